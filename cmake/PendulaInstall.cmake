@@ -1,0 +1,31 @@
+# What an install holds: the library, its headers with the kernels of this build, the generator for more of them, and
+# the CMake package.
+include(CMakePackageConfigHelpers)
+
+set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pendula")
+set(codegen_dir "${CMAKE_INSTALL_DATADIR}/pendula/codegen")
+
+install(TARGETS pendula_kernels pendula EXPORT pendulaTargets FILE_SET HEADERS)
+install(EXPORT pendulaTargets NAMESPACE pendula:: DESTINATION "${package_dir}")
+if(PENDULA_BUILD_PROGRAM)
+  install(TARGETS pendula_cli)
+endif()
+
+install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codegen_dir}"
+        FILES_MATCHING PATTERN "*.py" PATTERN "*.j2" PATTERN "__pycache__" EXCLUDE)
+install(FILES "${PENDULA_CODEGEN_DIR}/requirements.txt" DESTINATION "${codegen_dir}")
+install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/pendula")
+
+configure_package_config_file(
+  "${PROJECT_SOURCE_DIR}/cmake/pendulaConfig.cmake.in" "${PROJECT_BINARY_DIR}/pendulaConfig.cmake"
+  INSTALL_DESTINATION "${package_dir}" PATH_VARS CMAKE_INSTALL_INCLUDEDIR codegen_dir)
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/pendulaConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${PROJECT_BINARY_DIR}/pendulaConfig.cmake" "${PROJECT_BINARY_DIR}/pendulaConfigVersion.cmake"
+              "${PROJECT_SOURCE_DIR}/cmake/PendulaKernels.cmake" "${PROJECT_SOURCE_DIR}/cmake/PendulaPython.cmake"
+              "${PROJECT_SOURCE_DIR}/cmake/check_requirements.py"
+        DESTINATION "${package_dir}")
+
+if(PENDULA_NATIVE)
+  install(CODE "message(STATUS \"pendula: this library is for processors like this machine's; \
+configure with -DPENDULA_NATIVE=OFF for one that runs elsewhere\")")
+endif()

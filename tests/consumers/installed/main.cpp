@@ -1,0 +1,71 @@
+// Four links in space, released at rest in a vertical plane, move as the planar chain does: the kernel made in this
+// project's build and the library's own must agree.
+#include <cmath>
+#include <iostream>
+#include <pendula/kernels/planar_2.hpp>
+#include <pendula/kernels/spatial_4.hpp>
+#include <pendula/pendula.hpp>
+
+using namespace pendula;
+
+namespace {
+
+constexpr double step = 1e-3, duration = 0.2, azimuth = 0.3;
+
+template <class Space>
+Chain<Space> unit_chain(int links) {
+  ChainParameters<Space> parameters;
+  parameters.masses.setOnes(links);
+  parameters.lengths.setOnes(links);
+  return Chain<Space>(parameters);
+}
+
+// Compiled here, over this project's own kernel, with the number of stages known.
+Eigen::Vector3d last_bob_in_space(const Eigen::VectorXd& theta) {
+  const auto chain = unit_chain<Spatial>(4);
+  GaussStepper stepper(DenseMomentumNewton<kernels::Spatial4, 2>(chain, 2));
+  const Eigen::VectorXd phi = Eigen::VectorXd::Constant(4, azimuth);
+  for (auto outcome = stepper.start(State<Spatial>::from_angles(theta, phi)); stepper.time() < duration - step / 2;) {
+    if (outcome) outcome = stepper.step(step);
+    if (!outcome) throw std::runtime_error(message(outcome));
+  }
+  return bob_positions(chain, stepper.state()).col(3);
+}
+
+// From the compiled library.
+Eigen::Vector2d last_bob_in_plane(const Eigen::VectorXd& theta, double end) {
+  const auto chain = unit_chain<Planar>(static_cast<int>(theta.size()));
+  const auto integrator = make_integrator(chain, RunOptions{});
+  const auto result = simulate(*integrator, State<Planar>::from_angles(theta), {step, end, 1000}, [](const auto&) {});
+  if (!result.outcome) throw std::runtime_error(message(result.outcome));
+  return bob_positions(chain, integrator->state()).rightCols<1>();
+}
+
+bool near(const char* what, double got, double expected, double tolerance) {
+  std::cout << what << ": " << got << ", expected " << expected << ", off by " << std::abs(got - expected) << '\n';
+  return std::abs(got - expected) < tolerance;
+}
+
+double height_of_double_pendulum() {
+  using Kernel = kernels::Planar2;
+  const Kernel::Parameters<double> chain{Eigen::Vector2d::Ones(), Eigen::Vector2d::Ones(), Eigen::Vector2d::Zero(), 1};
+  double potential = 0;
+  Kernel::potential_energy(chain, Eigen::Vector2d::Zero(), potential);
+  return potential;
+}
+
+}  // namespace
+
+int main() {
+  const Eigen::VectorXd theta = Eigen::VectorXd::LinSpaced(4, 2.0, 1.4);
+  const Eigen::Vector3d space = last_bob_in_space(theta);
+  const Eigen::Vector2d plane = last_bob_in_plane(theta, duration);
+  const Eigen::Vector2d pair = last_bob_in_plane(Eigen::Vector2d::Constant(std::acos(0.0)), 1.0);
+  std::cout.precision(16);
+  bool good = near("x", space.x(), plane.x() * std::cos(azimuth), 1e-13);       // MEASURE
+  good = near("y", space.y(), plane.x() * std::sin(azimuth), 1e-13) && good;    // MEASURE
+  good = near("z", space.z(), plane.y(), 1e-13) && good;                        // MEASURE
+  good = near("potential energy", height_of_double_pendulum(), -3, 1e-15) && good;  // MEASURE
+  std::cout << pair.transpose() << '\n';
+  return good ? 0 : 1;
+}

@@ -1,0 +1,8 @@
+# A project that has pendula as a folder of its own.
+include("${CMAKE_CURRENT_LIST_DIR}/steps.cmake")
+
+take_project(subdirectory)
+step(${configure} -D "PENDULA_CHECKOUT=${SOURCE}")
+step(${build})
+step("${project}-build/swing")
+message(STATUS "${output}")

@@ -1,0 +1,13 @@
+# clang-format on every C++ file but the generated ones: cmake -D SOURCE=… -D CLANG_FORMAT=… -P layout.cmake
+cmake_minimum_required(VERSION 3.25)
+set(patterns "")
+foreach(folder IN ITEMS src tests bench examples)
+  list(APPEND patterns "${SOURCE}/${folder}/*.hpp" "${SOURCE}/${folder}/*.cpp")
+endforeach()
+file(GLOB_RECURSE files ${patterns})
+execute_process(COMMAND "${CLANG_FORMAT}" --dry-run --Werror ${files} RESULT_VARIABLE result ERROR_VARIABLE complaints)
+list(LENGTH files count)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "clang-format would change some of ${count} files; run clang-format -i on them.\n${complaints}")
+endif()
+message(STATUS "${count} files")

@@ -1,0 +1,15 @@
+# clang-tidy on the sources of the library and the program: cmake -D SOURCE=… -D BUILD=… -D CLANG_TIDY=… -P lint.cmake
+cmake_minimum_required(VERSION 3.25)
+include(ProcessorCount)
+ProcessorCount(jobs)
+file(GLOB_RECURSE files "${SOURCE}/src/*.cpp")
+list(JOIN files "\n" lines)
+file(WRITE "${BUILD}/lint.txt" "${lines}\n")
+# The compilation database is the compiler's: clang-tidy need not know each of its warnings.
+execute_process(
+  COMMAND xargs -P ${jobs} -n 1 -a "${BUILD}/lint.txt" "${CLANG_TIDY}" --quiet -p "${BUILD}"
+          --extra-arg=-Wno-unknown-warning-option
+  RESULT_VARIABLE result OUTPUT_VARIABLE complaints ERROR_VARIABLE notes)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "clang-tidy complains:\n${complaints}\n${notes}")
+endif()
