@@ -1,0 +1,3 @@
+"""From a SymPy model of one link to C++ kernels for chains of n links."""
+
+__version__ = "1.0.0"

@@ -1,0 +1,98 @@
+"""Command line of the generator: python -m pendula_codegen {kernel,link,tableaux,refresh} --output WHERE."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.models import MODELS
+from pendula_codegen.render import (
+    kernel_name,
+    render_kernel,
+    render_link,
+    render_tableaux,
+    write_atomically,
+)
+
+COMMITTED = {"planar": range(1, 5), "spatial": range(1, 4)}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit status 0; 2 with one line on standard error when the request or a model is wrong."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except GenerationError as error:
+        print(f"pendula_codegen: error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None:  # one line, without the usage text
+        self.exit(2, f"pendula_codegen: error: {message}\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="pendula_codegen", description="Generates pendula's C++ kernels from SymPy models.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    kernel = commands.add_parser("kernel", help="the dense kernel of a chain with a fixed number of links")
+    kernel.add_argument("--space", required=True, help=f"model: {', '.join(MODELS)}")
+    kernel.add_argument("--links", required=True, type=int, help="number of links, from 1")
+    kernel.set_defaults(run=_run_kernel)
+
+    link = commands.add_parser("link", help="direction of one link and its derivatives")
+    link.add_argument("--space", required=True, help=f"model: {', '.join(MODELS)}")
+    link.set_defaults(run=_run_link)
+
+    tableaux = commands.add_parser("tableaux", help="Gauss–Legendre coefficients")
+    tableaux.set_defaults(run=_run_tableaux)
+
+    refresh = commands.add_parser("refresh", help="everything that the repository keeps, into a folder")
+    refresh.set_defaults(run=_run_refresh)
+
+    for command in (kernel, link, tableaux, refresh):
+        command.add_argument(
+            "--output", required=True, type=Path, help="a .hpp file, or a folder to put it in"
+        )
+    return parser
+
+
+def _write(output: Path, name: str, text: str) -> None:
+    write_atomically(output if output.suffix == ".hpp" else output / name, text)
+
+
+def _run_kernel(options: argparse.Namespace) -> None:
+    text = render_kernel(options.space, options.links)
+    _write(options.output, f"{kernel_name(options.space, options.links)}.hpp", text)
+
+
+def _run_link(options: argparse.Namespace) -> None:
+    _write(options.output, f"{options.space}_link.hpp", render_link(options.space))
+
+
+def _run_tableaux(options: argparse.Namespace) -> None:
+    _write(options.output, "gauss_tableaux.hpp", render_tableaux())
+
+
+def _run_refresh(options: argparse.Namespace) -> None:
+    for name, text in committed_headers().items():
+        write_atomically(options.output / name, text)
+
+
+def committed_headers() -> dict[str, str]:
+    """File name and text of every header that the repository keeps under generated/."""
+    kernels = {
+        f"{kernel_name(space, links)}.hpp": render_kernel(space, links)
+        for space, numbers in COMMITTED.items()
+        for links in numbers
+    }
+    links = {f"{space}_link.hpp": render_link(space) for space in COMMITTED}
+    return {**kernels, **links, "gauss_tableaux.hpp": render_tableaux()}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

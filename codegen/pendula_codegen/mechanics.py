@@ -1,0 +1,89 @@
+"""Analytical mechanics of any Lagrangian L(q, v): momenta, gradient, Hessian, Euler–Lagrange equations.
+
+Nothing here knows about chains; chain.py builds a chain's Lagrangian and hands it over as a LagrangianSystem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from sympy import Add, Expr, Symbol
+
+from pendula_codegen.errors import GenerationError
+
+
+@dataclass(frozen=True)
+class LagrangianSystem:
+    """A mechanical system: L(q, v) and the generalised forces Q(q, v, inputs) beside it.
+
+    name            how messages call it
+    coordinates     q
+    velocities      v = dq/dt, in the order of the coordinates
+    parameters      every other symbol that L may hold
+    inputs          further symbols that only the forces may hold (torques, damping)
+    lagrangian      L, J
+    forces          Q_k, generalised forces that L does not give, N m
+    """
+
+    name: str
+    coordinates: tuple[Symbol, ...]
+    velocities: tuple[Symbol, ...]
+    parameters: tuple[Symbol, ...]
+    inputs: tuple[Symbol, ...]
+    lagrangian: Expr
+    forces: tuple[Expr, ...]
+
+    def __post_init__(self) -> None:
+        declared = (*self.coordinates, *self.velocities, *self.parameters)
+        require_declared(self.lagrangian, declared, f"the Lagrangian of model '{self.name}'")
+        for force in self.forces:
+            require_declared(force, (*declared, *self.inputs), f"a load of model '{self.name}'")
+
+
+def require_declared(expression: Expr, declared: Iterable[Symbol], what: str) -> None:
+    """Raises GenerationError when `expression` holds a symbol that is not among `declared`."""
+    known = {symbol.name for symbol in declared}
+    strangers = sorted({symbol.name for symbol in expression.free_symbols} - known)
+    if strangers:
+        raise GenerationError(f"{what} holds the symbol '{strangers[0]}', which the model does not declare")
+
+
+def gradient(expression: Expr, symbols: Sequence[Symbol]) -> list[Expr]:
+    """∂expression/∂symbol for each symbol.
+
+    A chain's Lagrangian is a long sum of terms that each hold few symbols, so every term is differentiated by
+    its own symbols only; this keeps the work proportional to what is not zero.
+    """
+    parts: dict[Symbol, list[Expr]] = {symbol: [] for symbol in symbols}
+    for term in Add.make_args(expression):
+        held = term.free_symbols
+        for symbol in symbols:
+            if symbol in held:
+                parts[symbol].append(term.diff(symbol))
+    return [Add(*parts[symbol]) for symbol in symbols]
+
+
+def jacobian(expressions: Sequence[Expr], symbols: Sequence[Symbol]) -> list[list[Expr]]:
+    """Row i, column j: ∂expressions[i]/∂symbols[j]."""
+    return [gradient(expression, symbols) for expression in expressions]
+
+
+def momenta(system: LagrangianSystem) -> list[Expr]:
+    """p_k = ∂L/∂v_k."""
+    return gradient(system.lagrangian, system.velocities)
+
+
+def euler_lagrange(system: LagrangianSystem, accelerations: Sequence[Symbol]) -> list[Expr]:
+    """d/dt ∂L/∂v_k − ∂L/∂q_k for each k, with dv/dt = accelerations (paper eq. 10); loads are not subtracted."""
+    p_D_q = jacobian(momenta(system), system.coordinates)
+    p_D_v = jacobian(momenta(system), system.velocities)
+    L_q = gradient(system.lagrangian, system.coordinates)
+    return [
+        Add(
+            *(slope * v for slope, v in zip(row_q, system.velocities, strict=True)),
+            *(inertia * a for inertia, a in zip(row_v, accelerations, strict=True)),
+            -force,
+        )
+        for row_q, row_v, force in zip(p_D_q, p_D_v, L_q, strict=True)
+    ]

@@ -1,0 +1,22 @@
+"""A link that swings in the vertical x–y plane, y up (paper eq. 1–2, 23)."""
+
+from sympy import Matrix, Rational, cos, sin, symbols
+
+from pendula_codegen.model import LinkModel
+
+theta, m, l, g, damping, sigma = symbols("theta m l g lambda sigma")
+
+MODEL = LinkModel(
+    name="planar",
+    coordinates=(theta,),
+    direction=Matrix([sin(theta), -cos(theta)]),
+    up=Matrix([0, 1]),
+    mass=m,
+    length=l,
+    gravity=g,
+    damping=damping,
+    torque=(sigma,),
+    # The torque turns about the axis that points out of the plane.
+    generalized_torque=lambda u, u_a: sigma * (u[0] * u_a[1] - u[1] * u_a[0]),
+    dissipation=lambda u_dot: Rational(1, 2) * damping * u_dot.dot(u_dot),
+)

@@ -1,0 +1,281 @@
+"""From polynomials to a short straight-line program: factoring, common subexpressions, operation counts.
+
+Two stages, both greedy and deterministic:
+1. every polynomial is factored by a multivariate Horner scheme (the atom in most terms is pulled out first), which
+   finds by itself, for example, the acceleration components of one link inside the equations of all the others;
+2. over all outputs together, the pair of factors (then of summands) that occurs most often becomes a temporary,
+   until no pair occurs twice.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import gcd, lcm
+
+from pendula_codegen.polynomial import Monomial, Polynomial
+
+Term = tuple[Fraction, int]  # coefficient, node
+ZERO: Term = (Fraction(0), -1)
+UNIT = -2  # stands for the number 1 as a node
+
+
+@dataclass
+class Graph:
+    """Expressions with shared parts. Node numbers below `atoms` are atoms; the others are products or sums.
+
+    A product is a tuple of nodes with multiplicity, a sum a tuple of (coefficient, node); neither has a numeric
+    factor of its own, so that ±x and 2x share x. `definitions` gives what a named atom stands for.
+    """
+
+    atoms: int
+    products: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    sums: dict[int, tuple[Term, ...]] = field(default_factory=dict)
+    definitions: dict[int, Term] = field(default_factory=dict)
+    _known: dict[tuple, int] = field(default_factory=dict)
+    _next: int = -1
+
+    def _node(self, table: dict, value: tuple) -> int:
+        key = (table is self.sums, value)
+        if key not in self._known:
+            self._next = max(self._next + 1, self.atoms)
+            self._known[key] = self._next
+            table[self._next] = value
+        return self._known[key]
+
+    def product(self, terms: Iterable[Term]) -> Term:
+        """The product of terms, nested products flattened."""
+        coefficient, factors = Fraction(1), []
+        for scale, node in terms:
+            coefficient *= scale
+            if node != UNIT:
+                factors += self.products.get(node, (node,))
+        if not coefficient:
+            return ZERO
+        if len(factors) < 2:
+            return coefficient, factors[0] if factors else UNIT
+        return coefficient, self._node(self.products, tuple(sorted(factors)))
+
+    def sum(self, terms: Iterable[Term]) -> Term:
+        """The sum of terms, scaled so that its coefficients are coprime integers and the first is positive."""
+        collected: Counter[int] = Counter()
+        for scale, node in terms:
+            inner = self.sums.get(node, ((Fraction(1), node),))
+            for coefficient, part in inner:
+                collected[part] += scale * coefficient
+        parts = sorted((node, value) for node, value in collected.items() if value)
+        if not parts:
+            return ZERO
+        content = _content([value for _, value in parts])
+        if parts[0][1] < 0:
+            content = -content
+        if len(parts) == 1:
+            return parts[0][1], parts[0][0]
+        return content, self._node(self.sums, tuple((value / content, node) for node, value in parts))
+
+    def children(self, node: int) -> list[int]:
+        """The nodes that `node` reads, with multiplicity."""
+        if node in self.products:
+            return list(self.products[node])
+        if node in self.sums:
+            return [part for _, part in self.sums[node]]
+        if node in self.definitions:
+            return [self.definitions[node][1]]
+        return []
+
+    def order(self, outputs: Iterable[int]) -> list[int]:
+        """All nodes that the outputs need, each after those it reads."""
+        done: dict[int, None] = {}
+        for output in outputs:
+            stack = [(output, False)]
+            while stack:
+                node, ready = stack.pop()
+                if node in done or node < 0:
+                    continue
+                if ready:
+                    done[node] = None
+                else:
+                    stack.append((node, True))
+                    stack += [(child, False) for child in reversed(self.children(node))]
+        return list(done)
+
+    def operations(self, outputs: Iterable[Term]) -> int:
+        """Additions, subtractions and multiplications of the whole program."""
+        roots = list(outputs)
+        count = sum(_scaling(coefficient) for coefficient, node in roots if node != UNIT)
+        for node in self.order(node for _, node in roots):
+            if node in self.products:
+                count += len(self.products[node]) - 1
+            elif node in self.sums:
+                terms = self.sums[node]
+                count += len(terms) - 1 + sum(_scaling(c) for c, part in terms if part != UNIT)
+            elif node in self.definitions:
+                count += _scaling(self.definitions[node][0])
+        return count
+
+
+def _scaling(coefficient: Fraction) -> int:
+    return 0 if abs(coefficient) in (0, 1) else 1
+
+
+def _content(values: list[Fraction]) -> Fraction:
+    """The positive number that makes `values` coprime integers when they are divided by it."""
+    numerator, denominator = 0, 1
+    for value in values:
+        numerator = gcd(numerator, value.numerator)
+        denominator = lcm(denominator, value.denominator)
+    return Fraction(numerator, denominator)
+
+
+def factor(graph: Graph, polynomial: Polynomial) -> Term:
+    """Multivariate Horner form of `polynomial`, built in `graph`."""
+    if not polynomial:
+        return ZERO
+    common = _common_atoms(polynomial)
+    if common:
+        polynomial = {_without(monomial, common): value for monomial, value in polynomial.items()}
+    outside = [(Fraction(1), atom) for atom in common]
+    return graph.product([*outside, _factor_sum(graph, polynomial)])
+
+
+def _factor_sum(graph: Graph, polynomial: Polynomial) -> Term:
+    """A polynomial without common atoms, as a sum of products."""
+    terms: list[Term] = []
+    rest = polynomial
+    while rest:
+        best, count = _most_frequent(rest)
+        if count < 2:
+            terms += [
+                graph.product([(value, UNIT), *((Fraction(1), atom) for atom in monomial)])
+                for monomial, value in rest.items()
+            ]
+            break
+        terms.append(factor(graph, {m: value for m, value in rest.items() if best in m}))
+        rest = {m: value for m, value in rest.items() if best not in m}
+    return graph.sum(terms)
+
+
+def _most_frequent(polynomial: Polynomial) -> tuple[int, int]:
+    """The atom in most monomials (the earlier one on a tie) and their number."""
+    counts: Counter[int] = Counter()
+    for monomial in polynomial:
+        counts.update(set(monomial))
+    return min(
+        ((atom, count) for atom, count in counts.items()), key=lambda x: (-x[1], x[0]), default=(-1, 0)
+    )
+
+
+def _common_atoms(polynomial: Polynomial) -> Monomial:
+    monomials = iter(polynomial)
+    common = Counter(next(monomials))
+    for monomial in monomials:
+        common &= Counter(monomial)
+        if not common:
+            break
+    return tuple(sorted(common.elements()))
+
+
+def _without(monomial: Monomial, removed: Monomial) -> Monomial:
+    remaining = Counter(monomial)
+    remaining.subtract(removed)
+    return tuple(sorted(remaining.elements()))
+
+
+class _PairExtraction:
+    """Replaces the pair of entries that most rows share by one new entry, until no pair is in two rows.
+
+    Rows are what `entries` returns for a node; subclasses say what a pair is and how it is replaced.
+    """
+
+    def __init__(self, graph: Graph, rows: Iterable[int]):
+        self.graph = graph
+        self.users: dict[tuple, set[int]] = {}
+        self.heap: list[tuple] = []
+        for row in rows:
+            self._register(row, self.pairs(row))
+        for pair, users in self.users.items():
+            heapq.heappush(self.heap, (-len(users), pair))
+
+    def run(self) -> None:
+        while self.heap:
+            count, pair = heapq.heappop(self.heap)
+            users = self.users.get(pair, set())
+            if len(users) < 2:
+                continue
+            if len(users) != -count:
+                heapq.heappush(self.heap, (-len(users), pair))
+                continue
+            self._extract(pair, sorted(users))
+
+    def _extract(self, pair: tuple, users: list[int]) -> None:
+        new = self.make(pair)
+        for row in users:
+            if row == new:
+                continue
+            before = self.pairs(row)
+            self.replace(row, pair, new)
+            after = self.pairs(row)
+            for gone in before - after:
+                self.users[gone].discard(row)
+            for fresh in sorted(self._register(row, after - before)):
+                heapq.heappush(self.heap, (-len(self.users[fresh]), fresh))
+        self.users[pair] = {new} if pair in self.pairs(new) else set()
+
+    def _register(self, row: int, pairs: Iterable[tuple]) -> list[tuple]:
+        added = list(pairs)
+        for pair in added:
+            self.users.setdefault(pair, set()).add(row)
+        return added
+
+    def pairs(self, row: int) -> set[tuple]:
+        raise NotImplementedError
+
+    def make(self, pair: tuple) -> int:
+        raise NotImplementedError
+
+    def replace(self, row: int, pair: tuple, new: int) -> None:
+        raise NotImplementedError
+
+
+class _ProductPairs(_PairExtraction):
+    def pairs(self, row: int) -> set[tuple]:
+        factors = self.graph.products[row]
+        return {(a, b) for i, a in enumerate(factors) for b in factors[i + 1 :]}
+
+    def make(self, pair: tuple) -> int:
+        return self.graph._node(self.graph.products, pair)
+
+    def replace(self, row: int, pair: tuple, new: int) -> None:
+        remaining = list(self.graph.products[row])
+        for node in pair:
+            remaining.remove(node)
+        self.graph.products[row] = tuple(sorted([*remaining, new]))
+
+
+class _SumPairs(_PairExtraction):
+    def pairs(self, row: int) -> set[tuple]:
+        terms = self.graph.sums[row]
+        return {(a, b, y / x) for i, (x, a) in enumerate(terms) for y, b in terms[i + 1 :]}
+
+    def make(self, pair: tuple) -> int:
+        a, b, ratio = pair
+        content = _content([Fraction(1), ratio])
+        return self.graph._node(self.graph.sums, ((1 / content, a), (ratio / content, b)))
+
+    def replace(self, row: int, pair: tuple, new: int) -> None:
+        a, b, _ = pair
+        terms = self.graph.sums[row]
+        own = next(value for value, node in terms if node == a)
+        scale = own / self.graph.sums[new][0][0]
+        remaining = [term for term in terms if term[1] not in (a, b)]
+        self.graph.sums[row] = tuple(sorted([*remaining, (scale, new)], key=lambda term: term[1]))
+
+
+def share(graph: Graph, outputs: Iterable[Term]) -> None:
+    """Introduces the temporaries that save operations over all `outputs` together."""
+    roots = [node for _, node in outputs]
+    _ProductPairs(graph, [node for node in graph.order(roots) if node in graph.products]).run()
+    _SumPairs(graph, [node for node in graph.order(roots) if node in graph.sums]).run()

@@ -1,0 +1,89 @@
+"""Gauss–Legendre tableaux, s = 1..8, computed in high precision and rounded once (paper eq. 45–51 for s = 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from mpmath import mp, mpf, polyroots, taylor, workdps
+
+DIGITS = 60
+MAX_STAGES = 8
+
+
+def _product(values) -> mpf:
+    result = mpf(1)
+    for value in values:
+        result *= value
+    return result
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """Gauss–Legendre collocation with `stages` stages; matrices are lists of rows of mpf."""
+
+    stages: int
+    c: list[mpf]
+    b: list[mpf]
+    a: list[list[mpf]]
+
+    @cached_property
+    def a_squared(self) -> list[list[mpf]]:
+        s = range(self.stages)
+        with workdps(DIGITS):
+            return [[sum((self.a[i][k] * self.a[k][j] for k in s), mpf(0)) for j in s] for i in s]
+
+    @cached_property
+    def extrapolation(self) -> list[list[mpf]]:
+        """ℓ_j(1 + c_i), ℓ the Lagrange basis on the nodes."""
+        with workdps(DIGITS):
+            return [[self._basis(j, 1 + node) for j in range(self.stages)] for node in self.c]
+
+    def _basis(self, j: int, x: mpf) -> mpf:
+        others = [k for k in range(self.stages) if k != j]
+        return _product((x - self.c[k]) / (self.c[j] - self.c[k]) for k in others)
+
+    @cached_property
+    def m(self) -> list[list[float]]:
+        """a_ij / b_j in double precision with m_ii = ½ and m_ij + m_ji = 1 exactly.
+
+        The larger of the two is rounded; 1 minus it is then exact (Sterbenz), because it lies in [½, 2]. m depends
+        on i and j through b_j only, and a_ij b_i + a_ji b_j = b_i b_j is what makes the method symplectic.
+        """
+        s = range(self.stages)
+        m = [[0.5] * self.stages for _ in s]
+        with workdps(DIGITS):
+            for i in s:
+                for j in s:
+                    exact = self.a[i][j] / self.b[j]
+                    if i != j and exact > mpf(1) / 2:
+                        m[i][j] = float(exact)
+                        m[j][i] = 1.0 - m[i][j]
+        return m
+
+    @property
+    def text(self) -> dict[str, list]:
+        """Shortest decimal literals that read back as the rounded doubles."""
+        matrices = {name: getattr(self, name) for name in ("a", "m", "a_squared", "extrapolation")}
+        return {
+            "c": [repr(float(x)) for x in self.c],
+            "b": [repr(float(x)) for x in self.b],
+            **{name: [[repr(float(x)) for x in row] for row in rows] for name, rows in matrices.items()},
+        }
+
+
+def gauss(stages: int) -> Tableau:
+    """The Gauss–Legendre method with `stages` stages, to DIGITS digits."""
+    with workdps(DIGITS):
+        return _gauss(stages)
+
+
+def _gauss(stages: int) -> Tableau:
+    coefficients = taylor(lambda x: mp.legendre(stages, 2 * x - 1), 0, stages)[::-1]
+    c = sorted((mp.re(root) for root in polyroots(coefficients, maxsteps=500, extraprec=4 * DIGITS)))
+    powers = range(1, stages + 1)
+    vandermonde = mp.matrix([[node ** (k - 1) for node in c] for k in powers])
+    # Collocation integrates every polynomial of degree < s exactly: Σ_j a_ij c_j^(k−1) = c_i^k / k.
+    a = [list(mp.lu_solve(vandermonde, mp.matrix([node**k / k for k in powers]))) for node in c]
+    b = list(mp.lu_solve(vandermonde, mp.matrix([mpf(1) / k for k in powers])))
+    return Tableau(stages, c, b, a)
