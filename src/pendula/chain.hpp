@@ -1,0 +1,134 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <pendula/space.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// A torque amplitude · sin(frequency t + phase) on one link, added to the constant torque.
+template <class Space>
+struct Drive {
+  int link = 0;                                                  ///< 0-based
+  Eigen::Matrix<double, Space::torque_components, 1> amplitude;  ///< N m
+  double frequency = 0;                                          ///< rad/s
+  double phase = 0;                                              ///< rad
+};
+
+/// What a chain is made of; `Chain` checks it.
+template <class Space, int N = Eigen::Dynamic>
+struct ChainParameters {
+  LinkVector<N> masses;              ///< bobs, (n)  kg
+  LinkVector<N> lengths;             ///< rods, (n)  m
+  double gravity = 9.81;             ///< m/s²
+  LinkVector<N> damping = {};        ///< λ, (n) or empty for none  N m s
+  Torque<Space, N> torque = {};      ///< constant torque, or empty for none  N m
+  std::vector<Drive<Space>> drives;  ///< sinusoidal torques
+};
+
+/// A chain of pendulums: immutable, and valid once built.
+///
+/// N is the number of links where it is known at compile time, as in Eigen; otherwise the parameters tell it.
+template <class Space, int N = Eigen::Dynamic>
+class Chain {
+ public:
+  /// Throws std::invalid_argument, naming the parameter and link, on sizes that differ, masses or lengths that are not
+  /// positive, negative damping, drives on links that do not exist, and anything that is not finite.
+  explicit Chain(ChainParameters<Space, N> parameters) : parameters_(fill(std::move(parameters))) {
+    validate();
+    mass_below_.resize(links());
+    double sum = 0;
+    for (int i = links(); i-- > 0;) mass_below_[i] = sum += masses()[i];
+    for (int i = 0; i < links(); ++i) loaded_ = loaded_ || damping()[i] != 0 || !torque_is_zero(i);
+    loaded_ = loaded_ || driven();
+  }
+
+  int links() const { return static_cast<int>(parameters_.masses.size()); }
+  const LinkVector<N>& masses() const { return parameters_.masses; }
+  const LinkVector<N>& lengths() const { return parameters_.lengths; }
+  const LinkVector<N>& damping() const { return parameters_.damping; }
+  double gravity() const { return parameters_.gravity; }
+  const std::vector<Drive<Space>>& drives() const { return parameters_.drives; }
+
+  /// M_d = Σ_{i≥d} m_i, the mass that rod d carries (paper eq. 7).
+  const LinkVector<N>& mass_below() const { return mass_below_; }
+
+  /// Whether the torque depends on time.
+  bool driven() const { return !parameters_.drives.empty(); }
+
+  /// Whether anything but gravity acts: damping, torque or a drive.
+  bool loaded() const { return loaded_; }
+
+  /// Constant torque without the drives, (torque_components x n)  [N m].
+  const Torque<Space, N>& constant_torque() const { return parameters_.torque; }
+
+  /// Torque on every link at `time`, (torque_components x n)  [N m].
+  void torque(double time, Eigen::Ref<Torque<Space, Eigen::Dynamic>> torque) const {
+    torque = parameters_.torque;
+    for (const Drive<Space>& drive : drives()) {
+      torque.col(drive.link) += std::sin(drive.frequency * time + drive.phase) * drive.amplitude;
+    }
+  }
+
+ private:
+  static ChainParameters<Space, N> fill(ChainParameters<Space, N> parameters) {
+    const auto links = parameters.masses.size();
+    if constexpr (N == Eigen::Dynamic) {
+      if (parameters.damping.size() == 0) parameters.damping.setZero(links);
+      if (parameters.torque.cols() == 0) parameters.torque.setZero(Space::torque_components, links);
+    }
+    return parameters;
+  }
+
+  bool torque_is_zero(int link) const { return (parameters_.torque.col(link).array() == 0).all(); }
+
+  [[noreturn]] static void reject(const std::string& what) { throw std::invalid_argument("chain: " + what); }
+
+  static void require_size(const char* name, Eigen::Index got, Eigen::Index links) {
+    if (got == links) return;
+    reject(std::string(name) + ": expected one entry for each of the " + std::to_string(links) + " links, got " +
+           std::to_string(got));
+  }
+
+  template <class Accept>
+  static void require(const char* name, const LinkVector<N>& values, const char* expected, Accept accept) {
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      if (accept(values[i])) continue;
+      reject(std::string(name) + " of link " + std::to_string(i + 1) + ": expected " + expected + ", got " +
+             std::to_string(values[i]));
+    }
+  }
+
+  void validate() const {
+    if (links() < 1) reject("masses: expected at least one link, got none");
+    require_size("lengths", lengths().size(), links());
+    require_size("damping", damping().size(), links());
+    require_size("torque", parameters_.torque.cols(), links());
+    const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
+    require("masses", masses(), "a positive finite number", positive);
+    require("lengths", lengths(), "a positive finite number", positive);
+    require("damping", damping(), "a finite number, not negative", [](double x) { return std::isfinite(x) && x >= 0; });
+    if (!std::isfinite(gravity())) reject("gravity: expected a finite number");
+    if (!parameters_.torque.allFinite()) reject("torque: expected finite numbers");
+    for (const Drive<Space>& drive : drives()) validate(drive);
+  }
+
+  void validate(const Drive<Space>& drive) const {
+    if (drive.link < 0 || drive.link >= links()) {
+      reject("drive: expected a link from 1 to " + std::to_string(links()) + ", got " + std::to_string(drive.link + 1));
+    }
+    if (!drive.amplitude.allFinite() || !std::isfinite(drive.frequency) || !std::isfinite(drive.phase)) {
+      reject("drive on link " + std::to_string(drive.link + 1) + ": expected finite numbers");
+    }
+  }
+
+  ChainParameters<Space, N> parameters_;
+  LinkVector<N> mass_below_;
+  bool loaded_ = false;
+};
+
+}  // namespace pendula

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <pendula/explicit_integrator.hpp>
+#include <pendula/forward_dynamics.hpp>
+#include <pendula/gauss/dense_newton.hpp>
+#include <pendula/gauss/gauss_integrator.hpp>
+#include <pendula/integrator.hpp>
+#include <string>
+
+namespace pendula {
+
+/// Every method over one generated kernel; the number of stages stays a run-time number, so that a build does not hold
+/// stages × forms × kernels specialisations. Throws std::invalid_argument for stages without a tableau.
+template <class Kernel>
+std::unique_ptr<Integrator<SpaceOf<Kernel>>> make_dense_integrator(const Chain<SpaceOf<Kernel>>& chain,
+                                                                   const RunOptions& options) {
+  using Space = SpaceOf<Kernel>;
+  const std::string kernel{Kernel::name};
+  if (options.method != Method::gauss) {
+    return make_explicit_integrator<Space>(std::make_unique<DenseForwardDynamics<Kernel>>(chain), options, kernel);
+  }
+  const Description description{"dense", "newton", kernel};
+  if (options.form == Form::velocity) {
+    using Newton = DenseVelocityNewton<Kernel>;
+    return std::make_unique<GaussIntegrator<Newton>>(Newton(chain, options.stages), description);
+  }
+  using Newton = DenseMomentumNewton<Kernel>;
+  return std::make_unique<GaussIntegrator<Newton>>(Newton(chain, options.stages), description);
+}
+
+}  // namespace pendula

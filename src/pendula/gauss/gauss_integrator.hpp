@@ -1,0 +1,30 @@
+#pragma once
+
+#include <pendula/gauss/stepper.hpp>
+#include <pendula/integrator.hpp>
+#include <utility>
+
+namespace pendula {
+
+/// A Gauss–Legendre stepper behind the run-time interface: one virtual call a step.
+template <class StageSolver>
+class GaussIntegrator : public Integrator<typename StageSolver::Space> {
+  using Space = typename StageSolver::Space;
+
+ public:
+  GaussIntegrator(StageSolver solver, Description description)
+      : stepper_(std::move(solver)), description_(std::move(description)) {}
+
+  Outcome start(const State<Space>& state) override { return stepper_.start(state); }
+  Outcome step(double h) override { return stepper_.step(h); }
+  double time() const override { return stepper_.time(); }
+  State<Space> state() const override { return stepper_.state(); }
+  const Statistics& statistics() const override { return stepper_.statistics(); }
+  Description describe() const override { return description_; }
+
+ private:
+  GaussStepper<StageSolver> stepper_;
+  Description description_;
+};
+
+}  // namespace pendula

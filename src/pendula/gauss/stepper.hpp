@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cmath>
+#include <pendula/gauss/compensated.hpp>
+#include <pendula/gauss/roundoff.hpp>
+#include <pendula/outcome.hpp>
+#include <utility>
+
+namespace pendula {
+
+/// What one iteration on the stages did.
+struct Correction {
+  double relative = 0;  ///< largest change of an unknown, relative to the size of the unknowns
+  int link = -1;        ///< 0-based link where it happened
+};
+
+struct StepperOptions {
+  int max_iterations = 50;
+};
+
+/// Takes implicit Gauss–Legendre steps with any solver of the stage equations.
+///
+/// A `StageSolver` owns the model and the workspace and offers
+///   using State; static constexpr RoundoffStop::Convergence convergence;
+///   Status start(const State&);            takes over a state; may find it singular
+///   void prepare(double time, double h);   predicts the stages of the next step
+///   Correction correct();                  improves the stages once
+///   int singular_link() const;             link whose coordinates fail at the stages, −1 where none does
+///   void accept();                         moves the state to the end of the step
+///   State state(double time) const;        the state as users read it
+/// and the stepper does not know which one it has.
+template <class StageSolver>
+class GaussStepper {
+ public:
+  using State = typename StageSolver::State;
+
+  explicit GaussStepper(StageSolver solver, StepperOptions options = {})
+      : solver_(std::move(solver)), options_(options), at_roundoff_(StageSolver::convergence) {}
+
+  /// Starts a new run at `state`; statistics begin at zero.
+  Outcome start(const State& state) {
+    time_.assign(state.time);
+    statistics_ = {};
+    const Status status = solver_.start(state);
+    return {status, time(), 0, 0, 0, status == Status::ok ? -1 : solver_.singular_link()};
+  }
+
+  /// Advances by `h`; on failure leaves the state untouched and says why.
+  Outcome step(double h) {
+    solver_.prepare(time(), h);
+    at_roundoff_.restart();
+    Correction correction;
+    for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
+      correction = solver_.correct();
+      ++statistics_.newton_iterations;
+      if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
+      if (at_roundoff_.reached(correction.relative)) return accept(h, iteration, correction);
+    }
+    return failure(Status::not_converged, h, options_.max_iterations, correction);
+  }
+
+  double time() const { return time_.value; }
+  State state() const { return solver_.state(time()); }
+  const Statistics& statistics() const { return statistics_; }
+  const StageSolver& solver() const { return solver_; }
+
+ private:
+  Outcome accept(double h, int iterations, const Correction& correction) {
+    if (solver_.singular_link() >= 0) return failure(Status::singular_mass_matrix, h, iterations, correction);
+    solver_.accept();
+    time_.add(h);
+    ++statistics_.steps;
+    return {Status::ok, time(), h, iterations, correction.relative, -1};
+  }
+
+  // A failure where coordinates are singular is theirs, whatever shape it took.
+  Outcome failure(Status status, double h, int iterations, const Correction& correction) {
+    ++statistics_.rejected_steps;
+    const int singular = solver_.singular_link();
+    if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
+    return {status, time(), h, iterations, correction.relative, correction.link};
+  }
+
+  StageSolver solver_;
+  StepperOptions options_;
+  RoundoffStop at_roundoff_;
+  Compensated<double> time_{};
+  Statistics statistics_;
+};
+
+}  // namespace pendula

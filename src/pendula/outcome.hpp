@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <ostream>
+#include <sstream>
+#include <string>
+
+namespace pendula {
+
+/// How a step ended. Everything but `ok` means that the state was left as it was before the step.
+enum class Status {
+  ok,
+  not_converged,         ///< the stage equations were not solved to round-off
+  not_finite,            ///< a value became infinite or NaN
+  singular_mass_matrix,  ///< the coordinates of a link fail: in (θ, φ), sin θ = 0
+};
+
+inline std::ostream& operator<<(std::ostream& out, Status status) {
+  switch (status) {
+    case Status::ok: return out << "ok";
+    case Status::not_converged: return out << "not converged";
+    case Status::not_finite: return out << "not finite";
+    case Status::singular_mass_matrix: return out << "singular mass matrix";
+  }
+  return out << "unknown status";
+}
+
+/// What came of a step, with all that is needed to understand a failure.
+struct Outcome {
+  Status status = Status::ok;
+  double time = 0;      ///< time before the step  [s]
+  double step = 0;      ///< step size that was tried  [s]
+  int iterations = 0;   ///< Newton (or fixed-point) iterations of the last attempt
+  double residual = 0;  ///< last correction relative to the size of the unknowns
+  int link = -1;        ///< 0-based link that the failure points at, −1 where there is none
+
+  explicit operator bool() const { return status == Status::ok; }
+};
+
+/// One sentence that says what happened, when, and where.
+inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
+  if (outcome) return out << "ok";
+  const auto where = [&](const char* before) -> std::string {
+    return outcome.link < 0 ? "" : before + std::to_string(outcome.link + 1);
+  };
+  out << "at t = " << outcome.time << " s: ";
+  switch (outcome.status) {
+    case Status::not_converged:
+      out << "the stage equations did not converge" << where(", worst at link ") << " (step " << outcome.step << " s, "
+          << outcome.iterations << " iterations, last relative correction " << outcome.residual
+          << "); a smaller step may help";
+      break;
+    case Status::not_finite:
+      out << "a value became infinite or NaN" << where(" at link ") << " (step " << outcome.step << " s, iteration "
+          << outcome.iterations << "); a smaller step may help";
+      break;
+    case Status::singular_mass_matrix:
+      out << "the mass matrix in (theta, phi) is singular" << where(": sin(theta) = 0 at link ")
+          << ", where phi has no meaning";
+      break;
+    case Status::ok: break;
+  }
+  return out;
+}
+
+inline std::string message(const Outcome& outcome) {
+  std::ostringstream text;
+  text << outcome;
+  return text.str();
+}
+
+/// Counts over a run.
+struct Statistics {
+  std::int64_t steps = 0;              ///< accepted steps
+  std::int64_t rejected_steps = 0;     ///< attempts that were not accepted
+  std::int64_t newton_iterations = 0;  ///< Newton or fixed-point iterations, all attempts
+  std::int64_t chart_switches = 0;     ///< links moved to their other chart
+};
+
+}  // namespace pendula

@@ -1,0 +1,46 @@
+// Energy over long runs: no drift in momentum form, and the velocity form beside it.
+
+#include "support/random_chain.hpp"
+#include "support/run.hpp"
+
+namespace pendula::test {
+namespace {
+
+struct EnergyRun {
+  double largest = 0;                 // max |H − H₀|
+  double first_tenth = 0, last_tenth = 0;  // medians of |H − H₀| over the rows
+};
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+EnergyRun energy_run(const State<Planar>& start, const RunOptions& options, double step, std::int64_t steps) {
+  const Chain<Planar> chain = equal_chain<Planar>(2);
+  const auto integrator = make_integrator(chain, options);
+  const double before = energy(chain, start);
+  std::vector<double> errors;
+  const RunResult result = simulate(*integrator, start, {step, step * static_cast<double>(steps), 100},
+                                    [&](const auto& state) { errors.push_back(std::abs(energy(chain, state) - before)); });
+  EXPECT_TRUE(result.outcome) << result.outcome;
+  EnergyRun run;
+  run.largest = *std::max_element(errors.begin(), errors.end());
+  const auto tenth = static_cast<std::ptrdiff_t>(errors.size() / 10);
+  run.first_tenth = median({errors.begin(), errors.begin() + tenth});
+  run.last_tenth = median({errors.end() - tenth, errors.end()});
+  return run;
+}
+
+// The chaotic double pendulum of mathematics: 10⁶ steps.
+TEST(LongRun, MomentumFormHasNoDriftAndVelocityFormWanders) {
+  const auto start = State<Planar>::from_angles(Eigen::Vector2d::Constant(M_PI / 2));
+  const EnergyRun momentum = energy_run(start, gauss(2, Form::momentum), 0.005, 1'000'000);
+  const EnergyRun velocity = energy_run(start, gauss(2, Form::velocity), 0.005, 1'000'000);
+  RecordProperty("momentum_largest", std::to_string(momentum.largest));
+  EXPECT_LT(momentum.last_tenth, 1.5 * momentum.first_tenth);
+  EXPECT_GT(velocity.last_tenth, 5 * momentum.last_tenth) << "the test would not see a drift";
+}
+
+}  // namespace
+}  // namespace pendula::test

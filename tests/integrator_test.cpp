@@ -1,0 +1,140 @@
+// The run-time factory, the explicit methods, the simulation loop, and how failures are told.
+
+#include <pendula/gauss/dense_newton.hpp>
+
+#include "support/kernels.hpp"
+#include "support/run.hpp"
+
+namespace pendula::test {
+namespace {
+
+State<Planar> swinging(int links) { return State<Planar>::from_angles(Eigen::VectorXd::Constant(links, 1.0)); }
+
+TEST(Factory, NamesTheKernelsToConfigure) {
+  const Chain<Planar> chain = equal_chain<Planar>(40);
+  try {
+    make_integrator(chain, gauss(2));
+    FAIL() << "expected NoKernel";
+  } catch (const NoKernel& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("no kernel for a planar chain of 40 links"), std::string::npos) << text;
+    EXPECT_NE(text.find("-DPENDULA_KERNELS=\"planar:40\""), std::string::npos) << text;
+  }
+}
+
+TEST(Factory, RefusesStagesWithoutATableau) {
+  EXPECT_THROW(make_integrator(equal_chain<Planar>(2), gauss(9)), std::invalid_argument);
+  EXPECT_THROW(make_integrator(equal_chain<Planar>(2), gauss(0)), std::invalid_argument);
+}
+
+TEST(Factory, SaysWhatRuns) {
+  const Description description = make_integrator(equal_chain<Spatial>(2), gauss(3))->describe();
+  EXPECT_EQ(description.solver, "dense");
+  EXPECT_EQ(description.iteration, "newton");
+  EXPECT_EQ(description.kernel, "spatial_2");
+}
+
+TEST(Factory, FixedSizeSteppersAgreeWithIt) {
+  const Chain<Planar> chain = equal_chain<Planar>(2);
+  GaussStepper<DenseMomentumNewton<kernels::Planar2, 3>> stepper{DenseMomentumNewton<kernels::Planar2, 3>(chain, 3)};
+  const auto integrator = make_integrator(chain, gauss(3));
+  ASSERT_TRUE(stepper.start(swinging(2)));
+  ASSERT_TRUE(integrator->start(swinging(2)));
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_TRUE(stepper.step(0.01));
+    ASSERT_TRUE(integrator->step(0.01));
+  }
+  EXPECT_LT(distance(stepper.state(), integrator->state()), 1e-13);
+}
+
+TEST(ExplicitMethods, MeetGaussLegendre) {
+  const Chain<Planar> chain = equal_chain<Planar>(2);
+  const State<Planar> reference = final_state(chain, swinging(2), gauss(8), 0.01, 1);
+  RunOptions options;
+  options.method = Method::rk4;
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, 1e-3, 1), reference), 1e-9);
+  options.tolerance = 1e-10;
+  const double any = std::numeric_limits<double>::infinity();
+  options.method = Method::dopri5;
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-7);
+  options.method = Method::fehlberg78;
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-8);
+}
+
+TEST(ExplicitMethods, ToleranceSteersTheError) {
+  const Chain<Planar> chain = equal_chain<Planar>(2);
+  const State<Planar> reference = final_state(chain, swinging(2), gauss(8), 0.01, 1);
+  const double any = std::numeric_limits<double>::infinity();
+  RunOptions options;
+  options.method = Method::dopri5;
+  options.tolerance = 1e-5;
+  const double coarse = distance(final_state(chain, swinging(2), options, any, 1), reference);
+  options.tolerance = 1e-9;
+  const double fine = distance(final_state(chain, swinging(2), options, any, 1), reference);
+  EXPECT_LT(fine, coarse / 100);
+  EXPECT_GT(coarse, 1e-9);
+}
+
+TEST(ExplicitMethods, RefuseASingularStart) {
+  RunOptions options;
+  options.method = Method::rk4;
+  const auto integrator = make_integrator(equal_chain<Spatial>(1), options);
+  const auto hanging = State<Spatial>::from_angles(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+  EXPECT_EQ(integrator->start(hanging).status, Status::singular_mass_matrix);
+}
+
+TEST(Failure, AtThePoleNamesTheLink) {
+  const auto integrator = make_integrator(equal_chain<Spatial>(3), gauss(2));
+  const auto start = State<Spatial>::from_angles(Eigen::Vector3d(1, 0, 1), Eigen::Vector3d::Zero());
+  const Outcome outcome = integrator->start(start);
+  EXPECT_EQ(outcome.status, Status::singular_mass_matrix);
+  EXPECT_EQ(outcome.link, 1);
+  EXPECT_EQ(message(outcome),
+            "at t = 0 s: the mass matrix in (theta, phi) is singular: sin(theta) = 0 at link 2, where phi has no meaning");
+}
+
+TEST(Failure, OfNewtonLeavesTheStateAndSaysHowFarItCame) {
+  const auto integrator = make_integrator(equal_chain<Planar>(4), gauss(8));
+  ASSERT_TRUE(integrator->start(swinging(4)));
+  const Outcome outcome = integrator->step(50.0);
+  ASSERT_FALSE(outcome);
+  EXPECT_GE(outcome.iterations, 1);
+  EXPECT_EQ(outcome.step, 50.0);
+  EXPECT_EQ(integrator->time(), 0);
+  EXPECT_EQ(distance(integrator->state(), swinging(4)), 0);
+  EXPECT_EQ(integrator->statistics().steps, 0);
+  EXPECT_EQ(integrator->statistics().rejected_steps, 1);
+  ASSERT_TRUE(integrator->step(0.01)) << "a failed step does no harm to the next";
+}
+
+std::vector<double> row_times(const Schedule& schedule) {
+  const auto integrator = make_integrator(equal_chain<Planar>(1), gauss(2));
+  std::vector<double> times;
+  const RunResult result =
+      simulate(*integrator, swinging(1), schedule, [&](const auto& state) { times.push_back(state.time); });
+  EXPECT_TRUE(result.outcome);
+  return times;
+}
+
+TEST(Simulation, RowsAreEveryFewStepsAndTheLast) {
+  EXPECT_EQ(row_times({0.25, 1.0, 2}), (std::vector<double>{0, 0.5, 1.0}));
+  EXPECT_EQ(row_times({0.25, 1.0, 3}), (std::vector<double>{0, 0.75, 1.0}));
+  EXPECT_EQ(row_times({0.25, 0.0, 3}), (std::vector<double>{0}));
+}
+
+TEST(Simulation, TheLastStepIsCut) {
+  const std::vector<double> times = row_times({0.3, 1.0, 1});
+  ASSERT_EQ(times.size(), 5u);
+  EXPECT_DOUBLE_EQ(times[3], 0.9);
+  EXPECT_DOUBLE_EQ(times[4], 1.0);
+  EXPECT_EQ(row_times({0.1, 1.0, 1}).size(), 11u) << "no sliver of a step at the end";
+}
+
+TEST(Simulation, RefusesANonsensicalSchedule) {
+  EXPECT_THROW(row_times({0.0, 1.0, 1}), std::invalid_argument);
+  EXPECT_THROW(row_times({0.1, -1.0, 1}), std::invalid_argument);
+  EXPECT_THROW(row_times({0.1, 1.0, 0}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace pendula::test

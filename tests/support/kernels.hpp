@@ -1,0 +1,74 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <pendula/kernels/planar_1.hpp>
+#include <pendula/kernels/planar_2.hpp>
+#include <pendula/kernels/planar_3.hpp>
+#include <pendula/kernels/planar_4.hpp>
+#include <pendula/kernels/spatial_1.hpp>
+#include <pendula/kernels/spatial_2.hpp>
+#include <pendula/kernels/spatial_3.hpp>
+
+#include "support/random_chain.hpp"
+
+namespace pendula::test {
+
+/// The committed kernels, for typed tests.
+using CommittedKernels = ::testing::Types<kernels::Planar1, kernels::Planar2, kernels::Planar3, kernels::Planar4,
+                                          kernels::Spatial1, kernels::Spatial2, kernels::Spatial3>;
+
+struct KernelName {
+  template <class Kernel>
+  static std::string GetName(int) {
+    return std::string(Kernel::name);
+  }
+};
+
+/// One seeded draw of everything that a kernel's entry points take.
+template <class Kernel>
+struct KernelInputs {
+  using Space = SpaceOf<Kernel>;
+  using Vector = typename Kernel::template Vector<double>;
+
+  Random random;
+  Chain<Space> chain;
+  typename Kernel::template Parameters<double> parameters;
+  typename Kernel::template Torque<double> torque;
+  Vector q, v, a;
+
+  explicit KernelInputs(unsigned seed)
+      : random(seed), chain(random_chain<Space>(random, Kernel::links, true)),
+        parameters(kernel_parameters<Kernel>(chain)) {
+    chain.torque(0, torque);
+    const State<Space> state = random_state<Space>(random, Kernel::links);
+    q = state.q;
+    v = state.v;
+    a = random.matrix<Vector>(Kernel::coordinates, 1, -3, 3);
+  }
+};
+
+/// The same parameters in another number type.
+template <class Kernel, class Real>
+typename Kernel::template Parameters<Real> parameters_as(const typename Kernel::template Parameters<double>& from) {
+  typename Kernel::template Parameters<Real> to;
+  for (int i = 0; i < Kernel::links; ++i) {
+    to.masses[i] = Real(from.masses[i]);
+    to.lengths[i] = Real(from.lengths[i]);
+    to.damping[i] = Real(from.damping[i]);
+  }
+  to.gravity = Real(from.gravity);
+  return to;
+}
+
+/// The same matrix in another number type, element by element: not every Real converts through Eigen's cast.
+template <class To, class From>
+To matrix_as(const From& from) {
+  To to;
+  for (Eigen::Index j = 0; j < from.cols(); ++j) {
+    for (Eigen::Index i = 0; i < from.rows(); ++i) to(i, j) = typename To::Scalar(from(i, j));
+  }
+  return to;
+}
+
+}  // namespace pendula::test
