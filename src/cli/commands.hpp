@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace pendula::cli {
+
+/// How the program ends.
+enum ExitStatus {
+  done = 0,
+  failed = 1,       ///< the computation failed; what was computed is kept
+  wrong_input = 2,  ///< file, key, value, command or option
+};
+
+struct SimulateOptions {
+  std::string scenario;                ///< the file
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  std::string output;                  ///< trajectory file, empty for none
+  bool json = false;                   ///< summary as JSON
+  bool quiet = false;                  ///< no summary, progress or warnings; JSON is still printed where asked for
+};
+
+/// Runs a scenario: trajectory to the file, summary to standard output, progress and warnings to standard error.
+/// Throws io::InputError.
+ExitStatus simulate(const SimulateOptions& options);
+
+struct CheckOptions {
+  std::optional<std::string> space;
+  std::optional<int> links;
+};
+
+/// The self-test of this build: kernels, order, energy; a table to standard output. Throws io::InputError where no
+/// kernel is chosen.
+ExitStatus check(const CheckOptions& options);
+
+/// Lists the fixed-n kernels of this build on standard output.
+ExitStatus kernels();
+
+}  // namespace pendula::cli

@@ -1,0 +1,127 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <new>
+#include <pendula/version.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "io/input_error.hpp"
+#include "io/nearest_name.hpp"
+
+namespace pendula::cli {
+namespace {
+
+/// The command line: what can be asked for, and what was.
+struct CommandLine {
+  CommandLine();
+
+  CLI::App app{"Multiple pendulums: chains of any length, in the plane and in space, moved by Gauss-Legendre.",
+               "pendula"};
+  CLI::App* simulate;
+  CLI::App* check;
+  CLI::App* kernels;
+  SimulateOptions simulate_options;
+  CheckOptions check_options;
+};
+
+CommandLine::CommandLine() {
+  app.set_version_flag("--version", "pendula " + std::string(version), "Print the version and end");
+  app.set_help_flag("-h,--help", "Print this help and end");
+  app.footer("Exit status: 0 done, 1 the computation failed (rows already computed are kept), 2 the input was wrong.");
+
+  simulate = app.add_subcommand("simulate", "Run a scenario; write its trajectory, print a summary");
+  simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file")->required();
+  simulate
+      ->add_option("--set", simulate_options.overrides,
+                   "Replace a key of the scenario, as in --set run.step=1e-4 or --set run.method=rk4; repeatable")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
+  simulate->add_option("-o,--output", simulate_options.output, "Write the trajectory to this file, as CSV")
+      ->type_name("FILE");
+  simulate->add_flag("--json", simulate_options.json, "Print the summary as one JSON object");
+  simulate->add_flag("--quiet", simulate_options.quiet, "Print errors only (and the JSON object, where asked for)");
+  simulate->footer("Example: pendula simulate double.toml --set run.step=1e-4 -o out.csv");
+
+  check = app.add_subcommand("check", "Test the kernels and methods of this build on themselves");
+  check->add_option("--space", check_options.space, "Only kernels of this space")
+      ->check(CLI::IsMember({"planar", "spatial"}));
+  check->add_option("--links", check_options.links, "Only kernels of this many links")->check(CLI::PositiveNumber);
+
+  kernels = app.add_subcommand("kernels", "List the kernels of this build: the chains that can be run");
+}
+
+/// What an unknown word may have been meant for: an option of `app`, or a command.
+std::string likely_meant(const CLI::App& app, const std::string& word) {
+  std::vector<std::string> names;
+  if (word.starts_with('-')) {
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+  } else {
+    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  }
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  return io::did_you_mean(io::nearest_name(word.substr(0, word.find('=')), views));
+}
+
+/// What is wrong with a command line, and where to read more.
+std::string complaint(const CommandLine& line, const std::string& what) {
+  const std::vector<CLI::App*> chosen = line.app.get_subcommands();
+  const CLI::App& app = chosen.empty() ? line.app : *chosen.front();
+  const std::string command = chosen.empty() ? "pendula" : "pendula " + app.get_name();
+  const std::vector<std::string> unexpected = line.app.remaining(true);
+  std::string text = what;
+  if (!unexpected.empty()) {
+    const std::string& word = unexpected.front();
+    const std::string kind = word.starts_with('-') ? "option" : chosen.empty() ? "command" : "argument";
+    text = "unknown " + kind + " " + word + likely_meant(app, word);
+  }
+  return command + ": " + text + "\nTry '" + command + " --help'.\n";
+}
+
+ExitStatus dispatch(const CommandLine& line) {
+  if (*line.simulate) return simulate(line.simulate_options);
+  if (*line.check) return check(line.check_options);
+  if (*line.kernels) return kernels();
+  std::cerr << complaint(line, "expected a command: simulate, check or kernels");
+  return wrong_input;
+}
+
+ExitStatus run(int argc, char** argv) {
+  CommandLine line;
+  try {
+    line.app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    line.app.exit(asked);
+    return done;
+  } catch (const CLI::ParseError& error) {
+    std::cerr << complaint(line, error.what());
+    return wrong_input;
+  }
+  const ExitStatus status = dispatch(line);
+  if (std::cout.flush()) return status;
+  std::cerr << "pendula: standard output could not be written\n";
+  return failed;
+}
+
+}  // namespace
+}  // namespace pendula::cli
+
+int main(int argc, char** argv) {
+  try {
+    return pendula::cli::run(argc, argv);
+  } catch (const pendula::io::InputError& error) {
+    std::cerr << "pendula: " << error.what() << '\n';
+    return pendula::cli::wrong_input;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "pendula: not enough memory\n";
+  } catch (const std::exception& error) {
+    std::cerr << "pendula: " << error.what() << '\n';
+  }
+  return pendula::cli::failed;
+}

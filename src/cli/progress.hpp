@@ -1,0 +1,41 @@
+#pragma once
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+
+namespace pendula::cli {
+
+/// A line on standard error that shows how far a run is; nothing at all where that is no terminal.
+class Progress {
+  using Clock = std::chrono::steady_clock;
+
+ public:
+  Progress(double duration, bool wanted) : duration_(duration), shown_(wanted && isatty(STDERR_FILENO) != 0) {}
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  ~Progress() {
+    if (drawn_) std::fputs("\r\x1b[K", stderr);
+  }
+
+  void at(double time) {
+    if (!shown_) return;
+    const auto now = Clock::now();
+    if (now - last_ < std::chrono::milliseconds(100)) return;
+    last_ = now;
+    drawn_ = true;
+    const double share = duration_ > 0 ? std::min(1.0, time / duration_) : 1.0;
+    std::fprintf(stderr, "\r\x1b[K%3.0f %%   t = %.6g of %.6g", 100 * share, time, duration_);
+    std::fflush(stderr);
+  }
+
+ private:
+  double duration_;
+  bool shown_;
+  bool drawn_ = false;
+  Clock::time_point last_ = Clock::now();
+};
+
+}  // namespace pendula::cli

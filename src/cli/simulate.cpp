@@ -1,0 +1,170 @@
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <pendula/integrator.hpp>
+#include <pendula/invariants.hpp>
+#include <pendula/simulation.hpp>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <variant>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/progress.hpp"
+#include "io/input_error.hpp"
+#include "io/run_record.hpp"
+#include "io/scenario.hpp"
+#include "io/summary.hpp"
+#include "io/trajectory.hpp"
+
+namespace pendula::cli {
+namespace {
+
+/// Thrown out of a row to end the run there.
+struct Interrupted {};
+
+/// Turns what the runtime says about an option, `key: …`, into an error at the place of that key.
+template <class Space>
+io::InputError option_error(const io::Scenario<Space>& scenario, const SimulateOptions& options,
+                            const std::string& what) {
+  const auto place = scenario.places.find(what.substr(0, what.find(':')));
+  const bool known = place != scenario.places.end();
+  return io::InputError((known ? place->second + ": run." : options.scenario + ": ") + what);
+}
+
+template <class Space>
+std::unique_ptr<Integrator<Space>> make(const io::Scenario<Space>& scenario, const SimulateOptions& options) {
+  try {
+    return make_integrator(scenario.chain, scenario.run);
+  } catch (const NoKernel& error) {
+    throw io::InputError(options.scenario + ": chain.links: " + error.what());
+  } catch (const std::invalid_argument& error) {
+    throw option_error(scenario, options, error.what());
+  }
+}
+
+/// Opens the trajectory file where one is asked for. Throws io::InputError, also where that would destroy the scenario.
+template <class Space>
+std::unique_ptr<io::TrajectoryFile<Space>> open_trajectory(const SimulateOptions& options, int links) {
+  if (options.output.empty()) return nullptr;
+  std::error_code none_there;
+  if (std::filesystem::equivalent(options.output, options.scenario, none_there)) {
+    throw io::InputError(options.output + ": expected a file for the trajectory, got the scenario itself");
+  }
+  return std::make_unique<io::TrajectoryFile<Space>>(options.output, links);
+}
+
+/// One run: who takes the rows, and how it ended.
+template <class Space>
+class Run {
+ public:
+  Run(const io::Scenario<Space>& scenario, const SimulateOptions& options)
+      : scenario_(scenario),
+        options_(options),
+        integrator_(make(scenario, options)),
+        file_(open_trajectory<Space>(options, scenario.chain.links())),
+        record_(scenario.chain, scenario.duration) {}
+
+  /// Never throws for a run that fails: the summary says so.
+  io::Summary run() {
+    const io::Ending ending = integrate();
+    const io::Ending written = close();
+    return summary(ending.ok() ? written : ending);
+  }
+
+ private:
+  io::Ending integrate() {
+    const double largest_step =
+        is_adaptive(scenario_.run.method) ? std::numeric_limits<double>::infinity() : scenario_.run.step;
+    const InterruptGuard guard;
+    Progress progress(scenario_.duration, !options_.quiet);
+    try {
+      const RunResult result =
+          simulate(*integrator_, scenario_.start, {largest_step, scenario_.duration, scenario_.every},
+                   [&](const State<Space>& state) {
+                     take(state);
+                     progress.at(state.time);
+                     if (guard.interrupted()) throw Interrupted();
+                   });
+      wall_seconds_ = result.stepping_seconds;
+      return io::ending_of(result.outcome);
+    } catch (const Interrupted&) {
+      return {"interrupted", "interrupted", {}};
+    } catch (const io::OutputError& error) {
+      return {"output_failed", error.what(), {}};
+    }
+  }
+
+  void take(const State<Space>& state) {
+    const Points<Space, Eigen::Dynamic> bobs = bob_positions(scenario_.chain, state);
+    const double energy = pendula::energy(scenario_.chain, state);
+    record_.add(state, bobs, energy);
+    if (file_) file_->write(state, bobs, energy);
+  }
+
+  io::Ending close() {
+    try {
+      if (file_) file_->close();
+      return {};
+    } catch (const io::OutputError& error) {
+      return {"output_failed", error.what(), {}};
+    }
+  }
+
+  io::Summary summary(const io::Ending& ending) const {
+    io::Summary summary;
+    summary.model = io::model_summary(options_.scenario, scenario_.chain, scenario_.natural);
+    summary.run = scenario_.run;
+    summary.description = integrator_->describe();
+    summary.duration = scenario_.duration;
+    summary.every = scenario_.every;
+    summary.ending = ending;
+    summary.statistics = integrator_->statistics();
+    summary.wall_seconds = wall_seconds_;
+    summary.energy_error = record_.energy_error();
+    summary.energy_final = record_.energy();
+    summary.table = record_.table();
+    summary.final = io::snapshot(scenario_.chain, record_.last());
+    summary.rows = record_.rows();
+    summary.trajectory = options_.output;
+    return summary;
+  }
+
+  const io::Scenario<Space>& scenario_;
+  const SimulateOptions& options_;
+  std::unique_ptr<Integrator<Space>> integrator_;
+  std::unique_ptr<io::TrajectoryFile<Space>> file_;
+  io::RunRecord<Space> record_;
+  double wall_seconds_ = std::nan("");  // unknown where a row ended the run
+};
+
+void warn(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::cerr << "pendula: warning: " << warning << '\n';
+}
+
+}  // namespace
+
+ExitStatus simulate(const SimulateOptions& options) {
+  const io::AnyScenario any = io::read_scenario(options.scenario, options.overrides);
+  return std::visit(
+      [&]<class Space>(const io::Scenario<Space>& scenario) {
+        if (!options.quiet) warn(scenario.warnings);
+        const io::Summary summary = Run<Space>(scenario, options).run();
+        if (options.json) {
+          std::cout << io::to_json(summary);
+        } else if (!options.quiet) {
+          std::cout << io::to_text(summary);
+        }
+        if (summary.ending.ok()) return done;
+        std::cerr << "pendula: " << summary.ending.message << '\n';
+        return failed;
+      },
+      any);
+}
+
+}  // namespace pendula::cli

@@ -1,0 +1,319 @@
+#include "io/scenario.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "io/number.hpp"
+#include "io/toml_reader.hpp"
+
+namespace pendula::io {
+namespace {
+
+using Names = std::span<const std::string_view>;
+
+constexpr std::array<std::string_view, 4> section_names = {"chain", "start", "run", "output"};
+constexpr std::array<std::string_view, 9> chain_keys = {"space",   "links",  "masses", "lengths", "gravity",
+                                                        "damping", "torque", "units",  "drive"};
+constexpr std::array<std::string_view, 4> drive_keys = {"link", "amplitude", "frequency", "phase"};
+constexpr std::array<std::string_view, 4> start_keys = {"theta", "phi", "theta_dot", "phi_dot"};
+constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "form",      "solver",
+                                                      "iteration", "step",   "tolerance", "duration"};
+constexpr std::array<std::string_view, 1> output_keys = {"every"};
+
+/// Where each key belongs, to tell those who put it elsewhere.
+constexpr std::array<std::string_view, 26> all_keys = {"chain.space",
+                                                       "chain.links",
+                                                       "chain.masses",
+                                                       "chain.lengths",
+                                                       "chain.gravity",
+                                                       "chain.damping",
+                                                       "chain.torque",
+                                                       "chain.units",
+                                                       "chain.drive",
+                                                       "chain.drive.link",
+                                                       "chain.drive.amplitude",
+                                                       "chain.drive.frequency",
+                                                       "chain.drive.phase",
+                                                       "start.theta",
+                                                       "start.phi",
+                                                       "start.theta_dot",
+                                                       "start.phi_dot",
+                                                       "run.method",
+                                                       "run.stages",
+                                                       "run.form",
+                                                       "run.solver",
+                                                       "run.iteration",
+                                                       "run.step",
+                                                       "run.tolerance",
+                                                       "run.duration",
+                                                       "output.every"};
+
+constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
+constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
+constexpr std::array<std::string_view, 4> method_names = {"gauss", "rk4", "dopri5", "fehlberg78"};
+constexpr std::array<std::string_view, 2> form_names = {"momentum", "velocity"};
+constexpr std::array<std::string_view, 3> solver_names = {"auto", "chain", "dense"};
+constexpr std::array<std::string_view, 3> iteration_names = {"auto", "newton", "fixed-point"};
+
+/// The sections of a document, each with known keys only.
+struct Sections {
+  explicit Sections(const toml::table& document)
+      : root(Entry(document, ""), section_names, all_keys),
+        chain(root, "chain", chain_keys, all_keys),
+        start(root, "start", start_keys, all_keys),
+        run(root, "run", run_keys, all_keys),
+        output(root, "output", output_keys, all_keys) {}
+
+  Section root, chain, start, run, output;
+};
+
+double number(const Section& section, std::string_view key, double otherwise, Sign sign = Sign::any) {
+  const std::optional<Entry> entry = section.find(key);
+  return entry ? entry->number(sign) : otherwise;
+}
+
+/// An enumerator by its name; the names stand in the order of the enumerators.
+template <class Enum>
+Enum choice(const Section& section, std::string_view key, Enum otherwise, Names names) {
+  const std::optional<Entry> entry = section.find(key);
+  return entry ? static_cast<Enum>(entry->choice(names)) : otherwise;
+}
+
+/// Whether an array has one element a link; in space a torque [x, y, z] is one vector for all.
+template <class Space>
+bool tells_links(const Entry& entry) {
+  if (Space::torque_components == 1 || entry.key() != "chain.torque") return entry.is_array();
+  return entry.is_array() && (entry.size() == 0 || entry.element(0).is_array());
+}
+
+/// Number of links: from the key `links`, or else from the first array.
+template <class Space>
+LinkCount link_count(const Sections& sections) {
+  if (const auto entry = sections.chain.find("links")) {
+    return {static_cast<int>(entry->integer(1, max_links)), entry->key()};
+  }
+  const std::array<std::pair<const Section*, std::string_view>, 8> arrays = {{
+      {&sections.chain, "masses"},
+      {&sections.chain, "lengths"},
+      {&sections.chain, "damping"},
+      {&sections.chain, "torque"},
+      {&sections.start, "theta"},
+      {&sections.start, "phi"},
+      {&sections.start, "theta_dot"},
+      {&sections.start, "phi_dot"},
+  }};
+  for (const auto& [section, key] : arrays) {
+    const std::optional<Entry> entry = section->find(key);
+    if (!entry || !tells_links<Space>(*entry)) continue;
+    if (entry->size() == 0) entry->fail("at least one link");
+    if (entry->size() > max_links) entry->fail("at most " + std::to_string(max_links) + " links");
+    return {static_cast<int>(entry->size()), entry->key()};
+  }
+  sections.chain.require("links", "a number of links, which no array tells");
+  return {};
+}
+
+/// One number a link, or `otherwise` for all where the key is not there.
+Eigen::VectorXd per_link(const Section& section, std::string_view key, const LinkCount& count, double otherwise,
+                         Sign sign = Sign::any) {
+  const std::optional<Entry> entry = section.find(key);
+  return entry ? entry->per_link(count, sign) : Eigen::VectorXd::Constant(count.links, otherwise);
+}
+
+/// Constant torque on each link: in the plane a number, in space a vector, or one of them for all links.
+template <class Space>
+Torque<Space, Eigen::Dynamic> constant_torque(const Section& chain, const LinkCount& count) {
+  Torque<Space, Eigen::Dynamic> torque(Space::torque_components, count.links);
+  const std::optional<Entry> entry = chain.find("torque");
+  if constexpr (Space::torque_components == 1) {
+    torque = per_link(chain, "torque", count, 0).transpose();
+  } else if (!entry || (entry->is_number() && entry->number() == 0)) {
+    torque.setZero();
+  } else if (entry->is_array() && !tells_links<Space>(*entry)) {
+    torque.colwise() = Eigen::Vector3d(entry->vector(3));
+  } else if (entry->size() == static_cast<std::size_t>(count.links)) {
+    for (Eigen::Index i = 0; i < torque.cols(); ++i) {
+      torque.col(i) = entry->element(static_cast<std::size_t>(i)).vector(3);
+    }
+  } else {
+    entry->fail("0, one vector [x, y, z] for all links, or " + std::to_string(count.links) + " of them");
+  }
+  return torque;
+}
+
+template <class Space>
+Drive<Space> read_drive(const Section& table, const LinkCount& count) {
+  Drive<Space> drive;
+  drive.link = static_cast<int>(
+                   table.require("link", "a link from 1 to " + std::to_string(count.links)).integer(1, count.links)) -
+               1;
+  if constexpr (Space::torque_components == 1) {
+    drive.amplitude[0] = table.require("amplitude", "a torque").number();
+  } else {
+    drive.amplitude = table.require("amplitude", "a torque [x, y, z]").vector(3);
+  }
+  drive.frequency = table.require("frequency", "an angular frequency").number();
+  drive.phase = number(table, "phase", drive.phase);
+  return drive;
+}
+
+template <class Space>
+std::vector<Drive<Space>> read_drives(const Section& chain, const LinkCount& count) {
+  std::vector<Drive<Space>> drives;
+  const std::optional<Entry> entry = chain.find("drive");
+  if (!entry) return drives;
+  if (!entry->is_array()) entry->fail("[[chain.drive]] tables");
+  for (std::size_t i = 0; i < entry->size(); ++i) {
+    drives.push_back(read_drive<Space>(Section(entry->element(i), drive_keys), count));
+  }
+  return drives;
+}
+
+template <class Space>
+ChainParameters<Space> read_chain(const Section& chain, const LinkCount& count) {
+  ChainParameters<Space> parameters;
+  parameters.masses = chain.require("masses", "the masses of the bobs").per_link(count, Sign::positive);
+  parameters.lengths = chain.require("lengths", "the lengths of the rods").per_link(count, Sign::positive);
+  parameters.gravity = number(chain, "gravity", parameters.gravity);
+  parameters.damping = per_link(chain, "damping", count, 0, Sign::not_negative);
+  parameters.torque = constant_torque<Space>(chain, count);
+  parameters.drives = read_drives<Space>(chain, count);
+  return parameters;
+}
+
+std::optional<Entry> natural_requested(const Section& chain) {
+  const std::optional<Entry> units = chain.find("units");
+  return units && units->choice(unit_systems) == 1 ? units : std::nullopt;
+}
+
+/// Passes to natural units where the scenario asks for them.
+template <class Space>
+std::optional<NaturalUnits> make_natural(const Section& chain, ChainParameters<Space>& parameters) {
+  const std::optional<Entry> requested = natural_requested(chain);
+  if (!requested) return std::nullopt;
+  if (parameters.gravity <= 0) {
+    const std::optional<Entry> gravity = chain.find("gravity");
+    (gravity ? *gravity : *requested).fail("a number > 0, which natural units need");
+  }
+  const NaturalUnits units = natural_units(parameters);
+  parameters = in_units(units, std::move(parameters));
+  return units;
+}
+
+template <class Space>
+State<Space> read_start(const Section& start, const LinkCount& count) {
+  const Eigen::VectorXd theta = start.require("theta", "the angles at the start").per_link(count);
+  const Eigen::VectorXd theta_dot = per_link(start, "theta_dot", count, 0);
+  if constexpr (Space::dof == 2) {
+    return State<Space>::from_angles(theta, per_link(start, "phi", count, 0), theta_dot,
+                                     per_link(start, "phi_dot", count, 0));
+  } else {
+    for (const std::string_view key : {"phi", "phi_dot"}) {
+      if (const auto entry = start.find(key)) entry->fail("no such key in a planar scenario");
+    }
+    return State<Space>::from_angles(theta, theta_dot);
+  }
+}
+
+RunOptions read_run(const Section& run) {
+  RunOptions options;
+  options.method = choice(run, "method", options.method, method_names);
+  if (const auto stages = run.find("stages")) options.stages = static_cast<int>(stages->integer(1, 8));
+  options.form = choice(run, "form", options.form, form_names);
+  options.solver = choice(run, "solver", options.solver, solver_names);
+  options.iteration = choice(run, "iteration", options.iteration, iteration_names);
+  options.step = number(run, "step", options.step, Sign::positive);
+  options.tolerance = number(run, "tolerance", options.tolerance, Sign::positive);
+  return options;
+}
+
+double read_duration(const Section& run, const RunOptions& options) {
+  const double duration = number(run, "duration", 10, Sign::not_negative);
+  if (is_adaptive(options.method) || duration / options.step <= max_steps) return duration;
+  const std::string expected = "a step of at least " + shortest(duration / max_steps) + " for this duration";
+  const std::optional<Entry> step = run.find("step");
+  (step ? *step : *run.find("duration")).fail(expected);
+}
+
+/// Keys of [run] that are there and mean nothing to the method: a warning, since a scenario may keep the settings of
+/// several methods side by side.
+std::vector<std::string> unused_keys(const Section& run, Method method) {
+  std::vector<std::string> warnings;
+  const auto check = [&](std::string_view key, bool used) {
+    const std::optional<Entry> entry = run.find(key);
+    if (!entry || used) return;
+    warnings.push_back(entry->where() + ": " + entry->key() + ": has no effect with method " +
+                       std::string(method_names[static_cast<std::size_t>(method)]));
+  };
+  for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, method == Method::gauss);
+  check("step", !is_adaptive(method));
+  check("tolerance", is_adaptive(method));
+  return warnings;
+}
+
+template <class Space>
+Chain<Space> build_chain(const Section& section, ChainParameters<Space> parameters) {
+  try {
+    return Chain<Space>(std::move(parameters));
+  } catch (const std::invalid_argument& error) {
+    throw InputError(section.where() + ": " + error.what());
+  }
+}
+
+template <class Space>
+Scenario<Space> read(const Sections& sections) {
+  const LinkCount count = link_count<Space>(sections);
+  ChainParameters<Space> parameters = read_chain<Space>(sections.chain, count);
+  const std::optional<NaturalUnits> natural = make_natural(sections.chain, parameters);
+  const RunOptions run = read_run(sections.run);
+  Scenario<Space> scenario{build_chain(sections.chain, std::move(parameters)),
+                           read_start<Space>(sections.start, count),
+                           run,
+                           read_duration(sections.run, run),
+                           10,
+                           natural,
+                           unused_keys(sections.run, run.method),
+                           {}};
+  if (const auto every = sections.output.find("every")) {
+    scenario.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
+  }
+  for (const std::string_view key : run_keys) {
+    if (const auto entry = sections.run.find(key)) scenario.places[std::string(key)] = entry->where();
+  }
+  return scenario;
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  const auto reject = [&](const std::string& why) {
+    throw InputError(file.string() + ": expected a scenario file that can be read, got: " + why);
+  };
+  if (std::filesystem::is_directory(file)) reject("a folder");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) reject(std::strerror(errno));
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (stream.bad()) reject("a read error");
+  return text;
+}
+
+}  // namespace
+
+AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides) {
+  const toml::table document = parse_toml(text, name, overrides);
+  const Sections sections(document);
+  const Entry space = sections.chain.require("space", "\"planar\" or \"spatial\"");
+  if (space.choice(space_names) == 0) return read<Planar>(sections);
+  return read<Spatial>(sections);
+}
+
+AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides) {
+  return parse_scenario(read_text(file), file.string(), overrides);
+}
+
+}  // namespace pendula::io

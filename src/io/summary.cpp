@@ -1,0 +1,252 @@
+#include "io/summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <pendula/version.hpp>
+#include <sstream>
+#include <string_view>
+
+#include "io/number.hpp"
+
+namespace pendula::io {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <class Value>
+std::string name_of(Value value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+bool is_gauss(const Summary& summary) {
+  return summary.run.method == Method::gauss;
+}
+
+/// null for an empty name.
+Json or_null(const std::string& name) {
+  return name.empty() ? Json() : Json(name);
+}
+
+/// null where a value does not apply.
+template <class Value>
+Json where(bool applies, const Value& value) {
+  return applies ? Json(value) : Json();
+}
+
+Json to_array(const Eigen::VectorXd& values) {
+  return std::vector<double>(values.begin(), values.end());
+}
+
+/// One array a column.
+Json columns(const Eigen::MatrixXd& matrix) {
+  Json array = Json::array();
+  for (Eigen::Index j = 0; j < matrix.cols(); ++j) array.push_back(to_array(matrix.col(j)));
+  return array;
+}
+
+Json to_json(const Snapshot& snapshot) {
+  const bool planar = snapshot.phi.size() == 0;
+  Json json{{"t", snapshot.time}, {"theta", to_array(snapshot.theta)}};
+  if (!planar) json["phi"] = to_array(snapshot.phi);
+  json["theta_dot"] = to_array(snapshot.theta_dot);
+  if (!planar) json["phi_dot"] = to_array(snapshot.phi_dot);
+  json["bobs"] = columns(snapshot.bobs);
+  json["velocities"] = columns(snapshot.velocities);
+  return json;
+}
+
+Json to_json(const Ending& ending) {
+  Json json{{"status", ending.status}};
+  if (!ending.ok()) json["message"] = ending.message;
+  if (ending.step) return json;
+  json["t"] = ending.step.time;
+  json["step"] = ending.step.step;
+  json["iterations"] = ending.step.iterations;
+  json["residual"] = ending.step.residual;
+  json["link"] = where(ending.step.link >= 0, ending.step.link + 1);
+  return json;
+}
+
+Json to_json(const std::optional<NaturalUnits>& natural) {
+  if (!natural) return nullptr;
+  return {{"length", natural->length}, {"mass", natural->mass}, {"time", natural->time}};
+}
+
+// The text: labels in one column, values in the next.
+
+constexpr std::size_t label_width = 19;
+constexpr std::size_t value_width = 12;
+
+std::string padded(const std::string& text, std::size_t width) {
+  return text + std::string(width - std::min(width, text.size()), ' ');
+}
+
+std::string right(const std::string& text, std::size_t width) {
+  return std::string(width - std::min(width, text.size()), ' ') + text;
+}
+
+std::string line(const std::string& label, const std::string& value) {
+  return padded(label, label_width) + value + "\n";
+}
+
+/// A value that stands in a column of values, and a remark on it.
+std::string line(const std::string& label, const std::string& value, const std::string& remark) {
+  return line(label, remark.empty() ? value : padded(value, value_width) + "  " + remark);
+}
+
+std::string plural(std::int64_t count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+std::string shown_or_dash(double value, int digits) {
+  return std::isfinite(value) ? rounded(value, digits) : "-";
+}
+
+/// "0.000523 s" as "523 us".
+std::string duration_text(double seconds) {
+  if (seconds >= 1) return rounded(seconds, 4) + " s";
+  if (seconds >= 1e-3) return rounded(seconds * 1e3, 4) + " ms";
+  return rounded(seconds * 1e6, 3) + " us";
+}
+
+std::string settings(const Summary& summary) {
+  const ModelSummary& model = summary.model;
+  const UnitNames unit = unit_names(model.natural);
+  const std::string acceleration = model.natural ? " g" : " m/s^2";
+  std::string text =
+      line("chain", model.space + ", " + plural(model.links, "link") + ", mass " + rounded(model.mass) +
+                        std::string(unit.mass) + ", length " + rounded(model.length) + std::string(unit.length) +
+                        ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
+  std::string method = name_of(summary.run.method);
+  if (is_gauss(summary)) {
+    method += ", " + plural(summary.run.stages, "stage") + " (order " + std::to_string(2 * summary.run.stages) + "), " +
+              name_of(summary.run.form) + " form";
+  }
+  text += line("method", method);
+  const Description& description = summary.description;
+  std::string solver = description.solver.empty() ? "" : description.solver + ", " + description.iteration;
+  if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
+  if (!solver.empty()) text += line("solver", solver);
+  const std::string time(unit.time);
+  text += is_adaptive(summary.run.method) ? line("tolerance", shortest(summary.run.tolerance))
+                                          : line("step", shortest(summary.run.step) + time);
+  text += line("duration", shortest(summary.duration) + time + ", a row every " + plural(summary.every, "step"));
+  if (model.natural) {
+    text += line("units", "l_1 = " + rounded(model.natural->length) + " m, M_1 = " + rounded(model.natural->mass) +
+                              " kg, sqrt(l_1/g) = " + rounded(model.natural->time) + " s");
+  }
+  return text;
+}
+
+std::string table(const Summary& summary) {
+  constexpr std::size_t width = 15;
+  constexpr std::string_view axes = "xyz";
+  std::string text = right("t", value_width);
+  const std::string last = std::to_string(summary.model.links);
+  for (Eigen::Index axis = 0; axis < summary.final.bobs.rows(); ++axis) {
+    text += right(std::string(1, axes[static_cast<std::size_t>(axis)]) + "_" + last, width);
+  }
+  text += right("energy error", width) + "\n";
+  for (const TableRow& row : summary.table) {
+    text += right(rounded(row.time), value_width);
+    for (const double coordinate : row.bob) text += right(rounded(coordinate, 9), width);
+    text += right(shown_or_dash(row.energy_error, 3), width) + "\n";
+  }
+  return text;
+}
+
+std::string statistics(const Summary& summary) {
+  const Statistics& counts = summary.statistics;
+  const auto a_step = [&](double total) {
+    return total / static_cast<double>(std::max<std::int64_t>(counts.steps, 1));
+  };
+  std::string text = line("steps", std::to_string(counts.steps));
+  text += line("rejected steps", std::to_string(counts.rejected_steps));
+  if (is_gauss(summary)) {
+    text += line("iterations", std::to_string(counts.newton_iterations),
+                 rounded(a_step(static_cast<double>(counts.newton_iterations)), 4) + " a step");
+  }
+  if (counts.chart_switches > 0) text += line("chart switches", std::to_string(counts.chart_switches));
+  return text + line("stepping time", duration_text(summary.wall_seconds),
+                     duration_text(a_step(summary.wall_seconds)) + " a step");
+}
+
+std::string energies(const Summary& summary) {
+  const std::string unit(unit_names(summary.model.natural).energy);
+  const std::string of = summary.model.gravity != 0 ? "of the sum of M_i g l_i" : "of the energy at the start";
+  return line("energy at start", rounded(summary.energy_error.initial, 12) + unit) +
+         line("energy at end", rounded(summary.energy_final, 12) + unit) +
+         line("largest error", shown_or_dash(summary.energy_error.largest, 3),
+              of + ", over " + plural(summary.rows, "row"));
+}
+
+std::string ending(const Summary& summary) {
+  constexpr std::string_view axes = "xyz";
+  const UnitNames unit = unit_names(summary.model.natural);
+  const auto bob = summary.final.bobs.col(summary.final.bobs.cols() - 1);
+  std::string position;
+  for (Eigen::Index axis = 0; axis < bob.size(); ++axis) {
+    position += (axis == 0 ? "" : ", ") + std::string(1, axes[static_cast<std::size_t>(axis)]) + " = ";
+    append_number(position, bob[axis]);
+  }
+  std::string text = line("last bob", position + std::string(unit.length) +
+                                          " at t = " + rounded(summary.final.time, 12) + std::string(unit.time));
+  if (!summary.trajectory.empty()) text += line("trajectory", summary.trajectory + ", " + plural(summary.rows, "row"));
+  if (!summary.ending.ok()) text += line("ended early", summary.ending.message);
+  return text;
+}
+
+}  // namespace
+
+Ending ending_of(const Outcome& outcome) {
+  if (outcome) return {};
+  std::string status = name_of(outcome.status);
+  std::ranges::replace(status, ' ', '_');
+  return {status, message(outcome), outcome};
+}
+
+std::string to_json(const Summary& summary) {
+  const bool gauss = is_gauss(summary);
+  const bool adaptive = is_adaptive(summary.run.method);
+  const Json json{{"pendula", version},
+                  {"scenario", summary.model.scenario},
+                  {"space", summary.model.space},
+                  {"links", summary.model.links},
+                  {"units", summary.model.natural ? "natural" : "SI"},
+                  {"natural_units", to_json(summary.model.natural)},
+                  {"method", name_of(summary.run.method)},
+                  {"stages", where(gauss, summary.run.stages)},
+                  {"form", where(gauss, name_of(summary.run.form))},
+                  {"solver", or_null(summary.description.solver)},
+                  {"iteration", or_null(summary.description.iteration)},
+                  {"kernel", or_null(summary.description.kernel)},
+                  {"step", where(!adaptive, summary.run.step)},
+                  {"tolerance", where(adaptive, summary.run.tolerance)},
+                  {"duration", summary.duration},
+                  {"every", summary.every},
+                  {"steps", summary.statistics.steps},
+                  {"rejected_steps", summary.statistics.rejected_steps},
+                  {"newton_iterations", summary.statistics.newton_iterations},
+                  {"chart_switches", summary.statistics.chart_switches},
+                  {"rows", summary.rows},
+                  {"trajectory", or_null(summary.trajectory)},
+                  {"energy_initial", summary.energy_error.initial},
+                  {"energy_final", summary.energy_final},
+                  {"energy_error_max", summary.energy_error.largest},
+                  {"wall_seconds", summary.wall_seconds},
+                  {"outcome", to_json(summary.ending)},
+                  {"final", to_json(summary.final)}};
+  constexpr int one_line = -1;
+  return json.dump(one_line, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string to_text(const Summary& summary) {
+  return "pendula " + std::string(version) + ": " + summary.model.scenario + "\n\n" + settings(summary) + "\n" +
+         table(summary) + "\n" + statistics(summary) + "\n" + energies(summary) + "\n" + ending(summary);
+}
+
+}  // namespace pendula::io

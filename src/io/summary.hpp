@@ -1,0 +1,94 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <pendula/chain.hpp>
+#include <pendula/integrator.hpp>
+#include <pendula/invariants.hpp>
+#include <pendula/options.hpp>
+#include <pendula/outcome.hpp>
+#include <pendula/state.hpp>
+#include <string>
+#include <vector>
+
+#include "io/natural_units.hpp"
+#include "io/run_record.hpp"
+
+namespace pendula::io {
+
+/// What was moved.
+struct ModelSummary {
+  std::string scenario;  ///< the file, as it was named
+  std::string space;     ///< "planar" or "spatial"
+  int links = 0;
+  double mass = 0;    ///< Σ m_i
+  double length = 0;  ///< Σ l_i
+  double gravity = 0;
+  bool loaded = false;                  ///< damping, torque or a drive
+  std::optional<NaturalUnits> natural;  ///< units of all numbers; empty for SI
+};
+
+/// A state with the bobs, in a form that serves both spaces.
+struct Snapshot {
+  double time = 0;
+  Eigen::VectorXd theta, phi, theta_dot, phi_dot;  ///< (n); phi and phi_dot are empty in the plane
+  Eigen::MatrixXd bobs, velocities;                ///< (dimension x n)
+};
+
+/// How a run ended.
+struct Ending {
+  std::string status = "ok";  ///< a word for programs
+  std::string message;        ///< a sentence for people; empty for "ok"
+  Outcome step;               ///< the step that failed, where one did
+
+  bool ok() const { return message.empty(); }
+};
+
+/// Everything that is told about a run.
+struct Summary {
+  ModelSummary model;
+  RunOptions run;           ///< as asked for
+  Description description;  ///< as it ran
+  double duration = 0;      ///< as asked for
+  std::int64_t every = 0;
+  Ending ending;
+  Statistics statistics;
+  double wall_seconds = 0;  ///< in the stepping loop alone
+  EnergyError energy_error;
+  double energy_final = 0;
+  std::vector<TableRow> table;
+  Snapshot final;  ///< the last state reached
+  std::int64_t rows = 0;
+  std::string trajectory;  ///< the file that holds the rows; empty for none
+};
+
+/// How a run ended that ended with `outcome`.
+Ending ending_of(const Outcome& outcome);
+
+template <class Space>
+ModelSummary model_summary(const std::string& scenario, const Chain<Space>& chain,
+                           const std::optional<NaturalUnits>& natural) {
+  return {scenario,        std::string(Space::name), chain.links(), chain.masses().sum(), chain.lengths().sum(),
+          chain.gravity(), chain.loaded(),           natural};
+}
+
+template <class Space>
+Snapshot snapshot(const Chain<Space>& chain, const State<Space>& state) {
+  Snapshot snapshot{
+      state.time, state.theta(), {}, state.theta_dot(), {}, bob_positions(chain, state), bob_velocities(chain, state)};
+  if constexpr (Space::dof == 2) {
+    snapshot.phi = state.phi();
+    snapshot.phi_dot = state.phi_dot();
+  }
+  return snapshot;
+}
+
+/// The summary as one JSON object, ended by a newline. Numbers are read back as the same doubles; what does not apply
+/// is null (the stages of "rk4", say), as is a number that is not finite.
+std::string to_json(const Summary& summary);
+
+/// The summary for people.
+std::string to_text(const Summary& summary);
+
+}  // namespace pendula::io

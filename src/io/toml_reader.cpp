@@ -1,0 +1,252 @@
+#include "io/toml_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "io/nearest_name.hpp"
+#include "io/number.hpp"
+
+namespace pendula::io {
+namespace {
+
+constexpr std::string_view override_prefix = "--set ";
+
+std::string quoted(std::string_view text) {
+  return '"' + std::string(text) + '"';
+}
+
+bool is_key_character(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+}
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  return first == text.npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+/// The parts of `a.b.c`; empty where one of them is no bare TOML key.
+std::vector<std::string_view> key_path(std::string_view key) {
+  std::vector<std::string_view> path;
+  for (std::size_t begin = 0; begin <= key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    const std::string_view part = key.substr(begin, end - begin);
+    if (part.empty() || !std::ranges::all_of(part, is_key_character)) return {};
+    path.push_back(part);
+    begin = end + 1;
+  }
+  return path;
+}
+
+toml::table parse(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw InputError(location(error.source()) + ": expected valid TOML, got: " + std::string(error.description()));
+  }
+}
+
+/// A word that a shell user types for a string: begins with a letter, and holds nothing that TOML gives a meaning to.
+bool is_bare_word(std::string_view text) {
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  return !text.empty() && is_letter(text.front()) &&
+         std::ranges::all_of(text, [](char c) { return is_key_character(c) || c == '.'; });
+}
+
+/// The value of an override in a table of its own, under the key "value".
+toml::table parse_value(std::string_view value, const std::string& where) {
+  const std::string assignment = "value = " + std::string(value);
+  try {
+    toml::table table = toml::parse(assignment, where);
+    if (table.size() == 1) return table;  // not "1 \n another = 2"
+  } catch (const toml::parse_error&) {
+    if (is_bare_word(value)) return toml::parse("value = " + quoted(value), where);
+  }
+  throw InputError(where + ": expected a TOML value after '=', got " + quoted(value));
+}
+
+void apply_override(toml::table& root, const std::string& text) {
+  const std::string where = std::string(override_prefix) + text;
+  const std::size_t equals = text.find('=');
+  const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
+  const std::vector<std::string_view> path = key_path(key);
+  if (equals == text.npos || path.empty()) {
+    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
+  }
+  toml::table value = parse_value(trimmed(std::string_view(text).substr(equals + 1)), where);
+  toml::table* table = &root;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    // A table made here takes the override as its place; one that stands in the file keeps its own.
+    if (!table->contains(path[i])) table->insert(path[i], std::move(*parse("t = {}", where).get("t")));
+    toml::node* next = table->get(path[i]);
+    if (!next->is_table()) {
+      throw InputError(where, std::string(key), "a table before the last dot (an array is set as a whole)",
+                       std::string(path[i]) + " = " + shown(*next));
+    }
+    table = next->as_table();
+  }
+  table->insert_or_assign(path.back(), std::move(*value.get("value")));
+}
+
+std::string expected_number(Sign sign) {
+  switch (sign) {
+    case Sign::any:
+      return "a finite number";
+    case Sign::not_negative:
+      return "a finite number >= 0";
+    case Sign::positive:
+      return "a finite number > 0";
+  }
+  return {};
+}
+
+bool fits(double value, Sign sign) {
+  if (!std::isfinite(value)) return false;
+  return sign == Sign::any || value > 0 || (sign == Sign::not_negative && value == 0);
+}
+
+/// A float always looks like one, so that `expected an integer, got 3.0` makes sense.
+std::string shown_float(double value) {
+  const std::string text = shortest(value);
+  return text.find_first_not_of("-0123456789") == text.npos ? text + ".0" : text;
+}
+
+std::string shown_array(const toml::array& array) {
+  constexpr std::size_t longest = 60;
+  std::string text = "[";
+  for (const toml::node& element : array) {
+    if (text.size() > 1) text += ", ";
+    if (text.size() > longest) return text + "...] (" + std::to_string(array.size()) + " values)";
+    text += shown(element);
+  }
+  return text + "]";
+}
+
+std::string joined(std::span<const std::string_view> names, std::string_view separator) {
+  std::string text;
+  for (const std::string_view name : names) text += std::string(text.empty() ? "" : separator) + std::string(name);
+  return text;
+}
+
+/// The key of this table that may have been meant, or the table that has this key.
+std::string hint_at_key(std::string_view key, std::span<const std::string_view> known,
+                        std::span<const std::string_view> elsewhere) {
+  const auto ends_in_key = [&](std::string_view name) { return name.ends_with("." + std::string(key)); };
+  const auto found = std::ranges::find_if(elsewhere, ends_in_key);
+  return found == elsewhere.end() ? did_you_mean(nearest_name(key, known)) : did_you_mean(*found);
+}
+
+}  // namespace
+
+toml::table parse_toml(std::string_view text, std::string_view name, std::span<const std::string> overrides) {
+  toml::table root = parse(text, std::string(name));
+  for (const std::string& override : overrides) apply_override(root, override);
+  return root;
+}
+
+std::string location(const toml::source_region& source) {
+  const std::string name = source.path ? *source.path : std::string("scenario");
+  return name.starts_with(override_prefix) ? name : name + ":" + std::to_string(source.begin.line);
+}
+
+std::string shown(const toml::node& node) {
+  if (const auto* array = node.as_array()) return shown_array(*array);
+  if (node.is_table()) return "a table";
+  if (const auto* value = node.as_string()) return quoted(value->get());
+  if (const auto* value = node.as_floating_point()) return shown_float(value->get());
+  if (const auto* value = node.as_integer()) return std::to_string(value->get());
+  if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";
+  return "a date or time";
+}
+
+Entry Entry::element(std::size_t index) const {
+  return {*node_->as_array()->get(index), key_ + "[" + std::to_string(index + 1) + "]"};
+}
+
+void Entry::fail(const std::string& expected) const {
+  throw InputError(where(), key_, expected, shown(*node_));
+}
+
+double Entry::number(Sign sign) const {
+  const std::optional<double> value = is_number() ? node_->value<double>() : std::nullopt;
+  if (!value || !fits(*value, sign)) fail(expected_number(sign));
+  return *value;
+}
+
+std::int64_t Entry::integer(std::int64_t least, std::int64_t most) const {
+  const auto* value = node_->as_integer();
+  if (value == nullptr || value->get() < least || value->get() > most) {
+    fail("an integer from " + std::to_string(least) + " to " + std::to_string(most));
+  }
+  return value->get();
+}
+
+std::size_t Entry::choice(std::span<const std::string_view> choices) const {
+  const auto* value = node_->as_string();
+  const auto found = value == nullptr ? choices.end() : std::ranges::find(choices, std::string_view(value->get()));
+  if (found != choices.end()) return static_cast<std::size_t>(found - choices.begin());
+  const std::string expected = quoted(joined(choices, "\" or \""));
+  if (value == nullptr) fail(expected);
+  throw InputError(where(), key_, expected, shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
+}
+
+Eigen::VectorXd Entry::per_link(const LinkCount& count, Sign sign) const {
+  if (is_number()) return Eigen::VectorXd::Constant(count.links, number(sign));
+  if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
+    fail(expected_number(sign) + " for all links, or an array of " + std::to_string(count.links) +
+         (key_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
+  }
+  Eigen::VectorXd values(count.links);
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(sign);
+  return values;
+}
+
+Eigen::VectorXd Entry::vector(Eigen::Index components) const {
+  if (!is_array() || size() != static_cast<std::size_t>(components)) {
+    fail(components == 3 ? "a vector [x, y, z]" : "a vector of " + std::to_string(components) + " numbers");
+  }
+  Eigen::VectorXd values(components);
+  for (Eigen::Index i = 0; i < components; ++i) values[i] = element(static_cast<std::size_t>(i)).number();
+  return values;
+}
+
+Section::Section(const Entry& entry, std::span<const std::string_view> known,
+                 std::span<const std::string_view> elsewhere)
+    : name_(entry.key()) {
+  read(entry, known, elsewhere);
+}
+
+Section::Section(const Section& parent, std::string name, std::span<const std::string_view> known,
+                 std::span<const std::string_view> elsewhere)
+    : name_(std::move(name)), where_(parent.where_) {
+  if (const std::optional<Entry> entry = parent.find(name_)) read(*entry, known, elsewhere);
+}
+
+void Section::read(const Entry& entry, std::span<const std::string_view> known,
+                   std::span<const std::string_view> elsewhere) {
+  table_ = entry.table();
+  where_ = entry.where();
+  if (table_ == nullptr) entry.fail("a table");
+  for (const auto& [key, node] : *table_) {
+    if (std::ranges::find(known, key.str()) != known.end()) continue;
+    throw InputError(location(node.source()), dotted(key.str()), "one of " + joined(known, ", "),
+                     "the unknown key " + quoted(key.str()) + hint_at_key(key.str(), known, elsewhere));
+  }
+}
+
+std::string Section::dotted(std::string_view key) const {
+  return (name_.empty() ? "" : name_ + ".") + std::string(key);
+}
+
+std::optional<Entry> Section::find(std::string_view key) const {
+  const toml::node* node = table_ == nullptr ? nullptr : table_->get(key);
+  if (node == nullptr) return std::nullopt;
+  return Entry(*node, dotted(key));
+}
+
+Entry Section::require(std::string_view key, const std::string& expected) const {
+  if (std::optional<Entry> entry = find(key)) return *entry;
+  throw InputError(where_, dotted(key), expected, "no such key");
+}
+
+}  // namespace pendula::io

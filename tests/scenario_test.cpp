@@ -1,0 +1,482 @@
+#include "io/scenario.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <pendula/invariants.hpp>
+#include <string>
+#include <vector>
+
+namespace pendula::io {
+namespace {
+
+using Overrides = std::vector<std::string>;
+
+const std::string planar_text = R"([chain]
+space   = "planar"
+masses  = [1.0, 2.0]
+lengths = 1
+
+[start]
+theta = [0.5, -0.25]
+)";
+
+const std::string spatial_text = R"([chain]
+space   = "spatial"
+links   = 3
+masses  = [1.0, 0.5, 2.0]
+lengths = 1.5
+gravity = 9.8
+damping = [0.0, 0.1, 0.2]
+torque  = [0.0, 0.0, 0.3]
+units   = "SI"
+
+[[chain.drive]]
+link = 2
+amplitude = [1.0, 0, 2.0]
+frequency = 3
+phase = 0.4
+
+[start]
+theta     = [1.0, 0.5, 0.2]
+phi       = 0.25
+theta_dot = 1
+phi_dot   = [1, 2, 3]
+
+[run]
+method    = "gauss"
+stages    = 4
+form      = "velocity"
+solver    = "dense"
+iteration = "newton"
+step      = 1e-2
+duration  = 5
+
+[output]
+every = 3
+)";
+
+template <class Space>
+Scenario<Space> parsed(const std::string& text, const Overrides& overrides = {}) {
+  return std::get<Scenario<Space>>(parse_scenario(text, "file.toml", overrides));
+}
+
+/// The message that a scenario is turned away with.
+std::string error_of(const std::string& text, const Overrides& overrides = {}) {
+  try {
+    parse_scenario(text, "file.toml", overrides);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// `text` with the first `from` replaced.
+std::string edited(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, text.npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+Eigen::VectorXd numbers(std::initializer_list<double> values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.begin(), static_cast<Eigen::Index>(values.size()));
+}
+
+TEST(Scenario, DefaultsAreThoseOfTheReference) {
+  const auto scenario = parsed<Planar>(planar_text);
+  EXPECT_EQ(scenario.chain.links(), 2);
+  EXPECT_EQ(scenario.chain.masses(), numbers({1, 2}));
+  EXPECT_EQ(scenario.chain.lengths(), numbers({1, 1}));  // a number means every link
+  EXPECT_EQ(scenario.chain.gravity(), 9.81);
+  EXPECT_FALSE(scenario.chain.loaded());
+  EXPECT_EQ(scenario.start.q, numbers({0.5, -0.25}));
+  EXPECT_EQ(scenario.start.v, numbers({0, 0}));
+  EXPECT_EQ(scenario.start.time, 0);
+  EXPECT_EQ(scenario.run.method, Method::gauss);
+  EXPECT_EQ(scenario.run.stages, 2);
+  EXPECT_EQ(scenario.run.form, Form::momentum);
+  EXPECT_EQ(scenario.run.solver, Solver::automatic);
+  EXPECT_EQ(scenario.run.iteration, Iteration::automatic);
+  EXPECT_EQ(scenario.run.step, 1e-3);
+  EXPECT_EQ(scenario.run.tolerance, 1e-9);
+  EXPECT_EQ(scenario.duration, 10);
+  EXPECT_EQ(scenario.every, 10);
+  EXPECT_FALSE(scenario.natural);
+  EXPECT_TRUE(scenario.warnings.empty());
+}
+
+TEST(Scenario, EveryKeyIsRead) {
+  const auto scenario = parsed<Spatial>(spatial_text);
+  EXPECT_EQ(scenario.chain.links(), 3);
+  EXPECT_EQ(scenario.chain.masses(), numbers({1, 0.5, 2}));
+  EXPECT_EQ(scenario.chain.lengths(), numbers({1.5, 1.5, 1.5}));
+  EXPECT_EQ(scenario.chain.gravity(), 9.8);
+  EXPECT_EQ(scenario.chain.damping(), numbers({0, 0.1, 0.2}));
+  EXPECT_EQ(scenario.chain.constant_torque(), Eigen::Vector3d(0, 0, 0.3).replicate(1, 3));
+  ASSERT_EQ(scenario.chain.drives().size(), 1u);
+  const Drive<Spatial>& drive = scenario.chain.drives()[0];
+  EXPECT_EQ(drive.link, 1);
+  EXPECT_EQ(drive.amplitude, Eigen::Vector3d(1, 0, 2));
+  EXPECT_EQ(drive.frequency, 3);
+  EXPECT_EQ(drive.phase, 0.4);
+  EXPECT_EQ(scenario.start.theta(), numbers({1, 0.5, 0.2}));
+  EXPECT_EQ(scenario.start.phi(), numbers({0.25, 0.25, 0.25}));
+  EXPECT_EQ(scenario.start.theta_dot(), numbers({1, 1, 1}));
+  EXPECT_EQ(scenario.start.phi_dot(), numbers({1, 2, 3}));
+  EXPECT_EQ(scenario.run.stages, 4);
+  EXPECT_EQ(scenario.run.form, Form::velocity);
+  EXPECT_EQ(scenario.run.solver, Solver::dense);
+  EXPECT_EQ(scenario.run.iteration, Iteration::newton);
+  EXPECT_EQ(scenario.run.step, 1e-2);
+  EXPECT_EQ(scenario.duration, 5);
+  EXPECT_EQ(scenario.every, 3);
+}
+
+TEST(Scenario, NamesOfSettingsMeanTheirEnumerators) {
+  const auto run = [](const std::string& setting) { return parsed<Planar>(planar_text, {"run." + setting}).run; };
+  EXPECT_EQ(run("method=rk4").method, Method::rk4);
+  EXPECT_EQ(run("method=dopri5").method, Method::dopri5);
+  EXPECT_EQ(run("method=fehlberg78").method, Method::fehlberg78);
+  EXPECT_EQ(run("form=momentum").form, Form::momentum);
+  EXPECT_EQ(run("solver=auto").solver, Solver::automatic);
+  EXPECT_EQ(run("solver=chain").solver, Solver::chain);
+  EXPECT_EQ(run("iteration=auto").iteration, Iteration::automatic);
+  EXPECT_EQ(run("iteration=fixed-point").iteration, Iteration::fixed_point);
+}
+
+TEST(Scenario, AnyArrayTellsTheNumberOfLinks) {
+  const std::string text = "[chain]\nspace = \"spatial\"\nmasses = 1\nlengths = 1\n[start]\ntheta = 1\n";
+  for (const std::string key : {"chain.masses", "chain.lengths", "chain.damping", "start.theta", "start.phi",
+                                "start.theta_dot", "start.phi_dot"}) {
+    EXPECT_EQ(parsed<Spatial>(text, {key + "=[1, 2, 3, 4]"}).chain.links(), 4) << key;
+  }
+  EXPECT_EQ(parsed<Spatial>(text, {"chain.torque=[[0, 0, 1], [0, 1, 0]]"}).chain.links(), 2);
+  EXPECT_EQ(parsed<Spatial>(text, {"chain.links=5"}).chain.links(), 5);
+  EXPECT_EQ(parsed<Planar>(text, {"chain.space=planar", "chain.torque=[1, 2, 3]"}).chain.links(), 3);
+  EXPECT_EQ(error_of(text),
+            "file.toml:1: chain.links: expected a number of links, which no array tells, got no such key");
+}
+
+TEST(Scenario, TorquesAreOneALinkOrOneForAll) {
+  const auto torque = [](const std::string& value) {
+    return parsed<Spatial>(spatial_text, {"chain.torque=" + value}).chain.constant_torque();
+  };
+  EXPECT_EQ(torque("0.0"), Eigen::MatrixXd::Zero(3, 3));
+  EXPECT_EQ(torque("[1, 2, 3]"), Eigen::Vector3d(1, 2, 3).replicate(1, 3));
+  EXPECT_EQ(torque("[[1, 2, 3], [4, 5, 6], [7, 8, 9]]"), (Eigen::Matrix3d() << 1, 4, 7, 2, 5, 8, 3, 6, 9).finished());
+  EXPECT_EQ(parsed<Planar>(planar_text, {"chain.torque=0.5"}).chain.constant_torque(), numbers({0.5, 0.5}).transpose());
+  EXPECT_EQ(parsed<Planar>(planar_text, {"chain.torque=[1, 2]"}).chain.constant_torque(), numbers({1, 2}).transpose());
+}
+
+TEST(Scenario, PlanarDrivesHaveOneNumber) {
+  const auto scenario =
+      parsed<Planar>(planar_text +
+                     "[[chain.drive]]\nlink = 1\namplitude = 2.0\nfrequency = 3.0\n[[chain.drive]]\nlink = 2\n"
+                     "amplitude = 1\nfrequency = 2\nphase = 0.4\n");
+  ASSERT_EQ(scenario.chain.drives().size(), 2u);
+  EXPECT_EQ(scenario.chain.drives()[0].amplitude[0], 2);
+  EXPECT_EQ(scenario.chain.drives()[0].phase, 0);
+  EXPECT_EQ(scenario.chain.drives()[1].link, 1);
+}
+
+TEST(Scenario, OverridesReplaceWhatTheFileSays) {
+  const auto scenario = parsed<Planar>(
+      planar_text, {"run.step=1e-4", "run.method = rk4", "chain.masses=[3, 4]", "output.every=7", "start={theta=0.125}",
+                    "chain.drive=[{link=1, amplitude=2, frequency=3}]", "run.step=2e-4"});
+  EXPECT_EQ(scenario.run.step, 2e-4);  // the last one counts
+  EXPECT_EQ(scenario.run.method, Method::rk4);
+  EXPECT_EQ(scenario.chain.masses(), numbers({3, 4}));
+  EXPECT_EQ(scenario.every, 7);
+  EXPECT_EQ(scenario.start.theta(), numbers({0.125, 0.125}));
+  EXPECT_EQ(scenario.chain.drives().size(), 1u);
+  EXPECT_TRUE(parsed<Spatial>(spatial_text, {"chain.drive=[]"}).chain.drives().empty());
+}
+
+struct BadInput {
+  std::string from, to, message;
+};
+
+TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
+  const std::vector<BadInput> inputs = {
+      // not the right tables
+      {"[output]\nevery = 3", "output = 3",
+       "file.toml:32: run.output: expected one of method, stages, form, solver, iteration, step, tolerance, duration, "
+       "got "
+       "the unknown key \"output\""},
+      {"[output]", "[outputs]",
+       "file.toml:32: outputs: expected one of chain, start, run, output, got the unknown key "
+       "\"outputs\" (did you mean output?)"},
+      {"[[chain.drive]]", "[chain.drive]", "file.toml:11: chain.drive: expected [[chain.drive]] tables, got a table"},
+      // unknown keys, with the one that may be meant
+      {"masses  =", "mases =",
+       "file.toml:4: chain.mases: expected one of space, links, masses, lengths, gravity, damping, "
+       "torque, units, drive, got the unknown key \"mases\" (did you mean masses?)"},
+      {"units   =", "theta =",
+       "file.toml:9: chain.theta: expected one of space, links, masses, lengths, gravity, damping, "
+       "torque, units, drive, got the unknown key \"theta\" (did you mean start.theta?)"},
+      {"phase = 0.4", "delay = 0.4",
+       "file.toml:15: chain.drive[1].delay: expected one of link, amplitude, frequency, "
+       "phase, got the unknown key \"delay\""},
+      {"theta_dot =", "theta_dto =",
+       "file.toml:20: start.theta_dto: expected one of theta, phi, theta_dot, phi_dot, got "
+       "the unknown key \"theta_dto\" (did you mean theta_dot?)"},
+      // missing keys
+      {"space   = \"spatial\"", "", "file.toml:1: chain.space: expected \"planar\" or \"spatial\", got no such key"},
+      {"masses  = [1.0, 0.5, 2.0]", "", "file.toml:1: chain.masses: expected the masses of the bobs, got no such key"},
+      {"lengths = 1.5", "", "file.toml:1: chain.lengths: expected the lengths of the rods, got no such key"},
+      {"theta     = [1.0, 0.5, 0.2]", "",
+       "file.toml:17: start.theta: expected the angles at the start, got no such key"},
+      {"link = 2", "", "file.toml:11: chain.drive[1].link: expected a link from 1 to 3, got no such key"},
+      {"frequency = 3", "", "file.toml:11: chain.drive[1].frequency: expected an angular frequency, got no such key"},
+      // wrong types
+      {"lengths = 1.5", "lengths = \"long\"",
+       "file.toml:5: chain.lengths: expected a finite number > 0 for all links, or "
+       "an array of 3 (the links that chain.links tells), got \"long\""},
+      {"[1.0, 0.5, 2.0]", "[1.0, true, 2.0]", "file.toml:4: chain.masses[2]: expected a finite number > 0, got true"},
+      {"links   = 3", "links = 3.0", "file.toml:3: chain.links: expected an integer from 1 to 1000000, got 3.0"},
+      {"gravity = 9.8", "gravity = [9.8]", "file.toml:6: chain.gravity: expected a finite number, got [9.8]"},
+      {"gravity = 9.8", "gravity = 1979-05-27",
+       "file.toml:6: chain.gravity: expected a finite number, got a date or time"},
+      {"\"spatial\"", "\"spacial\"",
+       "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got \"spacial\" (did "
+       "you mean spatial?)"},
+      {"\"spatial\"", "3", "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got 3"},
+      {"\"gauss\"", "\"euler\"",
+       "file.toml:24: run.method: expected \"gauss\" or \"rk4\" or \"dopri5\" or \"fehlberg78\", "
+       "got \"euler\""},
+      {"\"SI\"", "\"imperial\"", "file.toml:9: chain.units: expected \"SI\" or \"natural\", got \"imperial\""},
+      // wrong lengths
+      {"masses  = [1.0, 0.5, 2.0]", "masses = [1.0, 0.5]",
+       "file.toml:4: chain.masses: expected a finite number > 0 for all "
+       "links, or an array of 3 (the links that chain.links tells), got [1.0, 0.5]"},
+      {"phi_dot   = [1, 2, 3]", "phi_dot = []",
+       "file.toml:21: start.phi_dot: expected a finite number for all links, or an "
+       "array of 3 (the links that chain.links tells), got []"},
+      {"[0.0, 0.0, 0.3]", "[0.0, 0.3]", "file.toml:8: chain.torque: expected a vector [x, y, z], got [0.0, 0.3]"},
+      {"[0.0, 0.0, 0.3]", "[[0, 0, 1]]",
+       "file.toml:8: chain.torque: expected 0, one vector [x, y, z] for all links, or 3 "
+       "of them, got [[0, 0, 1]]"},
+      {"[0.0, 0.0, 0.3]", "[[0, 0, 1], [0, 0, 1], 2]",
+       "file.toml:8: chain.torque[3]: expected a vector [x, y, z], got 2"},
+      {"[0.0, 0.0, 0.3]", "0.3",
+       "file.toml:8: chain.torque: expected 0, one vector [x, y, z] for all links, or 3 of them, "
+       "got 0.3"},
+      {"[1.0, 0, 2.0]", "2.0", "file.toml:13: chain.drive[1].amplitude: expected a vector [x, y, z], got 2.0"},
+      // values out of range
+      {"[1.0, 0.5, 2.0]", "[1.0, -0.5, 2.0]", "file.toml:4: chain.masses[2]: expected a finite number > 0, got -0.5"},
+      {"[1.0, 0.5, 2.0]", "0", "file.toml:4: chain.masses: expected a finite number > 0, got 0"},
+      {"lengths = 1.5", "lengths = 0.0", "file.toml:5: chain.lengths: expected a finite number > 0, got 0.0"},
+      {"lengths = 1.5", "lengths = inf", "file.toml:5: chain.lengths: expected a finite number > 0, got inf"},
+      {"gravity = 9.8", "gravity = nan", "file.toml:6: chain.gravity: expected a finite number, got nan"},
+      {"[0.0, 0.1, 0.2]", "-0.1", "file.toml:7: chain.damping: expected a finite number >= 0, got -0.1"},
+      {"[1.0, 0.5, 0.2]", "[1.0, -inf, 0.2]", "file.toml:18: start.theta[2]: expected a finite number, got -inf"},
+      {"link = 2", "link = 4", "file.toml:12: chain.drive[1].link: expected an integer from 1 to 3, got 4"},
+      {"link = 2", "link = 0", "file.toml:12: chain.drive[1].link: expected an integer from 1 to 3, got 0"},
+      {"links   = 3", "links = 0", "file.toml:3: chain.links: expected an integer from 1 to 1000000, got 0"},
+      {"links   = 3", "links = 2000000000",
+       "file.toml:3: chain.links: expected an integer from 1 to 1000000, got "
+       "2000000000"},
+      {"stages    = 4", "stages = 9", "file.toml:25: run.stages: expected an integer from 1 to 8, got 9"},
+      {"stages    = 4", "stages = 0", "file.toml:25: run.stages: expected an integer from 1 to 8, got 0"},
+      {"step      = 1e-2", "step = 0", "file.toml:29: run.step: expected a finite number > 0, got 0"},
+      {"step      = 1e-2", "step = -1e-3", "file.toml:29: run.step: expected a finite number > 0, got -0.001"},
+      {"step      = 1e-2", "step = 1e-300",
+       "file.toml:29: run.step: expected a step of at least 5.555555555555556e-16 for "
+       "this duration, got 1e-300"},
+      {"step      = 1e-2", "tolerance = 0.0", "file.toml:29: run.tolerance: expected a finite number > 0, got 0.0"},
+      {"duration  = 5", "duration = -5", "file.toml:30: run.duration: expected a finite number >= 0, got -5"},
+      {"every = 3", "every = 0",
+       "file.toml:33: output.every: expected an integer from 1 to 9223372036854775807, got 0"},
+      {"every = 3", "every = 2.5",
+       "file.toml:33: output.every: expected an integer from 1 to 9223372036854775807, got 2.5"},
+  };
+  for (const BadInput& input : inputs) {
+    EXPECT_EQ(error_of(edited(spatial_text, input.from, input.to)), input.message);
+  }
+}
+
+TEST(Scenario, TextThatIsNoTomlIsToldByItsLine) {
+  const auto begins = [](const std::string& text, const std::string& start) {
+    EXPECT_EQ(error_of(text).substr(0, start.size()), start);  // the rest is the TOML library's
+  };
+  begins(edited(spatial_text, "1.0, 0.5", "1.0 0.5"),
+         "file.toml:4: expected valid TOML, got: Error while parsing array");
+  begins(edited(spatial_text, "links   = 3", "links = 3\nlinks = 4"), "file.toml:4: expected valid TOML, got: ");
+  begins(edited(spatial_text, "[start]", "[start"), "file.toml:17: expected valid TOML, got: ");
+  begins("[chain]\nspace = \"\xff\"\n", "file.toml:2: expected valid TOML, got: ");
+}
+
+TEST(Scenario, PlanarChainsHaveNoPhi) {
+  EXPECT_EQ(error_of(planar_text + "phi = 0.1\n"),
+            "file.toml:8: start.phi: expected no such key in a planar scenario, got 0.1");
+  EXPECT_EQ(error_of(planar_text + "phi_dot = [1, 2]\n"),
+            "file.toml:8: start.phi_dot: expected no such key in a planar scenario, got [1, 2]");
+}
+
+TEST(Scenario, ArraysThatDisagreeNameTheOneThatTellsTheLinks) {
+  EXPECT_EQ(error_of(edited(planar_text, "lengths = 1", "lengths = [1, 2, 3]")),
+            "file.toml:4: chain.lengths: expected a finite number > 0 for all links, or an array of 2 (the links that "
+            "chain.masses tells), got [1, 2, 3]");
+  EXPECT_EQ(error_of(edited(planar_text, "[1.0, 2.0]", "[]")),
+            "file.toml:3: chain.masses: expected at least one link, got []");
+}
+
+TEST(Scenario, LongArraysAreCutInMessages) {
+  std::string many = "[1";
+  for (int i = 0; i < 1000; ++i) many += ", 1";
+  EXPECT_EQ(error_of(edited(planar_text, "lengths = 1", "lengths = " + many + "]")),
+            "file.toml:4: chain.lengths: expected a finite number > 0 for all links, or an array of 2 (the links that "
+            "chain.masses tells), got [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, ...] (1001 values)");
+}
+
+TEST(Scenario, AnElementIsFoundOnItsOwnLine) {
+  EXPECT_EQ(error_of(edited(planar_text, "[1.0, 2.0]", "[\n  1.0,\n  -2.0,\n]")),
+            "file.toml:5: chain.masses[2]: expected a finite number > 0, got -2.0");
+}
+
+TEST(Scenario, AnEmptyFileLacksItsFirstKey) {
+  EXPECT_EQ(error_of(""), "file.toml:1: chain.space: expected \"planar\" or \"spatial\", got no such key");
+}
+
+TEST(Scenario, BadOverridesAreToldByTheirText) {
+  const std::vector<std::pair<std::string, std::string>> inputs = {
+      {"run.step=-1", "--set run.step=-1: run.step: expected a finite number > 0, got -1"},
+      {"run.step=nan", "--set run.step=nan: run.step: expected a finite number > 0, got nan"},
+      {"run.stpe=1",
+       "--set run.stpe=1: run.stpe: expected one of method, stages, form, solver, iteration, step, "
+       "tolerance, duration, got the unknown key \"stpe\" (did you mean step?)"},
+      {"step=1",
+       "--set step=1: step: expected one of chain, start, run, output, got the unknown key \"step\" (did you "
+       "mean run.step?)"},
+      {"run.step", "--set run.step: expected KEY=VALUE such as run.step=1e-4, got \"run.step\""},
+      {"=1", "--set =1: expected KEY=VALUE such as run.step=1e-4, got \"=1\""},
+      {"run..step=1", "--set run..step=1: expected KEY=VALUE such as run.step=1e-4, got \"run..step=1\""},
+      {"run.step=", "--set run.step=: expected a TOML value after '=', got \"\""},
+      {"run.step=1e-", "--set run.step=1e-: expected a TOML value after '=', got \"1e-\""},
+      {"run.step=1\nevery=2", "--set run.step=1\nevery=2: expected a TOML value after '=', got \"1\nevery=2\""},
+      {"run.method=eulr",
+       "--set run.method=eulr: run.method: expected \"gauss\" or \"rk4\" or \"dopri5\" or "
+       "\"fehlberg78\", got \"eulr\""},
+      {"run=3", "--set run=3: run: expected a table, got 3"},
+      {"chain.masses.first=3",
+       "--set chain.masses.first=3: chain.masses.first: expected a table before the last dot (an "
+       "array is set as a whole), got masses = [1.0, 2.0]"},
+      {"chain.masses=[1, -2]", "--set chain.masses=[1, -2]: chain.masses[2]: expected a finite number > 0, got -2"},
+  };
+  for (const auto& [override, message] : inputs) EXPECT_EQ(error_of(planar_text, {override}), message);
+}
+
+TEST(Scenario, SettingsWithoutEffectAreWarnedOf) {
+  const auto warnings = [](const Overrides& overrides) { return parsed<Planar>(planar_text, overrides).warnings; };
+  EXPECT_EQ(warnings({"run.tolerance=1e-8"}),
+            Overrides{"--set run.tolerance=1e-8: run.tolerance: has no effect with method gauss"});
+  EXPECT_EQ(warnings({"run.method=dopri5", "run.step=0.1", "run.form=velocity"}),
+            (Overrides{"--set run.form=velocity: run.form: has no effect with method dopri5",
+                       "--set run.step=0.1: run.step: has no effect with method dopri5"}));
+  EXPECT_TRUE(warnings({"run.method=rk4", "run.step=0.1"}).empty());
+}
+
+TEST(Scenario, KeysOfRunHaveTheirPlaces) {
+  const auto scenario = parsed<Spatial>(spatial_text, {"run.solver=chain"});
+  EXPECT_EQ(scenario.places.at("stages"), "file.toml:25");
+  EXPECT_EQ(scenario.places.at("solver"), "--set run.solver=chain");
+  EXPECT_EQ(scenario.places.count("tolerance"), 0u);
+}
+
+TEST(Scenario, FilesThatCannotBeReadAreInputErrors) {
+  const auto error = [](const std::filesystem::path& file) -> std::string {
+    try {
+      read_scenario(file);
+    } catch (const InputError& rejected) {
+      return rejected.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error("no/such.toml"),
+            "no/such.toml: expected a scenario file that can be read, got: No such file or directory");
+  EXPECT_EQ(
+      error(std::filesystem::temp_directory_path()),
+      std::filesystem::temp_directory_path().string() + ": expected a scenario file that can be read, got: a folder");
+}
+
+// Natural units (paper §3.1): what stands above `units` is SI, everything else in l_1, M_1, sqrt(l_1/g).
+
+const std::string natural_text = R"([chain]
+space   = "planar"
+masses  = [1.5, 0.5]
+lengths = [0.8, 0.6]
+gravity = 9.81
+damping = [0.1, 0.2]
+torque  = [0.3, -0.4]
+units   = "natural"
+drive   = [{ link = 2, amplitude = 0.5, frequency = 2.0, phase = 0.1 }]
+
+[start]
+theta     = [1.0, -0.5]
+theta_dot = [0.3, 0.7]
+
+[run]
+step = 1e-2
+duration = 3
+)";
+
+TEST(NaturalUnits, TwoLinksAreToldByTheirRatios) {
+  const Chain<Planar> chain = parsed<Planar>(natural_text).chain;
+  const double m = 0.5 / 2.0, l = 0.6 / 0.8;
+  EXPECT_DOUBLE_EQ(chain.masses()[0], 1 - m);
+  EXPECT_DOUBLE_EQ(chain.masses()[1], m);
+  EXPECT_DOUBLE_EQ(chain.lengths()[0], 1);
+  EXPECT_DOUBLE_EQ(chain.lengths()[1], l);
+  EXPECT_EQ(chain.gravity(), 1);
+}
+
+TEST(NaturalUnits, OnlyWhatStandsAboveUnitsIsConverted) {
+  const auto natural = parsed<Planar>(natural_text);
+  ASSERT_TRUE(natural.natural);
+  EXPECT_EQ(natural.natural->length, 0.8);
+  EXPECT_EQ(natural.natural->mass, 2);
+  EXPECT_DOUBLE_EQ(natural.natural->time, std::sqrt(0.8 / 9.81));
+  EXPECT_EQ(natural.chain.drives()[0].amplitude[0], 0.5);
+  EXPECT_EQ(natural.chain.drives()[0].frequency, 2);
+  EXPECT_EQ(natural.start.theta_dot(), numbers({0.3, 0.7}));
+  EXPECT_EQ(natural.run.step, 1e-2);
+  EXPECT_EQ(natural.duration, 3);
+}
+
+TEST(NaturalUnits, LoadsAndEnergyAreEqualAfterScalingBack) {
+  const auto natural = parsed<Planar>(natural_text);
+  const auto si = parsed<Planar>(natural_text, {"chain.units=SI"});
+  const NaturalUnits unit = *natural.natural;
+  const double torque_unit = 2 * 9.81 * 0.8;           // M_1 g l_1
+  EXPECT_NEAR(unit.energy() / torque_unit, 1, 1e-15);  // measured 2.2e-16
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(natural.chain.constant_torque()(0, i) * torque_unit, si.chain.constant_torque()(0, i),
+                1e-15);  // measured 1.1e-16
+    EXPECT_NEAR(natural.chain.damping()[i] * torque_unit * unit.time, si.chain.damping()[i],
+                1e-15);  // measured 5.6e-17
+  }
+  State<Planar> scaled_start = si.start;
+  scaled_start.v *= unit.time;  // rad/s to rad per natural unit of time
+  EXPECT_NEAR(energy(natural.chain, scaled_start) * torque_unit, energy(si.chain, si.start),
+              1e-14);  // measured 1.8e-15
+}
+
+TEST(NaturalUnits, SpatialTorquesAreConvertedToo) {
+  const auto scenario = parsed<Spatial>(spatial_text, {"chain.units=natural"});
+  const double torque_unit = 3.5 * 9.8 * 1.5;
+  EXPECT_NEAR(scenario.chain.constant_torque()(2, 1) * torque_unit, 0.3, 1e-15);  // measured 0
+  EXPECT_EQ(scenario.chain.drives()[0].amplitude, Eigen::Vector3d(1, 0, 2));
+}
+
+TEST(NaturalUnits, NeedGravity) {
+  EXPECT_EQ(error_of(edited(natural_text, "9.81", "0")),
+            "file.toml:5: chain.gravity: expected a number > 0, which natural units need, got 0");
+  EXPECT_EQ(error_of(edited(natural_text, "9.81", "-9.81")),
+            "file.toml:5: chain.gravity: expected a number > 0, which natural units need, got -9.81");
+}
+
+}  // namespace
+}  // namespace pendula::io
