@@ -24,13 +24,9 @@ class Blocks:
     cross: list[Matrix]
     rest: list[Matrix]
 
-    @property
-    def mass_matrix(self) -> Matrix:
-        return Matrix([[block for block in row] for row in self.mass])
-
 
 def collect_blocks(chain: Chain) -> Blocks:
-    """Sorts the terms of the Euler–Lagrange equations of `chain` into blocks; raises GenerationError on a leftover."""
+    """Sorts the terms of the chain's Euler–Lagrange equations into blocks; GenerationError on a leftover."""
     n, dof = chain.links, chain.model.dof
     blocks = Blocks(
         mass=[[zeros(n, n) for _ in range(dof)] for _ in range(dof)],

@@ -1,13 +1,13 @@
 """A chain of n links of one model: its symbols, kinematics, energies and loads.
 
-Kinetic energy in pair form, T = ½ Σ_ij μ_ij l_i l_j û̇_i·û̇_j with μ_ij = M_max(i,j): what two links contribute
-follows from û(q_i)·û(q_j) by differentiation, is simplified once per model, and is then instantiated per pair.
+Kinetic energy in pair form, T = ½ Σ_ij μ_ij l_i l_j û̇_i·û̇_j with μ_ij = M_max(i,j): what two links give to it
+follows from û(q_i)·û(q_j) by differentiation, is simplified once per model and instantiated per pair.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 
 from sympy import Add, Expr, Matrix, Rational, Symbol, cos, expand, sin, trigsimp
 
@@ -24,7 +24,7 @@ def on_link(symbol: Symbol, link: int, suffix: str = "") -> Symbol:
 
 @dataclass(frozen=True)
 class LinkTerms:
-    """What one link, or a pair of links, puts into the energies; template symbols carry the link number 1 or 2."""
+    """What one link, or a pair, puts into the energies; template symbols carry the link number 1 or 2."""
 
     rate_self: Expr  # û̇_1·û̇_1
     rate_pair: Expr  # û̇_1·û̇_2
@@ -44,7 +44,7 @@ def _direction(model: LinkModel, link: int) -> Matrix:
     return model.direction.subs({q: on_link(q, link) for q in model.coordinates})
 
 
-@lru_cache(maxsize=None)
+@cache
 def link_terms(name: str) -> LinkTerms:
     """The simplified terms of the built-in model `name`; the only place where SymPy simplifies."""
     return derive_link_terms(MODELS[name])
@@ -193,6 +193,26 @@ class Chain:
         rate = _rate(_direction(self.model, 1), self.model.coordinates, 1)
         return self._running_sum([self.length(j) * self._instance(rate, j) for j in self.numbers])
 
+    @cached_property
+    def rate_symbols(self) -> list[Matrix]:
+        """ṙ_i as symbols of their own (x_dot_i, …), so that the bobs' energies need not be written out."""
+        return [
+            Matrix([Symbol(f"{axis}_dot_{i}") for axis in "xyz"[: self.model.dimension]])
+            for i in self.numbers
+        ]
+
+    @cached_property
+    def rate_definitions(self) -> dict[Symbol, Expr]:
+        """What rate_symbols stand for: ṙ_i = ṙ_(i−1) + l_i û̇_i."""
+        rate = _rate(_direction(self.model, 1), self.model.coordinates, 1)
+        definitions: dict[Symbol, Expr] = {}
+        before = rate * 0
+        for i, symbols in zip(self.numbers, self.rate_symbols, strict=True):
+            step = before + self.length(i) * self._instance(rate, i)
+            definitions.update(zip(symbols, step, strict=True))
+            before = symbols
+        return definitions
+
     def _running_sum(self, steps: list[Matrix]) -> list[Matrix]:
         return [sum(steps[: i + 1], start=steps[0] * 0) for i in range(self.links)]
 
@@ -214,10 +234,9 @@ class Chain:
 
     @cached_property
     def kinetic_energy_of_bobs(self) -> Expr:
-        """T = ½ Σ_i m_i |ṙ_i|², J: the definition, linear in n."""
-        return Add(
-            *(Rational(1, 2) * self.mass(i) * r.dot(r) for i, r in zip(self.numbers, self.rates, strict=True))
-        )
+        """T = ½ Σ_i m_i |ṙ_i|², J: the definition, linear in n, in rate_symbols."""
+        rates = zip(self.numbers, self.rate_symbols, strict=True)
+        return Add(*(Rational(1, 2) * self.mass(i) * rate.dot(rate) for i, rate in rates))
 
     @cached_property
     def potential_energy(self) -> Expr:

@@ -1,9 +1,9 @@
-"""The entry points of a dense kernel: named functions with inputs, outputs, units and the expressions of a chain."""
+"""The entry points of a dense kernel: named functions, their arguments, units and expressions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import product
 
@@ -50,25 +50,28 @@ class Output:
 
 @dataclass(frozen=True)
 class Function:
-    """An entry point. `alternatives`: other values for the same outputs, kept when they are cheaper."""
+    """An entry point.
+
+    other_values   other forms of the outputs' values, kept when they are cheaper
+    definitions    what symbols stand for that are neither inputs nor the chain's own
+    """
 
     name: str
     title: str
     inputs: tuple[str, ...]
     outputs: tuple[Output, ...]
-    alternatives: tuple[tuple[Matrix | Expr, ...], ...] = ()
+    other_values: tuple[Matrix | Expr, ...] = ()
+    definitions: dict[Symbol, Expr] = field(default_factory=dict)
 
     def candidates(self) -> list[list[Assignment]]:
         first = [assignment for output in self.outputs for assignment in output.assignments]
+        if not self.other_values:
+            return [first]
         others = [
-            [
-                assignment
-                for output, value in zip(self.outputs, values, strict=True)
-                for assignment in Output(output.name, output.type, value, "").assignments
-            ]
-            for values in self.alternatives
+            replace(output, value=value)
+            for output, value in zip(self.outputs, self.other_values, strict=True)
         ]
-        return [first, *others]
+        return [first, [assignment for output in others for assignment in output.assignments]]
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class RenderedFunction:
 
     @property
     def arguments(self) -> list[str]:
-        """Parameters of the C++ function; an input that the mathematics does not need keeps its place, unnamed."""
+        """Parameters of the C++ function; an input that the mathematics does not need stays, unnamed."""
         read = [
             f"const {INPUT_TYPES[name]}& {name if name in self.body.sources else f'/*{name}*/'}"
             for name in self.function.inputs
@@ -118,7 +121,7 @@ class DenseKernel:
             self._linear_system(),
         ]
 
-    # --- values -----------------------------------------------------------------------------------------------
+    # --- values
 
     def _kinematics(self) -> list[Function]:
         numbers = self._paper("1, 2", "24–26")
@@ -155,7 +158,8 @@ class DenseKernel:
                 title,
                 ("chain", "q") if name == "potential_energy" else ("chain", "q", "v"),
                 (Output(symbol, "Real", value, "scalar|J"),),
-                ((other,),) if other is not None else (),
+                (other,) if other is not None else (),
+                self.chain.rate_definitions if other is not None else {},
             )
             for name, symbol, title, value, other in table
         ]
@@ -214,7 +218,7 @@ class DenseKernel:
         title = f"Block {name} of the equations of motion: {what}   (paper eq. {number})"
         return Function(f"block_{name}", title, ("chain", "q"), (output,))
 
-    # --- equations of motion ----------------------------------------------------------------------------------
+    # --- equations of motion
 
     @cached_property
     def _mass(self) -> Matrix:
@@ -232,7 +236,8 @@ class DenseKernel:
         return Output(name, "Matrix<Real>", value, f"{meaning}, ({size} x {size})|{unit}", lower)
 
     def _forces(self) -> list[Function]:
-        title = f"Generalised force  Q(q, v, torque) of torque and damping   (paper eq. 23{self._paper('', ', in space')})"
+        number = self._paper("23", "23, in space")
+        title = f"Generalised force  Q(q, v, torque) of torque and damping   (paper eq. {number})"
         inputs = ("chain", "q", "v", "torque")
         Q = self.chain.forces
         value = self._vector("Q", Q, "generalised force", "N m")
@@ -274,7 +279,7 @@ class DenseKernel:
             Function("residual_with_jacobians", title, inputs, (value, D_q, D_v, D_a)),
         ]
 
-    # --- the Lagrangian's derivatives -------------------------------------------------------------------------
+    # --- the Lagrangian's derivatives
 
     @cached_property
     def _L_q(self) -> list[Expr]:
@@ -355,19 +360,20 @@ class DenseKernel:
     def _paper(self, planar: str, spatial: str) -> str:
         return planar if self.chain.model.dof == 1 else spatial
 
-    # --- rendering --------------------------------------------------------------------------------------------
+    # --- rendering
 
     def render(self) -> list[RenderedFunction]:
-        vocabularies = self._vocabularies()
         return [
-            RenderedFunction(function, shortest_body(function.candidates(), vocabularies))
+            RenderedFunction(
+                function, shortest_body(function.candidates(), self._vocabularies(function.definitions))
+            )
             for function in self.functions()
         ]
 
-    def _vocabularies(self) -> list[Callable[[], Vocabulary]]:
+    def _vocabularies(self, extra: dict[Symbol, Expr]) -> list[Callable[[], Vocabulary]]:
         inertias = frozenset(s for s in self.chain.definitions if s.name.startswith("inertia"))
         alias = self.chain.mass_below(self.chain.links)
-        definitions = tail_recursion(self.chain)
+        definitions = {**tail_recursion(self.chain), **extra}
         return [
             partial(
                 Vocabulary,
@@ -401,7 +407,7 @@ class DenseKernel:
 
 
 def tail_recursion(chain: Chain) -> dict[Symbol, Expr]:
-    """The chain's definitions with M_i = m_i + M_(i+1), which costs one addition a link; M_n is m_n itself."""
+    """The chain's definitions with M_i = m_i + M_(i+1), one addition a link; M_n is m_n itself."""
     definitions = dict(chain.definitions)
     for i in chain.numbers:
         below = chain.mass_below(i + 1) if i < chain.links else Rational(0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from sympy import Add, Expr, Symbol
+from sympy import Add, Expr, Mul, Symbol
 
 from pendula_codegen.errors import GenerationError
 
@@ -52,16 +52,24 @@ def require_declared(expression: Expr, declared: Iterable[Symbol], what: str) ->
 def gradient(expression: Expr, symbols: Sequence[Symbol]) -> list[Expr]:
     """∂expression/∂symbol for each symbol.
 
-    A chain's Lagrangian is a long sum of terms that each hold few symbols, so every term is differentiated by
-    its own symbols only; this keeps the work proportional to what is not zero.
+    A chain's Lagrangian is a long sum of products that each hold few symbols, so every product is
+    differentiated by its own symbols only, factor by factor: the work is proportional to what is not zero,
+    and SymPy remembers the derivative of a factor that comes again.
     """
     parts: dict[Symbol, list[Expr]] = {symbol: [] for symbol in symbols}
     for term in Add.make_args(expression):
-        held = term.free_symbols
-        for symbol in symbols:
-            if symbol in held:
-                parts[symbol].append(term.diff(symbol))
+        factors = Mul.make_args(term)
+        for k, factor in enumerate(factors):
+            for symbol, slope in _factor_gradient(factor, parts.keys() & factor.free_symbols):
+                parts[symbol].append(Mul(*factors[:k], slope, *factors[k + 1 :]))
     return [Add(*parts[symbol]) for symbol in symbols]
+
+
+def _factor_gradient(factor: Expr, symbols: Iterable[Symbol]) -> Iterable[tuple[Symbol, Expr]]:
+    if isinstance(factor, Add | Mul):
+        held = list(symbols)
+        return zip(held, gradient(factor, held), strict=True)
+    return ((symbol, factor.diff(symbol)) for symbol in symbols)
 
 
 def jacobian(expressions: Sequence[Expr], symbols: Sequence[Symbol]) -> list[list[Expr]]:
@@ -75,7 +83,7 @@ def momenta(system: LagrangianSystem) -> list[Expr]:
 
 
 def euler_lagrange(system: LagrangianSystem, accelerations: Sequence[Symbol]) -> list[Expr]:
-    """d/dt ∂L/∂v_k − ∂L/∂q_k for each k, with dv/dt = accelerations (paper eq. 10); loads are not subtracted."""
+    """d/dt ∂L/∂v_k − ∂L/∂q_k for each k, dv/dt = accelerations (paper eq. 10); loads are not subtracted."""
     p_D_q = jacobian(momenta(system), system.coordinates)
     p_D_v = jacobian(momenta(system), system.velocities)
     L_q = gradient(system.lagrangian, system.coordinates)

@@ -6,12 +6,11 @@ import textwrap
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 from sympy import Add, Expr, Integer, Symbol, cos, sin
 
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.polynomial import Expander, Polynomial
+from pendula_codegen.polynomial import Expander, Number, Polynomial, ordered
 from pendula_codegen.straight_line import UNIT, ZERO, Graph, Term, factor, share
 
 WIDTH = 112
@@ -106,12 +105,12 @@ class Vocabulary:
         return self._expander.expand(expression)
 
     def define(self, graph: Graph, polynomials: Sequence[Polynomial]) -> None:
-        """Gives `graph` the definitions of the atoms that the polynomials hold, directly or through others."""
+        """Gives `graph` the definitions of the atoms that the polynomials hold, also through others."""
         waiting = [atom for polynomial in polynomials for monomial in polynomial for atom in monomial]
         while waiting:
             atom = waiting.pop()
             if atom in self._pending and atom not in graph.definitions:
-                definition = self.polynomial(self._pending[atom])
+                definition = ordered(self.polynomial(self._pending[atom]))
                 graph.definitions[atom] = factor(graph, definition)
                 waiting += [part for monomial in definition for part in monomial]
 
@@ -119,7 +118,7 @@ class Vocabulary:
         if expression in self._form.expanded:
             return self.polynomial(self._definitions[expression])
         if expression in self._numbers:
-            return {(self._numbers[expression],): Fraction(1)}
+            return {(self._numbers[expression],): 1}
         if isinstance(expression, Symbol):
             raise GenerationError(
                 f"a kernel function holds the symbol '{expression}', which is not an argument"
@@ -137,7 +136,7 @@ class Vocabulary:
             number = self._pairs.get((function, terms[0][1], terms[1][1]))
             if number is not None:
                 sign = terms[0][0] if function is sin else 1
-                return {(number,): Fraction(sign)}
+                return {(number,): sign}
         return self.polynomial(self._of_sum(function, terms))
 
     @staticmethod
@@ -207,7 +206,7 @@ def shortest_body(
 
 def _build(assignments: Sequence[Assignment], vocabulary: Vocabulary) -> tuple[Graph, list[Term]]:
     graph = Graph(atoms=len(vocabulary.names))
-    polynomials = [vocabulary.polynomial(value) for _, value in assignments]
+    polynomials = [ordered(vocabulary.polynomial(value)) for _, value in assignments]
     vocabulary.define(graph, polynomials)
     outputs = [factor(graph, polynomial) for polynomial in polynomials]
     share(graph, outputs)
@@ -306,13 +305,13 @@ class _Printer:
         return text
 
 
-def _number(value: Fraction) -> str:
+def _number(value: Number) -> str:
     if value.denominator & (value.denominator - 1) == 0:
         return f"Real({float(value)!r})"
     return f"Real({value.numerator}.0 / {value.denominator}.0)"
 
 
-def _scale(coefficient: Fraction, text: str) -> str:
+def _scale(coefficient: Number, text: str) -> str:
     if abs(coefficient) == 1:
         return text if coefficient > 0 else f"-{text}"
     return f"{_number(coefficient)} * {text}"

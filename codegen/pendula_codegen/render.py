@@ -23,7 +23,7 @@ WIDTH = 120
 
 
 def signature(name: str, arguments: list[str]) -> str:
-    """First line or lines of a static member function, broken at arguments to the width of the project's style."""
+    """First lines of a static member function, broken at arguments to the width of the project's style."""
     head = f"  static void {name}("
     lines = [head]
     for k, argument in enumerate(arguments):
@@ -48,7 +48,7 @@ ENVIRONMENT.globals["signature"] = signature
 
 
 def inputs_hash(model: str | None) -> str:
-    """SHA-256 (16 digits) over what a header is made from: the generator's sources and, where given, the model."""
+    """SHA-256 (16 digits) over what a header is made from: the generator's sources and the model, if any."""
     digest = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*")):
         name = path.relative_to(PACKAGE).as_posix()

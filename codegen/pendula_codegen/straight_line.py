@@ -1,10 +1,10 @@
 """From polynomials to a short straight-line program: factoring, common subexpressions, operation counts.
 
 Two stages, both greedy and deterministic:
-1. every polynomial is factored by a multivariate Horner scheme (the atom in most terms is pulled out first), which
-   finds by itself, for example, the acceleration components of one link inside the equations of all the others;
-2. over all outputs together, the pair of factors (then of summands) that occurs most often becomes a temporary,
-   until no pair occurs twice.
+1. every polynomial is factored by a multivariate Horner scheme (the atom in most terms is pulled out first),
+   which finds by itself, for example, the acceleration components of one link in the equations of the others;
+2. over all outputs together, the pair of factors (then of summands) that occurs most often becomes a
+   temporary, until no pair occurs twice.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ import heapq
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from fractions import Fraction
 from math import gcd, lcm
 
-from pendula_codegen.polynomial import Monomial, Polynomial
+from pendula_codegen.polynomial import Monomial, Number, Polynomial, quotient
 
-Term = tuple[Fraction, int]  # coefficient, node
-ZERO: Term = (Fraction(0), -1)
+Term = tuple[Number, int]  # coefficient, node
+ZERO: Term = (0, -1)
 UNIT = -2  # stands for the number 1 as a node
 
 
@@ -27,8 +26,8 @@ UNIT = -2  # stands for the number 1 as a node
 class Graph:
     """Expressions with shared parts. Node numbers below `atoms` are atoms; the others are products or sums.
 
-    A product is a tuple of nodes with multiplicity, a sum a tuple of (coefficient, node); neither has a numeric
-    factor of its own, so that ±x and 2x share x. `definitions` gives what a named atom stands for.
+    A product is a tuple of nodes with multiplicity, a sum a tuple of (coefficient, node); neither has a
+    number as a factor, so that ±x and 2x share x. `definitions` gives what a named atom stands for.
     """
 
     atoms: int
@@ -48,7 +47,8 @@ class Graph:
 
     def product(self, terms: Iterable[Term]) -> Term:
         """The product of terms, nested products flattened."""
-        coefficient, factors = Fraction(1), []
+        coefficient: Number = 1
+        factors: list[int] = []
         for scale, node in terms:
             coefficient *= scale
             if node != UNIT:
@@ -60,12 +60,11 @@ class Graph:
         return coefficient, self._node(self.products, tuple(sorted(factors)))
 
     def sum(self, terms: Iterable[Term]) -> Term:
-        """The sum of terms, scaled so that its coefficients are coprime integers and the first is positive."""
-        collected: Counter[int] = Counter()
+        """The sum of terms, nested sums flattened; scaled so that the first coefficient is positive."""
+        collected: dict[int, Number] = {}
         for scale, node in terms:
-            inner = self.sums.get(node, ((Fraction(1), node),))
-            for coefficient, part in inner:
-                collected[part] += scale * coefficient
+            for coefficient, part in self.sums.get(node, ((1, node),)):
+                collected[part] = collected.get(part, 0) + scale * coefficient
         parts = sorted((node, value) for node, value in collected.items() if value)
         if not parts:
             return ZERO
@@ -74,7 +73,9 @@ class Graph:
             content = -content
         if len(parts) == 1:
             return parts[0][1], parts[0][0]
-        return content, self._node(self.sums, tuple((value / content, node) for node, value in parts))
+        return content, self._node(
+            self.sums, tuple((quotient(value, content), node) for node, value in parts)
+        )
 
     def children(self, node: int) -> list[int]:
         """The nodes that `node` reads, with multiplicity."""
@@ -117,71 +118,69 @@ class Graph:
         return count
 
 
-def _scaling(coefficient: Fraction) -> int:
+def _scaling(coefficient: Number) -> int:
     return 0 if abs(coefficient) in (0, 1) else 1
 
 
-def _content(values: list[Fraction]) -> Fraction:
-    """The positive number that makes `values` coprime integers when they are divided by it."""
+def _content(values: list[Number]) -> Number:
+    """A positive factor worth pulling out of a sum: 1 where a coefficient is ±1, which is free already."""
+    if 1 in values or -1 in values:
+        return 1
     numerator, denominator = 0, 1
     for value in values:
         numerator = gcd(numerator, value.numerator)
         denominator = lcm(denominator, value.denominator)
-    return Fraction(numerator, denominator)
+    return quotient(numerator, denominator)
 
 
 def factor(graph: Graph, polynomial: Polynomial) -> Term:
     """Multivariate Horner form of `polynomial`, built in `graph`."""
     if not polynomial:
         return ZERO
-    common = _common_atoms(polynomial)
-    if common:
+    outside: list[Term] = []
+    counts = _occurrences(polynomial)
+    common = [atom for atom, count in counts.items() if count == len(polynomial)]
+    while common:
+        outside += [(1, atom) for atom in common]
         polynomial = {_without(monomial, common): value for monomial, value in polynomial.items()}
-    outside = [(Fraction(1), atom) for atom in common]
-    return graph.product([*outside, _factor_sum(graph, polynomial)])
+        counts = _occurrences(polynomial)
+        common = [atom for atom, count in counts.items() if count == len(polynomial)]
+    return graph.product([*outside, _factor_sum(graph, polynomial, counts)])
 
 
-def _factor_sum(graph: Graph, polynomial: Polynomial) -> Term:
+def _factor_sum(graph: Graph, polynomial: Polynomial, counts: Counter[int]) -> Term:
     """A polynomial without common atoms, as a sum of products."""
     terms: list[Term] = []
     rest = polynomial
     while rest:
-        best, count = _most_frequent(rest)
-        if count < 2:
+        best = min(counts, key=lambda atom: (-counts[atom], atom), default=-1)
+        if counts[best] < 2:
             terms += [
-                graph.product([(value, UNIT), *((Fraction(1), atom) for atom in monomial)])
+                graph.product([(value, UNIT), *((1, atom) for atom in monomial)])
                 for monomial, value in rest.items()
             ]
             break
-        terms.append(factor(graph, {m: value for m, value in rest.items() if best in m}))
-        rest = {m: value for m, value in rest.items() if best not in m}
+        group = {monomial: value for monomial, value in rest.items() if best in monomial}
+        terms.append(factor(graph, group))
+        rest = {monomial: value for monomial, value in rest.items() if monomial not in group}
+        counts.subtract(_occurrences(group))
     return graph.sum(terms)
 
 
-def _most_frequent(polynomial: Polynomial) -> tuple[int, int]:
-    """The atom in most monomials (the earlier one on a tie) and their number."""
+def _occurrences(polynomial: Polynomial) -> Counter[int]:
+    """In how many monomials each atom is."""
     counts: Counter[int] = Counter()
     for monomial in polynomial:
         counts.update(set(monomial))
-    return min(
-        ((atom, count) for atom, count in counts.items()), key=lambda x: (-x[1], x[0]), default=(-1, 0)
-    )
+    return counts
 
 
-def _common_atoms(polynomial: Polynomial) -> Monomial:
-    monomials = iter(polynomial)
-    common = Counter(next(monomials))
-    for monomial in monomials:
-        common &= Counter(monomial)
-        if not common:
-            break
-    return tuple(sorted(common.elements()))
-
-
-def _without(monomial: Monomial, removed: Monomial) -> Monomial:
-    remaining = Counter(monomial)
-    remaining.subtract(removed)
-    return tuple(sorted(remaining.elements()))
+def _without(monomial: Monomial, removed: list[int]) -> Monomial:
+    """`monomial` divided once by each of `removed`."""
+    remaining = list(monomial)
+    for atom in removed:
+        remaining.remove(atom)
+    return tuple(remaining)
 
 
 class _PairExtraction:
@@ -240,6 +239,10 @@ class _PairExtraction:
         raise NotImplementedError
 
 
+def _ratio(numerator: Number, denominator: Number) -> Number:
+    return numerator * denominator if denominator in (1, -1) else quotient(numerator, denominator)
+
+
 class _ProductPairs(_PairExtraction):
     def pairs(self, row: int) -> set[tuple]:
         factors = self.graph.products[row]
@@ -258,18 +261,18 @@ class _ProductPairs(_PairExtraction):
 class _SumPairs(_PairExtraction):
     def pairs(self, row: int) -> set[tuple]:
         terms = self.graph.sums[row]
-        return {(a, b, y / x) for i, (x, a) in enumerate(terms) for y, b in terms[i + 1 :]}
+        return {(a, b, _ratio(y, x)) for i, (x, a) in enumerate(terms) for y, b in terms[i + 1 :]}
 
     def make(self, pair: tuple) -> int:
         a, b, ratio = pair
-        content = _content([Fraction(1), ratio])
-        return self.graph._node(self.graph.sums, ((1 / content, a), (ratio / content, b)))
+        content = _content([1, ratio])
+        return self.graph._node(self.graph.sums, ((quotient(1, content), a), (quotient(ratio, content), b)))
 
     def replace(self, row: int, pair: tuple, new: int) -> None:
         a, b, _ = pair
         terms = self.graph.sums[row]
         own = next(value for value, node in terms if node == a)
-        scale = own / self.graph.sums[new][0][0]
+        scale = _ratio(own, self.graph.sums[new][0][0])
         remaining = [term for term in terms if term[1] not in (a, b)]
         self.graph.sums[row] = tuple(sorted([*remaining, (scale, new)], key=lambda term: term[1]))
 

@@ -1,4 +1,4 @@
-"""Gauss–Legendre tableaux, s = 1..8, computed in high precision and rounded once (paper eq. 45–51 for s = 2)."""
+"""Gauss–Legendre tableaux, s = 1..8, in high precision and rounded once (paper eq. 45–51 for s = 2)."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Tableau:
     def m(self) -> list[list[float]]:
         """a_ij / b_j in double precision with m_ii = ½ and m_ij + m_ji = 1 exactly.
 
-        The larger of the two is rounded; 1 minus it is then exact (Sterbenz), because it lies in [½, 2]. m depends
-        on i and j through b_j only, and a_ij b_i + a_ji b_j = b_i b_j is what makes the method symplectic.
+        The larger of the two is rounded; 1 minus it is then exact (Sterbenz), because it lies in [½, 2].
+        This is a_ij b_i + a_ji b_j = b_i b_j, which makes the method symplectic, without any rounding.
         """
         s = range(self.stages)
         m = [[0.5] * self.stages for _ in s]
@@ -80,7 +80,7 @@ def gauss(stages: int) -> Tableau:
 
 def _gauss(stages: int) -> Tableau:
     coefficients = taylor(lambda x: mp.legendre(stages, 2 * x - 1), 0, stages)[::-1]
-    c = sorted((mp.re(root) for root in polyroots(coefficients, maxsteps=500, extraprec=4 * DIGITS)))
+    c = sorted(mp.re(root) for root in polyroots(coefficients, maxsteps=500, extraprec=4 * DIGITS))
     powers = range(1, stages + 1)
     vandermonde = mp.matrix([[node ** (k - 1) for node in c] for k in powers])
     # Collocation integrates every polynomial of degree < s exactly: Σ_j a_ij c_j^(k−1) = c_i^k / k.

@@ -4,7 +4,7 @@ from sympy import Matrix, Rational, cos, sin, symbols
 
 from pendula_codegen.model import LinkModel
 
-theta, m, l, g, damping, sigma = symbols("theta m l g lambda sigma")
+theta, m, length, g, damping, sigma = symbols("theta m l g lambda sigma")
 
 MODEL = LinkModel(
     name="planar",
@@ -12,7 +12,7 @@ MODEL = LinkModel(
     direction=Matrix([sin(theta), -cos(theta)]),
     up=Matrix([0, 1]),
     mass=m,
-    length=l,
+    length=length,
     gravity=g,
     damping=damping,
     torque=(sigma,),

@@ -4,7 +4,7 @@ from sympy import Matrix, Rational, cos, sin, symbols
 
 from pendula_codegen.model import LinkModel
 
-theta, phi, m, l, g, damping = symbols("theta phi m l g lambda")
+theta, phi, m, length, g, damping = symbols("theta phi m l g lambda")
 tau = symbols("tau_x tau_y tau_z")
 
 MODEL = LinkModel(
@@ -13,7 +13,7 @@ MODEL = LinkModel(
     direction=Matrix([sin(theta) * cos(phi), sin(theta) * sin(phi), -cos(theta)]),
     up=Matrix([0, 0, 1]),
     mass=m,
-    length=l,
+    length=length,
     gravity=g,
     damping=damping,
     torque=tau,
