@@ -12,7 +12,9 @@ from sympy import Expr, Matrix, Rational, Symbol
 from pendula_codegen.blocks import Blocks, collect_blocks, recompose
 from pendula_codegen.chain import Chain
 from pendula_codegen.mechanics import gradient, jacobian
-from pendula_codegen.program import Angle, Assignment, Body, Form, Leaf, Vocabulary, shortest_body
+from pendula_codegen.printing import Body, print_body
+from pendula_codegen.program import Assignment, Program, shortest_program
+from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 
 INPUT_TYPES = {
     "chain": "Parameters<Real>",
@@ -364,11 +366,11 @@ class DenseKernel:
 
     def render(self) -> list[RenderedFunction]:
         return [
-            RenderedFunction(
-                function, shortest_body(function.candidates(), self._vocabularies(function.definitions))
-            )
-            for function in self.functions()
+            RenderedFunction(function, print_body(self.program(function))) for function in self.functions()
         ]
+
+    def program(self, function: Function) -> Program:
+        return shortest_program(function.candidates(), self._vocabularies(function.definitions))
 
     def _vocabularies(self, extra: dict[Symbol, Expr]) -> list[Callable[[], Vocabulary]]:
         inertias = frozenset(s for s in self.chain.definitions if s.name.startswith("inertia"))

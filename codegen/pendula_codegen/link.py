@@ -9,7 +9,9 @@ from itertools import combinations_with_replacement
 from sympy import Expr, Matrix, cos, sin
 
 from pendula_codegen.model import LinkModel
-from pendula_codegen.program import Angle, Assignment, Body, Form, Leaf, Vocabulary, shortest_body
+from pendula_codegen.printing import Body, print_body
+from pendula_codegen.program import Assignment, shortest_program
+from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 
 ORDER_NAMES = {1: "first", 2: "second", 3: "third"}
 
@@ -89,7 +91,7 @@ class LinkKernel:
         return [self._render(function) for function in self.functions()]
 
     def _render(self, function: LinkFunction) -> RenderedLinkFunction:
-        body = shortest_body([function.assignments], [lambda: self._vocabulary(function)])
+        body = print_body(shortest_program([function.assignments], [lambda: self._vocabulary(function)]))
         read = [
             f"const {kind}& {name if name in body.sources else f'/*{name}*/'}"
             for kind, name in function.inputs

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from sympy import Add, Expr, Mul, Symbol
+from sympy import Add, Expr, Integer, Mul, Symbol
 
 from pendula_codegen.errors import GenerationError
 
@@ -66,7 +66,9 @@ def gradient(expression: Expr, symbols: Sequence[Symbol]) -> list[Expr]:
 
 
 def _factor_gradient(factor: Expr, symbols: Iterable[Symbol]) -> Iterable[tuple[Symbol, Expr]]:
-    if isinstance(factor, Add | Mul):
+    if factor.is_Symbol:
+        return ((symbol, Integer(1)) for symbol in symbols)
+    if factor.is_Add or factor.is_Mul:
         held = list(symbols)
         return zip(held, gradient(factor, held), strict=True)
     return ((symbol, factor.diff(symbol)) for symbol in symbols)

@@ -13,6 +13,7 @@ import heapq
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import chain
 from math import gcd, lcm
 
 from pendula_codegen.polynomial import Monomial, Number, Polynomial, quotient
@@ -34,6 +35,7 @@ class Graph:
     products: dict[int, tuple[int, ...]] = field(default_factory=dict)
     sums: dict[int, tuple[Term, ...]] = field(default_factory=dict)
     definitions: dict[int, Term] = field(default_factory=dict)
+    factored: dict[tuple, Term] = field(default_factory=dict)
     _known: dict[tuple, int] = field(default_factory=dict)
     _next: int = -1
 
@@ -103,11 +105,10 @@ class Graph:
                     stack += [(child, False) for child in reversed(self.children(node))]
         return list(done)
 
-    def operations(self, outputs: Iterable[Term]) -> int:
-        """Additions, subtractions and multiplications of the whole program."""
-        roots = list(outputs)
-        count = sum(_scaling(coefficient) for coefficient, node in roots if node != UNIT)
-        for node in self.order(node for _, node in roots):
+    def operations(self, outputs: Iterable[Term], needed: Iterable[int]) -> int:
+        """Additions, subtractions and multiplications; `needed`: the nodes that order() gives."""
+        count = sum(_scaling(coefficient) for coefficient, node in outputs if node != UNIT)
+        for node in needed:
             if node in self.products:
                 count += len(self.products[node]) - 1
             elif node in self.sums:
@@ -134,7 +135,14 @@ def _content(values: list[Number]) -> Number:
 
 
 def factor(graph: Graph, polynomial: Polynomial) -> Term:
-    """Multivariate Horner form of `polynomial`, built in `graph`."""
+    """Multivariate Horner form of `polynomial`, built in `graph`; each polynomial is factored once."""
+    key = tuple(polynomial.items())
+    if key not in graph.factored:
+        graph.factored[key] = _factor(graph, polynomial)
+    return graph.factored[key]
+
+
+def _factor(graph: Graph, polynomial: Polynomial) -> Term:
     if not polynomial:
         return ZERO
     outside: list[Term] = []
@@ -153,8 +161,8 @@ def _factor_sum(graph: Graph, polynomial: Polynomial, counts: Counter[int]) -> T
     terms: list[Term] = []
     rest = polynomial
     while rest:
-        best = min(counts, key=lambda atom: (-counts[atom], atom), default=-1)
-        if counts[best] < 2:
+        best = _most_frequent(counts)
+        if best is None:
             terms += [
                 graph.product([(value, UNIT), *((1, atom) for atom in monomial)])
                 for monomial, value in rest.items()
@@ -167,12 +175,18 @@ def _factor_sum(graph: Graph, polynomial: Polynomial, counts: Counter[int]) -> T
     return graph.sum(terms)
 
 
+def _most_frequent(counts: Counter[int]) -> int | None:
+    """The atom in most monomials, the first one on a tie; None where no atom is in two."""
+    best, most = None, 1
+    for atom, count in counts.items():
+        if count > most or (count == most > 1 and atom < best):
+            best, most = atom, count
+    return best
+
+
 def _occurrences(polynomial: Polynomial) -> Counter[int]:
     """In how many monomials each atom is."""
-    counts: Counter[int] = Counter()
-    for monomial in polynomial:
-        counts.update(set(monomial))
-    return counts
+    return Counter(chain.from_iterable(map(set, polynomial)))
 
 
 def _without(monomial: Monomial, removed: list[int]) -> Monomial:
