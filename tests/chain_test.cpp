@@ -48,8 +48,7 @@ TEST(Chain, AddsDrivesToTheConstantTorque) {
 TEST(Chain, NamesWhatIsWrong) {
   auto parameters = two_links();
   parameters.masses[1] = -1;
-  EXPECT_EQ(error_of(parameters),
-            "chain: masses of link 2: expected a positive finite number, got -1.000000");
+  EXPECT_EQ(error_of(parameters), "chain: masses of link 2: expected a positive finite number, got -1.000000");
   parameters = two_links();
   parameters.lengths = Eigen::Vector3d::Ones();
   EXPECT_EQ(error_of(parameters), "chain: lengths: expected one entry for each of the 2 links, got 3");

@@ -7,7 +7,7 @@ namespace pendula::test {
 namespace {
 
 struct EnergyRun {
-  double largest = 0;                 // max |H − H₀|
+  double largest = 0;                      // max |H − H₀|
   double first_tenth = 0, last_tenth = 0;  // medians of |H − H₀| over the rows
 };
 
@@ -21,8 +21,9 @@ EnergyRun energy_run(const State<Planar>& start, const RunOptions& options, doub
   const auto integrator = make_integrator(chain, options);
   const double before = energy(chain, start);
   std::vector<double> errors;
-  const RunResult result = simulate(*integrator, start, {step, step * static_cast<double>(steps), 100},
-                                    [&](const auto& state) { errors.push_back(std::abs(energy(chain, state) - before)); });
+  const RunResult result =
+      simulate(*integrator, start, {step, step * static_cast<double>(steps), 100},
+               [&](const auto& state) { errors.push_back(std::abs(energy(chain, state) - before)); });
   EXPECT_TRUE(result.outcome) << result.outcome;
   EnergyRun run;
   run.largest = *std::max_element(errors.begin(), errors.end());

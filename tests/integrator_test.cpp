@@ -8,7 +8,9 @@
 namespace pendula::test {
 namespace {
 
-State<Planar> swinging(int links) { return State<Planar>::from_angles(Eigen::VectorXd::Constant(links, 1.0)); }
+State<Planar> swinging(int links) {
+  return State<Planar>::from_angles(Eigen::VectorXd::Constant(links, 1.0));
+}
 
 TEST(Factory, NamesTheKernelsToConfigure) {
   const Chain<Planar> chain = equal_chain<Planar>(40);
@@ -36,7 +38,7 @@ TEST(Factory, SaysWhatRuns) {
 
 TEST(Factory, FixedSizeSteppersAgreeWithIt) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
-  GaussStepper<DenseMomentumNewton<kernels::Planar2, 3>> stepper{DenseMomentumNewton<kernels::Planar2, 3>(chain, 3)};
+  GaussStepper<DenseMomentumNewton<kernels::Planar2, 3>> stepper(chain, 3);
   const auto integrator = make_integrator(chain, gauss(3));
   ASSERT_TRUE(stepper.start(swinging(2)));
   ASSERT_TRUE(integrator->start(swinging(2)));
@@ -44,7 +46,7 @@ TEST(Factory, FixedSizeSteppersAgreeWithIt) {
     ASSERT_TRUE(stepper.step(0.01));
     ASSERT_TRUE(integrator->step(0.01));
   }
-  EXPECT_LT(distance(stepper.state(), integrator->state()), 1e-13);
+  EXPECT_LT(distance(stepper.state(), integrator->state()), 3e-15);  // measured 2e-16
 }
 
 TEST(ExplicitMethods, MeetGaussLegendre) {
@@ -52,13 +54,13 @@ TEST(ExplicitMethods, MeetGaussLegendre) {
   const State<Planar> reference = final_state(chain, swinging(2), gauss(8), 0.01, 1);
   RunOptions options;
   options.method = Method::rk4;
-  EXPECT_LT(distance(final_state(chain, swinging(2), options, 1e-3, 1), reference), 1e-9);
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, 1e-3, 1), reference), 5e-10);  // measured 1.1e-10
   options.tolerance = 1e-10;
   const double any = std::numeric_limits<double>::infinity();
   options.method = Method::dopri5;
-  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-7);
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-9);  // measured 1.4e-10
   options.method = Method::fehlberg78;
-  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-8);
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);  // measured 4e-10
 }
 
 TEST(ExplicitMethods, ToleranceSteersTheError) {
@@ -71,7 +73,7 @@ TEST(ExplicitMethods, ToleranceSteersTheError) {
   const double coarse = distance(final_state(chain, swinging(2), options, any, 1), reference);
   options.tolerance = 1e-9;
   const double fine = distance(final_state(chain, swinging(2), options, any, 1), reference);
-  EXPECT_LT(fine, coarse / 100);
+  EXPECT_LT(fine, coarse / 1000);  // measured 1.5e-9 and 6.4e-5
   EXPECT_GT(coarse, 1e-9);
 }
 
@@ -89,17 +91,19 @@ TEST(Failure, AtThePoleNamesTheLink) {
   const Outcome outcome = integrator->start(start);
   EXPECT_EQ(outcome.status, Status::singular_mass_matrix);
   EXPECT_EQ(outcome.link, 1);
-  EXPECT_EQ(message(outcome),
-            "at t = 0 s: the mass matrix in (theta, phi) is singular: sin(theta) = 0 at link 2, where phi has no meaning");
+  EXPECT_EQ(
+      message(outcome),
+      "at t = 0 s: the mass matrix in (theta, phi) is singular: sin(theta) = 0 at link 2, where phi has no meaning");
 }
 
 TEST(Failure, OfNewtonLeavesTheStateAndSaysHowFarItCame) {
   const auto integrator = make_integrator(equal_chain<Planar>(4), gauss(8));
   ASSERT_TRUE(integrator->start(swinging(4)));
-  const Outcome outcome = integrator->step(50.0);
-  ASSERT_FALSE(outcome);
-  EXPECT_GE(outcome.iterations, 1);
-  EXPECT_EQ(outcome.step, 50.0);
+  const Outcome outcome = integrator->step(20.0);
+  ASSERT_EQ(outcome.status, Status::not_converged) << outcome;
+  EXPECT_EQ(outcome.iterations, StepperOptions{}.max_iterations);
+  EXPECT_EQ(outcome.step, 20.0);
+  EXPECT_GT(outcome.residual, 1e-2);  // measured 0.3
   EXPECT_EQ(integrator->time(), 0);
   EXPECT_EQ(distance(integrator->state(), swinging(4)), 0);
   EXPECT_EQ(integrator->statistics().steps, 0);

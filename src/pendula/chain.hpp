@@ -66,8 +66,9 @@ class Chain {
   /// Constant torque without the drives, (torque_components x n)  [N m].
   const Torque<Space, N>& constant_torque() const { return parameters_.torque; }
 
-  /// Torque on every link at `time`, (torque_components x n)  [N m].
-  void torque(double time, Eigen::Ref<Torque<Space, Eigen::Dynamic>> torque) const {
+  /// Torque on every link at `time`, (torque_components x n)  [N m], into a matrix of fixed or run-time size.
+  template <class Derived>
+  void torque(double time, Eigen::PlainObjectBase<Derived>& torque) const {
     torque = parameters_.torque;
     for (const Drive<Space>& drive : drives()) {
       torque.col(drive.link) += std::sin(drive.frequency * time + drive.phase) * drive.amplitude;

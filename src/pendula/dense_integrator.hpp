@@ -22,11 +22,9 @@ std::unique_ptr<Integrator<SpaceOf<Kernel>>> make_dense_integrator(const Chain<S
   }
   const Description description{"dense", "newton", kernel};
   if (options.form == Form::velocity) {
-    using Newton = DenseVelocityNewton<Kernel>;
-    return std::make_unique<GaussIntegrator<Newton>>(Newton(chain, options.stages), description);
+    return std::make_unique<GaussIntegrator<DenseVelocityNewton<Kernel>>>(chain, options.stages, description);
   }
-  using Newton = DenseMomentumNewton<Kernel>;
-  return std::make_unique<GaussIntegrator<Newton>>(Newton(chain, options.stages), description);
+  return std::make_unique<GaussIntegrator<DenseMomentumNewton<Kernel>>>(chain, options.stages, description);
 }
 
 }  // namespace pendula

@@ -57,7 +57,8 @@ class ExplicitIntegrator : public Integrator<Space> {
 
   State<Space> state() const override {
     const auto k = static_cast<Eigen::Index>(x_.size() / 2);
-    return {time(), Eigen::Map<const Eigen::VectorXd>(x_.data(), k), Eigen::Map<const Eigen::VectorXd>(x_.data() + k, k)};
+    return {time(), Eigen::Map<const Eigen::VectorXd>(x_.data(), k),
+            Eigen::Map<const Eigen::VectorXd>(x_.data() + k, k)};
   }
 
   const Statistics& statistics() const override { return statistics_; }
@@ -133,7 +134,8 @@ class AdaptiveIntegrator : public ExplicitIntegrator<Space> {
 
  public:
   AdaptiveIntegrator(std::unique_ptr<ForwardDynamics<Space>> dynamics, double tolerance, std::string kernel)
-      : Base(std::move(dynamics), std::move(kernel)), tolerance_(tolerance),
+      : Base(std::move(dynamics), std::move(kernel)),
+        tolerance_(tolerance),
         stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
 
   Outcome start(const State<Space>& state) override {
@@ -149,8 +151,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator<Space> {
       const double size = tried;
       double time = this->time();
       next_ = this->x_;
-      const bool accepted =
-          stepper_.try_step(std::ref(this->right_hand_side()), next_, time, tried) == odeint::success;
+      const bool accepted = stepper_.try_step(std::ref(this->right_hand_side()), next_, time, tried) == odeint::success;
       if (!Base::is_finite(next_) || !std::isfinite(tried)) return this->failure(Status::not_finite, size, next_);
       if (accepted) {
         this->x_.swap(next_);
@@ -183,14 +184,16 @@ std::unique_ptr<Integrator<Space>> make_explicit_integrator(std::unique_ptr<Forw
     throw std::invalid_argument("tolerance: expected a positive number, got " + std::to_string(options.tolerance));
   }
   switch (options.method) {
-    case Method::rk4: return std::make_unique<FixedStepIntegrator<Space>>(std::move(dynamics), std::move(kernel));
+    case Method::rk4:
+      return std::make_unique<FixedStepIntegrator<Space>>(std::move(dynamics), std::move(kernel));
     case Method::dopri5:
       return std::make_unique<AdaptiveIntegrator<Space, odeint::runge_kutta_dopri5<Vector>>>(
           std::move(dynamics), options.tolerance, std::move(kernel));
     case Method::fehlberg78:
       return std::make_unique<AdaptiveIntegrator<Space, odeint::runge_kutta_fehlberg78<Vector>>>(
           std::move(dynamics), options.tolerance, std::move(kernel));
-    case Method::gauss: break;
+    case Method::gauss:
+      break;
   }
   throw std::invalid_argument("method: expected an explicit one");
 }

@@ -44,8 +44,8 @@ class NoKernel : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The integrator that `options` ask for. Throws NoKernel, naming the PENDULA_KERNELS to configure, where a dense kernel
-/// is needed and not built in; std::invalid_argument for options that make no sense.
+/// The integrator that `options` ask for. Throws NoKernel, naming the PENDULA_KERNELS to configure, where a dense
+/// kernel is needed and not built in; std::invalid_argument for options that make no sense.
 template <class Space>
 std::unique_ptr<Integrator<Space>> make_integrator(const Chain<Space>& chain, const RunOptions& options);
 

@@ -16,14 +16,20 @@ enum class Solver { automatic, chain, dense };
 /// How the stage equations are iterated.
 enum class Iteration { automatic, newton, fixed_point };
 
-inline constexpr bool is_adaptive(Method method) { return method == Method::dopri5 || method == Method::fehlberg78; }
+inline constexpr bool is_adaptive(Method method) {
+  return method == Method::dopri5 || method == Method::fehlberg78;
+}
 
 inline std::ostream& operator<<(std::ostream& out, Method method) {
   switch (method) {
-    case Method::gauss: return out << "gauss";
-    case Method::rk4: return out << "rk4";
-    case Method::dopri5: return out << "dopri5";
-    case Method::fehlberg78: return out << "fehlberg78";
+    case Method::gauss:
+      return out << "gauss";
+    case Method::rk4:
+      return out << "rk4";
+    case Method::dopri5:
+      return out << "dopri5";
+    case Method::fehlberg78:
+      return out << "fehlberg78";
   }
   return out;
 }
@@ -34,18 +40,24 @@ inline std::ostream& operator<<(std::ostream& out, Form form) {
 
 inline std::ostream& operator<<(std::ostream& out, Solver solver) {
   switch (solver) {
-    case Solver::automatic: return out << "auto";
-    case Solver::chain: return out << "chain";
-    case Solver::dense: return out << "dense";
+    case Solver::automatic:
+      return out << "auto";
+    case Solver::chain:
+      return out << "chain";
+    case Solver::dense:
+      return out << "dense";
   }
   return out;
 }
 
 inline std::ostream& operator<<(std::ostream& out, Iteration iteration) {
   switch (iteration) {
-    case Iteration::automatic: return out << "auto";
-    case Iteration::newton: return out << "newton";
-    case Iteration::fixed_point: return out << "fixed-point";
+    case Iteration::automatic:
+      return out << "auto";
+    case Iteration::newton:
+      return out << "newton";
+    case Iteration::fixed_point:
+      return out << "fixed-point";
   }
   return out;
 }

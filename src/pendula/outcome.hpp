@@ -17,10 +17,14 @@ enum class Status {
 
 inline std::ostream& operator<<(std::ostream& out, Status status) {
   switch (status) {
-    case Status::ok: return out << "ok";
-    case Status::not_converged: return out << "not converged";
-    case Status::not_finite: return out << "not finite";
-    case Status::singular_mass_matrix: return out << "singular mass matrix";
+    case Status::ok:
+      return out << "ok";
+    case Status::not_converged:
+      return out << "not converged";
+    case Status::not_finite:
+      return out << "not finite";
+    case Status::singular_mass_matrix:
+      return out << "singular mass matrix";
   }
   return out << "unknown status";
 }
@@ -58,7 +62,8 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
       out << "the mass matrix in (theta, phi) is singular" << where(": sin(theta) = 0 at link ")
           << ", where phi has no meaning";
       break;
-    case Status::ok: break;
+    case Status::ok:
+      break;
   }
   return out;
 }

@@ -27,7 +27,7 @@ struct Spatial {
 
 /// Number of coordinates of N links, or Eigen::Dynamic where N is.
 template <class Space, int N>
-inline constexpr int coordinates_of = N == Eigen::Dynamic ? Eigen::Dynamic : Space::dof * N;
+inline constexpr int coordinates_of = N == Eigen::Dynamic ? Eigen::Dynamic : Space::dof* N;
 
 /// One number a link, (n).
 template <int N>

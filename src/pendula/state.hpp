@@ -10,36 +10,24 @@ namespace pendula {
 /// Angles and rates of a chain at one time, as users give and read them.
 template <class Space, int N = Eigen::Dynamic>
 struct State {
-  double time = 0;           ///< s
-  Coordinates<Space, N> q;   ///< angles θ_1..θ_n, then in space φ_1..φ_n, (dof·n)  rad
-  Coordinates<Space, N> v;   ///< their rates, (dof·n)  rad/s
+  double time = 0;          ///< s
+  Coordinates<Space, N> q;  ///< angles θ_1..θ_n, then in space φ_1..φ_n, (dof·n)  rad
+  Coordinates<Space, N> v;  ///< their rates, (dof·n)  rad/s
 
   int links() const { return static_cast<int>(q.size()) / Space::dof; }
   auto theta() const { return q.head(links()); }
   auto theta_dot() const { return v.head(links()); }
-  auto phi() const
-    requires(Space::dof == 2)
-  {
-    return q.tail(links());
-  }
-  auto phi_dot() const
-    requires(Space::dof == 2)
-  {
-    return v.tail(links());
-  }
+  auto phi() const requires(Space::dof == 2) { return q.tail(links()); }
+  auto phi_dot() const requires(Space::dof == 2) { return v.tail(links()); }
 
   /// A planar state, at rest unless rates are given.
-  static State from_angles(const LinkVector<N>& theta, const LinkVector<N>& theta_dot = {})
-    requires(Space::dof == 1)
-  {
+  static State from_angles(const LinkVector<N>& theta, const LinkVector<N>& theta_dot = {}) requires(Space::dof == 1) {
     return {0, theta, rates(theta_dot, theta.size())};
   }
 
   /// A spatial state, at rest unless rates are given.
   static State from_angles(const LinkVector<N>& theta, const LinkVector<N>& phi, const LinkVector<N>& theta_dot = {},
-                           const LinkVector<N>& phi_dot = {})
-    requires(Space::dof == 2)
-  {
+                           const LinkVector<N>& phi_dot = {}) requires(Space::dof == 2) {
     if (phi.size() != theta.size()) throw_sizes("phi", phi.size(), theta.size());
     State state;
     state.q.resize(2 * theta.size());

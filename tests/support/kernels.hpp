@@ -38,7 +38,8 @@ struct KernelInputs {
   Vector q, v, a;
 
   explicit KernelInputs(unsigned seed)
-      : random(seed), chain(random_chain<Space>(random, Kernel::links, true)),
+      : random(seed),
+        chain(random_chain<Space>(random, Kernel::links, true)),
         parameters(kernel_parameters<Kernel>(chain)) {
     chain.torque(0, torque);
     const State<Space> state = random_state<Space>(random, Kernel::links);

@@ -25,8 +25,7 @@ State<Space> final_state(const Chain<Space>& chain, const State<Space>& start, c
                          double duration) {
   const auto integrator = make_integrator(chain, options);
   const auto every = std::numeric_limits<std::int64_t>::max();
-  const RunResult result =
-      simulate(*integrator, start, {step, duration, every}, [](const State<Space>&) {});
+  const RunResult result = simulate(*integrator, start, {step, duration, every}, [](const State<Space>&) {});
   EXPECT_TRUE(result.outcome) << result.outcome;
   return integrator->state();
 }

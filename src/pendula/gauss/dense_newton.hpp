@@ -31,7 +31,8 @@ class PerStage {
   const T& operator[](int stage) const { return values_[static_cast<std::size_t>(stage)]; }
 
  private:
-  std::conditional_t<S == Eigen::Dynamic, std::vector<T>, std::array<T, static_cast<std::size_t>(S == Eigen::Dynamic ? 1 : S)>>
+  std::conditional_t<S == Eigen::Dynamic, std::vector<T>,
+                     std::array<T, static_cast<std::size_t>(S == Eigen::Dynamic ? 1 : S)>>
       values_;
 };
 
@@ -42,7 +43,10 @@ class StageSystem {
 
  public:
   explicit StageSystem(int stages)
-      : matrix_(Block * stages, Block * stages), right_(Block * stages), solution_(Block * stages), lu_(Block * stages) {}
+      : matrix_(Block * stages, Block * stages),
+        right_(Block * stages),
+        solution_(Block * stages),
+        lu_(Block * stages) {}
 
   auto block(int i, int j) { return matrix_.template block<Block, Block>(Block * i, Block * j); }
   auto residual(int i) { return right_.template segment<Block>(Block * i); }
@@ -65,6 +69,7 @@ template <class Kernel, int S>
 class DenseStages {
  public:
   using Space = SpaceOf<Kernel>;
+  using Chain = pendula::Chain<Space>;
   using State = pendula::State<Space>;
   using Vector = typename Kernel::template Vector<double>;
   using Matrix = typename Kernel::template Matrix<double>;
@@ -76,9 +81,14 @@ class DenseStages {
   int singular_link() const { return singular_link_; }
 
  protected:
-  DenseStages(const Chain<Space>& chain, int s)
-      : chain_(chain), parameters_(kernel_parameters<Kernel>(chain)), coefficients_(gauss_tableau<S>(s)), system_(s),
-        torque_(s), unknown_(s), last_unknown_(s) {
+  DenseStages(const Chain& chain, int s)
+      : chain_(chain),
+        parameters_(kernel_parameters<Kernel>(chain)),
+        coefficients_(gauss_tableau<S>(s)),
+        system_(s),
+        torque_(s),
+        unknown_(s),
+        last_unknown_(s) {
     for (int i = 0; i < s; ++i) chain_.torque(0, torque_[i]);
   }
 
@@ -147,7 +157,7 @@ class DenseStages {
     return i % Kernel::links;
   }
 
-  Chain<Space> chain_;
+  Chain chain_;
   Parameters parameters_;
   StepCoefficients<S> coefficients_;
   StageSystem<Kernel::coordinates, S> system_;
@@ -171,10 +181,10 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
   using Base::stages, Base::singular_link_;
 
  public:
-  using typename Base::Matrix, typename Base::Space, typename Base::State, typename Base::Vector;
+  using typename Base::Chain, typename Base::Matrix, typename Base::Space, typename Base::State, typename Base::Vector;
 
   /// Throws std::invalid_argument if the chain has another number of links, or there is no tableau with `s` stages.
-  DenseMomentumNewton(const Chain<Space>& chain, int s)
+  DenseMomentumNewton(const Chain& chain, int s)
       : Base(chain, s), position_(s), momentum_(s), force_(s), p_D_q_(s), p_D_v_(s), f_D_q_(s), f_D_v_(s) {}
 
   Status start(const State& state) {
@@ -274,7 +284,8 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
 /// symplectic.
 ///
 /// Unknown are the stage accelerations K_i, so that the mass matrix is never inverted;
-///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,  residual E(Q_i, V_i, K_i, t_i)  (paper eq. 27).
+///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,  residual E(Q_i, V_i, K_i, t_i)  (paper eq.
+///   27).
 template <class Kernel, int S = Eigen::Dynamic>
 class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
   using Base = detail::DenseStages<Kernel, S>;
@@ -282,10 +293,10 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
   using Base::stages, Base::singular_link_;
 
  public:
-  using typename Base::Matrix, typename Base::Space, typename Base::State, typename Base::Vector;
+  using typename Base::Chain, typename Base::Matrix, typename Base::Space, typename Base::State, typename Base::Vector;
 
   /// Throws std::invalid_argument if the chain has another number of links, or there is no tableau with `s` stages.
-  DenseVelocityNewton(const Chain<Space>& chain, int s)
+  DenseVelocityNewton(const Chain& chain, int s)
       : Base(chain, s), position_(s), velocity_(s), residual_(s), E_D_q_(s), E_D_v_(s), E_D_a_(s) {}
 
   Status start(const State& state) {

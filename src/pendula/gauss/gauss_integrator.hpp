@@ -12,8 +12,8 @@ class GaussIntegrator : public Integrator<typename StageSolver::Space> {
   using Space = typename StageSolver::Space;
 
  public:
-  GaussIntegrator(StageSolver solver, Description description)
-      : stepper_(std::move(solver)), description_(std::move(description)) {}
+  GaussIntegrator(const Chain<Space>& chain, int stages, Description description)
+      : stepper_(chain, stages), description_(std::move(description)) {}
 
   Outcome start(const State<Space>& state) override { return stepper_.start(state); }
   Outcome step(double h) override { return stepper_.step(h); }

@@ -6,8 +6,8 @@
 namespace pendula {
 
 /// Decides when an iteration has reached round-off: not at a fixed tolerance, which a long chain may never meet, but
-/// when the correction is a few ulp, or stops shrinking while small, or is so small that the next one of a quadratically
-/// convergent iteration is below round-off (Hairer, McLachlan, Razakarivony 2008; arXiv:1702.03354).
+/// when the correction is a few ulp, or stops shrinking while small, or is so small that the next one of a
+/// quadratically convergent iteration is below round-off (Hairer, McLachlan, Razakarivony 2008; arXiv:1702.03354).
 class RoundoffStop {
  public:
   enum class Convergence { linear, quadratic };

@@ -4,7 +4,6 @@
 #include <pendula/gauss/compensated.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/outcome.hpp>
-#include <utility>
 
 namespace pendula {
 
@@ -20,8 +19,8 @@ struct StepperOptions {
 
 /// Takes implicit Gauss–Legendre steps with any solver of the stage equations.
 ///
-/// A `StageSolver` owns the model and the workspace and offers
-///   using State; static constexpr RoundoffStop::Convergence convergence;
+/// A `StageSolver` owns the model and the workspace, is built from (chain, stages), and offers
+///   using Chain, State; static constexpr RoundoffStop::Convergence convergence;
 ///   Status start(const State&);            takes over a state; may find it singular
 ///   void prepare(double time, double h);   predicts the stages of the next step
 ///   Correction correct();                  improves the stages once
@@ -32,10 +31,12 @@ struct StepperOptions {
 template <class StageSolver>
 class GaussStepper {
  public:
+  using Chain = typename StageSolver::Chain;
   using State = typename StageSolver::State;
 
-  explicit GaussStepper(StageSolver solver, StepperOptions options = {})
-      : solver_(std::move(solver)), options_(options), at_roundoff_(StageSolver::convergence) {}
+  /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
+  GaussStepper(const Chain& chain, int stages, StepperOptions options = {})
+      : solver_(chain, stages), options_(options), at_roundoff_(StageSolver::convergence) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {

@@ -43,7 +43,8 @@ void copy(const std::array<double, From>& from, StageVector<S>& to) {
 template <std::size_t From, int S>
 void copy(const std::array<std::array<double, From>, From>& from, StageMatrix<S>& to) {
   constexpr auto size = static_cast<int>(From);
-  to = Eigen::Map<const Eigen::Matrix<double, size, size, size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>(from[0].data());
+  to = Eigen::Map<const Eigen::Matrix<double, size, size, size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>(
+      from[0].data());
 }
 
 template <int From, int S>
@@ -104,9 +105,9 @@ class StepCoefficients {
   int stages() const { return tableau_.stages(); }
   double h() const { return h_; }
   double hc(int i) const { return h_ * tableau_.c[i]; }
-  double hb(int j) const { return hb_[j]; }              ///< h b_j, rounded so that they sum to h exactly
+  double hb(int j) const { return hb_[j]; }  ///< h b_j, rounded so that they sum to h exactly
   double m(int i, int j) const { return tableau_.m(i, j); }
-  double ha(int i, int j) const { return ha_(i, j); }    ///< m_ij · hb_j
+  double ha(int i, int j) const { return ha_(i, j); }  ///< m_ij · hb_j
   double h2a2(int i, int j) const { return h2a2_(i, j); }
   double extrapolation(int i, int j) const { return extrapolation_(i, j); }
 
@@ -119,15 +120,21 @@ class StepCoefficients {
     h2a2_ = (h * h) * tableau_.a_squared;
   }
 
-  // The two outer weights, which are equal, take up the rounding of the rest (mathematics: the weights must sum to h
-  // exactly, or every step adds h·ulp of drift).
+  // Weights that do not sum to h exactly would make every step drift by an ulp of h. The inner ones are rounded to
+  // multiples of ulp(h), so that what they leave of h is exact, and its halves, the two equal outer ones, are too.
   void make_sum_exact() {
     const Eigen::Index s = hb_.size();
     if (s == 1) {
       hb_[0] = h_;
-    } else {
-      hb_[0] = hb_[s - 1] = (h_ - hb_.segment(1, s - 2).sum()) / 2;
+      return;
     }
+    double rest = h_;
+    for (Eigen::Index j = 1; j + 1 < s; ++j) {
+      const double sum = h_ + hb_[j];
+      hb_[j] = sum - h_;
+      rest -= hb_[j];
+    }
+    hb_[0] = hb_[s - 1] = rest / 2;
   }
 
   // ℓ_j(1 + ratio·c_i) on the nodes c.
