@@ -1,4 +1,4 @@
-"""Command line of the generator: python -m pendula_codegen {kernel,link,tableaux,refresh} --output WHERE."""
+"""Command line: python -m pendula_codegen {kernel,link,tableaux,refresh,counts} … --output WHERE."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.models import MODELS
 from pendula_codegen.render import (
@@ -54,6 +55,10 @@ def _parser() -> argparse.ArgumentParser:
     refresh = commands.add_parser("refresh", help="everything that the repository keeps, into a folder")
     refresh.set_defaults(run=_run_refresh)
 
+    counts = commands.add_parser("counts", help="operation counts of what the repository keeps, as JSON")
+    counts.set_defaults(run=_run_counts)
+    counts.add_argument("--output", required=True, type=Path, help="a .json file")
+
     for command in (kernel, link, tableaux, refresh):
         command.add_argument(
             "--output", required=True, type=Path, help="a .hpp file, or a folder to put it in"
@@ -81,6 +86,10 @@ def _run_tableaux(options: argparse.Namespace) -> None:
 def _run_refresh(options: argparse.Namespace) -> None:
     for name, text in committed_headers().items():
         write_atomically(options.output / name, text)
+
+
+def _run_counts(options: argparse.Namespace) -> None:
+    write_atomically(options.output, as_json(count_table(committed_headers())))
 
 
 def committed_headers() -> dict[str, str]:

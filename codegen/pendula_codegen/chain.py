@@ -6,7 +6,7 @@ follows from û(q_i)·û(q_j) by differentiation, is simplified once per model a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 
 from sympy import Add, Expr, Matrix, Rational, Symbol, cos, expand, sin, trigsimp
@@ -14,7 +14,6 @@ from sympy import Add, Expr, Matrix, Rational, Symbol, cos, expand, sin, trigsim
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.mechanics import LagrangianSystem, require_declared
 from pendula_codegen.model import LinkModel
-from pendula_codegen.models import MODELS
 
 
 def on_link(symbol: Symbol, link: int, suffix: str = "") -> Symbol:
@@ -45,12 +44,8 @@ def _direction(model: LinkModel, link: int) -> Matrix:
 
 
 @cache
-def link_terms(name: str) -> LinkTerms:
-    """The simplified terms of the built-in model `name`; the only place where SymPy simplifies."""
-    return derive_link_terms(MODELS[name])
-
-
-def derive_link_terms(model: LinkModel) -> LinkTerms:
+def link_terms(model: LinkModel) -> LinkTerms:
+    """The simplified terms of `model`; the only place where SymPy simplifies."""
     first, second = _direction(model, 1), _direction(model, 2)
     angles = [on_link(q, 1) for q in model.coordinates]
     dot = trigsimp(first.dot(second))
@@ -97,22 +92,16 @@ class Chain:
 
     model: LinkModel
     links: int
-    terms: LinkTerms = field(default=None)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if self.links < 1:
             raise GenerationError(f"a chain has at least one link: got --links {self.links}")
-        if self.terms is None:
-            object.__setattr__(self, "terms", self._terms_of_model())
-        self._require_declared()
-
-    def _terms_of_model(self) -> LinkTerms:
-        known = MODELS.get(self.model.name)
-        return link_terms(self.model.name) if known is self.model else derive_link_terms(self.model)
-
-    def _require_declared(self) -> None:
         what = f"the link direction of model '{self.model.name}'"
         require_declared(Add(*self.model.direction), self.model.coordinates, what)
+
+    @cached_property
+    def terms(self) -> LinkTerms:
+        return link_terms(self.model)
 
     @property
     def numbers(self) -> range:

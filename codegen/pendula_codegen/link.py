@@ -10,7 +10,7 @@ from sympy import Expr, Matrix, cos, sin
 
 from pendula_codegen.model import LinkModel
 from pendula_codegen.printing import Body, print_body
-from pendula_codegen.program import Assignment, shortest_program
+from pendula_codegen.program import Assignment, Program, shortest_program
 from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 
 ORDER_NAMES = {1: "first", 2: "second", 3: "third"}
@@ -90,8 +90,11 @@ class LinkKernel:
     def render(self) -> list[RenderedLinkFunction]:
         return [self._render(function) for function in self.functions()]
 
+    def program(self, function: LinkFunction) -> Program:
+        return shortest_program([function.assignments], [lambda: self._vocabulary(function)])
+
     def _render(self, function: LinkFunction) -> RenderedLinkFunction:
-        body = print_body(shortest_program([function.assignments], [lambda: self._vocabulary(function)]))
+        body = print_body(self.program(function))
         read = [
             f"const {kind}& {name if name in body.sources else f'/*{name}*/'}"
             for kind, name in function.inputs

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sympy import Expr, Matrix, Symbol
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a model is what it is by identity, so that results can be kept for it
 class LinkModel:
     """One link of a chain: its coordinates, parameters, direction and loads, and nothing derived from them.
 

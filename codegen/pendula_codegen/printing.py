@@ -110,8 +110,15 @@ class _Printer:
             return f"{target} = Real(0.0);"
         if node == UNIT:
             return f"{target} = {_number(coefficient)};"
-        text = self._expression(node) if coefficient == 1 else _scale(coefficient, self._factor(node))
-        return f"{target} = {text};"
+        return f"{target} = {self._scaled(coefficient, node)};"
+
+    def _scaled(self, coefficient: Number, node: int) -> str:
+        if coefficient == 1:
+            return self._expression(node)
+        terms = self._graph.sums.get(node, ()) if node not in self._names else ()
+        if coefficient == -1 and any(scale < 0 for scale, _ in terms):
+            return self._sum([(-scale, part) for scale, part in terms])
+        return _scale(coefficient, self._factor(node))
 
     def _expression(self, node: int) -> str:
         if node in self._names:

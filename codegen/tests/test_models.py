@@ -1,0 +1,57 @@
+"""A model that is wrong is refused with a message that names the culprit."""
+
+from dataclasses import replace
+
+import pytest
+from sympy import Matrix, Symbol, cos, simplify, sin
+
+from pendula_codegen.blocks import collect_blocks
+from pendula_codegen.chain import Chain
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.models import MODELS, find_model
+
+PLANAR, SPATIAL = MODELS["planar"], MODELS["spatial"]
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_direction_is_a_unit_vector(model):
+    assert simplify(model.direction.dot(model.direction)) == 1
+
+
+def test_undeclared_symbol_in_the_direction():
+    theta = PLANAR.coordinates[0]
+    bent = replace(PLANAR, direction=Matrix([sin(theta + Symbol("bend")), -cos(theta + Symbol("bend"))]))
+    with pytest.raises(GenerationError, match=r"holds the symbol 'bend', which the model does not declare$"):
+        Chain(bent, 2)
+
+
+def test_undeclared_symbol_in_the_dissipation():
+    windy = replace(PLANAR, dissipation=lambda rate: Symbol("wind") * rate.dot(rate))
+    with pytest.raises(GenerationError, match=r"a load of model 'planar' holds the symbol 'wind'"):
+        assert Chain(windy, 1).system
+
+
+def test_unknown_model():
+    with pytest.raises(GenerationError, match=r"^unknown model 'cubic': expected one of planar, spatial$"):
+        find_model("cubic")
+
+
+@pytest.mark.parametrize("links", [0, -3])
+def test_chain_without_links(links):
+    with pytest.raises(GenerationError, match=rf"^a chain has at least one link: got --links {links}$"):
+        Chain(PLANAR, links)
+
+
+def test_term_that_belongs_to_no_block():
+    """An inertia that depends on a rate gives a cubic term, for which the paper's equations have no block."""
+
+    class RateDependent(Chain):
+        @property
+        def kinetic_energy(self):
+            return super().kinetic_energy + self.coordinates[0] * self.velocities[0] ** 3
+
+    message = (
+        r"^equation 1 of model 'planar' has a term in theta_ddot_1\*theta_dot_1 that belongs to no block$"
+    )
+    with pytest.raises(GenerationError, match=message):
+        collect_blocks(RateDependent(PLANAR, 1))
