@@ -43,16 +43,9 @@ def _sort_terms(chain: Chain, equation: Expr, row: int, blocks: Blocks) -> None:
     """Puts each term of one expanded equation where its motion symbols (velocities, accelerations) say."""
     n = chain.links
     kind, i = divmod(row, n)
-    collected: dict[tuple[Symbol, ...], list[Expr]] = {}
-    motion = {*chain.velocities, *chain.accelerations}
-    for term in Add.make_args(equation):
-        moving, coefficient = _split(term, motion)
-        collected.setdefault(moving, []).append(coefficient)
     places = _places(chain)
-    for moving, coefficients in collected.items():
-        total = Add(*coefficients)
-        if total == 0:
-            continue
+    coefficients = _by_motion(chain, equation)
+    for moving in sorted(coefficients, key=str):
         if moving not in places:
             raise GenerationError(
                 f"equation {row + 1} of model '{chain.model.name}' has a term in "
@@ -60,13 +53,24 @@ def _sort_terms(chain: Chain, equation: Expr, row: int, blocks: Blocks) -> None:
             )
         what, b, j = places[moving]
         if what == "rest":
-            blocks.rest[kind][i, 0] = total
+            blocks.rest[kind][i, 0] = coefficients[moving]
         elif what == "cross":
-            blocks.cross[kind][i, j] = total
+            blocks.cross[kind][i, j] = coefficients[moving]
         elif what == "square":
-            blocks.square[kind][b][i, j] = -total
+            blocks.square[kind][b][i, j] = -coefficients[moving]
         else:
-            blocks.mass[kind][b][i, j] = total
+            blocks.mass[kind][b][i, j] = coefficients[moving]
+
+
+def _by_motion(chain: Chain, equation: Expr) -> dict[tuple[Symbol, ...], Expr]:
+    """Coefficients of the products of motion symbols in an expanded equation, without those that cancel."""
+    collected: dict[tuple[Symbol, ...], list[Expr]] = {}
+    motion = {*chain.velocities, *chain.accelerations}
+    for term in Add.make_args(equation):
+        moving, coefficient = _split(term, motion)
+        collected.setdefault(moving, []).append(coefficient)
+    totals = {moving: Add(*coefficients) for moving, coefficients in collected.items()}
+    return {moving: total for moving, total in totals.items() if total != 0}
 
 
 def _split(term: Expr, motion: set[Symbol]) -> tuple[tuple[Symbol, ...], Expr]:

@@ -43,7 +43,7 @@ def test_chain_without_links(links):
 
 
 def test_term_that_belongs_to_no_block():
-    """An inertia that depends on a rate gives a cubic term, for which the paper's equations have no block."""
+    """An inertia that depends on a rate: the paper's equations have no block for that."""
 
     class RateDependent(Chain):
         @property
