@@ -7,4 +7,6 @@
 const char* const alignments[] = {"pendula-heap-alignment=" PENDULA_TEXT(EIGEN_DEFAULT_ALIGN_BYTES) ";",
                                   "pendula-fixed-alignment=" PENDULA_TEXT(EIGEN_MAX_STATIC_ALIGN_BYTES) ";"};
 
-int main(int argc, char**) { return alignments[argc % 2][0]; }
+int main(int argc, char**) {
+  return alignments[argc % 2][0];
+}

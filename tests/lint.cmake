@@ -11,5 +11,6 @@ execute_process(
           --extra-arg=-Wno-unknown-warning-option
   RESULT_VARIABLE result OUTPUT_VARIABLE complaints ERROR_VARIABLE notes)
 if(NOT result EQUAL 0)
-  message(FATAL_ERROR "clang-tidy complains:\n${complaints}\n${notes}")
+  message("${complaints}\n${notes}")
+  message(FATAL_ERROR "clang-tidy complains")
 endif()

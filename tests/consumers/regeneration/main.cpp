@@ -18,8 +18,9 @@ typename Kernel::template Parameters<double> unit_chain() {
 }
 
 int main() {
+  const Five::Vector<double> q = Five::Vector<double>::Zero();
   double five = 0;
-  Five::potential_energy(unit_chain<Five>(), Five::Vector<double>::Zero(), five);
+  Five::potential_energy(unit_chain<Five>(), q, five);
   const double six = height_of_six(unit_chain<Six>(), Six::Vector<double>::Zero());
   std::cout << "potential energies " << five << " and " << six << '\n';
   return five == -15 && six == -21 ? 0 : 1;

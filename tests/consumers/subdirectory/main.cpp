@@ -11,8 +11,9 @@ double potential_energy_of_hanging_chain() {
   chain.lengths.setOnes();
   chain.damping.setZero();
   chain.gravity = 1;
+  const typename Kernel::template Vector<double> q = Kernel::template Vector<double>::Zero();
   double potential = 0;
-  Kernel::potential_energy(chain, Kernel::template Vector<double>::Zero(), potential);
+  Kernel::potential_energy(chain, q, potential);
   return potential;
 }
 
