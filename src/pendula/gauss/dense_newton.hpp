@@ -1,12 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <pendula/chain.hpp>
 #include <pendula/gauss/compensated.hpp>
+#include <pendula/gauss/linear_system.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/gauss/tableau.hpp>
@@ -36,32 +36,17 @@ class PerStage {
       values_;
 };
 
-/// The linear system of one Newton iteration: one block row and column a stage, solved by LU with pivoting.
+/// The linear system of one Newton iteration: one block row and column a stage.
 template <int Block, int S>
-class StageSystem {
-  static constexpr int size = S == Eigen::Dynamic ? Eigen::Dynamic : Block * S;
+class StageSystem : public LinearSystem<S == Eigen::Dynamic ? Eigen::Dynamic : Block * S> {
+  using Base = LinearSystem<S == Eigen::Dynamic ? Eigen::Dynamic : Block * S>;
 
  public:
-  explicit StageSystem(int stages)
-      : matrix_(Block * stages, Block * stages),
-        right_(Block * stages),
-        solution_(Block * stages),
-        lu_(Block * stages) {}
+  explicit StageSystem(int stages) : Base(Block * stages) {}
 
-  auto block(int i, int j) { return matrix_.template block<Block, Block>(Block * i, Block * j); }
-  auto residual(int i) { return right_.template segment<Block>(Block * i); }
-
-  void solve() {
-    lu_.compute(matrix_);
-    solution_ = lu_.solve(right_);
-  }
-
-  auto solution(int i) const { return solution_.template segment<Block>(Block * i); }
-
- private:
-  Eigen::Matrix<double, size, size> matrix_;
-  Eigen::Matrix<double, size, 1> right_, solution_;
-  Eigen::PartialPivLU<Eigen::Matrix<double, size, size>> lu_;
+  auto block(int i, int j) { return this->matrix.template block<Block, Block>(Block * i, Block * j); }
+  auto residual(int i) { return this->right.template segment<Block>(Block * i); }
+  auto correction(int i) const { return this->solution.template segment<Block>(Block * i); }
 };
 
 /// What both forms of the dense equations share: the model, the step's coefficients and torques, and the stage system.
@@ -124,7 +109,7 @@ class DenseStages {
   Correction apply_correction(double scale) {
     Correction worst{0, -1};
     for (int i = 0; i < stages(); ++i) {
-      const Vector change = system_.solution(i);
+      const Vector change = system_.correction(i);
       unknown_[i] -= change;
       scale = std::max(scale, unknown_[i].cwiseAbs().maxCoeff());
       Eigen::Index at = 0;

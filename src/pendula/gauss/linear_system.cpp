@@ -1,0 +1,7 @@
+#include <pendula/gauss/linear_system.hpp>
+
+namespace pendula {
+
+template class LinearSystem<Eigen::Dynamic>;
+
+}  // namespace pendula
