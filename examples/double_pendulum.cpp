@@ -1,0 +1,21 @@
+// A double pendulum released from the horizontal, moved by two-stage Gauss–Legendre for ten seconds.
+#include <pendula/kernels/planar_2.hpp>
+#include <pendula/pendula.hpp>
+
+#include <iostream>
+
+int main() {
+  using namespace pendula;
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::Vector2d(1, 1);
+  const Chain<Planar> chain(parameters);
+
+  GaussStepper<DenseMomentumNewton<kernels::Planar2, 2>> stepper(chain, 2);
+  Outcome outcome = stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(EIGEN_PI / 2)));
+  for (int step = 0; outcome && step < 20000; ++step) outcome = stepper.step(5e-4);
+  if (!outcome) {
+    std::cerr << outcome << '\n';
+    return 1;
+  }
+  std::cout << "last bob at " << bob_positions(chain, stepper.state()).col(1).transpose() << " m\n";
+}

@@ -1,0 +1,119 @@
+"""The README's commands: what they print now, and whether that is what the README shows.
+
+`python tests/readme/readme.py` writes the present output into the README; test_readme.py compares.
+Environment: PENDULA_PROGRAM, the program to run; PENDULA_BUILD, the build folder whose tests are counted.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+README = ROOT / "README.md"
+ELLIPSIS = "…"  # on a line of its own: lines left out
+CONSOLE = re.compile(r"```console\n(.*?)```", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Session:
+    """A console block: commands, and the output shown below the last of them."""
+
+    commands: list[str]
+    shown: list[str]
+
+    @staticmethod
+    def parse(block: str) -> "Session":
+        lines = block.rstrip("\n").split("\n")
+        commands = [line[2:] for line in lines if line.startswith("$ ")]
+        return Session(commands, lines[len(commands) :])
+
+    def text(self, output: list[str]) -> str:
+        return "\n".join([f"$ {command}" for command in self.commands] + output) + "\n"
+
+
+def sessions() -> list[Session]:
+    return [Session.parse(block) for block in CONSOLE.findall(README.read_text())]
+
+
+def program() -> str:
+    return os.environ["PENDULA_PROGRAM"]
+
+
+def run_pendula(command: str) -> list[str]:
+    """Both streams of the program, called in a folder with the examples and an empty out/."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "examples").symlink_to(ROOT / "examples")
+        (Path(folder) / "out").mkdir()
+        words = [program(), *shlex.split(command)[1:]]
+        done = subprocess.run(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return done.stdout.rstrip("\n").split("\n")
+
+
+def run_demo(command: str) -> list[str]:
+    """What the demo says from the program's call on; what comes before that differs by machine."""
+    done = subprocess.run(shlex.split(command), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    lines = done.stdout.rstrip("\n").split("\n")
+    start = next(i for i, line in enumerate(lines) if line.startswith("+ build/demo/bin/pendula"))
+    return [ELLIPSIS, *lines[start:]]
+
+
+def count_tests(_: str) -> list[str]:
+    """The line that ctest ends with when every test of the build passes: this runs inside one of them."""
+    listed = subprocess.run(
+        ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N"],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    total = re.search(r"Total Tests: (\d+)", listed.stdout)
+    assert total, listed.stdout
+    return [ELLIPSIS, f"100% tests passed, 0 tests failed out of {total[1]}", ELLIPSIS]
+
+
+def configure(command: str) -> list[str]:
+    """Only configures, elsewhere: the demo builds a kernel that generated/ lacks."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([*shlex.split(command), "-B", folder], cwd=ROOT, stdout=subprocess.DEVNULL, check=True)
+    return []
+
+
+RUNNERS = {"pendula": run_pendula, "scripts/demo": run_demo, "scripts/test": count_tests, "cmake": configure}
+
+
+def output(session: Session) -> list[str]:
+    command = session.commands[0]
+    return RUNNERS[shlex.split(command)[0]](command)
+
+
+def same_word(shown: str, now: str) -> bool:
+    """Equal, or numbers that differ by round-off, which is not the same on every processor."""
+    if shown == now:
+        return True
+    try:
+        a, b = float(shown.rstrip(",;")), float(now.rstrip(",;"))
+    except ValueError:
+        return False
+    return abs(a - b) <= 1e-9 * max(abs(a), abs(b)) + 1e-12
+
+
+def same_line(shown: str, now: str) -> bool:
+    if shown.startswith("stepping time") and now.startswith("stepping time"):
+        return True  # time is the machine's
+    a, b = shown.split(), now.split()
+    return len(a) == len(b) and all(map(same_word, a, b))
+
+
+def write() -> None:
+    def refreshed(match: re.Match[str]) -> str:
+        session = Session.parse(match[1])
+        return f"```console\n{session.text(output(session))}```"
+
+    README.write_text(CONSOLE.sub(refreshed, README.read_text()))
+
+
+if __name__ == "__main__":
+    write()
