@@ -379,11 +379,13 @@ TEST(Scenario, SettingsWithoutEffectAreWarnedOf) {
   EXPECT_TRUE(warnings({"run.method=rk4", "run.step=0.1"}).empty());
 }
 
-TEST(Scenario, KeysOfRunHaveTheirPlaces) {
+TEST(Scenario, SettingsKeepTheirPlacesForErrorsYetToCome) {
   const auto scenario = parsed<Spatial>(spatial_text, {"run.solver=chain"});
-  EXPECT_EQ(scenario.places.at("stages"), "file.toml:25");
-  EXPECT_EQ(scenario.places.at("solver"), "--set run.solver=chain");
+  EXPECT_EQ(scenario.places.at("stages"), "file.toml:25: run.stages");
+  EXPECT_EQ(scenario.places.at("solver"), "--set run.solver=chain: run.solver");
+  EXPECT_EQ(scenario.places.at("links"), "file.toml:3: chain.links");
   EXPECT_EQ(scenario.places.count("tolerance"), 0u);
+  EXPECT_EQ(parsed<Planar>(planar_text).places.at("links"), "file.toml:3: chain.masses");
 }
 
 TEST(Scenario, FilesThatCannotBeReadAreInputErrors) {

@@ -75,7 +75,7 @@ class IntegrationCheck {
     std::vector<CheckLine> lines;
     for (const Form form : {Form::momentum, Form::velocity}) {
       for (const int stages : {1, 2, 3}) {
-        lines.push_back({kernel_, label("order", stages, form), order(stages, form), 2 * stages - 0.1, true});
+        lines.push_back({kernel_, label("order", stages, form), order(stages, form), 2 * stages - 0.3, true});
       }
     }
     for (const Form form : {Form::momentum, Form::velocity}) {

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -17,6 +19,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
 #include "io/input_error.hpp"
+#include "io/number.hpp"
 #include "io/run_record.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"
@@ -28,23 +31,20 @@ namespace {
 /// Thrown out of a row to end the run there.
 struct Interrupted {};
 
-/// Turns what the runtime says about an option, `key: …`, into an error at the place of that key.
-template <class Space>
-io::InputError option_error(const io::Scenario<Space>& scenario, const SimulateOptions& options,
-                            const std::string& what) {
-  const auto place = scenario.places.find(what.substr(0, what.find(':')));
-  const bool known = place != scenario.places.end();
-  return io::InputError((known ? place->second + ": run." : options.scenario + ": ") + what);
-}
-
+/// The integrator that a scenario asks for. What the runtime says of an option, `key: …`, is said at the place of that
+/// key. Throws io::InputError.
 template <class Space>
 std::unique_ptr<Integrator<Space>> make(const io::Scenario<Space>& scenario, const SimulateOptions& options) {
   try {
     return make_integrator(scenario.chain, scenario.run);
   } catch (const NoKernel& error) {
-    throw io::InputError(options.scenario + ": chain.links: " + error.what());
+    throw io::InputError(scenario.places.at("links") + ": " + error.what());
   } catch (const std::invalid_argument& error) {
-    throw option_error(scenario, options, error.what());
+    const std::string what = error.what();
+    const std::size_t colon = std::min(what.find(':'), what.size());
+    const auto place = scenario.places.find(what.substr(0, colon));
+    throw io::InputError(place == scenario.places.end() ? options.scenario + ": " + what
+                                                        : place->second + what.substr(colon));
   }
 }
 
@@ -94,7 +94,7 @@ class Run {
       wall_seconds_ = result.stepping_seconds;
       return io::ending_of(result.outcome);
     } catch (const Interrupted&) {
-      return {"interrupted", "interrupted", {}};
+      return {"interrupted", "interrupted at t = " + io::shortest(record_.last().time), {}};
     } catch (const io::OutputError& error) {
       return {"output_failed", error.what(), {}};
     }

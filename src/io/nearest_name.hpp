@@ -8,7 +8,7 @@ namespace pendula::io {
 
 /// The candidate most like `name`, for "did you mean …?"; empty where none is near enough to be meant.
 ///
-/// Like means few insertions, deletions, replacements and swaps of neighbours: at most one in three letters.
+/// Like means few insertions, deletions, replacements and swaps of neighbours: about one in three letters.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> candidates);
 
 /// `" (did you mean NAME?)"`, or nothing for an empty name.

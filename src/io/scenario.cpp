@@ -97,7 +97,7 @@ bool tells_links(const Entry& entry) {
 template <class Space>
 LinkCount link_count(const Sections& sections) {
   if (const auto entry = sections.chain.find("links")) {
-    return {static_cast<int>(entry->integer(1, max_links)), entry->key()};
+    return {static_cast<int>(entry->integer(1, max_links)), entry->key(), entry->place()};
   }
   const std::array<std::pair<const Section*, std::string_view>, 8> arrays = {{
       {&sections.chain, "masses"},
@@ -114,10 +114,17 @@ LinkCount link_count(const Sections& sections) {
     if (!entry || !tells_links<Space>(*entry)) continue;
     if (entry->size() == 0) entry->fail("at least one link");
     if (entry->size() > max_links) entry->fail("at most " + std::to_string(max_links) + " links");
-    return {static_cast<int>(entry->size()), entry->key()};
+    return {static_cast<int>(entry->size()), entry->key(), entry->place()};
   }
   sections.chain.require("links", "a number of links, which no array tells");
   return {};
+}
+
+/// Keys without a default come first, so that a file that lacks one is not told about the number of links.
+void require_keys(const Sections& sections) {
+  sections.chain.require("masses", "the masses of the bobs");
+  sections.chain.require("lengths", "the lengths of the rods");
+  sections.start.require("theta", "the angles at the start");
 }
 
 /// One number a link, or `otherwise` for all where the key is not there.
@@ -179,8 +186,8 @@ std::vector<Drive<Space>> read_drives(const Section& chain, const LinkCount& cou
 template <class Space>
 ChainParameters<Space> read_chain(const Section& chain, const LinkCount& count) {
   ChainParameters<Space> parameters;
-  parameters.masses = chain.require("masses", "the masses of the bobs").per_link(count, Sign::positive);
-  parameters.lengths = chain.require("lengths", "the lengths of the rods").per_link(count, Sign::positive);
+  parameters.masses = chain.find("masses")->per_link(count, Sign::positive);
+  parameters.lengths = chain.find("lengths")->per_link(count, Sign::positive);
   parameters.gravity = number(chain, "gravity", parameters.gravity);
   parameters.damping = per_link(chain, "damping", count, 0, Sign::not_negative);
   parameters.torque = constant_torque<Space>(chain, count);
@@ -209,7 +216,7 @@ std::optional<NaturalUnits> make_natural(const Section& chain, ChainParameters<S
 
 template <class Space>
 State<Space> read_start(const Section& start, const LinkCount& count) {
-  const Eigen::VectorXd theta = start.require("theta", "the angles at the start").per_link(count);
+  const Eigen::VectorXd theta = start.find("theta")->per_link(count);
   const Eigen::VectorXd theta_dot = per_link(start, "theta_dot", count, 0);
   if constexpr (Space::dof == 2) {
     return State<Space>::from_angles(theta, per_link(start, "phi", count, 0), theta_dot,
@@ -249,7 +256,7 @@ std::vector<std::string> unused_keys(const Section& run, Method method) {
   const auto check = [&](std::string_view key, bool used) {
     const std::optional<Entry> entry = run.find(key);
     if (!entry || used) return;
-    warnings.push_back(entry->where() + ": " + entry->key() + ": has no effect with method " +
+    warnings.push_back(entry->place() + ": has no effect with method " +
                        std::string(method_names[static_cast<std::size_t>(method)]));
   };
   for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, method == Method::gauss);
@@ -269,6 +276,7 @@ Chain<Space> build_chain(const Section& section, ChainParameters<Space> paramete
 
 template <class Space>
 Scenario<Space> read(const Sections& sections) {
+  require_keys(sections);
   const LinkCount count = link_count<Space>(sections);
   ChainParameters<Space> parameters = read_chain<Space>(sections.chain, count);
   const std::optional<NaturalUnits> natural = make_natural(sections.chain, parameters);
@@ -284,8 +292,9 @@ Scenario<Space> read(const Sections& sections) {
   if (const auto every = sections.output.find("every")) {
     scenario.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
   }
+  scenario.places["links"] = count.place;
   for (const std::string_view key : run_keys) {
-    if (const auto entry = sections.run.find(key)) scenario.places[std::string(key)] = entry->where();
+    if (const auto entry = sections.run.find(key)) scenario.places[std::string(key)] = entry->place();
   }
   return scenario;
 }

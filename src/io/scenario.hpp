@@ -32,10 +32,12 @@ struct Scenario {
   State<Space> start;
   RunOptions run;
   double duration = 10;
-  std::int64_t every = 10;                                 ///< steps from row to row
-  std::optional<NaturalUnits> natural;                     ///< units of all numbers here; empty for SI
-  std::vector<std::string> warnings;                       ///< what is odd but no error, one sentence each
-  std::map<std::string, std::string, std::less<>> places;  ///< where the keys of [run] stand, for later errors
+  std::int64_t every = 10;              ///< steps from row to row
+  std::optional<NaturalUnits> natural;  ///< units of all numbers here; empty for SI
+  std::vector<std::string> warnings;    ///< what is odd but no error, one sentence each
+  /// `where: key` of what [run] sets, by key, and of what tells the number of links, by "links": for errors yet to
+  /// come.
+  std::map<std::string, std::string, std::less<>> places;
 };
 
 using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>>;

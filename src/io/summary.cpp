@@ -106,8 +106,9 @@ std::string shown_or_dash(double value, int digits) {
   return std::isfinite(value) ? rounded(value, digits) : "-";
 }
 
-/// "0.000523 s" as "523 us".
+/// "0.000523 s" as "523 us"; "-" for a time that is not known.
 std::string duration_text(double seconds) {
+  if (!std::isfinite(seconds)) return "-";
   if (seconds >= 1) return rounded(seconds, 4) + " s";
   if (seconds >= 1e-3) return rounded(seconds * 1e3, 4) + " ms";
   return rounded(seconds * 1e6, 3) + " us";
@@ -142,6 +143,11 @@ std::string settings(const Summary& summary) {
   return text;
 }
 
+/// Energy is conserved unless there are loads.
+std::string error_name(const Summary& summary) {
+  return summary.model.loaded ? "change" : "error";
+}
+
 std::string table(const Summary& summary) {
   constexpr std::size_t width = 15;
   constexpr std::string_view axes = "xyz";
@@ -150,7 +156,7 @@ std::string table(const Summary& summary) {
   for (Eigen::Index axis = 0; axis < summary.final.bobs.rows(); ++axis) {
     text += right(std::string(1, axes[static_cast<std::size_t>(axis)]) + "_" + last, width);
   }
-  text += right("energy error", width) + "\n";
+  text += right("energy " + error_name(summary), width) + "\n";
   for (const TableRow& row : summary.table) {
     text += right(rounded(row.time), value_width);
     for (const double coordinate : row.bob) text += right(rounded(coordinate, 9), width);
@@ -180,7 +186,7 @@ std::string energies(const Summary& summary) {
   const std::string of = summary.model.gravity != 0 ? "of the sum of M_i g l_i" : "of the energy at the start";
   return line("energy at start", rounded(summary.energy_error.initial, 12) + unit) +
          line("energy at end", rounded(summary.energy_final, 12) + unit) +
-         line("largest error", shown_or_dash(summary.energy_error.largest, 3),
+         line("largest " + error_name(summary), shown_or_dash(summary.energy_error.largest, 3),
               of + ", over " + plural(summary.rows, "row"));
 }
 

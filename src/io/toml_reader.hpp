@@ -27,10 +27,11 @@ std::string shown(const toml::node& node);
 /// What a number must be besides finite.
 enum class Sign { any, not_negative, positive };
 
-/// Number of links, and the key that told it.
+/// Number of links, and what told it.
 struct LinkCount {
   int links = 0;
-  std::string told_by;
+  std::string told_by;  ///< key
+  std::string place;    ///< `where: key`
 };
 
 /// One value of the scenario: converts to what is expected, or throws InputError with place, key, expected and got.
@@ -43,6 +44,7 @@ class Entry {
   bool is_number() const { return node_->is_number(); }
   const toml::table* table() const { return node_->as_table(); }
   std::string where() const { return location(node_->source()); }
+  std::string place() const { return where() + ": " + key_; }
 
   std::size_t size() const { return node_->is_array() ? node_->as_array()->size() : 0; }
   /// Element of an array, counted from 0 here and from 1 in messages, as links are.

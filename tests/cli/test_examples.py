@@ -1,0 +1,73 @@
+"""Every scenario in examples/ runs, and shows what its first lines promise."""
+
+import math
+from pathlib import Path
+
+import pytest
+from conftest import Trajectory
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
+
+
+@pytest.fixture
+def example(pendula, tmp_path):
+    """Runs an example; gives its summary and its trajectory."""
+
+    def run(name: str) -> tuple[dict, Trajectory]:
+        file = next(file for file in EXAMPLES if file.stem == name)
+        result = pendula("simulate", file, "-o", "out.csv", "--json")
+        assert (result.status, result.err) == (0, "")
+        return result.json, Trajectory.read(tmp_path / "out.csv")
+
+    return run
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_examples_run_without_a_warning(example, file):
+    summary, trajectory = example(file.stem)
+    assert summary["outcome"] == {"status": "ok"}
+    assert len(trajectory.rows) == summary["rows"] > 20
+
+
+def test_double_pendulum_keeps_its_energy(example):
+    summary, _ = example("double_pendulum")
+    assert summary["energy_error_max"] < 1e-14  # measured 6.0e-16
+    bob = summary["final"]["bobs"][1]
+    assert math.dist(bob, (-1.0407657832461712, -1.7073476624693271)) < 1e-12  # measured 1.8e-15
+
+
+def test_spherical_pendulum_keeps_energy_and_vertical_angular_momentum(example):
+    summary, trajectory = example("spherical_pendulum")
+    momenta = [
+        math.sin(theta) ** 2 * phi_dot
+        for theta, phi_dot in zip(trajectory.column("theta_1"), trajectory.column("phi_dot_1"), strict=True)
+    ]
+    assert max(abs(momentum - momenta[0]) for momentum in momenta) < 1e-13  # measured 1.1e-16
+    assert summary["energy_error_max"] < 1e-10  # measured 5.0e-12
+
+
+def test_small_oscillation_returns_after_one_period(example):
+    summary, trajectory = example("small_oscillation")
+    start = trajectory.rows[0]
+    end = summary["final"]
+    assert end["theta"] == pytest.approx([start[1], start[3], start[5]], abs=1e-8)  # measured 5.0e-10
+    assert end["theta_dot"] == pytest.approx([0, 0, 0], abs=1e-7)  # measured 2.0e-9
+
+
+def test_adaptive_method_agrees_with_gauss(example):
+    adaptive, _ = example("adaptive_method")
+    gauss, _ = example("double_pendulum")
+    assert math.dist(adaptive["final"]["bobs"][1], gauss["final"]["bobs"][1]) < 1e-9  # measured 5.5e-12
+    assert adaptive["energy_error_max"] > gauss["energy_error_max"]
+
+
+def test_natural_units_tell_their_scale(example):
+    summary, _ = example("natural_units")
+    units = {"length": 0.8, "mass": 2.0, "time": math.sqrt(0.8 / 9.81)}
+    assert summary["natural_units"] == pytest.approx(units, rel=1e-15)  # measured 0
+
+
+def test_loads_change_the_energy(example):
+    for name in ("driven_damped", "spatial_chain"):
+        summary, _ = example(name)
+        assert summary["energy_error_max"] > 1e-3  # measured 0.23, 0.022

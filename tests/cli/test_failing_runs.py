@@ -1,0 +1,161 @@
+"""Runs that fail on the way: exit status 1, a message, and every row that was computed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import Trajectory, program, settings
+
+# Without gravity one link turns evenly, θ = 0.1 - t; with one stage, in the middle of a step, the third step
+# of 0.04 is evaluated exactly at the pole.
+INTO_THE_POLE = """\
+[chain]
+space   = "spatial"
+masses  = [1.0]
+lengths = 1.0
+gravity = 0.0
+[start]
+theta     = 0.1
+theta_dot = -1.0
+[run]
+solver   = "dense"
+stages   = 1
+step     = 0.04
+duration = 1.0
+[output]
+every = 1
+"""
+
+
+@pytest.mark.parametrize("form", ["momentum", "velocity"])
+def test_a_pole_ends_the_run_and_the_rows_stay(pendula, tmp_path, form):
+    (tmp_path / "pole.toml").write_text(INTO_THE_POLE)
+    run = pendula("simulate", "pole.toml", "-o", "out.csv", "--json", *settings(f"run.form={form}"))
+    assert run.status == 1
+    assert "singular" in run.err and "link 1" in run.err and "t = 0.08" in run.err
+    assert run.json["outcome"]["status"] == "singular_mass_matrix"
+    assert run.json["outcome"]["link"] == 1
+    assert run.json["outcome"]["step"] == 0.04
+    assert run.json["steps"] == 2
+    trajectory = Trajectory.read(tmp_path / "out.csv")
+    assert trajectory.column("t") == pytest.approx([0, 0.04, 0.08], abs=1e-15)  # measured 0
+    assert trajectory.column("theta_1") == pytest.approx([0.1, 0.06, 0.02], abs=1e-14)  # measured 6.9e-18
+    assert trajectory.rows[-1][1] == run.json["final"]["theta"][0]
+
+
+@pytest.mark.parametrize("method", ["gauss", "rk4", "dopri5"])
+def test_a_start_at_the_pole_is_refused(pendula, tmp_path, method):
+    (tmp_path / "pole.toml").write_text(INTO_THE_POLE)
+    run = pendula(
+        "simulate",
+        "pole.toml",
+        "-o",
+        "out.csv",
+        "--json",
+        *settings("start.theta=0.0", f"run.method={method}"),
+    )
+    assert run.status == 1
+    assert run.json["outcome"]["status"] == "singular_mass_matrix"
+    assert (run.json["steps"], run.json["final"]["t"]) == (0, 0)
+    assert len(Trajectory.read(tmp_path / "out.csv").rows) == 1
+
+
+def test_newton_that_does_not_converge(pendula, double, tmp_path):
+    run = pendula(
+        "simulate",
+        double,
+        "-o",
+        "out.csv",
+        "--json",
+        *settings("run.step=0.3", "run.stages=3", "run.duration=1000", "output.every=1"),
+    )
+    assert run.status == 1
+    outcome, rows = run.json["outcome"], Trajectory.read(tmp_path / "out.csv").rows
+    assert outcome["status"] in ("not_converged", "not_finite")
+    assert outcome["iterations"] > 0
+    assert outcome["message"] in run.err
+    assert len(rows) == run.json["rows"] == run.json["steps"] + 1 >= 2
+    assert rows[-1][0] == run.json["final"]["t"] == outcome["t"]
+
+
+def test_the_last_state_of_a_failing_run_is_a_row_between_rows_too(pendula, tmp_path):
+    (tmp_path / "pole.toml").write_text(INTO_THE_POLE)
+    run = pendula("simulate", "pole.toml", "-o", "out.csv", *settings("output.every=1000"))
+    assert run.status == 1
+    t = Trajectory.read(tmp_path / "out.csv").column("t")
+    assert t == pytest.approx([0, 0.08], abs=1e-15)  # measured 0
+    assert "ended early" in run.out
+
+
+def test_a_failing_run_says_so_even_when_quiet(pendula, tmp_path):
+    (tmp_path / "pole.toml").write_text(INTO_THE_POLE)
+    run = pendula("simulate", "pole.toml", "--quiet")
+    assert (run.status, run.out) == (1, "")
+    assert run.err.startswith("pendula: at t = 0.08")
+
+
+def test_values_that_overflow_end_the_run(pendula, double):
+    run = pendula("simulate", double, "--json", *settings("start.theta_dot=1e200"))
+    assert run.status == 1
+    assert run.json["outcome"]["status"] in ("not_finite", "not_converged")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs the device that is always full")
+def test_a_full_disk_is_reported(pendula, double):
+    run = pendula("simulate", double, "-o", "/dev/full", "--json")
+    assert run.status == 1
+    assert run.err == "pendula: /dev/full: rows could not be written: No space left on device\n"
+    assert run.json["outcome"]["status"] == "output_failed"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs the device that is always full")
+def test_a_summary_that_cannot_be_written_is_reported(double):
+    with open("/dev/full", "w") as full:
+        run = subprocess.run(
+            [program(), "simulate", double],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    assert run.returncode == 1
+    assert run.stderr == "pendula: standard output could not be written\n"
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_keeps_its_rows(double, tmp_path, which):
+    file = tmp_path / "out.csv"
+    endless = settings("run.duration=1e9", "output.every=1")
+    command = [program(), "simulate", str(double), "-o", str(file), *endless]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        deadline = time.monotonic() + 60
+        while not (file.exists() and os.path.getsize(file) > 0):  # the first block of rows is there
+            assert time.monotonic() < deadline and run.poll() is None
+            time.sleep(0.02)
+        run.send_signal(which)
+        out, err = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert err.startswith("pendula: interrupted at t = ")
+    trajectory = Trajectory.read(file)
+    assert all(len(row) == len(trajectory.header) for row in trajectory.rows)
+    assert f"{len(trajectory.rows)} rows" in out
+
+
+def test_progress_is_for_terminals(double, tmp_path):
+    """On a terminal a line says how far the run is, and goes away at the end; standard output stays pure."""
+    pty = pytest.importorskip("pty")
+    mine, theirs = pty.openpty()
+    command = [program(), "simulate", str(double), "--json", "--set", "run.duration=2000"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs)
+    out, _ = run.communicate(timeout=120)
+    os.close(theirs)
+    seen = os.read(mine, 1 << 16).decode()
+    os.close(mine)
+    assert run.returncode == 0
+    assert "% " in seen and "of 2000" in seen
+    assert seen.endswith("\r\x1b[K")
+    assert out.count(b"\n") == 1
