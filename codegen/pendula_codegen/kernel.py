@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 from sympy import Expr, Matrix, Rational, Symbol
@@ -52,18 +52,13 @@ class Output:
 
 @dataclass(frozen=True)
 class Function:
-    """An entry point.
-
-    other_values   other forms of the outputs' values, kept when they are cheaper
-    definitions    what symbols stand for that are neither inputs nor the chain's own
-    """
+    """An entry point. `other_values`: another form of the outputs' values, kept when it is cheaper."""
 
     name: str
     title: str
     inputs: tuple[str, ...]
     outputs: tuple[Output, ...]
     other_values: tuple[Matrix | Expr, ...] = ()
-    definitions: dict[Symbol, Expr] = field(default_factory=dict)
 
     def candidates(self) -> list[list[Assignment]]:
         first = [assignment for output in self.outputs for assignment in output.assignments]
@@ -161,7 +156,6 @@ class DenseKernel:
                 ("chain", "q") if name == "potential_energy" else ("chain", "q", "v"),
                 (Output(symbol, "Real", value, "scalar|J"),),
                 (other,) if other is not None else (),
-                self.chain.rate_definitions if other is not None else {},
             )
             for name, symbol, title, value, other in table
         ]
@@ -370,23 +364,20 @@ class DenseKernel:
         ]
 
     def program(self, function: Function) -> Program:
-        return shortest_program(function.candidates(), self._vocabularies(function.definitions))
+        return shortest_program(function.candidates(), self._vocabularies)
 
-    def _vocabularies(self, extra: dict[Symbol, Expr]) -> list[Callable[[], Vocabulary]]:
+    @cached_property
+    def _vocabularies(self) -> list[Vocabulary]:
+        """One per form; shared by all functions, so that what two of them hold is expanded once."""
         inertias = frozenset(s for s in self.chain.definitions if s.name.startswith("inertia"))
         alias = self.chain.mass_below(self.chain.links)
-        definitions = {**tail_recursion(self.chain), **extra}
-        return [
-            partial(
-                Vocabulary,
-                self._leaves(),
-                self._angles(),
-                definitions,
-                Form(pair_angles, (inertias if expanded else frozenset()) | {alias}),
-            )
+        definitions = {**tail_recursion(self.chain), **self.chain.rate_definitions}
+        forms = [
+            Form(pair_angles, (inertias if expanded else frozenset()) | {alias})
             for pair_angles in (True, False)
             for expanded in (False, True)
         ]
+        return [Vocabulary(self._leaves(), self._angles(), definitions, form) for form in forms]
 
     def _leaves(self) -> list[Leaf]:
         chain, links = self.chain, self.chain.numbers

@@ -14,6 +14,7 @@ class LinkModel:
 
     coordinates         angles of one link (dof symbols), absolute, rad
     direction           unit vector along the rod as a function of the coordinates, (dimension x 1)
+    angles              the inverse of direction: unit vector -> coordinates
     up                  unit vector against gravity, (dimension x 1)
     mass, length, damping   parameters of one link: kg, m, N m s
     gravity             parameter of the chain: m/s²
@@ -25,6 +26,7 @@ class LinkModel:
     name: str
     coordinates: tuple[Symbol, ...]
     direction: Matrix
+    angles: Callable[[Matrix], tuple[Expr, ...]]
     up: Matrix
     mass: Symbol
     length: Symbol

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sympy import Expr
@@ -66,13 +66,13 @@ class Problem:
 
 
 def shortest_program(
-    alternatives: Sequence[Sequence[Assignment]], vocabularies: Sequence[Callable[[], Vocabulary]]
+    alternatives: Sequence[Sequence[Assignment]], vocabularies: Sequence[Vocabulary]
 ) -> Program:
     """The candidate that costs least, the first of several equals.
 
     Every alternative in every vocabulary competes in the first order; the winner is then tried in the others.
     """
-    problems = [pose(assignments, make()) for assignments in alternatives for make in vocabularies]
+    problems = [pose(assignments, atoms) for assignments in alternatives for atoms in vocabularies]
     programs = [problem.solve(ORDERS[0]) for problem in problems]
     winner = min(range(len(problems)), key=lambda k: programs[k].cost)
     finalists = [programs[winner], *(problems[winner].solve(order) for order in ORDERS[1:])]

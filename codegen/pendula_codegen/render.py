@@ -14,6 +14,7 @@ from pendula_codegen import __version__
 from pendula_codegen.chain import Chain
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.kernel import DenseKernel
+from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.models import find_model
 from pendula_codegen.tableau import DIGITS, MAX_STAGES, gauss
@@ -44,12 +45,19 @@ ENVIRONMENT = jinja2.Environment(
 )
 
 
-ENVIRONMENT.globals["signature"] = signature
+ENVIRONMENT.globals.update(signature=signature, solve_lines=solve_lines, unrolled=UNROLLED)
 
 
 # Sources that only one kind of header is made from; __main__ and counts write none.
 OWN_SOURCES = {
-    "kernel": {"blocks.py", "chain.py", "kernel.py", "mechanics.py", "templates/kernel.hpp.j2"},
+    "kernel": {
+        "blocks.py",
+        "chain.py",
+        "kernel.py",
+        "linear_solve.py",
+        "mechanics.py",
+        "templates/kernel.hpp.j2",
+    },
     "link": {"link.py", "templates/link.hpp.j2"},
     "tableaux": {"tableau.py", "templates/gauss_tableaux.hpp.j2"},
     "none": {"__main__.py", "counts.py"},
@@ -120,6 +128,7 @@ def render_link(space: str) -> str:
         struct=f"{space.capitalize()}Link",
         names=kernel.index_names(),
         trig=kernel.trig_names(),
+        angles=kernel.angles(),
         functions=kernel.render(),
     )
 

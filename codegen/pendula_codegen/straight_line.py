@@ -134,30 +134,34 @@ def _content(values: list[Number]) -> Number:
     return quotient(numerator, denominator)
 
 
-def factor(graph: Graph, polynomial: Polynomial) -> Term:
-    """Multivariate Horner form of `polynomial`, built in `graph`; each polynomial is factored once."""
+def factor(graph: Graph, polynomial: Polynomial, counts: dict[int, int] | None = None) -> Term:
+    """Multivariate Horner form of `polynomial`, built in `graph`; each polynomial is factored once.
+
+    counts   in how many of its monomials each atom is, where the caller knows
+    """
     key = tuple(polynomial.items())
     if key not in graph.factored:
-        graph.factored[key] = _factor(graph, polynomial)
+        graph.factored[key] = _factor(graph, polynomial, counts or _occurrences(polynomial))
     return graph.factored[key]
 
 
-def _factor(graph: Graph, polynomial: Polynomial) -> Term:
+def _factor(graph: Graph, polynomial: Polynomial, counts: dict[int, int]) -> Term:
     if not polynomial:
         return ZERO
     outside: list[Term] = []
-    counts = _occurrences(polynomial)
     common = [atom for atom, count in counts.items() if count == len(polynomial)]
+    counts = dict(counts)
     while common:
         outside += [(1, atom) for atom in common]
         polynomial = {_without(monomial, common): value for monomial, value in polynomial.items()}
-        counts = _occurrences(polynomial)
-        common = [atom for atom, count in counts.items() if count == len(polynomial)]
+        for atom in common:
+            counts[atom] = sum(1 for monomial in polynomial if atom in monomial)
+        common = [atom for atom in common if counts[atom] == len(polynomial)]
     return graph.product([*outside, _factor_sum(graph, polynomial, counts)])
 
 
-def _factor_sum(graph: Graph, polynomial: Polynomial, counts: Counter[int]) -> Term:
-    """A polynomial without common atoms, as a sum of products."""
+def _factor_sum(graph: Graph, polynomial: Polynomial, counts: dict[int, int]) -> Term:
+    """A polynomial without common atoms, as a sum of products; uses up `counts`."""
     terms: list[Term] = []
     rest = polynomial
     while rest:
@@ -168,14 +172,19 @@ def _factor_sum(graph: Graph, polynomial: Polynomial, counts: Counter[int]) -> T
                 for monomial, value in rest.items()
             ]
             break
-        group = {monomial: value for monomial, value in rest.items() if best in monomial}
-        terms.append(factor(graph, group))
-        rest = {monomial: value for monomial, value in rest.items() if monomial not in group}
-        counts.subtract(_occurrences(group))
+        group: Polynomial = {}
+        others: Polynomial = {}
+        for monomial, value in rest.items():
+            (group if best in monomial else others)[monomial] = value
+        held = _occurrences(group)
+        terms.append(factor(graph, group, held))
+        for atom, count in held.items():
+            counts[atom] -= count
+        rest = others
     return graph.sum(terms)
 
 
-def _most_frequent(counts: Counter[int]) -> int | None:
+def _most_frequent(counts: dict[int, int]) -> int | None:
     """The atom in most monomials, the first one on a tie; None where no atom is in two."""
     best, most = None, 1
     for atom, count in counts.items():
@@ -184,7 +193,7 @@ def _most_frequent(counts: Counter[int]) -> int | None:
     return best
 
 
-def _occurrences(polynomial: Polynomial) -> Counter[int]:
+def _occurrences(polynomial: Polynomial) -> dict[int, int]:
     """In how many monomials each atom is."""
     return Counter(chain.from_iterable(map(set, polynomial)))
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from sympy import Matrix, Symbol, cos, simplify, sin
+from sympy import Matrix, Rational, Symbol, cos, simplify, sin
 
 from pendula_codegen.blocks import collect_blocks
 from pendula_codegen.chain import Chain
@@ -16,6 +16,13 @@ PLANAR, SPATIAL = MODELS["planar"], MODELS["spatial"]
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_direction_is_a_unit_vector(model):
     assert simplify(model.direction.dot(model.direction)) == 1
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_angles_are_the_inverse_of_the_direction(model):
+    at = dict(zip(model.coordinates, (Rational(13, 10), Rational(-21, 10)), strict=False))
+    angles = Matrix(model.angles(model.direction.subs(at)))
+    assert (angles - Matrix(list(at.values()))).evalf(30).norm() < 1e-28  # measured 0
 
 
 def test_undeclared_symbol_in_the_direction():

@@ -8,7 +8,7 @@ from mpmath import mpf, sqrt, workdps
 from pendula_codegen.tableau import DIGITS, MAX_STAGES, gauss
 
 STAGES = range(1, MAX_STAGES + 1)
-TINY = mpf(10) ** (10 - DIGITS)
+TINY = mpf(10) ** (10 - DIGITS)  # measured 4e-57 for the extrapolation, 2e-60 elsewhere
 
 
 @pytest.mark.parametrize("s", STAGES)
@@ -25,9 +25,8 @@ def test_m_is_rounded_a_over_b(s):
     t = gauss(s)
     for i in range(s):
         for j in range(s):
-            assert (
-                abs(t.m[i][j] - t.a[i][j] / t.b[j]) <= 2.3e-16
-            )  # measured: at most 1.1e-16, half an ulp above 1
+            error = abs(t.m[i][j] - t.a[i][j] / t.b[j])
+            assert error <= 2.3e-16  # measured 1.1e-16, half an ulp above 1
 
 
 @pytest.mark.parametrize("s", STAGES)
@@ -57,7 +56,7 @@ def test_squared_matrix_and_extrapolation(s):
                 if k < s:
                     assert abs(twice - t.c[i] ** (k + 1) / (k * (k + 1))) < TINY
                 continued = sum(t.extrapolation[i][j] * t.c[j] ** (k - 1) for j in stages)
-                assert abs(continued - (1 + t.c[i]) ** (k - 1)) < TINY * 10**6
+                assert abs(continued - (1 + t.c[i]) ** (k - 1)) < TINY
 
 
 def test_two_stages_are_the_papers():

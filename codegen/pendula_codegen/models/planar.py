@@ -1,6 +1,6 @@
 """A link that swings in the vertical x–y plane, y up (paper eq. 1–2, 23)."""
 
-from sympy import Matrix, Rational, cos, sin, symbols
+from sympy import Matrix, Rational, atan2, cos, sin, symbols
 
 from pendula_codegen.model import LinkModel
 
@@ -10,6 +10,7 @@ MODEL = LinkModel(
     name="planar",
     coordinates=(theta,),
     direction=Matrix([sin(theta), -cos(theta)]),
+    angles=lambda u: (atan2(u[0], -u[1]),),
     up=Matrix([0, 1]),
     mass=m,
     length=length,

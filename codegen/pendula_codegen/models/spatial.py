@@ -1,6 +1,6 @@
 """A link that swings in space, z up: θ from the downward vertical, φ from the x axis (paper eq. 24–26)."""
 
-from sympy import Matrix, Rational, cos, sin, symbols
+from sympy import Matrix, Rational, atan2, cos, sin, sqrt, symbols
 
 from pendula_codegen.model import LinkModel
 
@@ -11,6 +11,7 @@ MODEL = LinkModel(
     name="spatial",
     coordinates=(theta, phi),
     direction=Matrix([sin(theta) * cos(phi), sin(theta) * sin(phi), -cos(theta)]),
+    angles=lambda u: (atan2(sqrt(u[0] ** 2 + u[1] ** 2), -u[2]), atan2(u[1], u[0])),
     up=Matrix([0, 0, 1]),
     mass=m,
     length=length,
