@@ -22,7 +22,7 @@ configure_package_config_file(
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/pendulaConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/pendulaConfig.cmake" "${PROJECT_BINARY_DIR}/pendulaConfigVersion.cmake"
               "${PROJECT_SOURCE_DIR}/cmake/PendulaKernels.cmake" "${PROJECT_SOURCE_DIR}/cmake/PendulaPython.cmake"
-              "${PROJECT_SOURCE_DIR}/cmake/check_requirements.py"
+              "${PROJECT_SOURCE_DIR}/cmake/PendulaXsimd.cmake" "${PROJECT_SOURCE_DIR}/cmake/check_requirements.py"
         DESTINATION "${package_dir}")
 
 if(PENDULA_NATIVE)

@@ -40,10 +40,11 @@ if(PENDULA_NATIVE)
   endif()
 endif()
 
+# -Warray-bounds: g++ 12 at -O3 takes vectorised copies of Eigen's two-vectors for reads beyond their end.
 set(_pendula_warnings
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wold-style-cast -Wcast-qual -Wnon-virtual-dtor
     -Woverloaded-virtual -Wextra-semi -Wimplicit-fallthrough -Wunused
-    $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond> $<$<CXX_COMPILER_ID:GNU>:-Wlogical-op>
+    "$<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond;-Wlogical-op;-Wno-array-bounds>"
     $<$<BOOL:${PENDULA_WARNINGS_AS_ERRORS}>:-Werror>)
 set(_pendula_sanitizers -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
 

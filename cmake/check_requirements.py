@@ -2,8 +2,8 @@
 
 usage: python check_requirements.py REQUIREMENTS.txt
 
-Exit 0 when it has them all; else one line on standard output names each that is missing or of another version, and
-the exit status is 1.
+Exit 0 when it has them all; else one line on standard output names each that is missing or of another
+version, and the exit status is 1.
 """
 
 import sys
