@@ -1,0 +1,45 @@
+// pendula_bench [--races FILE [--longest SECONDS]] [flags of Google Benchmark]
+#include <benchmark/benchmark.h>
+
+#include <cstdlib>
+#include <iostream>
+#include <pendula/version.hpp>
+#include <race.hpp>
+#include <steps.hpp>
+#include <string>
+#include <unit.hpp>
+#include <vector>
+
+namespace {
+
+/// Takes `--name VALUE` out of the arguments.
+std::string take(std::vector<char*>& arguments, const std::string& name, const std::string& otherwise) {
+  for (std::size_t i = 1; i + 1 < arguments.size(); ++i) {
+    if (arguments[i] != name) continue;
+    const std::string value = arguments[i + 1];
+    const auto at = arguments.begin() + static_cast<std::ptrdiff_t>(i);
+    arguments.erase(at, at + 2);
+    return value;
+  }
+  return otherwise;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<char*> arguments(argv, argv + argc);
+  const std::string races = take(arguments, "--races", "");
+  const double longest = std::stod(take(arguments, "--longest", "2"));
+  int count = static_cast<int>(arguments.size());
+  benchmark::Initialize(&count, arguments.data());
+  if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
+  benchmark::AddCustomContext("compiler", BENCH_COMPILER);
+  benchmark::AddCustomContext("flags", BENCH_FLAGS);
+  bench::register_unit();
+  bench::register_dense_steps();
+  bench::register_chain_costs();
+  bench::register_against_rk4imp();
+  if (!races.empty()) bench::register_races(races, longest);
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+}

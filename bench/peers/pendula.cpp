@@ -1,0 +1,74 @@
+#include <contestant.hpp>
+#include <peers/pendula.hpp>
+
+namespace bench {
+namespace {
+
+using pendula::Form, pendula::Iteration, pendula::Method, pendula::Planar, pendula::RunOptions, pendula::Solver;
+
+class PendulaRun : public Run {
+ public:
+  PendulaRun(const Problem& problem, const RunOptions& options, int steps, double step)
+      : problem_(problem),
+        steps_(steps),
+        step_(step),
+        start_(pendula::State<Planar>::from_angles(Eigen::VectorXd::Constant(problem.links, problem.angle))),
+        integrator_(pendula::make_integrator(chain_of(problem), options)) {}
+
+  void operator()() override {
+    outcome_ = integrator_->start(start_);
+    for (int k = 0; k < steps_ && outcome_; ++k) outcome_ = integrator_->step(step_);
+  }
+
+  EndState end() override {
+    if (!outcome_) return failed(problem_);
+    const auto state = integrator_->state();
+    return {{state.q.begin(), state.q.end()}, {state.v.begin(), state.v.end()}};
+  }
+
+ private:
+  Problem problem_;
+  int steps_;
+  double step_;
+  pendula::State<Planar> start_;
+  std::unique_ptr<pendula::Integrator<Planar>> integrator_;
+  pendula::Outcome outcome_;
+};
+
+RunOptions options_of(int stages, Solver solver, Iteration iteration) {
+  return {.stages = stages, .solver = solver, .iteration = iteration};
+}
+
+void add(std::vector<Contestant>& contestants, const std::string& name, const RunOptions& options, double coarsest,
+         double factor, int count) {
+  const auto built_in = [options](const Problem& problem) {
+    if (options.solver != Solver::dense) return true;
+    for (const auto& kernel : pendula::built_in_kernels()) {
+      if (kernel.space == Planar::name && kernel.links == problem.links) return true;
+    }
+    return false;
+  };
+  const auto settings = [=](const Problem& problem) { return step_counts(problem, coarsest, factor, count); };
+  const auto make = [options](const Problem& problem, double steps) {
+    return make_pendula(problem, options, static_cast<int>(steps), problem.duration / steps);
+  };
+  contestants.push_back({"pendula " + name, "steps", built_in, settings, make});
+}
+
+}  // namespace
+
+std::unique_ptr<Run> make_pendula(const Problem& problem, const RunOptions& options, int steps, double step) {
+  return std::make_unique<PendulaRun>(problem, options, steps, step);
+}
+
+void add_pendula(std::vector<Contestant>& contestants) {
+  const auto chain = [](int stages, Iteration iteration) { return options_of(stages, Solver::chain, iteration); };
+  add(contestants, "s = 8 fixed point", chain(8, Iteration::fixed_point), 0.7, 1.07, 40);
+  add(contestants, "s = 6 fixed point", chain(6, Iteration::fixed_point), 0.7, 1.1, 30);
+  add(contestants, "s = 8 Newton", chain(8, Iteration::newton), 0.7, 1.1, 30);
+  add(contestants, "s = 4 Newton", chain(4, Iteration::newton), 1, 1.5, 14);
+  add(contestants, "s = 2 Newton", chain(2, Iteration::newton), 1, 2, 12);
+  add(contestants, "s = 8 dense kernel", options_of(8, Solver::dense, Iteration::newton), 0.7, 1.1, 30);
+}
+
+}  // namespace bench

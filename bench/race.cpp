@@ -1,0 +1,124 @@
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <contestant.hpp>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <race.hpp>
+#include <references.hpp>
+
+namespace bench {
+namespace {
+
+constexpr double allowed_floors = 10;
+
+/// One setting of one contestant on one problem.
+struct Trial {
+  double setting, milliseconds, error;
+};
+
+double seconds_of(Run& run) {
+  const auto begin = std::chrono::steady_clock::now();
+  run();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// The best of a few runs, about 20 ms of them.
+Trial attempt(const Contestant& contestant, const Problem& problem, const Reference& reference, double setting) {
+  const std::unique_ptr<Run> run = contestant.make(problem, setting);
+  double best = seconds_of(*run);
+  for (double spent = best; spent < 0.02;) {
+    const double again = seconds_of(*run);
+    best = std::min(best, again);
+    spent += again;
+  }
+  return {setting, best * 1e3, error_of(run->end(), reference)};
+}
+
+/// From coarse to fine, a few settings past the first that is good enough.
+std::vector<Trial> scan(const Contestant& contestant, const Problem& problem, const Reference& reference,
+                        double longest) {
+  std::vector<Trial> trials;
+  int good = 0;
+  for (const double setting : contestant.settings(problem)) {
+    trials.push_back(attempt(contestant, problem, reference, setting));
+    good += trials.back().error <= allowed_floors * reference.floor;
+    if (good > 4 || trials.back().milliseconds > longest * 1e3) break;
+  }
+  return trials;
+}
+
+/// The cheapest trial that is good enough; failing that, the most accurate.
+const Trial& choose(const std::vector<Trial>& trials, const Reference& reference) {
+  const auto good = [&](const Trial& trial) { return trial.error <= allowed_floors * reference.floor; };
+  return *std::min_element(trials.begin(), trials.end(), [&](const Trial& a, const Trial& b) {
+    if (good(a) != good(b)) return good(a);
+    return good(a) ? a.milliseconds < b.milliseconds : a.error < b.error;
+  });
+}
+
+void enter(const Contestant& contestant, const Problem& problem, const Reference& reference, double setting,
+           const std::string& who) {
+  const auto race = [=](benchmark::State& state) {
+    const std::unique_ptr<Run> run = contestant.make(problem, setting);
+    for (auto _ : state) (*run)();
+    state.counters["error"] = error_of(run->end(), reference);
+    state.counters["floor"] = reference.floor;
+    state.counters["setting"] = setting;
+  };
+  const std::string name = "race/" + std::string(problem.name) + "/" + who;
+  benchmark::RegisterBenchmark(name.c_str(), race)->Unit(benchmark::kMillisecond);
+}
+
+std::vector<Contestant> everybody() {
+  std::vector<Contestant> contestants;
+  add_pendula(contestants);
+  add_gsl(contestants);
+  add_odeint(contestants);
+  add_cvode(contestants);
+  add_mujoco(contestants);
+  return contestants;
+}
+
+nlohmann::json json_of(const std::vector<Trial>& trials) {
+  auto list = nlohmann::json::array();
+  for (const Trial& trial : trials) {
+    const nlohmann::json error = std::isfinite(trial.error) ? nlohmann::json(trial.error) : nlohmann::json(nullptr);
+    list.push_back({{"setting", trial.setting}, {"milliseconds", trial.milliseconds}, {"error", error}});
+  }
+  return list;
+}
+
+}  // namespace
+
+void register_races(const std::string& file, double longest) {
+  auto kept = nlohmann::json::object();
+  const std::vector<Contestant> contestants = everybody();
+  for (std::size_t i = 0; i < problems.size(); ++i) {
+    const Problem& problem = problems[i];
+    const Reference& reference = references[i];
+    nlohmann::json& entry =
+        kept[std::string(problem.name)] = {{"floor", reference.floor}, {"trials", nlohmann::json::object()}};
+    for (const Contestant& contestant : contestants) {
+      if (!contestant.enters(problem)) continue;
+      std::vector<Trial> trials;
+      try {
+        trials = scan(contestant, problem, reference, longest);
+      } catch (const std::exception& error) {
+        std::cerr << problem.name << ", " << contestant.name << ": " << error.what() << '\n';
+        continue;
+      }
+      const Trial& chosen = choose(trials, reference);
+      std::cerr << problem.name << ", " << contestant.name << ": " << contestant.knob << ' ' << chosen.setting << ", "
+                << chosen.milliseconds << " ms, error " << chosen.error / reference.floor << " floors\n";
+      entry["trials"][contestant.name] = {{"knob", contestant.knob}, {"runs", json_of(trials)}};
+      enter(contestant, problem, reference, chosen.setting, contestant.name);
+      if (contestant.name == "GSL rk8pd") enter(contestant, problem, reference, 1e-12, "GSL rk8pd 1e-12");
+    }
+  }
+  std::ofstream(file) << kept.dump(1) << '\n';
+}
+
+}  // namespace bench

@@ -1,0 +1,272 @@
+"""Fills the tables of a page from the kept figures, between marks `<!-- NAME -->` and `<!-- /NAME -->`.
+
+usage: python bench/tabulate.py FIGURES_FOLDER PAGE.md
+
+A row whose benchmark did not run is left out.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+# The leads to reach: of races over GSL rk8pd at 1e-12, of steps over GSL rk4imp.
+PROBLEMS = {"D": 7, "P2": 6, "P5": 5, "P10": 5, "P20": 6, "P50": 12, "P100": 40}
+STEPS = {2: 15, 10: 30, 100: 700}
+LINKS = (2, 5, 10, 20, 50, 100, 1000, 10_000, 100_000)
+BASELINE = "GSL rk8pd 1e-12"
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A Markdown table, or nothing where there is no row."""
+    body = [list(row) for row in rows]
+    if not body:
+        return ""
+    head = list(head)
+    lines = [head, ["---"] * len(head), *body]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def number(value: float) -> str:
+    """Three digits, without an exponent."""
+    if value >= 100:
+        return f"{value:.0f}"
+    return f"{value:.2f}" if value < 10 else f"{value:.1f}"
+
+
+class Figures:
+    """The kept figures, by what the tables ask of them."""
+
+    def __init__(self, folder: Path) -> None:
+        """Reads benchmarks.json, races.json and memory.json."""
+        kept = json.loads((folder / "benchmarks.json").read_text(encoding="utf-8"))
+        self.context = kept["context"]
+        self.benchmarks = {name: e for name, e in kept["benchmarks"].items() if "failed" not in e}
+        self.races = json.loads((folder / "races.json").read_text(encoding="utf-8"))
+        memory = (folder / "memory.json").read_text(encoding="utf-8").strip()
+        self.memory = json.loads(memory) if memory else None
+
+    def cost(self, space: str, method: str, links: int) -> float | None:
+        """Sincos a link and iteration."""
+        entry = self.benchmarks.get(f"chain/{space}/{method}/n={links}")
+        return entry and entry["sincos_a_link_and_iteration"]
+
+    def step(self, who: str, links: int) -> float | None:
+        """Microseconds of a step of 2-stage Gauss at h = 1e-3."""
+        entry = self.benchmarks.get(f"step/{who}/n={links}")
+        return entry and entry["step_microseconds"]
+
+    def field(self, problem: str) -> dict[str, dict]:
+        """Who ran a race, by name."""
+        prefix = f"race/{problem}/"
+        return {n.removeprefix(prefix): e for n, e in self.benchmarks.items() if n.startswith(prefix)}
+
+    def finishers(self, problem: str, ours: bool) -> list[tuple[float, str]]:
+        """(milliseconds, name) of those within 10 floors, the fastest first."""
+        return sorted(
+            (entry["time"], name)
+            for name, entry in self.field(problem).items()
+            if entry["error"] <= 10 * entry["floor"]
+            and name.startswith("pendula") == ours
+            and name != BASELINE
+        )
+
+
+def machine(figures: Figures) -> str:
+    """What the figures were measured with, and the unit."""
+    c = figures.context
+    unit = figures.benchmarks["sincos"]["nanoseconds"] * 1e9
+    return (
+        f"{c['processor']}, one core; {c['compiler']}, `{c['flags']}`; {c['date']}. "
+        f"One scalar `sincos` (std::sin and std::cos of the same argument): {unit:.1f} ns."
+    )
+
+
+def cost_row(figures: Figures, what: str, space: str, method: str, wanted: float) -> Iterable[list[str]]:
+    """The row of one bound on the cost of a link and iteration, n = 2 … 10⁴."""
+    costs = [c for n in LINKS if n <= 10_000 and (c := figures.cost(space, method, n))]
+    if costs:
+        yield [what, f"≤ {wanted:g} sincos", f"{number(min(costs))}–{number(max(costs))} sincos"]
+
+
+def linear_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of linearity: cost at n = 10⁴ over n = 100, for the four methods above."""
+    ratios = []
+    for space in ("planar", "spatial"):
+        for method in ("s=2/newton", "s=8/fixed-point"):
+            long, short = figures.cost(space, method, 10_000), figures.cost(space, method, 100)
+            if long and short:
+                ratios.append(long / short)
+    if ratios:
+        found = ", ".join(f"{ratio:.2f}" for ratio in ratios)
+        yield ["cost a link and iteration, n = 10⁴ over n = 100 (the four rows above)", "≤ 1.15", found]
+
+
+def step_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of one step against rk4imp, by the faster of our two iterations."""
+    leads, wanted = [], []
+    for links, want in STEPS.items():
+        peer = figures.step("GSL rk4imp", links)
+        ours = [t for who in ("pendula Newton", "pendula fixed point") if (t := figures.step(who, links))]
+        if peer and ours:
+            leads.append(f"{number(peer / min(ours))}×")
+            wanted.append(f"{want}×")
+    if leads:
+        yield [
+            "one step, s = 2, h = 1e-3, against GSL rk4imp, n = 2 / 10 / 100",
+            "≥ " + " / ".join(wanted),
+            " / ".join(leads),
+        ]
+
+
+def race_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of the races: our fastest within 10 floors against GSL rk8pd at 1e-12."""
+    leads = []
+    for problem in PROBLEMS:
+        ours = figures.finishers(problem, ours=True)
+        baseline = figures.field(problem).get(BASELINE)
+        leads.append(f"{number(baseline['time'] / ours[0][0])}×" if ours and baseline else "–")
+    if any(lead != "–" for lead in leads):
+        yield [
+            "the race " + ", ".join(PROBLEMS) + ", against GSL rk8pd 1e-12",
+            "≥ " + ", ".join(f"{want}×" for want in PROBLEMS.values()),
+            ", ".join(leads),
+        ]
+
+
+def memory_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of peak memory."""
+    if figures.memory:
+        yield [
+            "memory of the whole program, n = 10⁵, s = 2, planar",
+            "≤ 64 MiB",
+            f"{figures.memory['peak_mebibytes']:.1f} MiB",
+        ]
+
+
+def goals(figures: Figures) -> str:
+    """What was to be reached, and what was."""
+    rows = [
+        *cost_row(figures, "planar, s = 2, Newton, n = 2 … 10⁴", "planar", "s=2/newton", 6),
+        *cost_row(figures, "spatial, s = 2, Newton, likewise", "spatial", "s=2/newton", 18),
+        *cost_row(figures, "planar, s = 8, fixed point, all stages", "planar", "s=8/fixed-point", 5),
+        *cost_row(figures, "spatial, s = 8, fixed point", "spatial", "s=8/fixed-point", 10),
+        *linear_row(figures),
+        *step_row(figures),
+        *race_row(figures),
+        *memory_row(figures),
+    ]
+    return table(["what", "to reach", "measured"], rows)
+
+
+def races(figures: Figures) -> str:
+    """Every race: milliseconds of each contestant at its cheapest setting within 10 floors."""
+    names = list(dict.fromkeys(name for problem in PROBLEMS for name in figures.field(problem)))
+    names.sort(key=lambda name: (not name.startswith("pendula"), name != BASELINE))
+    rows = [["floor of the error", *(f"{figures.races[p]['floor']:.1e}" for p in PROBLEMS)]]
+    for name in names:
+        cells = []
+        for problem in PROBLEMS:
+            entry = figures.field(problem).get(name)
+            if entry is None:
+                cells.append("")
+            elif entry["error"] <= 10 * entry["floor"]:
+                cells.append(number(entry["time"]))
+            else:
+                cells.append(f"*{number(entry['time'])} ({entry['error'] / entry['floor']:.0e})*")
+        rows.append([name, *cells])
+    return table(["", *PROBLEMS], rows)
+
+
+def peers(figures: Figures) -> str:
+    """Our fastest against the fastest of the others, with the dense dynamics and with ours."""
+    rows = []
+    for problem in PROBLEMS:
+        ours, others = figures.finishers(problem, ours=True), figures.finishers(problem, ours=False)
+        if not ours or not others:
+            continue
+        plain = [other for other in others if "O(n)" not in other[1]]
+        cells = [problem, f"{ours[0][1]}: {number(ours[0][0])}"]
+        for found in (plain, others):
+            if found:
+                time, name = found[0]
+                cells.append(f"{name}: {number(time)} ({number(time / ours[0][0])}×)")
+            else:
+                cells.append("–")
+        rows.append(cells)
+    return table(["", "pendula, ms", "fastest peer on its own, ms", "fastest peer of all, ms"], rows)
+
+
+def steps(figures: Figures) -> str:
+    """One step of 2-stage Gauss."""
+    rows = []
+    for who in ("GSL rk4imp", "pendula Newton", "pendula fixed point"):
+        cells = [figures.step(who, links) for links in STEPS]
+        if any(cells):
+            rows.append([who, *(number(cell) if cell else "–" for cell in cells)])
+    return table(["µs a step", *(f"n = {links}" for links in STEPS)], rows)
+
+
+def chain(figures: Figures) -> str:
+    """The cost of a link and iteration, for every n."""
+    rows = []
+    for space in ("planar", "spatial"):
+        for stages in (2, 4, 8):
+            for method in ("newton", "fixed-point"):
+                cells = [figures.cost(space, f"s={stages}/{method}", links) for links in LINKS]
+                if any(cells):
+                    numbers = (number(cell) if cell else "–" for cell in cells)
+                    rows.append([f"{space}, s = {stages}, {method}", *numbers])
+    return table(["sincos a link and iteration, n =", *map(str, LINKS)], rows)
+
+
+def dense(figures: Figures) -> str:
+    """Step times of the dense kernels: momentum form / velocity form, iterations of the first."""
+    kernels = sorted({name.split("/")[1] for name in figures.benchmarks if name.startswith("dense/")})
+    rows = []
+    for kernel in kernels:
+        cells = []
+        for stages in (1, 2, 4, 8):
+            names = (f"dense/{kernel}/s={stages}/{form}" for form in ("momentum", "velocity"))
+            forms = [figures.benchmarks.get(name) for name in names]
+            if all(forms):
+                times = " / ".join(number(form["step_microseconds"]) for form in forms)
+                cells.append(f"{times} ({forms[0]['iterations_a_step']:.1f})")
+            else:
+                cells.append("–")
+        rows.append([kernel.replace("_", " "), *cells])
+    head = ["µs a step", "s = 1, h = 1e-3", "s = 2, h = 1e-3", "s = 4, h = 5e-3", "s = 8, h = 1e-2"]
+    return table(head, rows)
+
+
+TABLES: dict[str, Callable[[Figures], str]] = {
+    "machine": machine,
+    "goals": goals,
+    "races": races,
+    "peers": peers,
+    "steps": steps,
+    "chain": chain,
+    "dense": dense,
+}
+
+
+def filled(page: str, figures: Figures) -> str:
+    """The page with every table between its marks."""
+    for name, make in TABLES.items():
+        pattern = rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)"
+        text = make(figures)
+        page, count = re.subn(pattern, lambda m, t=text: f"{m[1]}{t}\n{m[2]}", page, flags=re.DOTALL)
+        if count != 1:
+            raise SystemExit(f"tabulate.py: the page has {count} places for {name}, expected one")
+    return page
+
+
+def main() -> None:
+    """Reads the figures, rewrites the page."""
+    folder, page = map(Path, sys.argv[1:])
+    page.write_text(filled(page.read_text(encoding="utf-8"), Figures(folder)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
