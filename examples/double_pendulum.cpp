@@ -3,6 +3,7 @@
 #include <pendula/pendula.hpp>
 
 #include <iostream>
+#include <numbers>
 
 int main() {
   using namespace pendula;
@@ -11,7 +12,7 @@ int main() {
   const Chain<Planar> chain(parameters);
 
   GaussStepper<DenseMomentumNewton<kernels::Planar2, 2>> stepper(chain, 2);
-  Outcome outcome = stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(EIGEN_PI / 2)));
+  Outcome outcome = stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(std::numbers::pi / 2)));
   for (int step = 0; outcome && step < 20000; ++step) outcome = stepper.step(5e-4);
   if (!outcome) {
     std::cerr << outcome << '\n';
