@@ -1,5 +1,7 @@
 // The run-time factory, the explicit methods, the simulation loop, and how failures are told.
 
+#include <pendula/chain_integrator.hpp>
+#include <pendula/gauss/chain_solver.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 
 #include "support/kernels.hpp"
@@ -36,6 +38,18 @@ TEST(Factory, SaysWhatRuns) {
   EXPECT_EQ(description.kernel, "spatial_2");
 }
 
+TEST(Factory, ChoosesTheChainSolverForAnyNumberOfLinks) {
+  RunOptions options;
+  const auto integrator = make_integrator(equal_chain<Spatial>(40), options);
+  EXPECT_EQ(integrator->describe().solver, "chain");
+  EXPECT_EQ(integrator->describe().kernel, "");
+  options.iteration = Iteration::fixed_point;
+  EXPECT_EQ(make_integrator(equal_chain<Spatial>(40), options)->describe().iteration, "fixed-point");
+  options.form = Form::velocity;
+  options.solver = Solver::chain;
+  EXPECT_THROW(make_integrator(equal_chain<Spatial>(40), options), std::invalid_argument);
+}
+
 TEST(Factory, FixedSizeSteppersAgreeWithIt) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
   GaussStepper<DenseMomentumNewton<kernels::Planar2, 3>> stepper(chain, 3);
@@ -61,6 +75,29 @@ TEST(ExplicitMethods, MeetGaussLegendre) {
   EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-9);  // measured 1.4e-10
   options.method = Method::fehlberg78;
   EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);  // measured 4e-10
+}
+
+template <class Space>
+void expect_the_same_accelerations(const Chain<Space>& chain, ForwardDynamics<Space>& dense, const State<Space>& at) {
+  Eigen::VectorXd expected(at.q.size()), got(at.q.size());
+  dense.acceleration(0.3, at.q, at.v, expected);
+  make_chain_forward_dynamics(chain)->acceleration(0.3, at.q, at.v, got);
+  EXPECT_LT((got - expected).norm(), 1e-13 * expected.norm());  // measured 5e-15
+}
+
+TEST(ExplicitMethods, HaveTheSameAccelerationsWithoutAKernel) {
+  Random random(3);
+  const Chain<Planar> planar = random_chain<Planar>(random, 4, true);
+  DenseForwardDynamics<kernels::Planar4> planar_dense(planar);
+  expect_the_same_accelerations(planar, planar_dense, random_state<Planar>(random, 4));
+  const Chain<Spatial> spatial = random_chain<Spatial>(random, 3, true);
+  DenseForwardDynamics<kernels::Spatial3> spatial_dense(spatial);
+  expect_the_same_accelerations(spatial, spatial_dense, random_state<Spatial>(random, 3));
+  RunOptions options;
+  options.method = Method::rk4;
+  const auto integrator = make_integrator(equal_chain<Planar>(40), options);
+  ASSERT_TRUE(integrator->start(swinging(40)));
+  EXPECT_TRUE(integrator->step(1e-4));
 }
 
 TEST(ExplicitMethods, ToleranceSteersTheError) {
@@ -96,19 +133,42 @@ TEST(Failure, AtThePoleNamesTheLink) {
       "at t = 0 s: the mass matrix in (theta, phi) is singular: sin(theta) = 0 at link 2, where phi has no meaning");
 }
 
-TEST(Failure, OfNewtonLeavesTheStateAndSaysHowFarItCame) {
-  const auto integrator = make_integrator(equal_chain<Planar>(4), gauss(8));
+// 4 s are far too much for one step of four links, and little enough for its smallest part.
+TEST(Failure, OfAStepIsMendedByHalves) {
+  const Chain<Planar> chain = equal_chain<Planar>(4);
+  const auto integrator = make_integrator(chain, gauss(8));
   ASSERT_TRUE(integrator->start(swinging(4)));
-  const Outcome outcome = integrator->step(20.0);
-  ASSERT_EQ(outcome.status, Status::not_converged) << outcome;
-  EXPECT_EQ(outcome.iterations, StepperOptions{}.max_iterations);
-  EXPECT_EQ(outcome.step, 20.0);
-  EXPECT_GT(outcome.residual, 1e-2);  // measured 0.3
-  EXPECT_EQ(integrator->time(), 0);
-  EXPECT_EQ(distance(integrator->state(), swinging(4)), 0);
-  EXPECT_EQ(integrator->statistics().steps, 0);
-  EXPECT_EQ(integrator->statistics().rejected_steps, 1);
-  ASSERT_TRUE(integrator->step(0.01)) << "a failed step does no harm to the next";
+  const Outcome outcome = integrator->step(4.0);
+  ASSERT_TRUE(outcome) << outcome;
+  EXPECT_EQ(outcome.step, 4.0);
+  EXPECT_EQ(integrator->time(), 4.0);
+  EXPECT_EQ(integrator->statistics().steps, 1);
+  EXPECT_GT(integrator->statistics().rejected_steps, 0);
+  const double change = energy(chain, integrator->state()) - energy(chain, swinging(4));
+  EXPECT_LT(std::abs(change), 1e-2 * energy_scale(chain));  // measured 1.2e-3
+}
+
+template <class StageSolver>
+void expect_an_untouched_state_where_no_part_converges() {
+  GaussStepper<StageSolver> stepper(equal_chain<Planar>(4), 2, {.max_iterations = 1});
+  ASSERT_TRUE(stepper.start(swinging(4)));
+  const Outcome outcome = stepper.step(0.01);
+  EXPECT_EQ(outcome.status, Status::not_converged) << outcome;
+  EXPECT_EQ(outcome.step, 0.01 / 1024) << "the smallest part that was tried";
+  EXPECT_EQ(outcome.time, 0);
+  EXPECT_EQ(outcome.iterations, 1);
+  EXPECT_GT(outcome.residual, 0);
+  EXPECT_GE(outcome.link, 0);
+  EXPECT_EQ(stepper.time(), 0);
+  EXPECT_EQ(distance(stepper.state(), swinging(4)), 0);
+  EXPECT_EQ(stepper.statistics().steps, 0);
+  EXPECT_EQ(stepper.statistics().rejected_steps, 11);
+}
+
+TEST(Failure, LeavesTheStateAndSaysHowFarItCame) {
+  expect_an_untouched_state_where_no_part_converges<DenseMomentumNewton<kernels::Planar4>>();
+  expect_an_untouched_state_where_no_part_converges<DenseVelocityNewton<kernels::Planar4>>();
+  expect_an_untouched_state_where_no_part_converges<ChainSolver<Planar, 2>>();
 }
 
 std::vector<double> row_times(const Schedule& schedule) {

@@ -20,7 +20,7 @@ std::unique_ptr<Integrator<SpaceOf<Kernel>>> make_dense_integrator(const Chain<S
   if (options.method != Method::gauss) {
     return make_explicit_integrator<Space>(std::make_unique<DenseForwardDynamics<Kernel>>(chain), options, kernel);
   }
-  const Description description{"dense", "newton", kernel};
+  const Description description{"dense", "", kernel};
   if (options.form == Form::velocity) {
     return std::make_unique<GaussIntegrator<DenseVelocityNewton<Kernel>>>(chain, options.stages, description);
   }

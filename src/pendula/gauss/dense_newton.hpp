@@ -60,10 +60,15 @@ class DenseStages {
   using Matrix = typename Kernel::template Matrix<double>;
   using Parameters = typename Kernel::template Parameters<double>;
   using KernelTorque = typename Kernel::template Torque<double>;
-  static constexpr auto convergence = RoundoffStop::Convergence::quadratic;
+  static constexpr Convergence convergence() { return Convergence::quadratic; }
+  static constexpr Iteration iteration() { return Iteration::newton; }
+  static constexpr std::int64_t chart_switches() { return 0; }
 
   /// Link whose coordinates fail at the last evaluated stages, −1 where none does.
   int singular_link() const { return singular_link_; }
+
+  /// Stage i as it stands: its velocities, in velocity form its accelerations.
+  const Vector& stage(int i) const { return unknown_[i]; }
 
  protected:
   DenseStages(const Chain& chain, int s)
@@ -217,6 +222,15 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
     this->remember();
   }
 
+  void save() { saved_ = {q_, p_}; }
+
+  void restore() {
+    q_ = saved_[0];
+    p_ = saved_[1];
+    this->forget();
+    Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, velocity_);
+  }
+
   State state(double time) const {
     Vector v;
     Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v);
@@ -260,7 +274,8 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
   }
 
   Compensated<Vector> q_, p_;
-  Vector velocity_;  // at the start: the cold start of the predictor
+  std::array<Compensated<Vector>, 2> saved_;
+  Vector velocity_;  // the cold start of the predictor
   detail::PerStage<Vector, S> position_, momentum_, force_;
   detail::PerStage<Matrix, S> p_D_q_, p_D_v_, f_D_q_, f_D_v_;
 };
@@ -325,6 +340,14 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
     this->remember();
   }
 
+  void save() { saved_ = {q_, v_}; }
+
+  void restore() {
+    q_ = saved_[0];
+    v_ = saved_[1];
+    this->forget();
+  }
+
   State state(double time) const { return {time, q_.value, v_.value}; }
 
  private:
@@ -358,6 +381,7 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
   }
 
   Compensated<Vector> q_, v_;
+  std::array<Compensated<Vector>, 2> saved_;
   Vector acceleration_;  // at the start: the cold start of the predictor
   detail::PerStage<Vector, S> position_, velocity_, residual_;
   detail::PerStage<Matrix, S> E_D_q_, E_D_v_, E_D_a_;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <pendula/gauss/compensated.hpp>
 #include <pendula/gauss/roundoff.hpp>
+#include <pendula/options.hpp>
 #include <pendula/outcome.hpp>
 
 namespace pendula {
@@ -19,14 +20,18 @@ struct StepperOptions {
 
 /// Takes implicit Gauss–Legendre steps with any solver of the stage equations.
 ///
-/// A `StageSolver` owns the model and the workspace, is built from (chain, stages), and offers
-///   using Chain, State; static constexpr RoundoffStop::Convergence convergence;
+/// A `StageSolver` owns the model and the workspace, is built from (chain, stages, options of its own…), and offers
+///   using Chain, State;
 ///   Status start(const State&);            takes over a state; may find it singular
 ///   void prepare(double time, double h);   predicts the stages of the next step
 ///   Correction correct();                  improves the stages once
+///   Convergence convergence() const;       how its corrections shrink; may change from one to the next
 ///   int singular_link() const;             link whose coordinates fail at the stages, −1 where none does
 ///   void accept();                         moves the state to the end of the step
+///   void save(); void restore();           keep a state and go back to it; neither allocates
 ///   State state(double time) const;        the state as users read it
+///   std::int64_t chart_switches() const;   links moved to other coordinates since the start
+///   Iteration iteration() const;           what it iterates by
 /// and the stepper does not know which one it has.
 template <class StageSolver>
 class GaussStepper {
@@ -35,8 +40,9 @@ class GaussStepper {
   using State = typename StageSolver::State;
 
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
-  GaussStepper(const Chain& chain, int stages, StepperOptions options = {})
-      : solver_(chain, stages), options_(options), at_roundoff_(StageSolver::convergence) {}
+  template <class... SolverOptions>
+  GaussStepper(const Chain& chain, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
+      : solver_(chain, stages, solver_options...), options_(options) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
@@ -46,18 +52,14 @@ class GaussStepper {
     return {status, time(), 0, 0, 0, status == Status::ok ? -1 : solver_.singular_link()};
   }
 
-  /// Advances by `h`; on failure leaves the state untouched and says why.
+  /// Advances by `h`. Where the stage equations cannot be solved, the step is taken in halves, quarters … as far as
+  /// `smallest_part`; if that fails too, the state is left as it was and the outcome says why.
   Outcome step(double h) {
-    solver_.prepare(time(), h);
-    at_roundoff_.restart();
-    Correction correction;
-    for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
-      correction = solver_.correct();
-      ++statistics_.newton_iterations;
-      if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
-      if (at_roundoff_.reached(correction.relative)) return accept(h, iteration, correction);
-    }
-    return failure(Status::not_converged, h, options_.max_iterations, correction);
+    Outcome outcome = attempt(h);
+    if (!outcome && outcome.status != Status::singular_mass_matrix) outcome = step_in_parts(h);
+    if (outcome) ++statistics_.steps;
+    statistics_.chart_switches = solver_.chart_switches();
+    return outcome;
   }
 
   double time() const { return time_.value; }
@@ -65,12 +67,52 @@ class GaussStepper {
   const Statistics& statistics() const { return statistics_; }
   const StageSolver& solver() const { return solver_; }
 
+  /// A failing step is tried in parts down to this fraction of it.
+  static constexpr double smallest_part = 1.0 / 1024;
+
  private:
+  /// One step of exactly h; on failure the state is what it was.
+  Outcome attempt(double h) {
+    solver_.prepare(time(), h);
+    at_roundoff_.restart();
+    Correction correction;
+    for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
+      correction = solver_.correct();
+      ++statistics_.newton_iterations;
+      if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
+      if (at_roundoff_.reached(correction.relative, solver_.convergence())) return accept(h, iteration, correction);
+    }
+    return failure(Status::not_converged, h, options_.max_iterations, correction);
+  }
+
+  // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
+  Outcome step_in_parts(double h) {
+    const Compensated<double> start = time_;
+    solver_.save();
+    double done = 0, part = 0.5;
+    while (done < 1) {
+      const Outcome outcome = attempt(h * part);
+      if (outcome) {
+        done += part;
+        const bool fits = std::fmod(done, 2 * part) == 0 && part < 0.5;
+        if (fits) part *= 2;
+      } else if (part > smallest_part && outcome.status != Status::singular_mass_matrix) {
+        part /= 2;
+      } else {
+        solver_.restore();
+        time_ = start;
+        return outcome;
+      }
+    }
+    time_ = start;
+    time_.add(h);
+    return {Status::ok, time(), h, 0, 0, -1};
+  }
+
   Outcome accept(double h, int iterations, const Correction& correction) {
     if (solver_.singular_link() >= 0) return failure(Status::singular_mass_matrix, h, iterations, correction);
     solver_.accept();
     time_.add(h);
-    ++statistics_.steps;
     return {Status::ok, time(), h, iterations, correction.relative, -1};
   }
 

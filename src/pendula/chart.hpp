@@ -1,0 +1,108 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <pendula/space.hpp>
+
+namespace pendula {
+
+/// Which coordinates a link is described in: û = R û(q) with R the identity (chart 0, the user's angles) or the cyclic
+/// permutation of the axes (chart 1, whose poles lie on the y axis). Where one chart fails the other is at its best,
+/// so that a chain never meets a pole. In the plane there is only chart 0.
+using Chart = std::uint8_t;
+
+template <class Space>
+inline constexpr bool has_charts = Space::dof == 2;
+
+/// R x: components in the link's axes, (dimension) -> components in the world's.
+template <class Vector>
+Vector to_world([[maybe_unused]] Chart chart, const Vector& x) {
+  if constexpr (std::tuple_size_v<Vector> == 3) {
+    if (chart == 1) return {x[1], x[2], x[0]};
+  }
+  return x;
+}
+
+/// Rᵀ x: the inverse of to_world.
+template <class Vector>
+Vector to_chart([[maybe_unused]] Chart chart, const Vector& x) {
+  if constexpr (std::tuple_size_v<Vector> == 3) {
+    if (chart == 1) return {x[2], x[0], x[1]};
+  }
+  return x;
+}
+
+/// Axis of the world along which component k in the link's axes lies.
+template <class Space>
+constexpr int world_axis([[maybe_unused]] Chart chart, int k) {
+  if constexpr (has_charts<Space>) return (k + 2 * chart) % 3;
+  return k;
+}
+
+/// A chart is left where the determinant of its metric, sin²θ, falls below this: |sin θ| < ½.
+inline constexpr double chart_limit = 0.25;
+
+/// Direction of a link and its rate, in the axes of the world.
+template <class Space>
+struct Heading {
+  using Link = typename Space::Link;
+  typename Link::template Cartesian<double> u, u_dot;
+
+  Heading(Chart chart, const std::array<double, Space::dof>& q, const std::array<double, Space::dof>& v) {
+    typename Link::template Trig<double> trig;
+    Link::trig(q, trig);
+    Link::direction(trig, u);
+    Link::velocity(trig, v, u_dot);
+    u = to_world(chart, u);
+    u_dot = to_world(chart, u_dot);
+  }
+};
+
+/// Angles and rates of one link as the user reads them.
+template <class Space>
+struct LinkAngles {
+  std::array<double, Space::dof> q, v;
+};
+
+namespace detail {
+
+/// x moved by full turns to within half a turn of `near`.
+inline double unwrapped(double x, double near) {
+  return x + 2 * std::numbers::pi * std::round((near - x) / (2 * std::numbers::pi));
+}
+
+/// Of (θ, φ) and (−θ, φ + π), which are the same direction, whichever lies nearer to `near`.
+inline std::array<double, 2> nearest_angles(const std::array<double, 2>& q, const std::array<double, 2>& near) {
+  const std::array<double, 2> same{unwrapped(q[0], near[0]), unwrapped(q[1], near[1])};
+  const std::array<double, 2> other{unwrapped(-q[0], near[0]), unwrapped(q[1] + std::numbers::pi, near[1])};
+  const auto distance = [&](const auto& x) { return std::hypot(x[0] - near[0], x[1] - near[1]); };
+  return distance(other) < distance(same) ? other : same;
+}
+
+}  // namespace detail
+
+/// The user's θ, φ and their rates from a direction, continuous with the angles `near` of a moment before.
+///
+/// At the pole (sin θ < 10⁻¹⁴) φ is the plane in which the link moves, or what it was if the link rests, and
+/// φ̇ is zero.
+inline LinkAngles<Spatial> user_angles(const Heading<Spatial>& heading, const std::array<double, 2>& near) {
+  static constexpr double pole = 32 * std::numeric_limits<double>::epsilon();
+  const auto& [u, u_dot] = heading;
+  LinkAngles<Spatial> angles;
+  Spatial::Link::coordinates(u, angles.q);
+  const bool at_pole = std::hypot(u[0], u[1]) < pole;
+  const bool rests = std::hypot(u_dot[0], u_dot[1]) < pole;
+  if (at_pole) angles.q[1] = rests ? near[1] : std::atan2(u_dot[1], u_dot[0]);
+  angles.q = detail::nearest_angles(angles.q, near);
+  Spatial::Link::Trig<double> trig;
+  double determinant;
+  Spatial::Link::trig(angles.q, trig);
+  Spatial::Link::metric_determinant(trig, determinant);
+  Spatial::Link::rates(trig, at_pole ? 0.0 : 1 / determinant, u_dot, angles.v);
+  return angles;
+}
+
+}  // namespace pendula

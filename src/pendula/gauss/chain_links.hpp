@@ -1,0 +1,173 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <new>
+#include <pendula/chain.hpp>
+#include <pendula/gauss/lanes.hpp>
+#include <type_traits>
+#include <vector>
+
+namespace pendula {
+
+namespace detail {
+
+/// What workspaces hold before anybody wrote there: NaN where the build hunts for reads of it, otherwise zero.
+#ifdef EIGEN_INITIALIZE_MATRICES_BY_NAN
+inline constexpr double unwritten = std::numeric_limits<double>::quiet_NaN();
+#else
+inline constexpr double unwritten = 0;
+#endif
+
+struct AlignedDelete {
+  void operator()(double* block) const { ::operator delete (block, std::align_val_t{pack_alignment}); }
+};
+
+/// `PerLink` numbers a link in one block aligned for packs; on the stack where the number of links N is known.
+/// Up to eight more numbers can be read after the last.
+template <int PerLink, int N>
+class LinkArray {
+  static constexpr int round_up(int count) { return (count + 7) / 8 * 8; }
+  static constexpr bool fixed = N != Eigen::Dynamic;
+
+ public:
+  explicit LinkArray(int links, double value = unwritten) {
+    const int used = PerLink * links, held = round_up(used);
+    if constexpr (!fixed) {
+      const auto bytes = static_cast<std::size_t>(held) * sizeof(double);
+      block_.reset(static_cast<double*>(::operator new (bytes, std::align_val_t{pack_alignment})));
+    }
+    for (int k = 0; k < used; ++k) data()[k] = value;
+    for (int k = used; k < held; ++k) data()[k] = 0;
+  }
+
+  double* operator[](int link) { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
+  const double* operator[](int link) const { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
+  double* data() { return get(block_); }
+  const double* data() const { return get(block_); }
+
+ private:
+  using Fixed = std::array<double, static_cast<std::size_t>(fixed ? round_up(PerLink* N) : 1)>;
+  using Block = std::conditional_t<fixed, Fixed, std::unique_ptr<double[], AlignedDelete>>;
+
+  template <class Held>
+  static auto get(Held& block) {
+    if constexpr (fixed) {
+      return block.data();
+    } else {
+      return block.get();
+    }
+  }
+
+  alignas(pack_alignment) Block block_;
+};
+
+/// One T a link; on the stack where the number of links is known.
+template <class T, int N>
+class PerLink {
+ public:
+  explicit PerLink(int links, const T& value = T()) {
+    if constexpr (N == Eigen::Dynamic) {
+      values_.assign(static_cast<std::size_t>(links), value);
+    } else {
+      values_.fill(value);
+    }
+  }
+  T& operator[](int link) { return values_[static_cast<std::size_t>(link)]; }
+  const T& operator[](int link) const { return values_[static_cast<std::size_t>(link)]; }
+
+ private:
+  std::conditional_t<N == Eigen::Dynamic, std::vector<T>,
+                     std::array<T, static_cast<std::size_t>(N == Eigen::Dynamic ? 1 : N)>>
+      values_;
+};
+
+}  // namespace detail
+
+/// What the sweeps along a chain need to know of one link.
+struct LinkConstants {
+  double mass = 0, inverse_mass = 0;      ///< m, 1/m
+  double length = 0, inverse_length = 0;  ///< l, 1/l
+  double moment = 0;                      ///< M g l, M the mass that the rod carries
+  double damping = 0;                     ///< λ
+};
+
+/// The constants of a chain link by link, and the load R on a link, f_a = y_a·(l G) + û_a·R, in any number type.
+template <class Space, int N = Eigen::Dynamic>
+class ChainLinks {
+ public:
+  using Link = typename Space::Link;
+
+  explicit ChainLinks(const Chain<Space, N>& chain)
+      : links_(chain.links()), loaded_(chain.loaded()), constants_(chain.links()) {
+    for (int i = 0; i < links(); ++i) {
+      const double m = chain.masses()[i], l = chain.lengths()[i];
+      constants_[i] = {m, 1 / m, l, 1 / l, chain.mass_below()[i] * chain.gravity() * l, chain.damping()[i]};
+    }
+  }
+
+  int links() const {
+    if constexpr (N == Eigen::Dynamic) {
+      return links_;
+    } else {
+      return N;
+    }
+  }
+  bool loaded() const { return loaded_; }
+  const LinkConstants& operator[](int link) const { return constants_[link]; }
+
+  /// Weight alone, in the axes of the world.
+  template <class Real>
+  typename Link::template Cartesian<Real> weight(int link) const {
+    typename Link::template Cartesian<Real> load;
+    Link::weight_load(Real(constants_[link].moment), load);
+    return load;
+  }
+
+  /// Adds torque and drag to `load`; everything in the axes of the link's chart.
+  template <class Real>
+  void add_loads(int link, const typename Link::template Torque<Real>& torque,
+                 const typename Link::template Trig<Real>& trig, const typename Link::template Coordinates<Real>& v,
+                 typename Link::template Cartesian<Real>& load) const {
+    typename Link::template Cartesian<Real> u, u_dot, turning, drag;
+    Link::direction(trig, u);
+    Link::velocity(trig, v, u_dot);
+    Link::torque_load(torque, u, turning);
+    Link::drag_load(Real(constants_[link].damping), u_dot, drag);
+    for (std::size_t k = 0; k < load.size(); ++k) load[k] = load[k] + (turning[k] + drag[k]);
+  }
+
+ private:
+  int links_;
+  bool loaded_;
+  detail::PerLink<LinkConstants, N> constants_;
+};
+
+/// a·b.
+template <class Real, std::size_t D>
+Real dot(const std::array<Real, D>& a, const std::array<Real, D>& b) {
+  Real sum = a[0] * b[0];
+  for (std::size_t k = 1; k < D; ++k) sum = sum + a[k] * b[k];
+  return sum;
+}
+
+/// a x.
+template <class Real, std::size_t D>
+std::array<Real, D> scaled(const Real& a, const std::array<Real, D>& x) {
+  std::array<Real, D> result;
+  for (std::size_t k = 0; k < D; ++k) result[k] = a * x[k];
+  return result;
+}
+
+/// a + b.
+template <class Real, std::size_t D>
+std::array<Real, D> sum(const std::array<Real, D>& a, const std::array<Real, D>& b) {
+  std::array<Real, D> result;
+  for (std::size_t k = 0; k < D; ++k) result[k] = a[k] + b[k];
+  return result;
+}
+
+}  // namespace pendula

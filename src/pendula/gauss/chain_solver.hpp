@@ -1,0 +1,169 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <pendula/gauss/chain_fixed_point.hpp>
+#include <pendula/gauss/chain_newton.hpp>
+#include <pendula/gauss/chain_stages.hpp>
+#include <pendula/gauss/roundoff.hpp>
+#include <pendula/options.hpp>
+#include <pendula/outcome.hpp>
+
+namespace pendula {
+
+/// Cost of one Newton iteration on a chain in fixed-point iterations, by space and stages, as measured on ten links
+/// (AVX2, g++ 12). It grows with the cube of the blocks that Newton eliminates; the fixed point has a register to
+/// itself up to four stages and needs two above.
+template <class Space>
+constexpr double newton_cost(int stages) {
+  constexpr std::array<double, 8> planar{1.8, 3.6, 6.8, 8.0, 5.6, 7.9, 9.7, 12.8};
+  constexpr std::array<double, 8> spatial{3.1, 6.1, 10.4, 14.0, 11.5, 15.0, 19.9, 24.1};
+  return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)];
+}
+
+/// Chooses between the two iterations by what they take: iterations a step, counted while the run goes, times the cost
+/// of one. The other one is tried for a step now and then, so that the choice follows the motion. Nothing here depends
+/// on a clock: the same run makes the same choices.
+class IterationChoice {
+ public:
+  IterationChoice(Iteration wanted, double newton_cost, int stages) : wanted_(wanted), cost_{newton_cost, 1.0} {
+    const Iteration likely = stages <= 2 ? Iteration::newton : Iteration::fixed_point;
+    preferred_ = active_ = wanted == Iteration::automatic ? likely : wanted;
+  }
+
+  Iteration active() const { return active_; }
+  Iteration preferred() const { return preferred_; }
+  bool is_automatic() const { return wanted_ == Iteration::automatic; }
+
+  void begin_step() {
+    active_ = preferred_;
+    iterations_ = {};
+    if (is_automatic() && ++steps_ % trial_interval == trial_step) active_ = other(preferred_);
+  }
+
+  void count_iteration() { ++iterations_[index(active_)]; }
+
+  /// A fixed point that does not contract leaves the rest of the step to Newton.
+  void give_up_fixed_point() {
+    active_ = Iteration::newton;
+    gave_up_ = true;
+  }
+
+  void end_step() {
+    if (!is_automatic()) return;
+    if (gave_up_) {
+      preferred_ = Iteration::newton;
+      spent_[index(Iteration::fixed_point)] = forbidden;
+    } else {
+      const double after = active_ == Iteration::newton ? last_evaluation : 0;
+      spent_[index(active_)] = cost_[index(active_)] * (iterations_[index(active_)] + after);
+    }
+    gave_up_ = false;
+    const Iteration rival = other(preferred_);
+    if (spent_[index(rival)] > 0 && spent_[index(rival)] < worthwhile * spent_[index(preferred_)]) preferred_ = rival;
+  }
+
+ private:
+  static std::size_t index(Iteration iteration) { return iteration == Iteration::newton ? 0 : 1; }
+  static Iteration other(Iteration iteration) {
+    return iteration == Iteration::newton ? Iteration::fixed_point : Iteration::newton;
+  }
+
+  static constexpr int trial_interval = 64, trial_step = 8;
+  static constexpr double last_evaluation = 0.3;  // of forces after the last Newton iteration, in iterations
+  static constexpr double worthwhile = 0.9;       // what a change has to save
+  static constexpr double forbidden = 1e300;
+
+  Iteration wanted_, preferred_, active_;
+  std::array<double, 2> cost_;
+  std::array<double, 2> spent_{};  // by the last step with each iteration, 0: none yet
+  std::array<int, 2> iterations_{};
+  bool gave_up_ = false;
+  std::int64_t steps_ = 0;
+};
+
+/// The stage equations of a chain in momentum form, solved in O(n) by exact Newton, by fixed point, or by whichever
+/// takes less: a StageSolver for GaussStepper. Poles are no obstacle.
+template <class SpaceType, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
+class ChainSolver {
+ public:
+  using Space = SpaceType;
+  using Chain = pendula::Chain<Space, N>;
+  using State = pendula::State<Space, N>;
+
+  /// Throws std::invalid_argument unless `stages` is S.
+  ChainSolver(const Chain& chain, int stages, Iteration iteration = Iteration::automatic)
+      : stages_(chain),
+        elimination_(iteration == Iteration::fixed_point ? 0 : chain.links()),
+        fixed_point_(iteration == Iteration::newton ? 0 : chain.links()),
+        choice_(iteration, newton_cost<Space>(S), S) {
+    gauss_tableau<S>(stages);
+  }
+
+  Status start(const State& state) {
+    stages_.start(state);
+    return Status::ok;
+  }
+
+  void prepare(double time, double h) {
+    stages_.prepare(time, h);
+    choice_.begin_step();
+    count_ = 0;
+  }
+
+  Correction correct() {
+    ++count_;
+    choice_.count_iteration();
+    if (choice_.active() == Iteration::newton) return last_ = elimination_.correct(stages_);
+    const Correction correction = fixed_point_.correct(stages_);
+    if (choice_.is_automatic() && diverges(correction)) {
+      stages_.start_cold();
+      choice_.give_up_fixed_point();
+      return last_ = elimination_.correct(stages_);
+    }
+    return last_ = correction;
+  }
+
+  Convergence convergence() const {
+    return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
+  }
+
+  int singular_link() const { return -1; }
+
+  void accept() {
+    const bool newton = choice_.active() == Iteration::newton;
+    if (newton) {
+      stages_.place();
+      stages_.run_out();
+      stages_.set_all_forces();
+    }
+    choice_.end_step();
+    stages_.accept(choice_.is_automatic() || !newton);
+  }
+
+  State state(double time) const { return stages_.state(time); }
+  void save() { stages_.save(); }
+  void restore() { stages_.restore(); }
+
+  std::int64_t chart_switches() const { return stages_.chart_switches(); }
+  Iteration iteration() const { return choice_.preferred(); }
+
+ private:
+  // Slow contraction costs more than Newton; far from round-off, so that rounding is not taken for it.
+  bool diverges(const Correction& correction) const {
+    if (!std::isfinite(correction.relative)) return true;
+    const bool far = correction.relative > 1e-6;
+    return far && ((count_ > 3 && correction.relative > 0.7 * last_.relative) || count_ > 20);
+  }
+
+  ChainStages<Space, S, N, Arch> stages_;
+  ChainElimination<Space, S, N, Arch> elimination_;
+  ChainFixedPoint<Space, S, N, Arch> fixed_point_;
+  IterationChoice choice_;
+  Correction last_;
+  int count_ = 0;
+};
+
+}  // namespace pendula

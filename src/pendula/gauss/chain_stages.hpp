@@ -1,0 +1,553 @@
+#pragma once
+
+#include <cmath>
+#include <pendula/chain.hpp>
+#include <pendula/chart.hpp>
+#include <pendula/gauss/chain_links.hpp>
+#include <pendula/gauss/chain_sweep.hpp>
+#include <pendula/gauss/lanes.hpp>
+#include <pendula/gauss/sincos.hpp>
+#include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/tableau.hpp>
+#include <pendula/state.hpp>
+#include <xsimd/xsimd.hpp>
+
+namespace pendula {
+
+namespace detail {
+
+/// The coefficients of a step, one column a stage, padded to lanes.
+template <int S>
+class StageColumns {
+  static constexpr std::size_t stages = S, Z = lanes_for(S);
+  using L = Lanes<S>;
+
+ public:
+  StageColumns() : coefficients_(gauss_tableau<S>(S)) {
+    for (int i = 0; i < S; ++i) {
+      for (int j = 0; j < S; ++j) m_[j][i] = coefficients_.m(i, j);
+    }
+  }
+
+  void prepare(double h, double previous) {
+    coefficients_.prepare(h, previous);
+    const double ratio = previous == 0 ? 1 : h / previous;
+    if (h == h_ && ratio == ratio_) return;
+    h_ = h;
+    ratio_ = ratio;
+    for (int j = 0; j < S; ++j) {
+      hb_[j] = coefficients_.hb(j);
+      for (int i = 0; i < S; ++i) extrapolation_[j][i] = coefficients_.extrapolation(i, j);
+    }
+  }
+
+  double h() const { return h_; }
+  double hc(std::size_t i) const { return coefficients_.hc(static_cast<int>(i)); }
+  double hb(std::size_t j) const { return hb_[j]; }
+  double ha(std::size_t i, std::size_t j) const { return coefficients_.ha(static_cast<int>(i), static_cast<int>(j)); }
+
+  /// h Σ_j a_ij x_j for all i, as m_ij (h b_j x_j).
+  L integral(const L& x) const {
+    alignas(pack_alignment) double weighted[Z];
+    (L::load(hb_) * x).store(weighted);
+    return product(m_, weighted);
+  }
+
+  /// The polynomial through last step's stage values, at this step's stages.
+  L extrapolated(const double* last) const { return product(extrapolation_, last); }
+
+ private:
+  static L product(const double (&columns)[stages][Z], const double* x) {
+    L even = L(x[0]) * L::load(columns[0]);
+    if constexpr (S == 1) return even;
+    L odd = L(x[S > 1]) * L::load(columns[S > 1]);
+    for (std::size_t j = 2; j < S; j += 2) {
+      even = fma(L(x[j]), L::load(columns[j]), even);
+      if (j + 1 < S) odd = fma(L(x[j + 1]), L::load(columns[j + 1]), odd);
+    }
+    return even + odd;
+  }
+
+  StepCoefficients<S> coefficients_;
+  double h_ = 0, ratio_ = 0;
+  alignas(pack_alignment) double m_[stages][Z] = {};
+  alignas(pack_alignment) double extrapolation_[stages][Z] = {};
+  alignas(pack_alignment) double hb_[Z] = {};
+};
+
+/// Adds an increment to a number carried as value + low part (Kahan–Neumaier).
+inline void add_compensated(double increment, double& value, double& low) {
+  const double wanted = low + increment;
+  const double sum = value + wanted;
+  const double kept = sum - value;
+  low = (value - (sum - kept)) + (wanted - kept);
+  value = sum;
+}
+
+}  // namespace detail
+
+/// What both iterations on the stages of a chain share: state, charts, stage values, predictor, update.
+///
+/// In momentum form, q̇ = v, ṗ = f: stage i has position Q_i = q + h Σ_j a_ij V_j and momentum P_i = p + h Σ_j a_ij f_j.
+/// Arrays hold [link][coordinate][stage]; the stages of one number are a Lanes<S>, so that everything is done for all
+/// stages at once. q and p are kept in each link's chart, as value + low part.
+template <class Space, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
+class ChainStages {
+ public:
+  using Link = typename Space::Link;
+  using L = Lanes<S>;
+  using Coordinates = typename Link::template Coordinates<L>;
+  using Cartesian = typename Link::template Cartesian<L>;
+  using Trig = typename Link::template Trig<L>;
+  static constexpr std::size_t K = Space::dof, D = Space::dimension, Z = L::size;
+
+  explicit ChainStages(const Chain<Space, N>& chain)
+      : chain_(chain),
+        constants_(chain),
+        charts_(chain.links(), 0),
+        user_(chain.links()),
+        q_(chain.links()),
+        q_low_(chain.links()),
+        p_(chain.links()),
+        p_low_(chain.links()),
+        V_(chain.links()),
+        F_(chain.links()),
+        Q_(chain.links()),
+        sine_(chain.links()),
+        cosine_(chain.links()),
+        w_(chain.links()),
+        torque_(chain.loaded() ? chain.links() : 0),
+        at_state_(chain.links()),
+        saved_{charts_, user_, detail::LinkArray<4 * K, N>(chain.links())} {
+    if (constants_.loaded()) {
+      for (int i = 0; i < links(); ++i) set_constant_torque(i);
+    }
+  }
+
+  int links() const { return constants_.links(); }
+  const LinkConstants& constants(int i) const { return constants_[i]; }
+  const detail::StageColumns<S>& columns() const { return columns_; }
+  bool loaded() const { return constants_.loaded(); }
+  Chart chart(int i) const { return charts_[i]; }
+  std::int64_t chart_switches() const { return chart_switches_; }
+  double h() const { return columns_.h(); }
+
+  // --- Values of one link at all stages ---
+
+  Coordinates rates(int i) const { return load_each<K>(V_[i]); }
+  Coordinates forces(int i) const { return load_each<K>(F_[i]); }
+  Cartesian bob_velocity(int i) const { return load_each<D>(w_[i]); }
+  void set_rates(int i, const Coordinates& v) { store_each(v, V_[i]); }
+  void set_forces(int i, const Coordinates& f) { store_each(f, F_[i]); }
+  double* stored_rates(int i) { return V_[i]; }
+
+  Trig trig(int i) const {
+    Trig trig;
+    Link::trig_from(load_each<K>(sine_[i]), load_each<K>(cosine_[i]), trig);
+    return trig;
+  }
+
+  /// P_i = p + h Σ_j a_ij f_j.
+  L stage_momentum(int i, std::size_t a) const {
+    const L pushed = columns_.integral(L::load(F_[i] + a * Z));
+    return L(p_[i][a]) + (pushed + L(p_low_[i][a]));
+  }
+
+  /// u_a·G − P_i, the increment summed before p is met.
+  L momentum_residual(int i, std::size_t a, const L& momentum, const L& force) const {
+    return (momentum - L(p_[i][a])) - (columns_.integral(force) + L(p_low_[i][a]));
+  }
+
+  /// Load R on link i in the axes of its chart: weight, torque, drag.
+  Cartesian load(int i, const Trig& trig, const Coordinates& v) const {
+    Cartesian load = to_chart(charts_[i], constants_.template weight<L>(i));
+    if (loaded()) constants_.add_loads(i, torque(i), trig, v, load);
+    return load;
+  }
+
+  /// Torque on link i in the axes of its chart.
+  auto torque(int i) const { return to_chart(charts_[i], load_each<Space::torque_components>(torque_[i])); }
+
+  // --- A step ---
+
+  /// Takes over a state. A link near the pole starts in its other chart.
+  void start(const State<Space, N>& state) {
+    chart_switches_ = 0;
+    forget();
+    for (int i = 0; i < links(); ++i) start_link(i, state);
+    set_momenta();
+  }
+
+  /// Predicts the stages of a step of size h: from the last step's, or cold where there was none like it.
+  void prepare(double time, double h) {
+    const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
+    columns_.prepare(h, alike ? last_h_ : 0);
+    if (chain_.driven()) set_driven_torques(time);
+    if (!alike) return start_cold();
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        columns_.extrapolated(V_[i] + a * Z).store(V_[i] + a * Z);
+        columns_.extrapolated(F_[i] + a * Z).store(F_[i] + a * Z);
+      }
+    }
+    last_h_ = 0;  // what was predicted from is gone until the step is accepted
+  }
+
+  /// Stage velocities and forces of a motion that is what it is at the start of the step.
+  void start_cold() {
+    sweep_state(at_state_, [&](int i, const Rates& v, const Rates& f) {
+      for (std::size_t a = 0; a < K; ++a) {
+        L(v[a]).store(V_[i] + a * Z);
+        L(f[a]).store(F_[i] + a * Z);
+      }
+    });
+    last_h_ = 0;
+  }
+
+  /// Places the stages by V and takes their sines and cosines, all in one pass.
+  void place() {
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        const L moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
+        (L(q_[i][a]) + moved).store(Q_[i] + a * Z);
+      }
+    }
+    sincos_all(Q_.data(), sine_.data(), cosine_.data(), static_cast<std::ptrdiff_t>(K * Z) * links());
+  }
+
+  /// Velocities of the bobs at the placed stages, w_i = w_{i−1} + l Σ_a V_a û_a.
+  void run_out() {
+    Cartesian w = zero();
+    for (int i = 0; i < links(); ++i) {
+      Cartesian u_dot;
+      Link::velocity(trig(i), rates(i), u_dot);
+      w = sum(w, scaled(L(constants_[i].length), to_world(charts_[i], u_dot)));
+      store_each(w, w_[i]);
+    }
+  }
+
+  /// Forces f at the placed stages, from the velocities of the bobs: f_a = y_a·(l G) + û_a·R.
+  void set_all_forces() {
+    Cartesian G = zero();
+    for (int i = links(); i-- > 0;) {
+      G = sum(G, scaled(L(constants_[i].mass), bob_velocity(i)));
+      const Trig at = trig(i);
+      const Coordinates v = rates(i);
+      Coordinates f;
+      Link::force(at, v, to_chart(charts_[i], scaled(L(constants_[i].length), G)), load(i, at, v), f);
+      set_forces(i, f);
+    }
+  }
+
+  /// Moves the state to the end of the step, and links that come near a pole to their other chart. Increments are added
+  /// one by one: that keeps their sum's rounding in the low part.
+  void accept(bool forces_are_predicted) {
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        for (std::size_t j = 0; j < S; ++j) {
+          detail::add_compensated(columns_.hb(j) * V_[i][a * Z + j], q_[i][a], q_low_[i][a]);
+          detail::add_compensated(columns_.hb(j) * F_[i][a * Z + j], p_[i][a], p_low_[i][a]);
+        }
+      }
+    }
+    last_h_ = h();
+    if constexpr (has_charts<Space>) change_charts(forces_are_predicted);
+  }
+
+  /// The next step starts cold.
+  void forget() { last_h_ = 0; }
+
+  State<Space, N> state(double time) const {
+    State<Space, N> state;
+    state.time = time;
+    state.q.resize(Space::dof * links());
+    state.v.resize(Space::dof * links());
+    TensionSweep<Space, double, N> sweep(links());
+    sweep_state(sweep, [&](int i, const Rates& v, const Rates&) {
+      const LinkAngles<Space> angles = read(i, v);
+      for (std::size_t a = 0; a < K; ++a) {
+        state.q[entry(i, a)] = angles.q[a];
+        state.v[entry(i, a)] = angles.v[a];
+      }
+    });
+    return state;
+  }
+
+  /// Keeps the state, to go back to where a step has to be given up half-way.
+  void save() {
+    saved_.charts = charts_;
+    saved_.user = user_;
+    for_each_saved([](double& kept, double& value) { kept = value; });
+  }
+
+  void restore() {
+    charts_ = saved_.charts;
+    user_ = saved_.user;
+    for_each_saved([](double& kept, double& value) { value = kept; });
+    forget();
+  }
+
+  /// p_a of link i, in the user's coordinates where the link is in chart 0.
+  double momentum(int i, std::size_t a) const { return p_[i][a]; }
+
+ private:
+  using Rates = std::array<double, K>;
+  using PlainTrig = typename Link::template Trig<double>;
+  using PlainCartesian = typename Link::template Cartesian<double>;
+
+  // Farther than this the polynomial of the last step is no prediction.
+  static constexpr double farthest_extrapolation = 1.5;
+
+  struct Saved {
+    detail::PerLink<Chart, N> charts;
+    detail::PerLink<Rates, N> user;
+    detail::LinkArray<4 * K, N> numbers;
+  };
+
+  template <std::size_t Count>
+  static std::array<L, Count> load_each(const double* from) {
+    std::array<L, Count> values;
+    for (std::size_t k = 0; k < Count; ++k) values[k] = L::load(from + k * Z);
+    return values;
+  }
+  template <std::size_t Count>
+  static void store_each(const std::array<L, Count>& values, double* to) {
+    for (std::size_t k = 0; k < Count; ++k) values[k].store(to + k * Z);
+  }
+  static Cartesian zero() {
+    Cartesian zero;
+    zero.fill(L(0.0));
+    return zero;
+  }
+
+  // Where coordinate a of link i stands in the user's vectors.
+  Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
+
+  Rates position(int i) const {
+    Rates q;
+    for (std::size_t a = 0; a < K; ++a) q[a] = q_[i][a];
+    return q;
+  }
+
+  void set_position(int i, const Rates& q) {
+    for (std::size_t a = 0; a < K; ++a) {
+      q_[i][a] = q[a];
+      q_low_[i][a] = 0;
+    }
+  }
+
+  void start_link(int i, const State<Space, N>& state) {
+    Rates q, v;
+    for (std::size_t a = 0; a < K; ++a) {
+      q[a] = state.q[entry(i, a)];
+      v[a] = state.v[entry(i, a)];
+    }
+    charts_[i] = 0;
+    user_[i] = q;
+    PlainTrig trig;
+    Link::trig(q, trig);
+    if (has_charts<Space> && metric_determinant(trig) < chart_limit) {
+      const Heading<Space> heading(0, q, v);
+      charts_[i] = 1;
+      Link::coordinates(to_chart(Chart{1}, heading.u), q);
+      Link::trig(q, trig);
+      Link::rates(trig, 1 / metric_determinant(trig), to_chart(Chart{1}, heading.u_dot), v);
+    }
+    set_position(i, q);
+    for (std::size_t a = 0; a < K; ++a) V_[i][a * Z] = v[a];
+  }
+
+  // p_a = l û_a·G from the rates that start_link left in the first lane.
+  void set_momenta() {
+    PlainCartesian w{}, G{};
+    for (int i = 0; i < links(); ++i) {
+      const Heading<Space> heading(charts_[i], position(i), first_lane(V_[i]));
+      w = sum(w, scaled(constants_[i].length, heading.u_dot));
+      for (std::size_t k = 0; k < D; ++k) w_[i][k * Z] = w[k];
+    }
+    for (int i = links(); i-- > 0;) {
+      for (std::size_t k = 0; k < D; ++k) G[k] += constants_[i].mass * w_[i][k * Z];
+      const PlainCartesian momentum = to_chart(charts_[i], scaled(constants_[i].length, G));
+      set_momentum(i, position(i), momentum);
+    }
+  }
+
+  void set_momentum(int i, const Rates& q, const PlainCartesian& momentum) {
+    PlainTrig trig;
+    typename Link::template First<double> u_a;
+    Link::trig(q, trig);
+    Link::direction_first(trig, u_a);
+    for (std::size_t a = 0; a < K; ++a) {
+      p_[i][a] = dot(u_a[a], momentum);
+      p_low_[i][a] = 0;
+    }
+  }
+
+  static Rates first_lane(const double* from) {
+    Rates values;
+    for (std::size_t a = 0; a < K; ++a) values[a] = from[a * Z];
+    return values;
+  }
+
+  static double metric_determinant(const PlainTrig& trig) {
+    double determinant;
+    Link::metric_determinant(trig, determinant);
+    return determinant;
+  }
+
+  // Rates and forces of every link at (q, p), one stage wide: visit(i, v, f).
+  template <class Sweep, class Visit>
+  void sweep_state(Sweep& sweep, Visit visit) const {
+    for (int i = links(); i-- > 0;) {
+      PlainTrig trig;
+      PlainCartesian u, across;
+      Link::trig(position(i), trig);
+      Link::direction(trig, u);
+      Rates p;
+      for (std::size_t a = 0; a < K; ++a) p[a] = p_[i][a] * constants_[i].inverse_length;
+      Link::tangent_momentum(trig, 1 / metric_determinant(trig), p, across);
+      sweep.inward(i, constants_[i], to_world(charts_[i], u), to_world(charts_[i], across));
+    }
+    for (int i = 0; i < links(); ++i) {
+      PlainTrig trig;
+      PlainCartesian u_dot, G;
+      Rates v, f;
+      sweep.outward(i, constants_[i], u_dot, G);
+      Link::trig(position(i), trig);
+      Link::rates(trig, 1 / metric_determinant(trig), to_chart(charts_[i], u_dot), v);
+      PlainCartesian load = to_chart(charts_[i], constants_.template weight<double>(i));
+      if (loaded()) constants_.add_loads(i, to_chart(charts_[i], first_torque(i)), trig, v, load);
+      Link::force(trig, v, to_chart(charts_[i], scaled(constants_[i].length, G)), load, f);
+      visit(i, v, f);
+    }
+  }
+
+  typename Link::template Torque<double> first_torque(int i) const {
+    typename Link::template Torque<double> torque;
+    for (std::size_t k = 0; k < Space::torque_components; ++k) torque[k] = torque_[i][k * Z];
+    return torque;
+  }
+
+  void set_constant_torque(int i) {
+    for (std::size_t k = 0; k < Space::torque_components; ++k) {
+      L(chain_.constant_torque()(static_cast<Eigen::Index>(k), i)).store(torque_[i] + k * Z);
+    }
+  }
+
+  void set_driven_torques(double time) {
+    for (const Drive<Space>& drive : chain_.drives()) set_constant_torque(drive.link);
+    for (const Drive<Space>& drive : chain_.drives()) {
+      for (std::size_t j = 0; j < S; ++j) {
+        const double wave = std::sin(drive.frequency * (time + columns_.hc(j)) + drive.phase);
+        for (std::size_t k = 0; k < Space::torque_components; ++k) {
+          torque_[drive.link][k * Z + j] += wave * drive.amplitude[static_cast<Eigen::Index>(k)];
+        }
+      }
+    }
+  }
+
+  LinkAngles<Space> read(int i, const Rates& v) const {
+    if constexpr (has_charts<Space>) {
+      if (charts_[i] == 1) return user_angles(Heading<Space>(1, position(i), v), user_[i]);
+    }
+    return {position(i), v};
+  }
+
+  // --- Charts ---
+
+  void change_charts(bool forces_are_predicted) {
+    bool changed = false;
+    for (int i = 0; i < links(); ++i) {
+      if (charts_[i] == 1) follow(i);
+      if (last_determinant(i) >= chart_limit) continue;
+      change_chart(i);
+      changed = true;
+    }
+    if (!changed || !forces_are_predicted) return;
+    run_out();
+    set_all_forces();
+  }
+
+  // The user's angles of a link in chart 1, kept up so that they stay continuous.
+  void follow(int i) { user_[i] = user_angles(Heading<Space>(1, position(i), last_rates(i)), user_[i]).q; }
+
+  Rates last_rates(int i) const { return first_lane(V_[i] + (S - 1)); }
+
+  double last_determinant(int i) const {
+    L determinant;
+    Link::metric_determinant(trig(i), determinant);
+    alignas(pack_alignment) double stages[Z];
+    determinant.store(stages);
+    return stages[S - 1];
+  }
+
+  // Moves position and momentum to the other chart, and the stage velocities from which the next step is predicted.
+  void change_chart(int i) {
+    const Chart from = charts_[i], to = static_cast<Chart>(1 - from);
+    const Rates q = position(i);
+    PlainTrig trig;
+    PlainCartesian across;
+    Rates p;
+    for (std::size_t a = 0; a < K; ++a) p[a] = p_[i][a] + p_low_[i][a];
+    Link::trig(q, trig);
+    Link::tangent_momentum(trig, 1 / metric_determinant(trig), p, across);
+    const Heading<Space> heading(from, q, last_rates(i));
+    if (from == 0) user_[i] = q;
+    Rates moved;
+    if (to == 0) {
+      moved = user_[i];
+    } else {
+      Link::coordinates(to_chart(to, heading.u), moved);
+    }
+    set_position(i, moved);
+    set_momentum(i, moved, to_chart(to, to_world(from, across)));
+    for (std::size_t j = 0; j < S; ++j) change_stage(i, j, from, to);
+    charts_[i] = to;
+    ++chart_switches_;
+  }
+
+  void change_stage(int i, std::size_t j, Chart from, Chart to) {
+    const Rates last_q = first_lane(Q_[i] + j);
+    const Heading<Space> heading(from, last_q, first_lane(V_[i] + j));
+    LinkAngles<Space> angles;
+    if (to == 0) {
+      angles = user_angles(heading, user_[i]);
+    } else {
+      PlainTrig trig;
+      Link::coordinates(to_chart(to, heading.u), angles.q);
+      Link::trig(angles.q, trig);
+      Link::rates(trig, 1 / metric_determinant(trig), to_chart(to, heading.u_dot), angles.v);
+    }
+    for (std::size_t a = 0; a < K; ++a) {
+      V_[i][a * Z + j] = angles.v[a];
+      sine_[i][a * Z + j] = std::sin(angles.q[a]);
+      cosine_[i][a * Z + j] = std::cos(angles.q[a]);
+    }
+  }
+
+  template <class Copy>
+  void for_each_saved(Copy copy) {
+    for (int i = 0; i < links(); ++i) {
+      double* kept = saved_.numbers[i];
+      for (auto* values : {&q_, &q_low_, &p_, &p_low_}) {
+        for (std::size_t a = 0; a < K; ++a) copy(*kept++, (*values)[i][a]);
+      }
+    }
+  }
+
+  Chain<Space, N> chain_;
+  ChainLinks<Space, N> constants_;
+  detail::StageColumns<S> columns_;
+  detail::PerLink<Chart, N> charts_;
+  detail::PerLink<Rates, N> user_;  // the user's angles of links in chart 1, when they were last read
+  detail::LinkArray<K, N> q_, q_low_, p_, p_low_;
+  detail::LinkArray<K * Z, N> V_, F_, Q_, sine_, cosine_;
+  detail::LinkArray<D * Z, N> w_;
+  detail::LinkArray<Space::torque_components * Z, N> torque_;
+  TensionSweep<Space, double, N> at_state_;
+  Saved saved_;
+  double last_h_ = 0;  // of the step that V and F belong to; 0: they belong to none
+  std::int64_t chart_switches_ = 0;
+};
+
+}  // namespace pendula
