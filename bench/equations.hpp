@@ -159,11 +159,13 @@ class RecursiveEquations {
   static constexpr int links = N;
   using State = std::array<Real, std::size_t{2} * N>;
 
+  using Links = std::array<Real, std::size_t{N}>;  ///< one number a link, from the pivot out
+
   explicit RecursiveEquations(const Problem& problem)
       : RecursiveEquations(filled(problem.mass), filled(problem.length), Real(problem.gravity)) {}
 
-  /// Any chain: masses [kg] and lengths [m] from the pivot out, gravity [m/s²].
-  RecursiveEquations(const std::array<Real, N>& masses, const std::array<Real, N>& lengths, Real gravity) {
+  /// Any chain: masses [kg], lengths [m], gravity [m/s²].
+  RecursiveEquations(const Links& masses, const Links& lengths, Real gravity) {
     Real below = 0;
     for (std::size_t i = N; i-- > 0;) {
       below += masses[i];
@@ -190,7 +192,7 @@ class RecursiveEquations {
 
  private:
   using Batch = xsimd::batch<double>;
-  static constexpr std::size_t padded = (N + Batch::size - 1) / Batch::size * Batch::size;
+  static constexpr std::size_t padded = (std::size_t{N} + Batch::size - 1) / Batch::size * Batch::size;
 
   // Several sines at once where the type allows it, as in our own solver.
   void sines(const Real* theta) {
@@ -248,8 +250,8 @@ class RecursiveEquations {
     }
   }
 
-  static std::array<Real, N> filled(double value) {
-    std::array<Real, N> row;
+  static Links filled(double value) {
+    Links row;
     row.fill(Real(value));
     return row;
   }

@@ -102,7 +102,7 @@ std::vector<Long> disturbed(const Problem& problem, std::mt19937_64& random) {
     return value + Long(unit) * std::uniform_real_distribution<Long>(-0.5L, 0.5L)(random);
   };
   typename RecursiveEquations<Long, N>::State y{};
-  std::array<Long, N> masses, lengths;
+  typename RecursiveEquations<Long, N>::Links masses, lengths;
   for (std::size_t i = 0; i < N; ++i) {
     y[i] = rounded(problem.angle);
     masses[i] = rounded(problem.mass);
@@ -119,7 +119,7 @@ double floor_of(const Problem& problem) {
   RecursiveEquations<Long, N> equations(problem);
   const std::vector<Long> exact = fehlberg(equations, equations.start(problem), problem.duration, 1e-17L);
   std::mt19937_64 random(1);
-  std::array<double, 15> changes;
+  std::array<double, 15> changes{};
   for (double& change : changes) change = distance(disturbed<N>(problem, random), exact);
   std::nth_element(changes.begin(), changes.begin() + 7, changes.end());
   return std::max(changes[7], 0x1p-53);

@@ -421,7 +421,7 @@ inline constexpr std::array references{
     Reference{"P10", 3.6e-16, end_P10},
     Reference{"P20", 6.5e-16, end_P20},
     Reference{"P50", 5.1e-15, end_P50},
-    Reference{"P100", 2.4e-14, end_P100},
+    Reference{"P100", 2.2e-14, end_P100},
 };
 
 }  // namespace bench
