@@ -22,7 +22,7 @@ bool is_key_character(char c) {
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t");
-  return first == text.npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
+  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
 /// The parts of `a.b.c`; empty where one of them is no bare TOML key.
@@ -70,7 +70,7 @@ void apply_override(toml::table& root, const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
   const std::vector<std::string_view> path = key_path(key);
-  if (equals == text.npos || path.empty()) {
+  if (equals == std::string::npos || path.empty()) {
     throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
   }
   toml::table value = parse_value(trimmed(std::string_view(text).substr(equals + 1)), where);
@@ -108,7 +108,7 @@ bool fits(double value, Sign sign) {
 /// A float always looks like one, so that `expected an integer, got 3.0` makes sense.
 std::string shown_float(double value) {
   const std::string text = shortest(value);
-  return text.find_first_not_of("-0123456789") == text.npos ? text + ".0" : text;
+  return text.find_first_not_of("-0123456789") == std::string::npos ? text + ".0" : text;
 }
 
 std::string shown_array(const toml::array& array) {
