@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <new>
+#include <pendula/gauss/chain_solver.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"
@@ -44,6 +45,58 @@ TEST(Allocation, IsSeenByTheCounter) {
   const long before = allocations;
   const Eigen::VectorXd vector(100);
   EXPECT_GT(allocations, before) << vector.size();
+}
+
+TEST(Allocation, NoneInAStepOfTheChainSolver) {
+  Random random(2);
+  for (int links : {1, 3, 50}) {
+    const Chain<Planar> planar = random_chain<Planar>(random, links, true);
+    const Chain<Spatial> spatial = random_chain<Spatial>(random, links, true);
+    const State<Planar> planar_start = random_state<Planar>(random, links);
+    const State<Spatial> spatial_start = random_state<Spatial>(random, links);
+    for (int stages = 1; stages <= 8; ++stages) {
+      for (Iteration iteration : {Iteration::newton, Iteration::fixed_point, Iteration::automatic}) {
+        RunOptions options = gauss(stages);
+        options.solver = Solver::chain;
+        options.iteration = iteration;
+        EXPECT_EQ(allocations_in_steps(planar, planar_start, options), 0) << stages << " stages, " << iteration;
+        EXPECT_EQ(allocations_in_steps(spatial, spatial_start, options), 0) << stages << " stages, " << iteration;
+      }
+    }
+  }
+}
+
+TEST(Allocation, NoneInAStepOfFixedSize) {
+  const Chain<Spatial, 3> chain({.masses = Eigen::Vector3d::Ones(),
+                                 .lengths = Eigen::Vector3d::Ones(),
+                                 .damping = Eigen::Vector3d::Zero(),
+                                 .torque = Torque<Spatial, 3>::Zero(),
+                                 .drives = {}});
+  GaussStepper<ChainSolver<Spatial, 2, 3>> stepper(chain, 2);
+  State<Spatial, 3> start;
+  start.q << 1.0, 0.5, 0.2, 0.3, 0.1, 0.4;
+  start.v.setZero();
+  const long before = allocations;
+  ASSERT_TRUE(stepper.start(start));
+  for (int i = 0; i < 500; ++i) ASSERT_TRUE(stepper.step(5e-3));
+  EXPECT_EQ(allocations - before, 0) << "not even at the start";
+  EXPECT_GT(stepper.statistics().chart_switches, 0);
+}
+
+TEST(Allocation, NoneInAStepTakenInParts) {
+  const Chain<Planar> chain = equal_chain<Planar>(4);
+  RunOptions options = gauss(8);
+  const auto start = State<Planar>::from_angles(Eigen::VectorXd::Constant(4, 1.0));
+  for (Solver solver : {Solver::dense, Solver::chain}) {
+    options.solver = solver;
+    options.iteration = Iteration::newton;
+    const auto integrator = make_integrator(chain, options);
+    ASSERT_TRUE(integrator->start(start));
+    const long before = allocations;
+    ASSERT_TRUE(integrator->step(4.0));
+    EXPECT_EQ(allocations - before, 0) << solver;
+    EXPECT_GT(integrator->statistics().rejected_steps, 0) << solver;
+  }
 }
 
 TEST(Allocation, NoneInAStep) {

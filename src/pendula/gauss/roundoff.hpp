@@ -1,9 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace pendula {
 
@@ -25,6 +25,7 @@ class RoundoffStop {
   void restart() {
     count_ = 0;
     stalls_ = 0;
+    last_ = {};
     ++steps_;
   }
 
@@ -32,32 +33,44 @@ class RoundoffStop {
   bool reached(double correction, Convergence convergence) {
     if (convergence != convergence_) restart();  // other iterations shrink at other rates
     convergence_ = convergence;
-    const double previous = std::exchange(last_, correction);
-    if (++count_ == 1) {
-      first_ = best_ = correction;
-      return convergence == Convergence::quadratic && (correction == 0 || is_enough(correction));
-    }
-    if (correction == 0) return true;
-    const bool done =
-        convergence == Convergence::linear ? linear_done(previous, correction) : quadratic_done(previous, correction);
-    best_ = std::min(best_, correction);
-    return done;
+    std::shift_right(last_.begin(), last_.end(), 1);
+    last_[0] = correction;
+    ++count_;
+    return convergence == Convergence::linear ? linear_done() : quadratic_done();
   }
 
-  double last() const { return last_; }
+  double last() const { return last_[0]; }
 
  private:
-  bool linear_done(double previous, double correction) {
-    const double rate = correction / previous;
-    if (rate < 1 && correction * rate <= negligible) return true;
-    return has_stalled(previous, correction, 2);
+  // A fixed point on velocities and forces is two interleaved sequences: velocities follow from the forces of the
+  // iteration before, and those from the velocities before that. (From rest the first correction is exactly zero.) So
+  // corrections are looked at in pairs, and their rate over two iterations.
+  bool linear_done() {
+    const double pair = std::max(last_[0], last_[1]), pair_before = std::max(last_[2], last_[3]);
+    if (count_ < 3) return false;
+    if (pair == 0) return true;
+    const double rate = pair / pair_before;
+    if (rate < 1 && pair * rate <= negligible) return true;
+    if (count_ == 3) first_ = best_ = pair_before;
+    const bool stalled = has_stalled(rate, 2.0 / std::max(1, count_ - 3), 2);
+    best_ = std::min(best_, pair);
+    return stalled;
   }
 
-  bool quadratic_done(double previous, double correction) {
-    const double measured = correction / (previous * previous);
-    if (correction > noise) constant_ = constant_ == 0 ? measured : std::max(measured, constant_ / 2);
+  bool quadratic_done() {
+    const double correction = last_[0];
+    if (count_ == 1) {
+      first_ = best_ = correction;
+      return correction == 0 || is_enough(correction);
+    }
+    if (correction > noise) {
+      const double measured = correction / (last_[1] * last_[1]);
+      constant_ = constant_ == 0 ? measured : std::max(measured, constant_ / 2);
+    }
     if (correction <= few_ulp || is_enough(correction)) return true;
-    return has_stalled(previous, correction, 1);
+    const bool stalled = has_stalled(correction / last_[1], 1.0 / std::max(1, count_ - 2), 1);
+    best_ = std::min(best_, correction);
+    return stalled;
   }
 
   // C from an earlier step may be out of date: now and then one more correction measures it again.
@@ -67,10 +80,9 @@ class RoundoffStop {
   }
 
   // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding.
-  bool has_stalled(double previous, double correction, int enough) {
-    if (correction > small || correction < previous / 2) return false;
-    const double average = std::pow(best_ / first_, 1.0 / std::max(1, count_ - 2));
-    if (correction >= previous * (1 + average) / 2) ++stalls_;
+  bool has_stalled(double rate, double exponent, int enough) {
+    const bool suspicious = last_[0] <= small && rate >= 0.5;
+    if (suspicious && rate >= (1 + std::pow(best_ / first_, exponent)) / 2) ++stalls_;
     return stalls_ >= enough;
   }
 
@@ -82,7 +94,8 @@ class RoundoffStop {
   static constexpr int check_interval = 32;
 
   Convergence convergence_ = Convergence::quadratic;
-  double first_ = 0, best_ = 0, last_ = 0;
+  std::array<double, 4> last_{};  // the newest first
+  double first_ = 0, best_ = 0;
   double constant_ = 0;
   int count_ = 0, stalls_ = 0, steps_ = 0;
 };
