@@ -52,7 +52,7 @@ CommandLine::CommandLine() {
       ->check(CLI::IsMember({"planar", "spatial"}));
   check->add_option("--links", check_options.links, "Only kernels of this many links")->check(CLI::PositiveNumber);
 
-  kernels = app.add_subcommand("kernels", "List the kernels of this build: the chains that can be run");
+  kernels = app.add_subcommand("kernels", "List the fixed-n kernels of this build");
 }
 
 /// What an unknown word may have been meant for: an option of `app`, or a command.

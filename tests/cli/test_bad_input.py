@@ -130,7 +130,8 @@ def test_the_scenario_is_not_overwritten(pendula, double):
 
 
 def test_a_chain_without_a_kernel_names_what_to_configure(pendula, double, tmp_path):
-    run = pendula("simulate", "double.toml", "-o", "out.csv", *settings("chain.masses=1", "chain.links=97"))
+    given = settings("chain.masses=1", "chain.links=97", "run.solver=dense")
+    run = pendula("simulate", "double.toml", "-o", "out.csv", *given)
     assert run.status == 2
     reason = "no kernel for a planar chain of 97 links"
     assert run.err.startswith(f"pendula: --set chain.links=97: chain.links: {reason}")

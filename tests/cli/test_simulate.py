@@ -32,31 +32,40 @@ REQUIRED = {
 }
 
 
-@pytest.mark.parametrize("form", ["momentum", "velocity"])
-def test_double_pendulum_with_two_stages(pendula, double, form):
-    run = pendula(
-        "simulate", double, "--json", *settings("run.step=5e-4", "run.duration=10", f"run.form={form}")
-    )
+# Either form, by the dense solver, and whatever "auto" means.
+WAYS = pytest.mark.parametrize(
+    "ways",
+    [
+        ["run.form=momentum"],
+        ["run.form=velocity"],
+        ["run.form=momentum", "run.solver=dense"],
+        ["run.form=velocity", "run.solver=dense"],
+    ],
+    ids=" ".join,
+)
+
+
+@WAYS
+def test_double_pendulum_with_two_stages(pendula, double, ways):
+    run = pendula("simulate", double, "--json", *settings("run.step=5e-4", "run.duration=10", *ways))
     assert run.status == 0
     x, y = run.json["final"]["bobs"][1]
     assert abs(x - DOUBLE_X) < 1e-8  # measured 9.7e-12 (momentum), 6.2e-12 (velocity)
     assert abs(y - DOUBLE_Y) < 1e-8  # measured 6.5e-13, 5.5e-13
-    assert run.json["form"] == form
 
 
-@pytest.mark.parametrize("form", ["momentum", "velocity"])
-def test_double_pendulum_with_six_stages(pendula, double, form):
-    run = pendula(
-        "simulate", double, "--json", *settings("run.stages=6", "run.duration=10", f"run.form={form}")
-    )
+@WAYS
+def test_double_pendulum_with_six_stages(pendula, double, ways):
+    run = pendula("simulate", double, "--json", *settings("run.stages=6", "run.duration=10", *ways))
+    assert run.status == 0
     x, y = run.json["final"]["bobs"][1]
     assert abs(x - DOUBLE_X) < 1e-12  # measured 1.6e-15
     assert abs(y - DOUBLE_Y) < 1e-12  # measured 8.9e-16
 
 
-@pytest.mark.parametrize("form", ["momentum", "velocity"])
-def test_spherical_pendulum_with_four_stages(pendula, spherical, form):
-    run = pendula("simulate", spherical, "--json", *settings(f"run.form={form}"))
+@WAYS
+def test_spherical_pendulum_with_four_stages(pendula, spherical, ways):
+    run = pendula("simulate", spherical, "--json", *settings(*ways))
     assert run.status == 0
     bob = run.json["final"]["bobs"][0]
     assert math.dist(bob, SPHERICAL_BOB) < 1e-9  # measured 4.9e-11 (momentum), 8.4e-13 (velocity)
@@ -92,6 +101,40 @@ def test_summary_has_the_keys_of_the_interface(pendula, double):
     assert set(summary["final"]) == {"t", "theta", "theta_dot", "bobs", "velocities"}
     assert len(summary["final"]["bobs"]) == len(summary["final"]["velocities"]) == 2
     assert all(len(vector) == 2 for vector in summary["final"]["bobs"] + summary["final"]["velocities"])
+
+
+def test_summary_says_what_auto_ran(pendula, double):
+    chain = pendula("simulate", double, "--json").json
+    assert (chain["solver"], chain["kernel"]) == ("chain", None)
+    assert chain["iteration"] in ("newton", "fixed-point")
+    dense = pendula("simulate", double, "--json", *settings("run.form=velocity")).json
+    assert (dense["solver"], dense["iteration"], dense["kernel"]) == ("dense", "newton", "planar_2")
+
+
+@pytest.mark.parametrize("iteration", ["newton", "fixed-point"])
+def test_summary_says_the_iteration_that_was_asked_for(pendula, double, iteration):
+    summary = pendula("simulate", double, "--json", *settings(f"run.iteration={iteration}")).json
+    assert summary["iteration"] == iteration
+
+
+def test_chains_without_a_kernel_run(pendula, double):
+    given = settings("chain.masses=1", "chain.lengths=0.01", "chain.links=97", "run.duration=0.05")
+    summary = pendula("simulate", double, "--json", *given).json
+    assert (summary["links"], summary["kernel"], summary["outcome"]) == (97, None, {"status": "ok"})
+    assert len(summary["final"]["bobs"]) == 97
+
+
+def test_spatial_chains_pass_the_pole(pendula, spherical):
+    """Started at rest, one link swings in a plane through the pole, as in the plane."""
+    at_rest = settings("start.theta=1.0", "start.theta_dot=0", "start.phi_dot=0", "run.stages=6")
+    space = pendula("simulate", spherical, "--json", *at_rest).json
+    assert space["chart_switches"] > 0
+    flat = settings("chain.space=planar", "start={theta=1.0}", "run.stages=6")
+    plane = pendula("simulate", spherical, "--json", *flat).json
+    (x, y, z), (across, up) = space["final"]["bobs"][0], plane["final"]["bobs"][0]
+    assert (x, y, z) == pytest.approx(
+        (across * math.cos(0.3), across * math.sin(0.3), up), abs=1e-12
+    )  # measured 0
 
 
 def test_summary_in_space_has_phi_and_vectors_of_three(pendula, spherical):
