@@ -117,7 +117,10 @@ class ChainElimination {
   // A Newton term of every stage, where the blocks are made from.
   struct alignas(pack_alignment) PerStage {
     double values[Z];
-    void operator=(const L& lanes) { lanes.store(values); }
+    PerStage& operator=(const L& lanes) {
+      lanes.store(values);
+      return *this;
+    }
     double operator[](std::size_t stage) const { return values[stage]; }
   };
 

@@ -11,7 +11,8 @@ struct Compensated {
 
   void assign(const T& exact) {
     value = exact;
-    compensation = exact - exact;  // zero of the same size
+    compensation = exact;
+    compensation -= exact;  // zero of the same size
   }
 
   /// Adds an increment; what does not fit into value goes into the compensation.
