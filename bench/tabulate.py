@@ -76,7 +76,7 @@ class Figures:
 def machine(figures: Figures) -> str:
     """What the figures were measured with, and the unit."""
     c = figures.context
-    unit = figures.benchmarks["sincos"]["nanoseconds"] * 1e9
+    unit = figures.benchmarks["sincos"]["nanoseconds"]
     return (
         f"{c['processor']}, one core; {c['compiler']}, `{c['flags']}`; {c['date']}. "
         f"One scalar `sincos` (std::sin and std::cos of the same argument): {unit:.1f} ns."
@@ -240,8 +240,23 @@ def dense(figures: Figures) -> str:
     return table(head, rows)
 
 
+def work_precision(figures: Figures) -> str:
+    """The picture of the races, once there is one."""
+    text = "Time against error of the final state: the double pendulum and ten links"
+    return f"![{text}](images/work_precision.svg)" if figures.races else ""
+
+
+def scaling(figures: Figures) -> str:
+    """The picture of the chain solver's costs, once there is one."""
+    measured = any(name.startswith("chain/") for name in figures.benchmarks)
+    text = "Cost of a link and iteration against the number of links"
+    return f"![{text}](images/scaling.svg)" if measured else ""
+
+
 TABLES: dict[str, Callable[[Figures], str]] = {
     "machine": machine,
+    "work precision": work_precision,
+    "scaling": scaling,
     "goals": goals,
     "races": races,
     "peers": peers,
