@@ -12,6 +12,19 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
+#if defined(__SANITIZE_ADDRESS__)
+
+// The sanitizer has an allocator of its own, and calls back. (g++ comes without the header that declares this.)
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*malloc_hook)(const volatile void*, std::size_t),
+                                                         void (*free_hook)(const volatile void*));
+
+namespace {
+const int hooked = __sanitizer_install_malloc_and_free_hooks([](const volatile void*, std::size_t) { ++allocations; },
+                                                             [](const volatile void*) {});
+}  // namespace
+
+#else
+
 // glibc's own entry points, so that this sees Eigen's malloc as well as operator new.
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -27,6 +40,8 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
   return __libc_memalign(alignment, size);
 }
 }
+
+#endif
 
 namespace pendula::test {
 namespace {
