@@ -57,7 +57,7 @@ class ChainIsDense : public ::testing::Test {
   State<Space> start;
 };
 
-TYPED_TEST_SUITE(ChainIsDense, CommittedKernels, KernelName);
+TYPED_TEST_SUITE(ChainIsDense, KernelsToFour, KernelName);
 
 TYPED_TEST(ChainIsDense, InOneStep) {
   for (int stages = 1; stages <= 8; ++stages) {

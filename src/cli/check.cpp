@@ -68,21 +68,23 @@ class IntegrationCheck {
         start_(test_start<Space>(links)),
         time_(0.4 / std::sqrt(links)) {}
 
+  // What was measured is the worst of the committed kernels.
   std::vector<CheckLine> lines() const {
     std::vector<CheckLine> lines;
+    const auto add = [&](const std::string& what, double measured, double limit, bool at_least = false) {
+      lines.push_back({kernel_, what, measured, limit, at_least});
+    };
     for (const Form form : {Form::momentum, Form::velocity}) {
       for (const int stages : {1, 2, 3}) {
-        lines.push_back({kernel_, label("order", stages, form), order(stages, form), 2 * stages - 0.3, true});
+        add(label("order", stages, form), order(stages, form), 2 * stages - 0.3, true);  // measured 2s − 0.06
       }
     }
     for (const Form form : {Form::momentum, Form::velocity}) {
-      lines.push_back({kernel_, label("energy error", 6, form), energy_error(6, form), 1e-13});
+      add(label("energy error", 6, form), energy_error(6, form), 1e-13);  // measured 9.1e-17
     }
-    const double reversal = time_reversal();
-    lines.push_back({kernel_, label("way back", 4, Form::momentum), reversal, 1e-12});
-    lines.push_back({kernel_, "dense = chain, 2 stages, newton", dense_to_chain(2, Iteration::newton), 1e-12});
-    lines.push_back(
-        {kernel_, "dense = chain, 6 stages, fixed-point", dense_to_chain(6, Iteration::fixed_point), 1e-12});
+    add(label("way back", 4, Form::momentum), time_reversal(), 1e-12);                              // measured 2.7e-15
+    add("dense = chain, 2 stages, newton", dense_to_chain(2, Iteration::newton), 1e-12);            // measured 3.3e-15
+    add("dense = chain, 6 stages, fixed-point", dense_to_chain(6, Iteration::fixed_point), 1e-12);  // measured 2.9e-15
     return lines;
   }
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <pendula/space.hpp>
+#include <type_traits>
 
 namespace pendula {
 
@@ -35,6 +36,15 @@ Vector to_chart([[maybe_unused]] Chart chart, const Vector& x) {
   return x;
 }
 
+/// visit(chart) with the chart as a constant, so that turning vectors costs nothing but this one decision.
+template <class Space, class Visit>
+auto in_chart(Chart chart, Visit visit) {
+  if constexpr (has_charts<Space>) {
+    if (chart == 1) return visit(std::integral_constant<Chart, 1>{});
+  }
+  return visit(std::integral_constant<Chart, 0>{});
+}
+
 /// Axis of the world along which component k in the link's axes lies.
 template <class Space>
 constexpr int world_axis([[maybe_unused]] Chart chart, int k) {
@@ -54,11 +64,22 @@ struct Heading {
   Heading(Chart chart, const std::array<double, Space::dof>& q, const std::array<double, Space::dof>& v) {
     typename Link::template Trig<double> trig;
     Link::trig(q, trig);
-    Link::direction(trig, u);
-    Link::velocity(trig, v, u_dot);
-    u = to_world(chart, u);
-    u_dot = to_world(chart, u_dot);
+    *this = of_trig(chart, trig, v);
   }
+
+  /// The same from sines and cosines computed elsewhere.
+  static Heading of_trig(Chart chart, const typename Link::template Trig<double>& trig,
+                         const std::array<double, Space::dof>& v) {
+    Heading heading;
+    Link::direction(trig, heading.u);
+    Link::velocity(trig, v, heading.u_dot);
+    heading.u = to_world(chart, heading.u);
+    heading.u_dot = to_world(chart, heading.u_dot);
+    return heading;
+  }
+
+ private:
+  Heading() = default;
 };
 
 /// Angles and rates of one link as the user reads them.

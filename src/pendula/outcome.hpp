@@ -11,6 +11,7 @@ namespace pendula {
 enum class Status {
   ok,
   not_converged,         ///< the stage equations were not solved to round-off
+  wrong_root,            ///< they were, but not by the motion: energy came from nowhere
   not_finite,            ///< a value became infinite or NaN
   singular_mass_matrix,  ///< the coordinates of a link fail: in (θ, φ), sin θ = 0
 };
@@ -21,6 +22,8 @@ inline std::ostream& operator<<(std::ostream& out, Status status) {
       return out << "ok";
     case Status::not_converged:
       return out << "not converged";
+    case Status::wrong_root:
+      return out << "wrong root";
     case Status::not_finite:
       return out << "not finite";
     case Status::singular_mass_matrix:
@@ -53,6 +56,10 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
       out << "the stage equations did not converge" << where(", worst at link ") << " (step " << outcome.step << " s, "
           << outcome.iterations << " iterations, last relative correction " << outcome.residual
           << "); a smaller step may help";
+      break;
+    case Status::wrong_root:
+      out << "the stage equations have a solution that is not the motion, with energy from nowhere (step "
+          << outcome.step << " s, " << outcome.iterations << " iterations); a smaller step may help";
       break;
     case Status::not_finite:
       out << "a value became infinite or NaN" << where(" at link ") << " (step " << outcome.step << " s, iteration "

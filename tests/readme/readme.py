@@ -57,7 +57,7 @@ def run_demo(command: str) -> list[str]:
     """What the demo says from the program's call on; what comes before that differs by machine."""
     done = subprocess.run(shlex.split(command), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     lines = done.stdout.rstrip("\n").split("\n")
-    start = next(i for i, line in enumerate(lines) if line.startswith("+ build/demo/bin/pendula"))
+    start = next(i for i, line in enumerate(lines) if line.startswith("+ build/release/bin/pendula"))
     return [ELLIPSIS, *lines[start:]]
 
 

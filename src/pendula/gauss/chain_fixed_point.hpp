@@ -15,86 +15,76 @@ class ChainFixedPoint {
  public:
   using Stages = ChainStages<Space, S, N, Arch>;
 
-  explicit ChainFixedPoint(int links) : sweep_(links), inverse_determinant_(links) {}
+  explicit ChainFixedPoint(int links) : sweep_(links) {}
 
   /// Replaces stage velocities and forces once.
   Correction correct(Stages& stages) {
-    stages.place();
-    for (int i = stages.links(); i-- > 0;) inward(stages, i);
-    Watch watch;
-    for (int i = 0; i < stages.links(); ++i) outward(stages, i, watch);
-    return watch.correction();
+    sweep_inward(stages);
+    return sweep_outward(stages);
   }
 
  private:
-  using Link = typename Space::Link;
   using L = typename Stages::L;
+  using Sweep = MotionSweep<Space, L, N>;
   using Coordinates = typename Stages::Coordinates;
-  using Cartesian = typename Stages::Cartesian;
   static constexpr std::size_t K = Stages::K, Z = Stages::Z;
 
-  // The largest change in every lane, and the link where it was. What is not a number reaches the last link.
-  struct Watch {
-    L change{0.0}, scale{0.0}, last{0.0};
-    L link{-1.0};
-
-    void see(int i, const L& before, const L& after) {
-      const L size = abs(after - before);
-      link = select_greater(size, change, L(i), link);
-      change = max(change, size);
-      scale = max(scale, abs(after));
-      last = after;
-    }
-
-    Correction correction() const {
-      alignas(pack_alignment) double changes[Z], scales[Z], links[Z], lasts[Z];
-      change.store(changes);
-      scale.store(scales);
-      link.store(links);
-      last.store(lasts);
-      std::size_t worst = 0;
-      double largest_scale = 0;
-      for (std::size_t k = 0; k < S; ++k) {
-        if (!std::isfinite(lasts[k])) return {std::numeric_limits<double>::quiet_NaN(), static_cast<int>(links[worst])};
-        if (changes[k] > changes[worst]) worst = k;
-        largest_scale = std::max(largest_scale, scales[k]);
+  // Everything is inlined into the two sweeps, so that what they carry stays in registers.
+  //
+  // Leaves momenta where the forces were, until the way out replaces them.
+  [[gnu::flatten]] void sweep_inward(Stages& stages) {
+    typename Sweep::Inward carried;
+    for (int end = stages.links(); end > 0;) {
+      const int begin = Stages::block_before(end);
+      stages.place_block(end);
+      while (end > begin) {
+        const int i = --end;
+        Coordinates p;
+        for (std::size_t a = 0; a < K; ++a) p[a] = stages.stage_momentum(i, a);
+        stages.set_forces(i, p);
+        sweep_.inward(carried, i, stages.constants(i), stages.placed(i), p);
       }
-      return {changes[worst] > 0 ? changes[worst] / largest_scale : 0, static_cast<int>(links[worst])};
     }
-  };
-
-  void inward(Stages& stages, int i) {
-    const auto trig = stages.trig(i);
-    const L inverse_length(stages.constants(i).inverse_length);
-    L determinant;
-    Link::metric_determinant(trig, determinant);
-    const L inverse = has_charts<Space> ? L(1.0) / determinant : determinant;
-    inverse.store(inverse_determinant_[i]);
-    Coordinates p;
-    for (std::size_t a = 0; a < K; ++a) p[a] = stages.stage_momentum(i, a) * inverse_length;
-    Cartesian u, across;
-    Link::direction(trig, u);
-    Link::tangent_momentum(trig, inverse, p, across);
-    sweep_.inward(i, stages.constants(i), to_world(stages.chart(i), u), to_world(stages.chart(i), across));
   }
 
-  void outward(Stages& stages, int i, Watch& watch) {
-    const auto trig = stages.trig(i);
-    const Chart chart = stages.chart(i);
-    Cartesian u_dot, G;
-    sweep_.outward(i, stages.constants(i), u_dot, G);
-    Coordinates v, f;
-    Link::rates(trig, L::load(inverse_determinant_[i]), to_chart(chart, u_dot), v);
-    const Cartesian momentum = to_chart(chart, scaled(L(stages.constants(i).length), G));
-    Link::force(trig, v, momentum, stages.load(i, trig, v), f);
-    const Coordinates before = stages.rates(i);
-    for (std::size_t a = 0; a < K; ++a) watch.see(i, before[a], v[a]);
-    stages.set_rates(i, v);
-    stages.set_forces(i, f);
+  [[gnu::flatten]] Correction sweep_outward(Stages& stages) {
+    L change(0.0), scale(0.0);
+    typename Sweep::Outward carried(stages.placed(0));
+    for (int i = 0; i < stages.links(); ++i) {
+      const auto at = stages.placed(i);
+      const auto next = stages.placed(std::min(i + 1, stages.links() - 1));
+      const auto load = [&](Chart chart, const Coordinates& v) { return stages.load(i, chart, at.trig, v); };
+      const Coordinates before = stages.rates(i);
+      Coordinates v, f;
+      sweep_.outward(carried, i, stages.constants(i), at, next, stages.forces(i), load, v, f);
+      for (std::size_t a = 0; a < K; ++a) {
+        change = max(change, abs(v[a] - before[a]));
+        scale = max(scale, abs(v[a]));
+      }
+      stages.set_rates(i, v);
+      stages.set_forces(i, f);
+    }
+    return {relative(change, scale, stages.rates(stages.links() - 1)), -1};
   }
 
-  TensionSweep<Space, L, N> sweep_;
-  detail::LinkArray<static_cast<int>(Z), N> inverse_determinant_;
+  // What is not a number reaches the last link, though not always the largest change.
+  static double relative(const L& change, const L& scale, const Coordinates& last) {
+    alignas(pack_alignment) double changes[Z], scales[Z], lasts[Z];
+    L all_last(0.0);
+    for (std::size_t a = 0; a < K; ++a) all_last = all_last + last[a];
+    change.store(changes);
+    scale.store(scales);
+    all_last.store(lasts);
+    double largest_change = 0, largest_scale = 0;
+    for (std::size_t k = 0; k < S; ++k) {
+      if (!std::isfinite(lasts[k])) return std::numeric_limits<double>::quiet_NaN();
+      largest_change = std::max(largest_change, changes[k]);
+      largest_scale = std::max(largest_scale, scales[k]);
+    }
+    return largest_change > 0 ? largest_change / largest_scale : 0;
+  }
+
+  MotionSweep<Space, L, N> sweep_;
 };
 
 }  // namespace pendula

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <pendula/forward_dynamics.hpp>
 #include <pendula/gauss/chain_sweep.hpp>
 #include <vector>
@@ -33,15 +34,19 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
       b = sum(b, scaled(chain_.lengths()[i], turning(motion(i).trig, rates_of(i, v))));
       motion(i).b = b;
     }
+    typename TensionSweep<Space, double>::Inward next;
     for (int i = chain_.links(); i-- > 0;) {
       below = sum(below, scaled(chain_.masses()[i], motion(i).b));
-      inward(i, below, rates_of(i, v));
+      inward(next, i, below, rates_of(i, v));
     }
+    typename TensionSweep<Space, double>::Outward before;
     for (int i = 0; i < chain_.links(); ++i) {
+      const Motion& here = motion(i);
       Cartesian u_ddot, G;
       Rates a;
-      sweep_.outward(i, constants_[i], u_ddot, G);
-      Link::rates(motion(i).trig, motion(i).inverse_determinant, u_ddot, a);
+      sweep_.outward(before, i, constants_[i], here.u, motion(std::min(i + 1, chain_.links() - 1)).u, here.across,
+                     u_ddot, G);
+      Link::rates(here.trig, here.inverse_determinant, u_ddot, a);
       for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
     }
   }
@@ -49,7 +54,7 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
  private:
   struct Motion {
     Trig trig;
-    Cartesian b;
+    Cartesian b, u, across;
     double inverse_determinant;
   };
 
@@ -82,7 +87,7 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     return turning;
   }
 
-  void inward(int i, const Cartesian& below, const Rates& v) {
+  void inward(typename TensionSweep<Space, double>::Inward& next, int i, const Cartesian& below, const Rates& v) {
     const Trig& trig = motion(i).trig;
     Cartesian load = constants_.template weight<double>(i);
     typename Link::template Torque<double> torque;
@@ -97,10 +102,9 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     Link::direction_first(trig, u_a);
     Rates p;
     for (std::size_t a = 0; a < p.size(); ++a) p[a] = dot(u_a[a], load) * constants_[i].inverse_length;
-    Cartesian u, across;
-    Link::direction(trig, u);
-    Link::tangent_momentum(trig, motion(i).inverse_determinant, p, across);
-    sweep_.inward(i, constants_[i], u, across);
+    Link::direction(trig, motion(i).u);
+    Link::tangent_momentum(trig, motion(i).inverse_determinant, p, motion(i).across);
+    sweep_.inward(next, i, constants_[i], motion(i).u, motion(i).across);
   }
 
   Chain<Space> chain_;

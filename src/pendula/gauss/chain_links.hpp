@@ -9,6 +9,7 @@
 #include <pendula/chain.hpp>
 #include <pendula/gauss/lanes.hpp>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace pendula {
@@ -87,6 +88,44 @@ class PerLink {
 
 }  // namespace detail
 
+/// {component(0), component(1), …}; written out, so that the numbers can stay in registers.
+template <std::size_t D, class Component>
+auto components(Component component) {
+  return [&]<std::size_t... k>(std::index_sequence<k...>) {
+    return std::array{component(k)...};
+  }
+  (std::make_index_sequence<D>());
+}
+
+/// a·b.
+template <class Real, std::size_t D>
+Real dot(const std::array<Real, D>& a, const std::array<Real, D>& b) {
+  static_assert(D == 2 || D == 3);
+  if constexpr (D == 2) {
+    return a[0] * b[0] + a[1] * b[1];
+  } else {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  }
+}
+
+/// a x.
+template <class Real, std::size_t D>
+std::array<Real, D> scaled(const Real& a, const std::array<Real, D>& x) {
+  return components<D>([&](std::size_t k) { return a * x[k]; });
+}
+
+/// a + b.
+template <class Real, std::size_t D>
+std::array<Real, D> sum(const std::array<Real, D>& a, const std::array<Real, D>& b) {
+  return components<D>([&](std::size_t k) { return a[k] + b[k]; });
+}
+
+/// a − b.
+template <class Real, std::size_t D>
+std::array<Real, D> difference(const std::array<Real, D>& a, const std::array<Real, D>& b) {
+  return components<D>([&](std::size_t k) { return a[k] - b[k]; });
+}
+
 /// What the sweeps along a chain need to know of one link.
 struct LinkConstants {
   double mass = 0, inverse_mass = 0;      ///< m, 1/m
@@ -137,7 +176,7 @@ class ChainLinks {
     Link::velocity(trig, v, u_dot);
     Link::torque_load(torque, u, turning);
     Link::drag_load(Real(constants_[link].damping), u_dot, drag);
-    for (std::size_t k = 0; k < load.size(); ++k) load[k] = load[k] + (turning[k] + drag[k]);
+    load = sum(load, sum(turning, drag));
   }
 
  private:
@@ -145,29 +184,5 @@ class ChainLinks {
   bool loaded_;
   detail::PerLink<LinkConstants, N> constants_;
 };
-
-/// a·b.
-template <class Real, std::size_t D>
-Real dot(const std::array<Real, D>& a, const std::array<Real, D>& b) {
-  Real sum = a[0] * b[0];
-  for (std::size_t k = 1; k < D; ++k) sum = sum + a[k] * b[k];
-  return sum;
-}
-
-/// a x.
-template <class Real, std::size_t D>
-std::array<Real, D> scaled(const Real& a, const std::array<Real, D>& x) {
-  std::array<Real, D> result;
-  for (std::size_t k = 0; k < D; ++k) result[k] = a * x[k];
-  return result;
-}
-
-/// a + b.
-template <class Real, std::size_t D>
-std::array<Real, D> sum(const std::array<Real, D>& a, const std::array<Real, D>& b) {
-  std::array<Real, D> result;
-  for (std::size_t k = 0; k < D; ++k) result[k] = a[k] + b[k];
-  return result;
-}
 
 }  // namespace pendula

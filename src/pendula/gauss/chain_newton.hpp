@@ -140,7 +140,7 @@ class ChainElimination {
     alignas(pack_alignment) double k[unknowns] = {};
   };
 
-  void inward(Stages& stages) {
+  [[gnu::flatten]] void inward(Stages& stages) {
     Carried carried;
     Cartesian G;
     G.fill(L(0.0));
@@ -159,7 +159,7 @@ class ChainElimination {
     const Chart chart = stages.chart(i);
     const auto trig = stages.trig(i);
     const Coordinates v = stages.rates(i);
-    const Cartesian load = stages.load(i, trig, v);
+    const Cartesian load = stages.load(i, chart, trig, v);
     typename Link::template First<L> u, y;
     typename Link::template Symmetric<L> p_D_q, f_D_q;
     Coordinates p, f;
@@ -250,7 +250,7 @@ class ChainElimination {
     }
   }
 
-  Correction outward(Stages& stages) {
+  [[gnu::flatten]] Correction outward(Stages& stages) {
     alignas(pack_alignment) double dw[vectors] = {};
     Cartesian lanes_dw;
     lanes_dw.fill(L(0.0));

@@ -130,7 +130,16 @@ class ChainSolver {
     return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
   }
 
+  /// The fixed point takes no note of where it changes what; one more iteration tells.
+  int worst_link() {
+    if (choice_.active() == Iteration::newton) return last_.link;
+    stages_.keep_rates();
+    fixed_point_.correct(stages_);
+    return stages_.most_changed_link();
+  }
+
   int singular_link() const { return -1; }
+  double unexplained_energy() { return stages_.unexplained_energy(); }
 
   void accept() {
     const bool newton = choice_.active() == Iteration::newton;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <pendula/chain.hpp>
 #include <pendula/chart.hpp>
 #include <pendula/gauss/chain_links.hpp>
-#include <pendula/gauss/chain_sweep.hpp>
+#include <pendula/gauss/chain_motion.hpp>
+#include <pendula/gauss/energy_tally.hpp>
 #include <pendula/gauss/lanes.hpp>
 #include <pendula/gauss/sincos.hpp>
 #include <pendula/gauss/stepper.hpp>
@@ -112,7 +114,6 @@ class ChainStages {
         p_low_(chain.links()),
         V_(chain.links()),
         F_(chain.links()),
-        Q_(chain.links()),
         sine_(chain.links()),
         cosine_(chain.links()),
         w_(chain.links()),
@@ -147,6 +148,8 @@ class ChainStages {
     return trig;
   }
 
+  Placed<Space, L> placed(int i) const { return {charts_[i], trig(i)}; }
+
   /// P_i = p + h Σ_j a_ij f_j.
   L stage_momentum(int i, std::size_t a) const {
     const L pushed = columns_.integral(L::load(F_[i] + a * Z));
@@ -159,14 +162,34 @@ class ChainStages {
   }
 
   /// Load R on link i in the axes of its chart: weight, torque, drag.
-  Cartesian load(int i, const Trig& trig, const Coordinates& v) const {
-    Cartesian load = to_chart(charts_[i], constants_.template weight<L>(i));
+  Cartesian load(int i, Chart chart, const Trig& trig, const Coordinates& v) const {
+    Cartesian load = to_chart(chart, constants_.template weight<L>(i));
     if (loaded()) constants_.add_loads(i, torque(i), trig, v, load);
     return load;
   }
 
   /// Torque on link i in the axes of its chart.
   auto torque(int i) const { return to_chart(charts_[i], load_each<Space::torque_components>(torque_[i])); }
+
+  /// Keeps the stage velocities, in the room of the bobs'; afterwards tells which link's have changed most.
+  void keep_rates() {
+    for (int i = 0; i < links(); ++i) std::copy_n(V_[i], K * Z, w_[i]);
+  }
+  int most_changed_link() const {
+    int link = -1;
+    double most = 0;
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t k = 0; k < K * Z; ++k) {
+        const double change = std::abs(V_[i][k] - w_[i][k]);
+        if (k % Z >= S) continue;
+        if (!std::isfinite(V_[i][k])) return i;
+        if (change <= most) continue;
+        most = change;
+        link = i;
+      }
+    }
+    return link;
+  }
 
   // --- A step ---
 
@@ -204,19 +227,30 @@ class ChainStages {
     last_h_ = 0;
   }
 
-  /// Places the stages by V and takes their sines and cosines, all in one pass.
+  /// Places the stages by V and takes their sines and cosines.
   void place() {
-    for (int i = 0; i < links(); ++i) {
+    for (int end = links(); end > 0; end = block_before(end)) place_block(end);
+  }
+
+  /// Links are placed from the last one to the first, a few at once: [block_before(end), end).
+  static int block_before(int end) { return (end - 1) / placed_at_once * placed_at_once; }
+
+  void place_block(int end) {
+    const int begin = block_before(end);
+    alignas(pack_alignment) double Q[placed_at_once * K * Z];
+    if (end - begin < placed_at_once) std::fill(Q, Q + placed_at_once * K * Z, 0.0);
+    for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
         const L moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
-        (L(q_[i][a]) + moved).store(Q_[i] + a * Z);
+        (L(q_[i][a]) + moved).store(Q + (static_cast<std::size_t>(i - begin) * K + a) * Z);
       }
     }
-    sincos_all(Q_.data(), sine_.data(), cosine_.data(), static_cast<std::ptrdiff_t>(K * Z) * links());
+    // Past the last link of the chain this writes what nobody reads.
+    sincos_all(Q, sine_[begin], cosine_[begin], placed_at_once * K * Z);
   }
 
   /// Velocities of the bobs at the placed stages, w_i = w_{i−1} + l Σ_a V_a û_a.
-  void run_out() {
+  [[gnu::flatten]] void run_out() {
     Cartesian w = zero();
     for (int i = 0; i < links(); ++i) {
       Cartesian u_dot;
@@ -234,9 +268,24 @@ class ChainStages {
       const Trig at = trig(i);
       const Coordinates v = rates(i);
       Coordinates f;
-      Link::force(at, v, to_chart(charts_[i], scaled(L(constants_[i].length), G)), load(i, at, v), f);
+      Link::force(at, v, to_chart(charts_[i], scaled(L(constants_[i].length), G)), load(i, charts_[i], at, v), f);
       set_forces(i, f);
     }
+  }
+
+  /// The most that a stage has, as it was last placed.
+  double unexplained_energy() {
+    EnergyTally<Space> start;
+    sweep_state(at_state_, [&](int i, const Rates& v, const Rates&) {
+      start.add(chain_, i, Heading<Space>(charts_[i], position(i), v));
+    });
+    double most = 0;
+    for (std::size_t j = 0; j < S; ++j) {
+      EnergyTally<Space> stage;
+      for (int i = 0; i < links(); ++i) add_stage(i, j, stage);
+      most = std::max(most, pendula::unexplained_energy(chain_, start, stage));
+    }
+    return most;
   }
 
   /// Moves the state to the end of the step, and links that come near a pole to their other chart. Increments are added
@@ -262,7 +311,7 @@ class ChainStages {
     state.time = time;
     state.q.resize(Space::dof * links());
     state.v.resize(Space::dof * links());
-    TensionSweep<Space, double, N> sweep(links());
+    MotionSweep<Space, double, N> sweep(links());
     sweep_state(sweep, [&](int i, const Rates& v, const Rates&) {
       const LinkAngles<Space> angles = read(i, v);
       for (std::size_t a = 0; a < K; ++a) {
@@ -287,9 +336,6 @@ class ChainStages {
     forget();
   }
 
-  /// p_a of link i, in the user's coordinates where the link is in chart 0.
-  double momentum(int i, std::size_t a) const { return p_[i][a]; }
-
  private:
   using Rates = std::array<double, K>;
   using PlainTrig = typename Link::template Trig<double>;
@@ -297,6 +343,10 @@ class ChainStages {
 
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
+
+  // As few links as fill the widest registers, so that one link's sines are taken while the sweep waits for another's
+  // division.
+  static constexpr int placed_at_once = K * Z < 8 ? static_cast<int>(8 / (K * Z)) : 1;
 
   struct Saved {
     detail::PerLink<Chart, N> charts;
@@ -322,6 +372,12 @@ class ChainStages {
 
   // Where coordinate a of link i stands in the user's vectors.
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
+
+  Rates momentum(int i) const {
+    Rates p;
+    for (std::size_t a = 0; a < K; ++a) p[a] = p_[i][a];
+    return p;
+  }
 
   Rates position(int i) const {
     Rates q;
@@ -383,6 +439,21 @@ class ChainStages {
     }
   }
 
+  void add_stage(int i, std::size_t j, EnergyTally<Space>& stage) const {
+    const Heading<Space> heading = stage_heading(i, j);
+    double torque = 0;
+    if (loaded()) {
+      for (std::size_t k = 0; k < Space::torque_components; ++k) torque = std::hypot(torque, torque_[i][k * Z + j]);
+    }
+    stage.add(chain_, i, heading, std::abs(h()) * torque * std::sqrt(dot(heading.u_dot, heading.u_dot)));
+  }
+
+  Heading<Space> stage_heading(int i, std::size_t j) const {
+    PlainTrig at;
+    Link::trig_from(first_lane(sine_[i] + j), first_lane(cosine_[i] + j), at);
+    return Heading<Space>::of_trig(charts_[i], at, first_lane(V_[i] + j));
+  }
+
   static Rates first_lane(const double* from) {
     Rates values;
     for (std::size_t a = 0; a < K; ++a) values[a] = from[a * Z];
@@ -395,31 +466,37 @@ class ChainStages {
     return determinant;
   }
 
+  Placed<Space, double> placed_at_state(int i) const {
+    Placed<Space, double> at{charts_[i], {}};
+    Link::trig(position(i), at.trig);
+    return at;
+  }
+
   // Rates and forces of every link at (q, p), one stage wide: visit(i, v, f).
-  template <class Sweep, class Visit>
-  void sweep_state(Sweep& sweep, Visit visit) const {
+  template <class Visit>
+  void sweep_state(MotionSweep<Space, double, N>& sweep, Visit visit) const {
+    typename MotionSweep<Space, double, N>::Inward inward;
+    Placed<Space, double> at;
     for (int i = links(); i-- > 0;) {
-      PlainTrig trig;
-      PlainCartesian u, across;
-      Link::trig(position(i), trig);
-      Link::direction(trig, u);
-      Rates p;
-      for (std::size_t a = 0; a < K; ++a) p[a] = p_[i][a] * constants_[i].inverse_length;
-      Link::tangent_momentum(trig, 1 / metric_determinant(trig), p, across);
-      sweep.inward(i, constants_[i], to_world(charts_[i], u), to_world(charts_[i], across));
+      at = placed_at_state(i);
+      sweep.inward(inward, i, constants_[i], at, momentum(i));
     }
-    for (int i = 0; i < links(); ++i) {
-      PlainTrig trig;
-      PlainCartesian u_dot, G;
+    typename MotionSweep<Space, double, N>::Outward outward(at);
+    Placed<Space, double> next = at;
+    for (int i = 0; i < links(); ++i, at = next) {
+      if (i + 1 < links()) next = placed_at_state(i + 1);
       Rates v, f;
-      sweep.outward(i, constants_[i], u_dot, G);
-      Link::trig(position(i), trig);
-      Link::rates(trig, 1 / metric_determinant(trig), to_chart(charts_[i], u_dot), v);
-      PlainCartesian load = to_chart(charts_[i], constants_.template weight<double>(i));
-      if (loaded()) constants_.add_loads(i, to_chart(charts_[i], first_torque(i)), trig, v, load);
-      Link::force(trig, v, to_chart(charts_[i], scaled(constants_[i].length, G)), load, f);
+      sweep.outward(
+          outward, i, constants_[i], at, next, momentum(i),
+          [&](Chart, const Rates& rates) { return load_at_state(i, at.trig, rates); }, v, f);
       visit(i, v, f);
     }
+  }
+
+  PlainCartesian load_at_state(int i, const PlainTrig& trig, const Rates& v) const {
+    PlainCartesian load = to_chart(charts_[i], constants_.template weight<double>(i));
+    if (loaded()) constants_.add_loads(i, to_chart(charts_[i], first_torque(i)), trig, v, load);
+    return load;
   }
 
   typename Link::template Torque<double> first_torque(int i) const {
@@ -501,14 +578,13 @@ class ChainStages {
     }
     set_position(i, moved);
     set_momentum(i, moved, to_chart(to, to_world(from, across)));
-    for (std::size_t j = 0; j < S; ++j) change_stage(i, j, from, to);
+    for (std::size_t j = 0; j < S; ++j) change_stage(i, j, to);
     charts_[i] = to;
     ++chart_switches_;
   }
 
-  void change_stage(int i, std::size_t j, Chart from, Chart to) {
-    const Rates last_q = first_lane(Q_[i] + j);
-    const Heading<Space> heading(from, last_q, first_lane(V_[i] + j));
+  void change_stage(int i, std::size_t j, Chart to) {
+    const Heading<Space> heading = stage_heading(i, j);
     LinkAngles<Space> angles;
     if (to == 0) {
       angles = user_angles(heading, user_[i]);
@@ -541,10 +617,10 @@ class ChainStages {
   detail::PerLink<Chart, N> charts_;
   detail::PerLink<Rates, N> user_;  // the user's angles of links in chart 1, when they were last read
   detail::LinkArray<K, N> q_, q_low_, p_, p_low_;
-  detail::LinkArray<K * Z, N> V_, F_, Q_, sine_, cosine_;
+  detail::LinkArray<K * Z, N> V_, F_, sine_, cosine_;
   detail::LinkArray<D * Z, N> w_;
   detail::LinkArray<Space::torque_components * Z, N> torque_;
-  TensionSweep<Space, double, N> at_state_;
+  MotionSweep<Space, double, N> at_state_;
   Saved saved_;
   double last_h_ = 0;  // of the step that V and F belong to; 0: they belong to none
   std::int64_t chart_switches_ = 0;

@@ -8,76 +8,80 @@ namespace pendula {
 
 /// Velocities of a chain from its momenta in O(n): the inverse of the mass matrix by two sweeps, in any number type.
 ///
-/// With G_i = Σ_{j≥i} m_j w_j the momentum below rod i, only its part across the rod is given, (Σ_a p_a u^a)/l; along
-/// the rod it is a tension that the sweep finds. From the tip inward, G_i = π_i u_i (u_i·w_{i−1}) + γ_i u_i + given
-/// part, because a rod hands on nothing but what lies along it: the matrix that the general elimination carries from
-/// link to link is of rank one here. One division a link, and no coordinates.
+/// With G_i = Σ_{j≥i} m_j before.wj the momentum below rod i, only its part across the rod is given, (Σ_a p_a u^a)/l;
+/// along the rod it is a tension that the sweep finds, because a rod hands on nothing but what lies along it: the
+/// matrix that the general elimination carries from link to link is of rank one here,
+///   G_i = (π_i (u_i·before.w{i−1}) + γ_i) u_i + across_i.
+/// One division a link, and no coordinates. What a sweep carries from link to link is the caller's, so that it can stay
+/// in registers. Between the sweeps a link keeps three numbers and a vector, no more: on
+/// long chains what costs is memory. Directions are cheaper made again than kept.
 template <class Space, class Real, int N = Eigen::Dynamic>
 class TensionSweep {
  public:
   using Cartesian = typename Space::Link::template Cartesian<Real>;
 
-  explicit TensionSweep(int links) : links_(links), carried_(links) {}
+  /// What the inward sweep carries: of the link just done, direction and momentum below it where its rod rests. Below
+  /// the last link there is nothing.
+  struct Inward {
+    Cartesian u = zero(), resting = zero();
+    Real pi{0.0};
+  };
+
+  /// What the outward sweep carries: the velocity of the bob before.
+  struct Outward {
+    Cartesian w = zero();
+  };
+
+  explicit TensionSweep(int links) : carried_(links, unwritten()) {}
 
   /// Inward, i = n−1 … 0: takes direction u and given momentum across the rod, both in the axes of the world.
-  void inward(int i, const LinkConstants& link, const Cartesian& u, const Cartesian& across) {
-    Carried& here = carried_[i];
-    here.u = u;
-    here.across = across;
+  void inward(Inward& next, int i, const LinkConstants& link, const Cartesian& u, const Cartesian& across) {
     const Real m(link.mass), inverse_m(link.inverse_mass);
-    if (i == links_ - 1) {
-      here.side = scaled(Real(0.0), u);
-      here.free = scaled(inverse_m, across);
-      here.coupling = here.gamma = Real(0.0);
-      here.pi = m;
-      return;
-    }
-    const Carried& next = carried_[i + 1];
-    const Real cosine = dot(u, next.u);
-    const Real along = dot(u, next.across);
-    Cartesian given;
-    for (std::size_t k = 0; k < u.size(); ++k) {
-      here.side[k] = next.u[k] - cosine * u[k];
-      given[k] = (across[k] - (next.across[k] - along * u[k])) - next.gamma * here.side[k];
-    }
-    const Real e = Real(1.0) / (m + next.pi * dot(here.side, here.side));
-    const Real pull = (dot(here.side, given) * e) * next.pi;
-    for (std::size_t k = 0; k < u.size(); ++k) here.free[k] = (given[k] - pull * here.side[k]) * inverse_m;
-    here.coupling = next.pi * cosine * e;
-    here.pi = (next.pi + m) * e * m;
-    here.gamma = along + cosine * (next.gamma + pull);
+    const Real cosine = dot(u, next.u), along = dot(u, next.resting);
+    // The next rod's direction, and what is given of this bob's momentum, across this rod.
+    const Cartesian side = difference(next.u, scaled(cosine, u));
+    const Cartesian given = difference(across, difference(next.resting, scaled(along, u)));
+    const Real e = Real(1.0) / (m + next.pi * dot(side, side));
+    const Real pi_e = next.pi * e;
+    const Real pull = dot(side, given) * pi_e;
+    const Real gamma = along + cosine * pull;
+    next.pi = (next.pi + m) * (e * m);
+    next.u = u;
+    next.resting = sum(across, scaled(gamma, u));
+    carried_[i] = {scaled(inverse_m, difference(given, scaled(pull, side))), pi_e * cosine, next.pi, gamma};
   }
 
-  /// Outward, i = 0 … n−1: gives the rate of the direction and the momentum G below the rod.
-  void outward(int i, const LinkConstants& link, Cartesian& u_dot, Cartesian& momentum) {
+  /// Outward, i = 0 … n−1, from what inward was given, and the next link's direction (of the last link: anything
+  /// finite): gives the rate of the direction and the momentum G below the rod.
+  void outward(Outward& before, int i, const LinkConstants& link, const Cartesian& u, const Cartesian& next_u,
+               const Cartesian& across, Cartesian& u_dot, Cartesian& momentum) {
     const Carried& here = carried_[i];
-    if (i == 0) w_ = scaled(Real(0.0), here.u);
-    const Real along = dot(here.u, w_);
-    const Real side = along * here.coupling;
+    const Real along = dot(u, before.w);
+    const Real aside = along * here.coupling;
+    const Real onward = along + aside * dot(u, next_u);
     const Real tension = here.pi * along + here.gamma;
-    for (std::size_t k = 0; k < w_.size(); ++k) {
-      const Real w = (along * here.u[k] + here.free[k]) - side * here.side[k];
-      u_dot[k] = (w - w_[k]) * Real(link.inverse_length);
-      w_[k] = w;
-      momentum[k] = tension * here.u[k] + here.across[k];
-    }
+    const Cartesian w = difference(sum(scaled(onward, u), here.free), scaled(aside, next_u));
+    u_dot = scaled(Real(link.inverse_length), difference(w, before.w));
+    momentum = sum(scaled(tension, u), across);
+    before.w = w;
   }
 
  private:
-  struct Carried {
-    Cartesian u, across;
-    Cartesian side;  // u of the next link, across u of this one
-    Cartesian free;  // w across the rod where the link before rests
-    Real coupling, pi, gamma;
+  static Cartesian zero() {
+    return components<Space::dimension>([](std::size_t) { return Real(0.0); });
+  }
 
-    Carried() : coupling(detail::unwritten), pi(detail::unwritten), gamma(detail::unwritten) {
-      for (Cartesian* vector : {&u, &across, &side, &free}) vector->fill(Real(detail::unwritten));
-    }
+  struct Carried {
+    Cartesian free;  // w across the rod where the bob before rests
+    Real coupling, pi, gamma;
   };
 
-  int links_;
+  static Carried unwritten() {
+    const Real none(detail::unwritten);
+    return {components<Space::dimension>([&](std::size_t) { return none; }), none, none, none};
+  }
+
   detail::PerLink<Carried, N> carried_;
-  Cartesian w_;  // velocity of the bob before
 };
 
 }  // namespace pendula

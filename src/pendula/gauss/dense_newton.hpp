@@ -6,6 +6,7 @@
 #include <limits>
 #include <pendula/chain.hpp>
 #include <pendula/gauss/compensated.hpp>
+#include <pendula/gauss/energy_tally.hpp>
 #include <pendula/gauss/linear_system.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stepper.hpp>
@@ -63,6 +64,7 @@ class DenseStages {
   static constexpr Convergence convergence() { return Convergence::quadratic; }
   static constexpr Iteration iteration() { return Iteration::newton; }
   static constexpr std::int64_t chart_switches() { return 0; }
+  static constexpr int worst_link() { return -1; }
 
   /// Link whose coordinates fail at the last evaluated stages, −1 where none does.
   int singular_link() const { return singular_link_; }
@@ -124,6 +126,33 @@ class DenseStages {
     }
     if (worst.relative > 0) worst.relative /= scale;
     return worst;
+  }
+
+  /// Energy of the chain at (q, v), and the work that torques may do there.
+  EnergyTally<Space> tally(const Vector& q, const Vector& v, const KernelTorque& torque) const {
+    EnergyTally<Space> tally;
+    for (int link = 0; link < Kernel::links; ++link) {
+      std::array<double, Space::dof> at, rate;
+      for (int a = 0; a < Space::dof; ++a) {
+        at[static_cast<std::size_t>(a)] = q[a * Kernel::links + link];
+        rate[static_cast<std::size_t>(a)] = v[a * Kernel::links + link];
+      }
+      const Heading<Space> heading(0, at, rate);
+      const double power = torque.col(link).norm() * std::sqrt(dot(heading.u_dot, heading.u_dot));
+      tally.add(chain_, link, heading, std::abs(coefficients_.h()) * power);
+    }
+    return tally;
+  }
+
+  /// The most that a stage has; `position` and `velocity` hold one vector a stage.
+  double most_unexplained(const Vector& q, const Vector& v, const PerStage<Vector, S>& position,
+                          const PerStage<Vector, S>& velocity) const {
+    const EnergyTally<Space> start = tally(q, v, torque_[0]);
+    double most = 0;
+    for (int i = 0; i < stages(); ++i) {
+      most = std::max(most, pendula::unexplained_energy(chain_, start, tally(position[i], velocity[i], torque_[i])));
+    }
+    return most;
   }
 
   // At a pole, one coordinate of a link carries no mass while its other one does. The mass ratio is sin²θ; below this
@@ -205,6 +234,13 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
     }
     system_.solve();
     return this->apply_correction(0);
+  }
+
+  double unexplained_energy() {
+    place_stages();
+    Vector v;
+    Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v);
+    return this->most_unexplained(q_.value, v, position_, unknown_);
   }
 
   void accept() {
@@ -326,6 +362,11 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
     }
     system_.solve();
     return this->apply_correction(v_.value.cwiseAbs().maxCoeff() / std::abs(coefficients_.h()));
+  }
+
+  double unexplained_energy() {
+    place_stages();
+    return this->most_unexplained(q_.value, v_.value, position_, velocity_);
   }
 
   void accept() {

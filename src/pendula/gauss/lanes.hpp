@@ -55,86 +55,113 @@ template <int Size>
 using RegisterFor = typename decltype(detail::widest_register<Size>())::type;
 
 /// `Size` numbers in SIMD registers that the compiler's target decides on; arithmetic goes number by number.
-/// Loads and stores need addresses aligned to `pack_alignment`.
+/// Loads and stores need addresses aligned to `pack_alignment`. More than one register is two packs, not an array:
+/// compilers keep those in registers.
 template <int Size, class Register = RegisterFor<Size>>
 class Pack {
   static constexpr int width = detail::register_size<Register>;
-  static constexpr int registers = Size / width;
-  static_assert(registers * width == Size);
+  static constexpr bool split = Size > width;
+  static_assert(Size % width == 0);
+  static constexpr int low_size = (Size / width + 1) / 2 * width;
+  using Low = Pack<split ? low_size : Size, Register>;
+  using High = Pack<split ? Size - low_size : Size, Register>;
+  struct Halves {
+    Low low;
+    High high;
+  };
 
  public:
   static constexpr int size = Size;
 
   Pack() = default;
   explicit Pack(double value) {
-    for (Register& r : registers_) r = Register(value);
+    if constexpr (split) {
+      held_ = {Low(value), High(value)};
+    } else {
+      held_ = Register(value);
+    }
   }
 
   static Pack load(const double* from) {
     Pack pack;
-    for (int i = 0; i < registers; ++i) detail::load(from + i * width, pack.registers_[i]);
+    if constexpr (split) {
+      pack.held_ = {Low::load(from), High::load(from + low_size)};
+    } else {
+      detail::load(from, pack.held_);
+    }
     return pack;
   }
   void store(double* to) const {
-    for (int i = 0; i < registers; ++i) detail::store(to + i * width, registers_[i]);
+    if constexpr (split) {
+      held_.low.store(to);
+      held_.high.store(to + low_size);
+    } else {
+      detail::store(to, held_);
+    }
   }
 
   friend Pack operator+(const Pack& a, const Pack& b) {
-    return each([&](int i) { return a.registers_[i] + b.registers_[i]; });
+    return each([](const auto& x, const auto& y) { return x + y; }, a, b);
   }
   friend Pack operator-(const Pack& a, const Pack& b) {
-    return each([&](int i) { return a.registers_[i] - b.registers_[i]; });
+    return each([](const auto& x, const auto& y) { return x - y; }, a, b);
   }
   friend Pack operator*(const Pack& a, const Pack& b) {
-    return each([&](int i) { return a.registers_[i] * b.registers_[i]; });
+    return each([](const auto& x, const auto& y) { return x * y; }, a, b);
   }
   friend Pack operator/(const Pack& a, const Pack& b) {
-    return each([&](int i) { return a.registers_[i] / b.registers_[i]; });
+    return each([](const auto& x, const auto& y) { return x / y; }, a, b);
   }
   friend Pack operator-(const Pack& a) {
-    return each([&](int i) { return -a.registers_[i]; });
+    return each([](const auto& x) { return -x; }, a);
   }
 
   /// a b + c, with one rounding where the processor has such an instruction.
   friend Pack fma(const Pack& a, const Pack& b, const Pack& c) {
-    using std::fma, xsimd::fma;
-    return each([&](int i) {
-      if constexpr (std::is_same_v<Register, double>) {
-        return a.registers_[i] * b.registers_[i] + c.registers_[i];
-      } else {
-        return fma(a.registers_[i], b.registers_[i], c.registers_[i]);
-      }
-    });
+    return each(
+        [](const Register& x, const Register& y, const Register& z) -> Register {
+          if constexpr (std::is_same_v<Register, double>) {
+            return x * y + z;
+          } else {
+            return xsimd::fma(x, y, z);
+          }
+        },
+        a, b, c);
   }
 
   friend Pack abs(const Pack& a) {
-    using std::abs, xsimd::abs;
-    return each([&](int i) { return Register(abs(a.registers_[i])); });
+    return each(
+        [](const Register& x) -> Register {
+          using std::abs, xsimd::abs;
+          return abs(x);
+        },
+        a);
   }
   friend Pack max(const Pack& a, const Pack& b) {
-    using std::max, xsimd::max;
-    return each([&](int i) { return Register(max(a.registers_[i], b.registers_[i])); });
-  }
-  /// a > b ? x : y.
-  friend Pack select_greater(const Pack& a, const Pack& b, const Pack& x, const Pack& y) {
-    return each([&](int i) {
-      if constexpr (std::is_same_v<Register, double>) {
-        return a.registers_[i] > b.registers_[i] ? x.registers_[i] : y.registers_[i];
-      } else {
-        return xsimd::select(a.registers_[i] > b.registers_[i], x.registers_[i], y.registers_[i]);
-      }
-    });
+    return each(
+        [](const Register& x, const Register& y) -> Register {
+          using std::max, xsimd::max;
+          return max(x, y);
+        },
+        a, b);
   }
 
  private:
-  template <class Operation>
-  static Pack each(Operation operation) {
-    Pack pack;
-    for (int i = 0; i < registers; ++i) pack.registers_[i] = operation(i);
-    return pack;
+  template <int, class>
+  friend class Pack;
+
+  template <class Operation, class... Packs>
+  static Pack each(Operation operation, const Packs&... packs) {
+    Pack result;
+    if constexpr (split) {
+      result.held_ = {Low::each(operation, packs.held_.low...), High::each(operation, packs.held_.high...)};
+    } else {
+      result.held_ = operation(packs.held_...);
+    }
+    return result;
   }
 
-  Register registers_[static_cast<std::size_t>(registers)];
+  std::conditional_t<split, Halves, Register> held_;
 };
 
 /// In bytes; enough for any register that xsimd knows.

@@ -37,6 +37,21 @@ struct ReducedSinCos {
   }
 };
 
+/// The same by the standard library, for numbers of any size.
+template <class Arch>
+[[gnu::noinline, gnu::cold]] void sincos_of_large(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sine,
+                                                  xsimd::batch<double, Arch>& cosine) {
+  using Batch = xsimd::batch<double, Arch>;
+  alignas(pack_alignment) double at[Batch::size], s[Batch::size], c[Batch::size];
+  x.store_aligned(at);
+  for (std::size_t i = 0; i < Batch::size; ++i) {
+    s[i] = std::sin(at[i]);
+    c[i] = std::cos(at[i]);
+  }
+  sine = Batch::load_aligned(s);
+  cosine = Batch::load_aligned(c);
+}
+
 }  // namespace detail
 
 /// Sine and cosine of every number of a register, to 0.75 ulp where |x| < 10⁵ and by the standard library beyond.
@@ -66,16 +81,8 @@ void sincos(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sin
   sine = xsimd::bitwise_cast<Batch>((bits(reduced.sine) ^ difference) ^ sine_sign);
   cosine = xsimd::bitwise_cast<Batch>((bits(reduced.cosine) ^ difference) ^ cosine_sign);
 
-  if (!xsimd::all(xsimd::abs(x) < Batch(1e5))) [[unlikely]] {
-    alignas(pack_alignment) double at[Batch::size], s[Batch::size], c[Batch::size];
-    x.store_aligned(at);
-    for (std::size_t i = 0; i < Batch::size; ++i) {
-      s[i] = std::sin(at[i]);
-      c[i] = std::cos(at[i]);
-    }
-    sine = Batch::load_aligned(s);
-    cosine = Batch::load_aligned(c);
-  }
+  if (!xsimd::all(xsimd::abs(x) < Batch(1e5))) [[unlikely]]
+    detail::sincos_of_large(x, sine, cosine);
 }
 
 inline void sincos(double x, double& sine, double& cosine) {

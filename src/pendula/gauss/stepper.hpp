@@ -11,7 +11,7 @@ namespace pendula {
 /// What one iteration on the stages did.
 struct Correction {
   double relative = 0;  ///< largest change of an unknown, relative to the size of the unknowns
-  int link = -1;        ///< 0-based link where it happened
+  int link = -1;        ///< 0-based link where it happened; −1: ask the solver
 };
 
 struct StepperOptions {
@@ -26,7 +26,9 @@ struct StepperOptions {
 ///   void prepare(double time, double h);   predicts the stages of the next step
 ///   Correction correct();                  improves the stages once
 ///   Convergence convergence() const;       how its corrections shrink; may change from one to the next
+///   int worst_link();                      where a correction was largest that did not say; where a step failed only
 ///   int singular_link() const;             link whose coordinates fail at the stages, −1 where none does
+///   double unexplained_energy();           most that a stage has, see energy_tally.hpp
 ///   void accept();                         moves the state to the end of the step
 ///   void save(); void restore();           keep a state and go back to it; neither allocates
 ///   State state(double time) const;        the state as users read it
@@ -71,16 +73,24 @@ class GaussStepper {
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
+  // An iteration that goes farther than this from where it began, relative to the unknowns, may have come to a solution
+  // of the stage equations that is not the motion: its energy is looked at.
+  static constexpr double trusted_prediction = 0.3;
+
   /// One step of exactly h; on failure the state is what it was.
   Outcome attempt(double h) {
     solver_.prepare(time(), h);
     at_roundoff_.restart();
     Correction correction;
+    bool far = false;
     for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
       correction = solver_.correct();
       ++statistics_.newton_iterations;
       if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
-      if (at_roundoff_.reached(correction.relative, solver_.convergence())) return accept(h, iteration, correction);
+      if (iteration == 1) far = correction.relative > trusted_prediction;
+      if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
+      if (far && solver_.unexplained_energy() > 1) return failure(Status::wrong_root, h, iteration, correction);
+      return accept(h, iteration, correction);
     }
     return failure(Status::not_converged, h, options_.max_iterations, correction);
   }
@@ -121,7 +131,8 @@ class GaussStepper {
     ++statistics_.rejected_steps;
     const int singular = solver_.singular_link();
     if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
-    return {status, time(), h, iterations, correction.relative, correction.link};
+    const int link = correction.link >= 0 || status == Status::wrong_root ? correction.link : solver_.worst_link();
+    return {status, time(), h, iterations, correction.relative, link};
   }
 
   StageSolver solver_;

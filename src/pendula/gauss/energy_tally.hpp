@@ -1,0 +1,45 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <pendula/chain.hpp>
+#include <pendula/chart.hpp>
+#include <pendula/gauss/chain_links.hpp>
+#include <pendula/invariants.hpp>
+
+namespace pendula {
+
+/// Energy of a chain at one moment, added up link by link from the pivot out, in any coordinates.
+template <class Space>
+struct EnergyTally {
+  double kinetic = 0;      ///< J
+  double potential = 0;    ///< J
+  double torque_work = 0;  ///< at most what torques do in the step, Σ |torque| |û̇| h  [J]
+
+  /// Adds link i with its direction, its rate and the work that its torque may do.
+  template <int N>
+  void add(const Chain<Space, N>& chain, int i, const Heading<Space>& heading, double work = 0) {
+    const double l = chain.lengths()[i], m = chain.masses()[i];
+    position_ = sum(position_, scaled(l, heading.u));
+    velocity_ = sum(velocity_, scaled(l, heading.u_dot));
+    kinetic += m * dot(velocity_, velocity_) / 2;
+    potential += m * chain.gravity() * position_.back();
+    torque_work += work;
+  }
+
+  double energy() const { return kinetic + potential; }
+
+ private:
+  std::array<double, Space::dimension> position_{}, velocity_{};
+};
+
+/// Energy that a stage has above the start of the step and that no torque can have brought, in units of all the energy
+/// the chain had: kinetic, and Σ M |g| l. On the motion this is a truncation error. The stage equations of too large a
+/// step have other solutions, too, in which the chain moves at any speed; those it tells apart.
+template <class Space, int N>
+double unexplained_energy(const Chain<Space, N>& chain, const EnergyTally<Space>& start,
+                          const EnergyTally<Space>& stage) {
+  return (stage.energy() - start.energy() - stage.torque_work) / (start.kinetic + energy_scale(chain));
+}
+
+}  // namespace pendula
