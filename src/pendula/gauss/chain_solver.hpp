@@ -139,15 +139,14 @@ class ChainSolver {
   }
 
   int singular_link() const { return -1; }
-  double unexplained_energy() { return stages_.unexplained_energy(); }
+  double unexplained_energy() {
+    if (choice_.active() == Iteration::newton) stages_.find_forces();
+    return stages_.unexplained_energy();
+  }
 
   void accept() {
     const bool newton = choice_.active() == Iteration::newton;
-    if (newton) {
-      stages_.place();
-      stages_.run_out();
-      stages_.set_all_forces();
-    }
+    if (newton) stages_.find_forces();
     choice_.end_step();
     stages_.accept(choice_.is_automatic() || !newton);
   }

@@ -119,7 +119,8 @@ class ChainStages {
         w_(chain.links()),
         torque_(chain.loaded() ? chain.links() : 0),
         at_state_(chain.links()),
-        saved_{charts_, user_, detail::LinkArray<4 * K, N>(chain.links())} {
+        saved_{charts_, user_, detail::LinkArray<4 * K, N>(chain.links())},
+        tried_(chain.links()) {
     if (constants_.loaded()) {
       for (int i = 0; i < links(); ++i) set_constant_torque(i);
     }
@@ -199,6 +200,7 @@ class ChainStages {
     forget();
     for (int i = 0; i < links(); ++i) start_link(i, state);
     set_momenta();
+    run_start_ = tally_at_state();
   }
 
   /// Predicts the stages of a step of size h: from the last step's, or cold where there was none like it.
@@ -260,6 +262,13 @@ class ChainStages {
     }
   }
 
+  /// Forces f of the stages that V places, which Newton on V alone leaves behind.
+  void find_forces() {
+    place();
+    run_out();
+    set_all_forces();
+  }
+
   /// Forces f at the placed stages, from the velocities of the bobs: f_a = y_a·(l G) + û_a·R.
   void set_all_forces() {
     Cartesian G = zero();
@@ -273,32 +282,19 @@ class ChainStages {
     }
   }
 
-  /// The most that a stage has, as it was last placed.
+  /// What the end of the step would have; the state stays where it is.
   double unexplained_energy() {
-    EnergyTally<Space> start;
-    sweep_state(at_state_, [&](int i, const Rates& v, const Rates&) {
-      start.add(chain_, i, Heading<Space>(charts_[i], position(i), v));
-    });
-    double most = 0;
-    for (std::size_t j = 0; j < S; ++j) {
-      EnergyTally<Space> stage;
-      for (int i = 0; i < links(); ++i) add_stage(i, j, stage);
-      most = std::max(most, pendula::unexplained_energy(chain_, start, stage));
-    }
-    return most;
+    const EnergyTally<Space> start = loaded() ? tally_at_state() : run_start_;
+    for_each_saved(tried_, [](double& kept, double& value) { kept = value; });
+    move();
+    const EnergyTally<Space> end = tally_at_state();
+    for_each_saved(tried_, [](double& kept, double& value) { value = kept; });
+    return pendula::unexplained_energy(chain_, start, end);
   }
 
-  /// Moves the state to the end of the step, and links that come near a pole to their other chart. Increments are added
-  /// one by one: that keeps their sum's rounding in the low part.
+  /// Moves the state to the end of the step, and links that come near a pole to their other chart.
   void accept(bool forces_are_predicted) {
-    for (int i = 0; i < links(); ++i) {
-      for (std::size_t a = 0; a < K; ++a) {
-        for (std::size_t j = 0; j < S; ++j) {
-          detail::add_compensated(columns_.hb(j) * V_[i][a * Z + j], q_[i][a], q_low_[i][a]);
-          detail::add_compensated(columns_.hb(j) * F_[i][a * Z + j], p_[i][a], p_low_[i][a]);
-        }
-      }
-    }
+    move();
     last_h_ = h();
     if constexpr (has_charts<Space>) change_charts(forces_are_predicted);
   }
@@ -326,13 +322,13 @@ class ChainStages {
   void save() {
     saved_.charts = charts_;
     saved_.user = user_;
-    for_each_saved([](double& kept, double& value) { kept = value; });
+    for_each_saved(saved_.numbers, [](double& kept, double& value) { kept = value; });
   }
 
   void restore() {
     charts_ = saved_.charts;
     user_ = saved_.user;
-    for_each_saved([](double& kept, double& value) { value = kept; });
+    for_each_saved(saved_.numbers, [](double& kept, double& value) { value = kept; });
     forget();
   }
 
@@ -439,19 +435,35 @@ class ChainStages {
     }
   }
 
-  void add_stage(int i, std::size_t j, EnergyTally<Space>& stage) const {
-    const Heading<Space> heading = stage_heading(i, j);
-    double torque = 0;
-    if (loaded()) {
-      for (std::size_t k = 0; k < Space::torque_components; ++k) torque = std::hypot(torque, torque_[i][k * Z + j]);
-    }
-    stage.add(chain_, i, heading, std::abs(h()) * torque * std::sqrt(dot(heading.u_dot, heading.u_dot)));
+  EnergyTally<Space> tally_at_state() {
+    EnergyTally<Space> tally;
+    sweep_state(at_state_, [&](int i, const Rates& v, const Rates&) {
+      const Heading<Space> heading(charts_[i], position(i), v);
+      double torque = 0;
+      if (loaded()) {
+        for (const double component : first_torque(i)) torque = std::hypot(torque, component);
+      }
+      tally.add(chain_, i, heading, std::abs(h()) * torque * std::sqrt(dot(heading.u_dot, heading.u_dot)));
+    });
+    return tally;
   }
 
   Heading<Space> stage_heading(int i, std::size_t j) const {
     PlainTrig at;
     Link::trig_from(first_lane(sine_[i] + j), first_lane(cosine_[i] + j), at);
     return Heading<Space>::of_trig(charts_[i], at, first_lane(V_[i] + j));
+  }
+
+  // Increments are added one by one: that keeps their sum's rounding in the low part.
+  void move() {
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        for (std::size_t j = 0; j < S; ++j) {
+          detail::add_compensated(columns_.hb(j) * V_[i][a * Z + j], q_[i][a], q_low_[i][a]);
+          detail::add_compensated(columns_.hb(j) * F_[i][a * Z + j], p_[i][a], p_low_[i][a]);
+        }
+      }
+    }
   }
 
   static Rates first_lane(const double* from) {
@@ -602,9 +614,9 @@ class ChainStages {
   }
 
   template <class Copy>
-  void for_each_saved(Copy copy) {
+  void for_each_saved(detail::LinkArray<4 * K, N>& numbers, Copy copy) {
     for (int i = 0; i < links(); ++i) {
-      double* kept = saved_.numbers[i];
+      double* kept = numbers[i];
       for (auto* values : {&q_, &q_low_, &p_, &p_low_}) {
         for (std::size_t a = 0; a < K; ++a) copy(*kept++, (*values)[i][a]);
       }
@@ -621,8 +633,10 @@ class ChainStages {
   detail::LinkArray<D * Z, N> w_;
   detail::LinkArray<Space::torque_components * Z, N> torque_;
   MotionSweep<Space, double, N> at_state_;
+  EnergyTally<Space> run_start_;
   Saved saved_;
-  double last_h_ = 0;  // of the step that V and F belong to; 0: they belong to none
+  detail::LinkArray<4 * K, N> tried_;  // the state, while the end of a step is looked at
+  double last_h_ = 0;                  // of the step that V and F belong to; 0: they belong to none
   std::int64_t chart_switches_ = 0;
 };
 

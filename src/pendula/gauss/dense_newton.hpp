@@ -144,15 +144,10 @@ class DenseStages {
     return tally;
   }
 
-  /// The most that a stage has; `position` and `velocity` hold one vector a stage.
-  double most_unexplained(const Vector& q, const Vector& v, const PerStage<Vector, S>& position,
-                          const PerStage<Vector, S>& velocity) const {
-    const EnergyTally<Space> start = tally(q, v, torque_[0]);
-    double most = 0;
-    for (int i = 0; i < stages(); ++i) {
-      most = std::max(most, pendula::unexplained_energy(chain_, start, tally(position[i], velocity[i], torque_[i])));
-    }
-    return most;
+  /// What the end of the step would have, at (q, v); the step starts at (q_start, v_start).
+  double unexplained(const Vector& q_start, const Vector& v_start, const Vector& q, const Vector& v) const {
+    const EnergyTally<Space> start = chain_.loaded() ? tally(q_start, v_start, torque_[0]) : run_start_;
+    return pendula::unexplained_energy(chain_, start, tally(q, v, torque_[0]));
   }
 
   // At a pole, one coordinate of a link carries no mass while its other one does. The mass ratio is sin²θ; below this
@@ -176,6 +171,7 @@ class DenseStages {
     return i % Kernel::links;
   }
 
+  EnergyTally<Space> run_start_;
   Chain chain_;
   Parameters parameters_;
   StepCoefficients<S> coefficients_;
@@ -218,6 +214,7 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
     Kernel::momentum_from_velocity(parameters_, q, velocity_, p);
     q_.assign(q);
     p_.assign(p);
+    this->run_start_ = this->tally(q, velocity_, torque_[0]);
     return singular_link_ < 0 ? Status::ok : Status::singular_mass_matrix;
   }
 
@@ -237,22 +234,16 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
   }
 
   double unexplained_energy() {
-    place_stages();
-    Vector v;
-    Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v);
-    return this->most_unexplained(q_.value, v, position_, unknown_);
+    const auto [moved, pushed] = increments();
+    const Vector q = q_.value + moved, p = p_.value + pushed;
+    Vector v_start, v;
+    Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v_start);
+    Kernel::velocity_from_momentum(parameters_, q, p, v);
+    return this->unexplained(q_.value, v_start, q, v);
   }
 
   void accept() {
-    place_stages();
-    for (int i = 0; i < stages(); ++i) {
-      Kernel::momentum_form(parameters_, position_[i], unknown_[i], torque_[i], momentum_[i], force_[i]);
-    }
-    Vector moved = Vector::Zero(), pushed = Vector::Zero();
-    for (int j = 0; j < stages(); ++j) {
-      moved += coefficients_.hb(j) * unknown_[j];
-      pushed += coefficients_.hb(j) * force_[j];
-    }
+    const auto [moved, pushed] = increments();
     q_.add(moved);
     p_.add(pushed);
     this->remember();
@@ -283,6 +274,20 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
       for (int j = 0; j < stages(); ++j) moved += coefficients_.m(i, j) * (coefficients_.hb(j) * unknown_[j]);
       position_[i] = q_.value + moved;
     }
+  }
+
+  // Of q and p, over the step.
+  std::array<Vector, 2> increments() {
+    place_stages();
+    for (int i = 0; i < stages(); ++i) {
+      Kernel::momentum_form(parameters_, position_[i], unknown_[i], torque_[i], momentum_[i], force_[i]);
+    }
+    Vector moved = Vector::Zero(), pushed = Vector::Zero();
+    for (int j = 0; j < stages(); ++j) {
+      moved += coefficients_.hb(j) * unknown_[j];
+      pushed += coefficients_.hb(j) * force_[j];
+    }
+    return {moved, pushed};
   }
 
   void evaluate_with_jacobians() {
@@ -346,6 +351,7 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
     if (singular_link_ >= 0) return Status::singular_mass_matrix;
     chain_.torque(state.time, torque_[0]);
     Kernel::acceleration(parameters_, q_.value, v_.value, torque_[0], acceleration_);
+    this->run_start_ = this->tally(q_.value, v_.value, torque_[0]);
     return Status::ok;
   }
 
@@ -365,17 +371,12 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
   }
 
   double unexplained_energy() {
-    place_stages();
-    return this->most_unexplained(q_.value, v_.value, position_, velocity_);
+    const auto [moved, pushed] = increments();
+    return this->unexplained(q_.value, v_.value, q_.value + moved, v_.value + pushed);
   }
 
   void accept() {
-    place_stages();
-    Vector moved = Vector::Zero(), pushed = Vector::Zero();
-    for (int j = 0; j < stages(); ++j) {
-      moved += coefficients_.hb(j) * velocity_[j];
-      pushed += coefficients_.hb(j) * unknown_[j];
-    }
+    const auto [moved, pushed] = increments();
     q_.add(moved);
     v_.add(pushed);
     this->remember();
@@ -403,6 +404,17 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
       position_[i] = q_.value + moved;
       velocity_[i] = v_.value + pushed;
     }
+  }
+
+  // Of q and v, over the step.
+  std::array<Vector, 2> increments() {
+    place_stages();
+    Vector moved = Vector::Zero(), pushed = Vector::Zero();
+    for (int j = 0; j < stages(); ++j) {
+      moved += coefficients_.hb(j) * velocity_[j];
+      pushed += coefficients_.hb(j) * unknown_[j];
+    }
+    return {moved, pushed};
   }
 
   void evaluate_with_jacobians() {

@@ -33,13 +33,14 @@ struct EnergyTally {
   std::array<double, Space::dimension> position_{}, velocity_{};
 };
 
-/// Energy that a stage has above the start of the step and that no torque can have brought, in units of all the energy
-/// the chain had: kinetic, and Σ M |g| l. On the motion this is a truncation error. The stage equations of too large a
-/// step have other solutions, too, in which the chain moves at any speed; those it tells apart.
+/// Energy that a chain has above an earlier moment and that no torque can have brought, in units of all the energy the
+/// chain had: kinetic, and Σ M |g| l. That moment is the start of the run where nothing but weight acts, otherwise the
+/// start of the step. On the motion this is a truncation error. The stage equations of too large a step have other
+/// solutions, too, in which the chain moves at any speed; those it tells apart.
 template <class Space, int N>
 double unexplained_energy(const Chain<Space, N>& chain, const EnergyTally<Space>& start,
-                          const EnergyTally<Space>& stage) {
-  return (stage.energy() - start.energy() - stage.torque_work) / (start.kinetic + energy_scale(chain));
+                          const EnergyTally<Space>& now) {
+  return (now.energy() - start.energy() - now.torque_work) / (start.kinetic + energy_scale(chain));
 }
 
 }  // namespace pendula

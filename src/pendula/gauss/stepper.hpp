@@ -28,7 +28,7 @@ struct StepperOptions {
 ///   Convergence convergence() const;       how its corrections shrink; may change from one to the next
 ///   int worst_link();                      where a correction was largest that did not say; where a step failed only
 ///   int singular_link() const;             link whose coordinates fail at the stages, −1 where none does
-///   double unexplained_energy();           most that a stage has, see energy_tally.hpp
+///   double unexplained_energy();           that the end of the step would have: energy_tally.hpp
 ///   void accept();                         moves the state to the end of the step
 ///   void save(); void restore();           keep a state and go back to it; neither allocates
 ///   State state(double time) const;        the state as users read it
@@ -75,7 +75,7 @@ class GaussStepper {
  private:
   // An iteration that goes farther than this from where it began, relative to the unknowns, may have come to a solution
   // of the stage equations that is not the motion: its energy is looked at.
-  static constexpr double trusted_prediction = 0.3;
+  static constexpr double trusted_prediction = 0.02;
 
   /// One step of exactly h; on failure the state is what it was.
   Outcome attempt(double h) {
