@@ -29,10 +29,8 @@ class ChainFixedPoint {
   using Coordinates = typename Stages::Coordinates;
   static constexpr std::size_t K = Stages::K, Z = Stages::Z;
 
-  // Everything is inlined into the two sweeps, so that what they carry stays in registers.
-  //
   // Leaves momenta where the forces were, until the way out replaces them.
-  [[gnu::flatten]] void sweep_inward(Stages& stages) {
+  PENDULA_IN_REGISTERS void sweep_inward(Stages& stages) {
     typename Sweep::Inward carried;
     for (int end = stages.links(); end > 0;) {
       const int begin = Stages::block_before(end);
@@ -47,7 +45,7 @@ class ChainFixedPoint {
     }
   }
 
-  [[gnu::flatten]] Correction sweep_outward(Stages& stages) {
+  PENDULA_IN_REGISTERS Correction sweep_outward(Stages& stages) {
     L change(0.0), scale(0.0);
     typename Sweep::Outward carried(stages.placed(0));
     for (int i = 0; i < stages.links(); ++i) {

@@ -140,7 +140,7 @@ class ChainElimination {
     alignas(pack_alignment) double k[unknowns] = {};
   };
 
-  [[gnu::flatten]] void inward(Stages& stages) {
+  PENDULA_IN_REGISTERS void inward(Stages& stages) {
     Carried carried;
     Cartesian G;
     G.fill(L(0.0));
@@ -250,7 +250,7 @@ class ChainElimination {
     }
   }
 
-  [[gnu::flatten]] Correction outward(Stages& stages) {
+  PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
     alignas(pack_alignment) double dw[vectors] = {};
     Cartesian lanes_dw;
     lanes_dw.fill(L(0.0));

@@ -18,8 +18,8 @@ namespace pendula {
 /// itself up to four stages and needs two above.
 template <class Space>
 constexpr double newton_cost(int stages) {
-  constexpr std::array<double, 8> planar{1.8, 3.6, 6.8, 8.0, 5.6, 7.9, 9.7, 12.8};
-  constexpr std::array<double, 8> spatial{3.1, 6.1, 10.4, 14.0, 11.5, 15.0, 19.9, 24.1};
+  constexpr std::array<double, 8> planar{2.5, 3.6, 5.7, 7.4, 8.5, 10.8, 15.3, 18.5};
+  constexpr std::array<double, 8> spatial{2.5, 3.6, 8.4, 11.5, 12.4, 16.6, 26.1, 30.8};
   return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)];
 }
 

@@ -252,7 +252,7 @@ class ChainStages {
   }
 
   /// Velocities of the bobs at the placed stages, w_i = w_{i−1} + l Σ_a V_a û_a.
-  [[gnu::flatten]] void run_out() {
+  PENDULA_IN_REGISTERS void run_out() {
     Cartesian w = zero();
     for (int i = 0; i < links(); ++i) {
       Cartesian u_dot;

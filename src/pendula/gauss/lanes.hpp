@@ -6,6 +6,14 @@
 #include <type_traits>
 #include <xsimd/xsimd.hpp>
 
+/// Before a function that carries packs through a loop: everything it calls is inlined, so that they stay in registers.
+/// Not where a sanitizer would have all of that instrumented.
+#if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__)
+#define PENDULA_IN_REGISTERS [[gnu::flatten]]
+#else
+#define PENDULA_IN_REGISTERS
+#endif
+
 namespace pendula {
 
 namespace detail {
