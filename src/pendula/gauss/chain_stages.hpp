@@ -239,16 +239,30 @@ class ChainStages {
 
   void place_block(int end) {
     const int begin = block_before(end);
-    alignas(pack_alignment) double Q[placed_at_once * K * Z];
+    alignas(pack_alignment) double Q[placed_at_once * K * Z], Q_low[placed_at_once * K * Z];
     if (end - begin < placed_at_once) std::fill(Q, Q + placed_at_once * K * Z, 0.0);
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
-        const L moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
-        (L(q_[i][a]) + moved).store(Q + (static_cast<std::size_t>(i - begin) * K + a) * Z);
+        const std::size_t at = (static_cast<std::size_t>(i - begin) * K + a) * Z;
+        const L q(q_[i][a]), moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
+        const L placed = q + moved;
+        placed.store(Q + at);
+        ((q - placed) + moved).store(Q_low + at);
       }
     }
     // Past the last link of the chain this writes what nobody reads.
     sincos_all(Q, sine_[begin], cosine_[begin], placed_at_once * K * Z);
+    // What rounding the angle lost, which is most where links have turned often.
+    for (int i = begin; i < end; ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        double* sine = sine_[i] + a * Z;
+        double* cosine = cosine_[i] + a * Z;
+        const L s = L::load(sine), c = L::load(cosine);
+        const L low = L::load(Q_low + (static_cast<std::size_t>(i - begin) * K + a) * Z);
+        fma(c, low, s).store(sine);
+        fma(-s, low, c).store(cosine);
+      }
+    }
   }
 
   /// Velocities of the bobs at the placed stages, w_i = w_{i−1} + l Σ_a V_a û_a.
