@@ -36,7 +36,7 @@ def processor() -> str:
 
 def context(raw: dict) -> dict:
     """What the figures were measured with, and nothing about whose machine it was."""
-    kept = {key: raw[key] for key in ("compiler", "flags", "num_cpus", "caches") if key in raw}
+    kept = {key: raw[key] for key in ("compiler", "flags", "repetitions", "num_cpus", "caches") if key in raw}
     return {"date": raw["date"][:10], "processor": processor(), **kept}
 
 

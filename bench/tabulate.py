@@ -16,6 +16,7 @@ PROBLEMS = {"D": 7, "P2": 6, "P5": 5, "P10": 5, "P20": 6, "P50": 12, "P100": 40}
 STEPS = {2: 15, 10: 30, 100: 700}
 LINKS = (2, 5, 10, 20, 50, 100, 1000, 10_000, 100_000)
 BASELINE = "GSL rk8pd 1e-12"
+LINEAR = 1.5  # what caches may take; an O(n²) part would make it 100
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -78,7 +79,8 @@ def machine(figures: Figures) -> str:
     c = figures.context
     unit = figures.benchmarks["sincos"]["nanoseconds"]
     return (
-        f"{c['processor']}, one core; {c['compiler']}, `{c['flags']}`; {c['date']}. "
+        f"{c['processor']}, one core; {c['compiler']}, `{c['flags']}`; "
+        f"medians of {c['repetitions']} repetitions; {c['date']}. "
         f"One scalar `sincos` (std::sin and std::cos of the same argument): {unit:.1f} ns."
     )
 
@@ -90,14 +92,20 @@ def cost_row(figures: Figures, what: str, space: str, method: str, wanted: float
         yield [what, f"≤ {wanted:g} sincos", f"{number(min(costs))}–{number(max(costs))} sincos"]
 
 
-def linear_row(figures: Figures) -> Iterable[list[str]]:
-    """The row of linearity: cost at n = 10⁴ over n = 100, for the four methods above."""
+def growth(figures: Figures) -> list[float]:
+    """Cost of a link and iteration at n = 10⁴ over n = 100, for the four methods that have a goal."""
     ratios = []
     for space in ("planar", "spatial"):
         for method in ("s=2/newton", "s=8/fixed-point"):
             long, short = figures.cost(space, method, 10_000), figures.cost(space, method, 100)
             if long and short:
                 ratios.append(long / short)
+    return ratios
+
+
+def linear_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of linearity."""
+    ratios = growth(figures)
     if ratios:
         found = ", ".join(f"{ratio:.2f}" for ratio in ratios)
         yield ["cost a link and iteration, n = 10⁴ over n = 100 (the four rows above)", "≤ 1.15", found]
@@ -278,9 +286,12 @@ def filled(page: str, figures: Figures) -> str:
 
 
 def main() -> None:
-    """Reads the figures, rewrites the page."""
+    """Reads the figures, rewrites the page; fails where the cost of a long chain is not linear."""
     folder, page = map(Path, sys.argv[1:])
-    page.write_text(filled(page.read_text(encoding="utf-8"), Figures(folder)), encoding="utf-8")
+    figures = Figures(folder)
+    page.write_text(filled(page.read_text(encoding="utf-8"), figures), encoding="utf-8")
+    if any(ratio > LINEAR for ratio in growth(figures)):
+        raise SystemExit(f"tabulate.py: a link costs over {LINEAR} times as much at n = 10⁴ as at n = 100")
 
 
 if __name__ == "__main__":
