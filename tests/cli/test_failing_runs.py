@@ -64,15 +64,15 @@ def test_a_start_at_the_pole_is_refused(pendula, tmp_path, method):
 
 
 @pytest.mark.parametrize("solver", ["chain", "dense"])
-def test_a_step_that_does_not_converge(pendula, double, tmp_path, solver):
-    """Steps of a thousand seconds have no solution near by, nor have their smallest parts."""
+def test_a_step_that_is_far_too_large(pendula, double, tmp_path, solver):
+    """Steps of a thousand seconds find no solution, or none that is the motion, nor do their smallest parts."""
     given = settings(
         f"run.solver={solver}", "run.stages=3", "run.step=1e3", "run.duration=1e9", "output.every=1"
     )
     run = pendula("simulate", double, "-o", "out.csv", "--json", *given)
     assert run.status == 1
     outcome, rows = run.json["outcome"], Trajectory.read(tmp_path / "out.csv").rows
-    assert outcome["status"] in ("not_converged", "not_finite")
+    assert outcome["status"] in ("not_converged", "wrong_root", "not_finite")
     assert outcome["iterations"] > 0
     assert outcome["message"] in run.err
     assert run.json["rejected_steps"] > 0
