@@ -24,8 +24,8 @@ const std::array<double, count>& arguments() {
 }
 
 /// One pair for each argument, the same ones in every pass: the processor has learnt libm's branches, as it does where
-/// angles change smoothly. On arguments never seen before a pair takes half as long again, and costs would look
-/// smaller. g++ and clang make a single libm call of a pair. The store keeps calls from being merged.
+/// angles change smoothly. On arguments never seen before a pair takes nearly twice as long, and costs would look
+/// smaller. g++ and clang make a single libm call of a pair; the store keeps calls from being merged.
 void pass() {
   for (const double angle : arguments()) {
     double sine = std::sin(angle), cosine = std::cos(angle);
