@@ -65,7 +65,7 @@ def test_a_start_at_the_pole_is_refused(pendula, tmp_path, method):
 
 @pytest.mark.parametrize("solver", ["chain", "dense"])
 def test_a_step_that_is_far_too_large(pendula, double, tmp_path, solver):
-    """Steps of a thousand seconds find no solution, or none that is the motion, nor do their smallest parts."""
+    """Steps of a thousand seconds find no solution, or none that is the motion; nor do their parts."""
     given = settings(
         f"run.solver={solver}", "run.stages=3", "run.step=1e3", "run.duration=1e9", "output.every=1"
     )
