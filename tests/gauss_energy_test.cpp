@@ -37,11 +37,10 @@ TEST(LongRun, MomentumFormHasNoDriftAndVelocityFormWanders) {
   const auto start = State<Planar>::from_angles(Eigen::Vector2d::Constant(M_PI / 2));
   const EnergyRun momentum = energy_run(start, gauss(2, Form::momentum), 0.005, 1'000'000);
   const EnergyRun velocity = energy_run(start, gauss(2, Form::velocity), 0.005, 1'000'000);
-  EXPECT_LT(momentum.first_tenth, 4e-10);                      // measured 2.0e-10
-  EXPECT_LT(momentum.last_tenth, 1.5 * momentum.first_tenth);  // measured 0.92
-  EXPECT_GT(velocity.last_tenth, 4 * velocity.first_tenth);    // measured 6.3
-  EXPECT_GT(velocity.last_tenth, 30 * momentum.last_tenth)
-      << "measured 100; the motion is chaotic, another rounding 255";
+  EXPECT_LT(momentum.first_tenth, 4e-10);                      // measured 2.2e-10
+  EXPECT_LT(momentum.last_tenth, 1.5 * momentum.first_tenth);  // measured 0.98
+  // Where a chaotic walk has got to by then is chance: measured 61; from starts up to 4e-3 rad beside, 16 to 170.
+  EXPECT_GT(velocity.last_tenth, 5 * momentum.last_tenth);
 }
 
 }  // namespace

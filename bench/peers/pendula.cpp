@@ -1,3 +1,4 @@
+#include <cmath>
 #include <contestant.hpp>
 #include <peers/pendula.hpp>
 
@@ -8,16 +9,17 @@ using pendula::Form, pendula::Iteration, pendula::Method, pendula::Planar, pendu
 
 class PendulaRun : public Run {
  public:
-  PendulaRun(const Problem& problem, const RunOptions& options, int steps, double step)
+  PendulaRun(const Problem& problem, const RunOptions& options, int steps, double step, double last_step)
       : problem_(problem),
         steps_(steps),
         step_(step),
+        last_step_(last_step),
         start_(pendula::State<Planar>::from_angles(Eigen::VectorXd::Constant(problem.links, problem.angle))),
         integrator_(pendula::make_integrator(chain_of(problem), options)) {}
 
   void operator()() override {
     outcome_ = integrator_->start(start_);
-    for (int k = 0; k < steps_ && outcome_; ++k) outcome_ = integrator_->step(step_);
+    for (int k = 1; k <= steps_ && outcome_; ++k) outcome_ = integrator_->step(k < steps_ ? step_ : last_step_);
   }
 
   EndState end() override {
@@ -29,11 +31,18 @@ class PendulaRun : public Run {
  private:
   Problem problem_;
   int steps_;
-  double step_;
+  double step_, last_step_;
   pendula::State<Planar> start_;
   std::unique_ptr<pendula::Integrator<Planar>> integrator_;
   pendula::Outcome outcome_;
 };
+
+// Steps of a size that sums without rounding, and a last one that ends where the problem does: T/steps, rounded, would
+// end elsewhere by more than the floor.
+std::unique_ptr<Run> make_whole_run(const Problem& problem, const RunOptions& options, int steps) {
+  const double step = std::ldexp(std::floor(std::ldexp(problem.duration / steps, 40)), -40);
+  return std::make_unique<PendulaRun>(problem, options, steps, step, problem.duration - (steps - 1) * step);
+}
 
 RunOptions options_of(int stages, Solver solver, Iteration iteration) {
   return {.stages = stages, .solver = solver, .iteration = iteration};
@@ -50,7 +59,7 @@ void add(std::vector<Contestant>& contestants, const std::string& name, const Ru
   };
   const auto settings = [=](const Problem& problem) { return step_counts(problem, coarsest, factor, count); };
   const auto make = [options](const Problem& problem, double steps) {
-    return make_pendula(problem, options, static_cast<int>(steps), problem.duration / steps);
+    return make_whole_run(problem, options, static_cast<int>(steps));
   };
   contestants.push_back({"pendula " + name, "steps", built_in, settings, make});
 }
@@ -58,7 +67,7 @@ void add(std::vector<Contestant>& contestants, const std::string& name, const Ru
 }  // namespace
 
 std::unique_ptr<Run> make_pendula(const Problem& problem, const RunOptions& options, int steps, double step) {
-  return std::make_unique<PendulaRun>(problem, options, steps, step);
+  return std::make_unique<PendulaRun>(problem, options, steps, step, step);
 }
 
 void add_pendula(std::vector<Contestant>& contestants) {

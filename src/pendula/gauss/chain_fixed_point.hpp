@@ -37,9 +37,8 @@ class ChainFixedPoint {
       stages.place_block(end);
       while (end > begin) {
         const int i = --end;
-        Coordinates p;
-        for (std::size_t a = 0; a < K; ++a) p[a] = stages.stage_momentum(i, a);
-        stages.set_forces(i, p);
+        const Momenta<Coordinates> p = stages.stage_momenta(i);
+        stages.set_forces(i, p.value);
         sweep_.inward(carried, i, stages.constants(i), stages.placed(i), p);
       }
     }

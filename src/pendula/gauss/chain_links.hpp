@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -126,12 +127,20 @@ std::array<Real, D> difference(const std::array<Real, D>& a, const std::array<Re
   return components<D>([&](std::size_t k) { return a[k] - b[k]; });
 }
 
-/// What the sweeps along a chain need to know of one link.
+/// What the sweeps along a chain need to know of one link. Low parts are what a number has lost to rounding: unlike that
+/// of a sum, it would act in the same sense step after step.
 struct LinkConstants {
   double mass = 0, inverse_mass = 0;      ///< m, 1/m
   double length = 0, inverse_length = 0;  ///< l, 1/l
-  double moment = 0;                      ///< M g l, M the mass that the rod carries
+  double inverse_length_low = 0;
+  double moment = 0, moment_low = 0;      ///< M g l, M the mass that the rod carries
   double damping = 0;                     ///< λ
+
+  /// x/l as if 1/l were exact.
+  template <class Real>
+  Real over_length(const Real& x) const {
+    return x * Real(inverse_length) + x * Real(inverse_length_low);
+  }
 };
 
 /// The constants of a chain link by link, and the load R on a link, f_a = y_a·(l G) + û_a·R, in any number type.
@@ -144,7 +153,7 @@ class ChainLinks {
       : links_(chain.links()), loaded_(chain.loaded()), constants_(chain.links()) {
     for (int i = 0; i < links(); ++i) {
       const double m = chain.masses()[i], l = chain.lengths()[i];
-      constants_[i] = {m, 1 / m, l, 1 / l, chain.mass_below()[i] * chain.gravity() * l, chain.damping()[i]};
+      constants_[i] = link_constants(m, l, chain.mass_below()[i], chain.gravity(), chain.damping()[i]);
     }
   }
 
@@ -180,6 +189,13 @@ class ChainLinks {
   }
 
  private:
+  static LinkConstants link_constants(double m, double l, double M, double g, double damping) {
+    const double inverse = 1 / l, inverse_low = std::fma(-l, inverse, 1) / l;
+    const double weight = M * g, weight_low = std::fma(M, g, -weight);
+    const double moment = weight * l, moment_low = std::fma(weight, l, -moment) + weight_low * l;
+    return {m, 1 / m, l, inverse, inverse_low, moment, moment_low, damping};
+  }
+
   int links_;
   bool loaded_;
   detail::PerLink<LinkConstants, N> constants_;

@@ -14,8 +14,15 @@ struct Placed {
   typename Space::Link::template Trig<Real> trig;
 };
 
+/// The momenta of one link, and what they lost to rounding. Those of neighbours nearly cancel on a long chain, and what
+/// is left is the velocity: without the low parts it would carry the rounding of the sum of all masses.
+template <class Coordinates>
+struct Momenta {
+  Coordinates value, low;
+};
+
 /// Hamilton's equations of a chain in O(n): velocities v and forces f of every link from positions and momenta p, in
-/// any number type. One sweep inward, then one outward; both are given the same.
+/// any number type. One sweep inward, then one outward. In space the low parts of momenta go unused.
 template <class Space, class Real, int N = Eigen::Dynamic>
 class MotionSweep {
   using Link = typename Space::Link;
@@ -35,14 +42,15 @@ class MotionSweep {
   explicit MotionSweep(int links) : tension_(links), inverse_determinant_(links) {}
 
   /// i = n−1 … 0.
-  void inward(Inward& next, int i, const LinkConstants& link, const Placed<Space, Real>& at, const Coordinates& p) {
+  void inward(Inward& next, int i, const LinkConstants& link, const Placed<Space, Real>& at,
+              const Momenta<Coordinates>& p) {
     Real determinant;
     Link::metric_determinant(at.trig, determinant);
     const Real inverse = Real(1.0) / determinant;
     inverse_determinant_[i] = inverse;
     Cartesian u, across;
     Link::direction(at.trig, u);
-    Link::tangent_momentum(at.trig, inverse, scaled(Real(link.inverse_length), p), across);
+    Link::tangent_momentum(at.trig, inverse, scaled(Real(link.inverse_length), p.value), across);
     in_chart<Space>(at.chart,
                     [&](auto chart) { tension_.inward(next, i, link, to_world(chart, u), to_world(chart, across)); });
   }
@@ -78,6 +86,9 @@ class MotionSweep {
 
 /// In the plane there is one direction across a rod, t = û_θ: vectors are pairs of numbers along u and t, and going to
 /// the next link turns them by the angle between the two rods. The same sweep with half the arithmetic, and û_θθ = −û.
+///
+/// That angle enters by 1 − cos, made of the difference of the directions: rounding of a direction along itself, which no
+/// angle has, then drops out, where links are nearly aligned and momenta nearly cancel.
 template <class Real, int N>
 class MotionSweep<Planar, Real, N> {
   using Link = Planar::Link;
@@ -96,10 +107,21 @@ class MotionSweep<Planar, Real, N> {
     }
   };
 
+  struct Turn {  // from a link to the next
+    Real versine, cosine, sine;
+
+    Turn(const Frame& frame, const Cartesian& next_u) {
+      const Cartesian onward = difference(next_u, frame.u);
+      versine = Real(0.5) * dot(onward, onward);
+      cosine = Real(1.0) - versine;
+      sine = dot(frame.t, onward);
+    }
+  };
+
  public:
   struct Inward {  // of the link just done, with the momentum below it where its rod rests
     Cartesian u{Real(0.0), Real(0.0)};
-    Real across{0.0}, gamma{0.0}, pi{0.0};
+    Real across{0.0}, across_low{0.0}, gamma{0.0}, pi{0.0};
   };
 
   struct Outward {  // the link to come, and in its frame the velocity of the bob before
@@ -111,33 +133,40 @@ class MotionSweep<Planar, Real, N> {
 
   explicit MotionSweep(int links) : carried_(links) {}
 
-  void inward(Inward& next, int i, const LinkConstants& link, const At& at, const Coordinates& p) {
+  void inward(Inward& next, int i, const LinkConstants& link, const At& at, const Momenta<Coordinates>& p) {
+    using std::fma;
     const Frame frame(at);
-    const Real across = p[0] * Real(link.inverse_length), m(link.mass);
-    const Real cosine = dot(frame.u, next.u), sine = dot(frame.t, next.u);
-    const Real push = next.pi * sine;
-    const Real e = Real(1.0) / (m + push * sine);
-    const Real pull = push * cosine;
-    const Real free = (across - (sine * next.gamma + cosine * next.across)) * e;
-    const Real gamma = (cosine * next.gamma - sine * next.across) + pull * free;
+    const Turn turn(frame, next.u);
+    const Real inverse(link.inverse_length), inverse_low(link.inverse_length_low), m(link.mass);
+    const Real across = p.value[0] * inverse;
+    const Real across_low = fma(p.value[0], inverse, -across) + (p.value[0] * inverse_low + p.low[0] * inverse);
+    const Real push = next.pi * turn.sine;
+    const Real e = Real(1.0) / (m + push * turn.sine);
+    const Real pull = push * turn.cosine;
+    const Real low = across_low - turn.cosine * next.across_low;
+    const Real free = ((across - next.across) + (low + (turn.versine * next.across - turn.sine * next.gamma))) * e;
+    const Real gamma = (turn.cosine * next.gamma - turn.sine * next.across) + pull * free;
     const Real pi = (next.pi + m) * (e * m);
     carried_[i] = {free, pull * e, pi, gamma};
-    next = {frame.u, across, gamma, pi};
+    next = {frame.u, across, across_low, gamma, pi};
   }
 
   template <class Load>
   void outward(Outward& before, int i, const LinkConstants& link, const At& /*at*/, const At& next, const Coordinates&,
                Load load, Coordinates& v, Coordinates& f) {
     const Carried& here = carried_[i];
-    const Frame frame(before.at), next_frame(next);
+    const Frame frame(before.at);
     // Of this bob, across the rod; along it, it goes as the bob before.
     const Real w = here.free - before.along * here.coupling;
     const Real turning = w - before.aside;
-    v[0] = turning * Real(link.inverse_length);
-    f[0] = dot(frame.t, load(Chart{0}, v)) - turning * (here.pi * before.along + here.gamma);
-    const Real cosine = dot(frame.u, next_frame.u), sine = dot(frame.t, next_frame.u);
-    const Real along = cosine * before.along + sine * w;
-    before.aside = cosine * w - sine * before.along;
+    v[0] = link.over_length(turning);
+    Cartesian weight_low;
+    Link::weight_load(Real(link.moment_low), weight_low);
+    const Real pull = here.pi * before.along + here.gamma;
+    f[0] = dot(frame.t, load(Chart{0}, v)) - (turning * pull - dot(frame.t, weight_low));
+    const Turn turn(frame, Frame(next).u);
+    const Real along = turn.cosine * before.along + turn.sine * w;
+    before.aside = turn.cosine * w - turn.sine * before.along;
     before.along = along;
     before.at = next;
   }

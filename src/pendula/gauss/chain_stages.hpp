@@ -152,9 +152,14 @@ class ChainStages {
   Placed<Space, L> placed(int i) const { return {charts_[i], trig(i)}; }
 
   /// P_i = p + h Σ_j a_ij f_j.
-  L stage_momentum(int i, std::size_t a) const {
-    const L pushed = columns_.integral(L::load(F_[i] + a * Z));
-    return L(p_[i][a]) + (pushed + L(p_low_[i][a]));
+  Momenta<Coordinates> stage_momenta(int i) const {
+    Momenta<Coordinates> P;
+    for (std::size_t a = 0; a < K; ++a) {
+      const L p(p_[i][a]), pushed = columns_.integral(L::load(F_[i] + a * Z)) + L(p_low_[i][a]);
+      P.value[a] = p + pushed;
+      P.low[a] = (p - P.value[a]) + pushed;
+    }
+    return P;
   }
 
   /// u_a·G − P_i, the increment summed before p is met.
@@ -389,6 +394,12 @@ class ChainStages {
     return p;
   }
 
+  Rates momentum_low(int i) const {
+    Rates low;
+    for (std::size_t a = 0; a < K; ++a) low[a] = p_low_[i][a];
+    return low;
+  }
+
   Rates position(int i) const {
     Rates q;
     for (std::size_t a = 0; a < K; ++a) q[a] = q_[i][a];
@@ -493,8 +504,14 @@ class ChainStages {
   }
 
   Placed<Space, double> placed_at_state(int i) const {
+    Rates sine, cosine;
+    for (std::size_t a = 0; a < K; ++a) {
+      const double s = std::sin(q_[i][a]), c = std::cos(q_[i][a]), low = q_low_[i][a];
+      sine[a] = s + c * low;
+      cosine[a] = c - s * low;
+    }
     Placed<Space, double> at{charts_[i], {}};
-    Link::trig(position(i), at.trig);
+    Link::trig_from(sine, cosine, at.trig);
     return at;
   }
 
@@ -505,7 +522,7 @@ class ChainStages {
     Placed<Space, double> at;
     for (int i = links(); i-- > 0;) {
       at = placed_at_state(i);
-      sweep.inward(inward, i, constants_[i], at, momentum(i));
+      sweep.inward(inward, i, constants_[i], at, {momentum(i), momentum_low(i)});
     }
     typename MotionSweep<Space, double, N>::Outward outward(at);
     Placed<Space, double> next = at;

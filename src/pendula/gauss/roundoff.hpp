@@ -24,7 +24,6 @@ class RoundoffStop {
   /// A new step begins. What Newton's constant C was is remembered from step to step.
   void restart() {
     count_ = 0;
-    stalls_ = 0;
     last_ = {};
     ++steps_;
   }
@@ -44,7 +43,8 @@ class RoundoffStop {
  private:
   // A fixed point on velocities and forces is two interleaved sequences: velocities follow from the forces of the
   // iteration before, and those from the velocities before that. (From rest the first correction is exactly zero.) So
-  // corrections are looked at in pairs, and their rate over two iterations.
+  // corrections are looked at in pairs, and their rate over two iterations; one that has not shrunk against the one before
+  // the last, of its own sequence, has come to rounding.
   bool linear_done() {
     const double pair = std::max(last_[0], last_[1]), pair_before = std::max(last_[2], last_[3]);
     if (count_ < 3) return false;
@@ -52,7 +52,7 @@ class RoundoffStop {
     const double rate = pair / pair_before;
     if (rate < 1 && pair * rate <= negligible) return true;
     if (count_ == 3) first_ = best_ = pair_before;
-    const bool stalled = has_stalled(rate, 2.0 / std::max(1, count_ - 3), 2);
+    const bool stalled = has_stalled(last_[0] / last_[2], 2.0 / std::max(1, count_ - 3));
     best_ = std::min(best_, pair);
     return stalled;
   }
@@ -68,7 +68,7 @@ class RoundoffStop {
       constant_ = constant_ == 0 ? measured : std::max(measured, constant_ / 2);
     }
     if (correction <= few_ulp || is_enough(correction)) return true;
-    const bool stalled = has_stalled(correction / last_[1], 1.0 / std::max(1, count_ - 2), 1);
+    const bool stalled = has_stalled(correction / last_[1], 1.0 / std::max(1, count_ - 2));
     best_ = std::min(best_, correction);
     return stalled;
   }
@@ -80,14 +80,13 @@ class RoundoffStop {
   }
 
   // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding.
-  bool has_stalled(double rate, double exponent, int enough) {
+  bool has_stalled(double rate, double exponent) const {
     const bool suspicious = last_[0] <= small && rate >= 0.5;
-    if (suspicious && rate >= (1 + std::pow(best_ / first_, exponent)) / 2) ++stalls_;
-    return stalls_ >= enough;
+    return suspicious && rate >= (1 + std::pow(best_ / first_, exponent)) / 2;
   }
 
   static constexpr double few_ulp = 2 * std::numeric_limits<double>::epsilon();
-  static constexpr double negligible = 1e-21;
+  static constexpr double negligible = 1e-20;
   static constexpr double small = 1e-7;   // no iteration that converges stops shrinking above this
   static constexpr double noise = 1e-12;  // corrections below may be rounding alone and say nothing of C
   static constexpr double safety = 10;
@@ -97,7 +96,7 @@ class RoundoffStop {
   std::array<double, 4> last_{};  // the newest first
   double first_ = 0, best_ = 0;
   double constant_ = 0;
-  int count_ = 0, stalls_ = 0, steps_ = 0;
+  int count_ = 0, steps_ = 0;
 };
 
 }  // namespace pendula

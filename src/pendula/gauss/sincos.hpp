@@ -17,23 +17,22 @@ struct ReducedSinCos {
   Batch sine, cosine;
 
   ReducedSinCos(const Batch& r, const Batch& low) {
-    using xsimd::fma, xsimd::fnma, xsimd::fms;
     const Batch z = r * r;
-    const Batch z_low = fms(r, r, z);
+    const Batch z_low = fused(r, r, -z);
     const Batch z2 = z * z;
-    const Batch p01 = fma(z, Batch(8.33333333332248946124e-03), Batch(-1.66666666666666324348e-01));
-    const Batch p23 = fma(z, Batch(2.75573137070700676789e-06), Batch(-1.98412698298579493134e-04));
-    const Batch p45 = fma(z, Batch(1.58969099521155010221e-10), Batch(-2.50507602534068634195e-08));
-    const Batch p = fma(z2, fma(z2, p45, p23), p01);
-    const Batch q01 = fma(z, Batch(-1.38888888888741095749e-03), Batch(4.16666666666666019037e-02));
-    const Batch q23 = fma(z, Batch(-2.75573143513906633035e-07), Batch(2.48015872894767294178e-05));
-    const Batch q45 = fma(z, Batch(-1.13596475577881948265e-11), Batch(2.08757232129817482790e-09));
-    const Batch q = fma(z2, fma(z2, q45, q23), q01);
+    const Batch p01 = fused(z, Batch(8.33333333332248946124e-03), Batch(-1.66666666666666324348e-01));
+    const Batch p23 = fused(z, Batch(2.75573137070700676789e-06), Batch(-1.98412698298579493134e-04));
+    const Batch p45 = fused(z, Batch(1.58969099521155010221e-10), Batch(-2.50507602534068634195e-08));
+    const Batch p = fused(z2, fused(z2, p45, p23), p01);
+    const Batch q01 = fused(z, Batch(-1.38888888888741095749e-03), Batch(4.16666666666666019037e-02));
+    const Batch q23 = fused(z, Batch(-2.75573143513906633035e-07), Batch(2.48015872894767294178e-05));
+    const Batch q45 = fused(z, Batch(-1.13596475577881948265e-11), Batch(2.08757232129817482790e-09));
+    const Batch q = fused(z2, fused(z2, q45, q23), q01);
     const Batch half = Batch(0.5) * z;
     const Batch one_less_half = Batch(1.0) - half;
-    sine = r + fma(r * z, p, low * one_less_half);
-    const Batch tail = fnma(r, low, ((Batch(1.0) - one_less_half) - half)) - Batch(0.5) * z_low;
-    cosine = one_less_half + fma(z2, q, tail);
+    sine = r + fused(r * z, p, low * one_less_half);
+    const Batch tail = fused(-r, low, ((Batch(1.0) - one_less_half) - half)) - Batch(0.5) * z_low;
+    cosine = one_less_half + fused(z2, q, tail);
   }
 };
 
@@ -63,12 +62,12 @@ void sincos(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sin
   // Adding 1.5·2⁵² rounds x/(π/2) to an integer and leaves its low bits in the mantissa. The two leading pieces of π/2
   // have 33 bits each, so that their products with that integer are exact.
   const Batch magic(6755399441055744.0);
-  const Batch shifted = xsimd::fma(x, Batch(0x1.45f306dc9c883p-1), magic);
+  const Batch shifted = detail::fused(x, Batch(0x1.45f306dc9c883p-1), magic);
   const Batch n = shifted - magic;
-  const Batch y = xsimd::fnma(n, Batch(0x1.921fb544p+0), x);
+  const Batch y = detail::fused(n, Batch(-0x1.921fb544p+0), x);
   const Batch middle = n * Batch(0x1.0b4611a6p-34);
   const Batch r = y - middle;
-  const Batch low = xsimd::fnma(n, Batch(0x1.3198a2e037073p-69), (y - r) - middle);
+  const Batch low = detail::fused(n, Batch(-0x1.3198a2e037073p-69), (y - r) - middle);
   const detail::ReducedSinCos<Arch> reduced(r, low);
 
   const auto bits = [](const Batch& value) { return xsimd::bitwise_cast<Integers>(value); };
