@@ -54,9 +54,10 @@ State<Space> random_state(Random& random, int links) {
 
 /// Equal unit masses and lengths.
 template <class Space>
-Chain<Space> equal_chain(int links, double gravity = 9.81) {
+Chain<Space> equal_chain(int links, double gravity = 9.81, double length = 1) {
   ChainParameters<Space> parameters;
-  parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(links);
+  parameters.masses = Eigen::VectorXd::Ones(links);
+  parameters.lengths = Eigen::VectorXd::Constant(links, length);
   parameters.gravity = gravity;
   return Chain<Space>(parameters);
 }
