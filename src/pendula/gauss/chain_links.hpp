@@ -127,14 +127,14 @@ std::array<Real, D> difference(const std::array<Real, D>& a, const std::array<Re
   return components<D>([&](std::size_t k) { return a[k] - b[k]; });
 }
 
-/// What the sweeps along a chain need to know of one link. Low parts are what a number has lost to rounding: unlike that
-/// of a sum, it would act in the same sense step after step.
+/// What the sweeps along a chain need to know of one link. Low parts are what a number has lost to rounding: unlike
+/// that of a sum, it would act in the same sense step after step.
 struct LinkConstants {
   double mass = 0, inverse_mass = 0;      ///< m, 1/m
   double length = 0, inverse_length = 0;  ///< l, 1/l
   double inverse_length_low = 0;
-  double moment = 0, moment_low = 0;      ///< M g l, M the mass that the rod carries
-  double damping = 0;                     ///< λ
+  double moment = 0, moment_low = 0;  ///< M g l, M the mass that the rod carries
+  double damping = 0;                 ///< λ
 
   /// x/l as if 1/l were exact.
   template <class Real>

@@ -22,7 +22,7 @@ struct Momenta {
 };
 
 /// Hamilton's equations of a chain in O(n): velocities v and forces f of every link from positions and momenta p, in
-/// any number type. One sweep inward, then one outward. In space the low parts of momenta go unused.
+/// any number type. One sweep inward, then one outward. In space low parts go unused.
 template <class Space, class Real, int N = Eigen::Dynamic>
 class MotionSweep {
   using Link = typename Space::Link;
@@ -162,8 +162,8 @@ class MotionSweep<Planar, Real, N> {
     v[0] = link.over_length(turning);
     Cartesian weight_low;
     Link::weight_load(Real(link.moment_low), weight_low);
-    const Real pull = here.pi * before.along + here.gamma;
-    f[0] = dot(frame.t, load(Chart{0}, v)) - (turning * pull - dot(frame.t, weight_low));
+    const Real tension = here.pi * before.along + here.gamma;
+    f[0] = dot(frame.t, load(Chart{0}, v)) - (turning * tension - dot(frame.t, weight_low));
     const Turn turn(frame, Frame(next).u);
     const Real along = turn.cosine * before.along + turn.sine * w;
     before.aside = turn.cosine * w - turn.sine * before.along;
