@@ -41,7 +41,8 @@ void add_cvode(std::vector<Contestant>& contestants);
 void add_mujoco(std::vector<Contestant>& contestants);
 void add_pendula(std::vector<Contestant>& contestants);
 
-/// GSL's rk4imp, the 2-stage Gauss method, with a constant step; also timed step by step.
-std::unique_ptr<Run> make_rk4imp(const Problem& problem, int steps, double step);
+/// GSL's rk4imp, the 2-stage Gauss method, with a constant step; also timed step by step. Its Newton iteration stops at
+/// the driver's tolerance.
+std::unique_ptr<Run> make_rk4imp(const Problem& problem, int steps, double step, double newton_tolerance);
 
 }  // namespace bench

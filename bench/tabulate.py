@@ -6,6 +6,7 @@ A row whose benchmark did not run is left out.
 """
 
 import json
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable
@@ -40,13 +41,14 @@ class Figures:
     """The kept figures, by what the tables ask of them."""
 
     def __init__(self, folder: Path) -> None:
-        """Reads benchmarks.json, races.json and memory.json."""
+        """Reads benchmarks.json, races.json, memory.json and iterations.json."""
         kept = json.loads((folder / "benchmarks.json").read_text(encoding="utf-8"))
         self.context = kept["context"]
         self.benchmarks = {name: e for name, e in kept["benchmarks"].items() if "failed" not in e}
         self.races = json.loads((folder / "races.json").read_text(encoding="utf-8"))
         memory = (folder / "memory.json").read_text(encoding="utf-8").strip()
         self.memory = json.loads(memory) if memory else None
+        self.iterations = json.loads((folder / "iterations.json").read_text(encoding="utf-8"))
 
     def cost(self, space: str, method: str, links: int) -> float | None:
         """Sincos a link and iteration."""
@@ -248,6 +250,25 @@ def dense(figures: Figures) -> str:
     return table(head, rows)
 
 
+def simplified(figures: Figures) -> str:
+    """Iterations of three methods, and what an iteration of the simplified Newton may cost to be worth it."""
+    rows = []
+    for run in figures.iterations:
+        links, stages = run["links"], run["stages"]
+        costs = [figures.cost("planar", f"s={stages}/{name}", links) for name in ("newton", "fixed-point")]
+        if not all(costs):
+            continue
+        unit = costs[0] / costs[1]
+        newton, simple, fixed = (
+            run["iterations"][name] or math.inf for name in ("newton", "simplified newton", "fixed-point")
+        )
+        even = min(newton * unit, fixed) / simple
+        cells = [number(value) if math.isfinite(value) else "–" for value in (newton, fixed, simple, even)]
+        cells[0] += f" ({number(unit)})"
+        rows.append([str(links), str(stages), f"{run['turn']:g}", *cells])
+    return table(["n", "s", "h ω", "Newton", "fixed point", "simplified Newton", "breaks even at"], rows)
+
+
 def work_precision(figures: Figures) -> str:
     """The picture of the races, once there is one."""
     text = "Time against error of the final state: the double pendulum and ten links"
@@ -270,6 +291,7 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "peers": peers,
     "steps": steps,
     "chain": chain,
+    "simplified": simplified,
     "dense": dense,
 }
 

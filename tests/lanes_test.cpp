@@ -15,8 +15,8 @@ class PackTest : public ::testing::Test {};
 using Sizes = ::testing::Types<Pack<1>, Pack<2>, Pack<4>, Pack<8>>;
 TYPED_TEST_SUITE(PackTest, Sizes, );
 
-// The low part of a product is what fma(a, b, −ab) leaves: nothing, if it rounds twice as the fma of some SIMD libraries
-// does. Compiled without such an instruction, that is what there is.
+// The low part of a product is what fma(a, b, −ab) leaves: nothing, if it rounds twice as the fma of some SIMD
+// libraries does. Compiled without such an instruction, that is what there is.
 TYPED_TEST(PackTest, FusedMultiplyAddRoundsOnce) {
 #ifndef FP_FAST_FMA
   GTEST_SKIP() << "compiled for a processor without fused multiply-add";

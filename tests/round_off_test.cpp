@@ -52,13 +52,13 @@ TEST(RoundOff, PublishedChaoticRun) {
   }
 }
 
-/// The error of bench::problems[which] after `steps` steps that sum to its duration exactly, in floors: what half a unit
-/// in the last place of the data makes.
+/// The error of bench::problems[which] after `steps` steps that sum to its duration exactly, in floors: what half a
+/// unit in the last place of the data makes.
 double error_in_floors(std::size_t which, int steps) {
   const bench::Problem& problem = bench::problems[which];
   const int n = problem.links;
-  const auto integrator = make_integrator(equal_chain<Planar>(n, problem.gravity, problem.length),
-                                          along_chain(8, Iteration::fixed_point));
+  const auto integrator =
+      make_integrator(equal_chain<Planar>(n, problem.gravity, problem.length), along_chain(8, Iteration::fixed_point));
   const double h = std::ldexp(std::floor(std::ldexp(problem.duration / steps, 40)), -40);
   EXPECT_TRUE(integrator->start(State<Planar>::from_angles(Eigen::VectorXd::Constant(n, problem.angle))));
   for (int k = 1; k < steps; ++k) EXPECT_TRUE(integrator->step(h));

@@ -87,8 +87,8 @@ class MotionSweep {
 /// In the plane there is one direction across a rod, t = û_θ: vectors are pairs of numbers along u and t, and going to
 /// the next link turns them by the angle between the two rods. The same sweep with half the arithmetic, and û_θθ = −û.
 ///
-/// That angle enters by 1 − cos, made of the difference of the directions: rounding of a direction along itself, which no
-/// angle has, then drops out, where links are nearly aligned and momenta nearly cancel.
+/// That angle enters by 1 − cos, made of the difference of the directions: rounding of a direction along itself, which
+/// no angle has, then drops out, where links are nearly aligned and momenta nearly cancel.
 template <class Real, int N>
 class MotionSweep<Planar, Real, N> {
   using Link = Planar::Link;

@@ -55,8 +55,8 @@ void store(double* to, const xsimd::batch<double, Arch>& from) {
   from.store_aligned(to);
 }
 
-// x y + z, rounded once where the processor can. The one place with intrinsics: xsimd's rounds twice in registers of two
-// and, before version 11, of eight (its issue 884), and what a product loses to rounding could not be told.
+// x y + z, rounded once where the processor can. The one place with intrinsics: xsimd's rounds twice in registers of
+// two and, before version 11, of eight (its issue 884), and what a product loses to rounding could not be told.
 inline double fused(double x, double y, double z) {
 #ifdef FP_FAST_FMA
   return std::fma(x, y, z);
@@ -147,7 +147,8 @@ class Pack {
 
   /// a b + c, with one rounding where the processor has such an instruction.
   friend Pack fma(const Pack& a, const Pack& b, const Pack& c) {
-    return each([](const Register& x, const Register& y, const Register& z) { return detail::fused(x, y, z); }, a, b, c);
+    return each([](const Register& x, const Register& y, const Register& z) { return detail::fused(x, y, z); }, a, b,
+                c);
   }
 
   friend Pack abs(const Pack& a) {

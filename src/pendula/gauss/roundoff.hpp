@@ -43,8 +43,8 @@ class RoundoffStop {
  private:
   // A fixed point on velocities and forces is two interleaved sequences: velocities follow from the forces of the
   // iteration before, and those from the velocities before that. (From rest the first correction is exactly zero.) So
-  // corrections are looked at in pairs, and their rate over two iterations; one that has not shrunk against the one before
-  // the last, of its own sequence, has come to rounding.
+  // corrections are looked at in pairs, and their rate over two iterations. One that has not shrunk against the one
+  // before the last, of its own sequence, has come to rounding, and the other sequence too if it is no larger.
   bool linear_done() {
     const double pair = std::max(last_[0], last_[1]), pair_before = std::max(last_[2], last_[3]);
     if (count_ < 3) return false;
@@ -54,7 +54,7 @@ class RoundoffStop {
     if (count_ == 3) first_ = best_ = pair_before;
     const bool stalled = has_stalled(last_[0] / last_[2], 2.0 / std::max(1, count_ - 3));
     best_ = std::min(best_, pair);
-    return stalled;
+    return stalled && last_[1] <= 2 * last_[0];
   }
 
   bool quadratic_done() {
