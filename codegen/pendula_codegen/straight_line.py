@@ -10,6 +10,7 @@ Two stages, both greedy and deterministic:
 from __future__ import annotations
 
 import heapq
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -206,7 +207,7 @@ def _without(monomial: Monomial, removed: list[int]) -> Monomial:
     return tuple(remaining)
 
 
-class _PairExtraction:
+class _PairExtraction(ABC):
     """Replaces the pair of entries that most rows share by one new entry, until no pair is in two rows.
 
     Rows are what `entries` returns for a node; subclasses say what a pair is and how it is replaced.
@@ -252,14 +253,17 @@ class _PairExtraction:
             self.users.setdefault(pair, set()).add(row)
         return added
 
+    @abstractmethod
     def pairs(self, row: int) -> set[tuple]:
-        raise NotImplementedError
+        """The pairs that could be taken out of a row."""
 
+    @abstractmethod
     def make(self, pair: tuple) -> int:
-        raise NotImplementedError
+        """A new node that is the pair."""
 
+    @abstractmethod
     def replace(self, row: int, pair: tuple, new: int) -> None:
-        raise NotImplementedError
+        """Puts the new node into a row, for the pair."""
 
 
 def _ratio(numerator: Number, denominator: Number) -> Number:
