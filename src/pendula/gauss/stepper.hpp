@@ -44,7 +44,7 @@ class GaussStepper {
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
   template <class... SolverOptions>
   GaussStepper(const Chain& chain, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
-      : solver_(chain, stages, solver_options...), options_(options) {}
+      : solver_(chain, stages, solver_options...), options_(options), at_roundoff_(chain.links()) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
