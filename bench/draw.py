@@ -51,6 +51,7 @@ OURS = {
 TITLES = {
     "D": "Double pendulum, T = 10 s",
     "P10": "Ten links, T = 1 s",
+    "P100": "A hundred links, T = 1 s",
 }
 
 
@@ -89,8 +90,8 @@ def draw_race(axes: Axes, title: str, race: dict) -> None:
 
 
 def draw_work_precision(races: dict, folder: Path) -> None:
-    """The two races side by side, one legend for both."""
-    figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
+    """Races side by side, one legend for all."""
+    figure, panels = plt.subplots(1, len(TITLES), figsize=(4.4 * len(TITLES), 4.6), layout="constrained")
     for axes, (name, title) in zip(panels, TITLES.items(), strict=True):
         draw_race(axes, title, races[name])
     entries: dict = {}

@@ -271,7 +271,7 @@ def simplified(figures: Figures) -> str:
 
 def work_precision(figures: Figures) -> str:
     """The picture of the races, once there is one."""
-    text = "Time against error of the final state: the double pendulum and ten links"
+    text = "Time against error of the final state: the double pendulum, ten links, a hundred"
     return f"![{text}](images/work_precision.svg)" if figures.races else ""
 
 
