@@ -15,7 +15,7 @@ int steps_of(int links) {
   return links <= 2 ? 2000 : links <= 10 ? 500 : 10;
 }
 
-/// Newton of rk4imp gets through with this, in powers of a hundred, and not with less.
+/// Newton of rk4imp gets through with this; on ten and a hundred links not with 1e-8.
 double newton_tolerance_of(int links) {
   return links <= 2 ? 1e-12 : 1e-6;
 }

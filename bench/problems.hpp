@@ -58,6 +58,12 @@ auto with_links(int links, Visit visit) {
   }
 }
 
+/// A step that sums without rounding: `steps - 1` of it and the rest of the duration end where the problem does.
+/// duration / steps, rounded, would end elsewhere by more than a floor.
+inline double summing_step(const Problem& problem, int steps) {
+  return std::ldexp(std::floor(std::ldexp(problem.duration / steps, 40)), -40);
+}
+
 /// Where a run ended: absolute angles and their rates.
 struct EndState {
   std::vector<double> theta;      ///< rad

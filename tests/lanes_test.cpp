@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <pendula/gauss/lanes.hpp>
 #include <pendula/gauss/sincos.hpp>

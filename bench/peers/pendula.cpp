@@ -1,4 +1,3 @@
-#include <cmath>
 #include <contestant.hpp>
 #include <peers/pendula.hpp>
 
@@ -37,10 +36,8 @@ class PendulaRun : public Run {
   pendula::Outcome outcome_;
 };
 
-// Steps of a size that sums without rounding, and a last one that ends where the problem does: T/steps, rounded, would
-// end elsewhere by more than the floor.
 std::unique_ptr<Run> make_whole_run(const Problem& problem, const RunOptions& options, int steps) {
-  const double step = std::ldexp(std::floor(std::ldexp(problem.duration / steps, 40)), -40);
+  const double step = summing_step(problem, steps);
   return std::make_unique<PendulaRun>(problem, options, steps, step, problem.duration - (steps - 1) * step);
 }
 

@@ -52,7 +52,7 @@ State<Space> random_state(Random& random, int links) {
   return state;
 }
 
-/// Equal unit masses and lengths.
+/// Equal links of unit mass.
 template <class Space>
 Chain<Space> equal_chain(int links, double gravity = 9.81, double length = 1) {
   ChainParameters<Space> parameters;
