@@ -101,7 +101,7 @@ TYPED_TEST(ChainIsDense, InTheNewtonDirection) {
   constexpr double h = 0.2;  // large, so that every term of Newton's matrix counts
   DenseMomentumNewton<Kernel> dense(this->chain, S);
   ChainStages<KernelSpace, S> chain_stages(this->chain);
-  ChainElimination<KernelSpace, S> elimination(Kernel::links);
+  ChainNewton<KernelSpace, S> newton(Kernel::links);
   ASSERT_EQ(dense.start(this->start), Status::ok);
   chain_stages.start(this->start);
   dense.prepare(0, h);
@@ -109,7 +109,7 @@ TYPED_TEST(ChainIsDense, InTheNewtonDirection) {
   for (int iteration = 1; iteration <= 2; ++iteration) {
     const double size = dense.correct().relative;
     EXPECT_GT(size, 1e-7) << "a correction that is only rounding compares nothing";
-    elimination.correct(chain_stages);
+    newton.correct(chain_stages);
     for (int i = 0; i < S; ++i) {
       const Eigen::VectorXd expected = dense.stage(i), got = stage(chain_stages, static_cast<std::size_t>(i));
       EXPECT_LT((got - expected).norm(), 1e-13 * expected.norm()) << "iteration " << iteration;  // measured 8e-15

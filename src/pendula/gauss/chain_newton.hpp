@@ -92,11 +92,11 @@ void solve_negated(Block<M, M>& S, Block<M, Columns>& Y, double* y) {
 ///   S = D + E B J,  K = −S⁻¹ E B,  k = −S⁻¹ (r + E g),  P ← B + B J K,  g ← g + B J k,
 /// and outward δV = k + K δw_{i−1}, δw_i = δw_{i−1} + J δV. At h = 0 this is the articulated-body recursion.
 template <class Space, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
-class ChainElimination {
+class ChainNewton {
  public:
   using Stages = ChainStages<Space, S, N, Arch>;
 
-  explicit ChainElimination(int links) : gains_(links) {}
+  explicit ChainNewton(int links) : gains_(links) {}
 
   /// Improves the stage velocities once.
   Correction correct(Stages& stages) {

@@ -98,7 +98,7 @@ class ChainSolver {
   /// Throws std::invalid_argument unless `stages` is S.
   ChainSolver(const Chain& chain, int stages, Iteration iteration = Iteration::automatic)
       : stages_(chain),
-        elimination_(iteration == Iteration::fixed_point ? 0 : chain.links()),
+        newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
         fixed_point_(iteration == Iteration::newton ? 0 : chain.links()),
         choice_(iteration, newton_cost<Space>(S, chain.links()), S) {
     gauss_tableau<S>(stages);
@@ -118,12 +118,12 @@ class ChainSolver {
   Correction correct() {
     ++count_;
     choice_.count_iteration();
-    if (choice_.active() == Iteration::newton) return last_ = elimination_.correct(stages_);
+    if (choice_.active() == Iteration::newton) return last_ = newton_.correct(stages_);
     const Correction correction = fixed_point_.correct(stages_);
     if (choice_.is_automatic() && diverges(correction)) {
       stages_.start_cold();
       choice_.give_up_fixed_point();
-      return last_ = elimination_.correct(stages_);
+      return last_ = newton_.correct(stages_);
     }
     return last_ = correction;
   }
@@ -169,7 +169,7 @@ class ChainSolver {
   }
 
   ChainStages<Space, S, N, Arch> stages_;
-  ChainElimination<Space, S, N, Arch> elimination_;
+  ChainNewton<Space, S, N, Arch> newton_;
   ChainFixedPoint<Space, S, N, Arch> fixed_point_;
   IterationChoice choice_;
   Correction last_;
