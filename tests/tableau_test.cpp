@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <pendula/gauss/tableau.hpp>
 
 namespace pendula {
@@ -22,12 +23,29 @@ TEST_P(EveryTableau, MeetsTheOrderConditions) {
   }
 }
 
-TEST_P(EveryTableau, IsSymplecticToTheLastBit) {
-  const Tableau<> tableau = gauss_tableau(GetParam());
-  for (int i = 0; i < tableau.stages(); ++i) {
-    EXPECT_EQ(tableau.m(i, i), 0.5);
-    for (int j = 0; j < tableau.stages(); ++j) EXPECT_EQ(tableau.m(i, j) + tableau.m(j, i), 1.0);
+template <class Real>
+void expect_symplectic(int stages) {
+  const auto tableau = gauss_tableau<Eigen::Dynamic, Real>(stages);
+  for (int i = 0; i < stages; ++i) {
+    EXPECT_EQ(tableau.m(i, i), Real(0.5));
+    for (int j = 0; j < stages; ++j) EXPECT_EQ(tableau.m(i, j) + tableau.m(j, i), Real(1));
   }
+}
+
+TEST_P(EveryTableau, IsSymplecticToTheLastBit) {
+  expect_symplectic<float>(GetParam());
+  expect_symplectic<double>(GetParam());
+  expect_symplectic<long double>(GetParam());
+}
+
+// Σ_j a_ij = c_i, Σ b_i c_i = 1/2, and a_ij = m_ij b_j: in all the bits of a long double.
+TEST_P(EveryTableau, HasTheBitsOfALongDouble) {
+  const auto tableau = gauss_tableau<Eigen::Dynamic, long double>(GetParam());
+  constexpr long double epsilon = std::numeric_limits<long double>::epsilon();
+  EXPECT_LT((tableau.a.rowwise().sum() - tableau.c).cwiseAbs().maxCoeff(), 4 * epsilon);  // measured 1
+  EXPECT_LT(std::abs(tableau.b.dot(tableau.c) - 0.5L), 2 * epsilon);                      // measured 0.5
+  const StageMatrix<Eigen::Dynamic, long double> from_m = tableau.m * tableau.b.asDiagonal();
+  EXPECT_LT((from_m - tableau.a).cwiseAbs().maxCoeff(), 2 * epsilon);  // measured 0.25
 }
 
 TEST_P(EveryTableau, IsConsistent) {

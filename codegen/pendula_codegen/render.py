@@ -17,7 +17,7 @@ from pendula_codegen.kernel import DenseKernel
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.models import find_model
-from pendula_codegen.tableau import DIGITS, MAX_STAGES, gauss
+from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, VECTORS, gauss
 
 PACKAGE = Path(__file__).parent
 WIDTH = 120
@@ -143,6 +143,8 @@ def render_tableaux() -> str:
             "--output gauss_tableaux.hpp",
         ),
         tableaux=[gauss(stages) for stages in range(1, MAX_STAGES + 1)],
+        vectors=VECTORS,
+        matrices=MATRICES,
         digits=DIGITS,
     )
 

@@ -9,6 +9,8 @@ from mpmath import mp, mpf, polyroots, taylor, workdps
 
 DIGITS = 60
 MAX_STAGES = 8
+VECTORS = ("c", "c_low", "b", "b_low")
+MATRICES = ("a", "a_low", "m", "m_low", "a_squared", "extrapolation")
 
 
 def _product(values) -> mpf:
@@ -61,15 +63,49 @@ class Tableau:
                         m[j][i] = 1.0 - m[i][j]
         return m
 
+    @cached_property
+    def c_low(self) -> list[mpf]:
+        return [_lost(x, float(x)) for x in self.c]
+
+    @cached_property
+    def b_low(self) -> list[mpf]:
+        return [_lost(x, float(x)) for x in self.b]
+
+    @cached_property
+    def a_low(self) -> list[list[mpf]]:
+        return [[_lost(x, float(x)) for x in row] for row in self.a]
+
+    @cached_property
+    def m_low(self) -> list[list[mpf]]:
+        """What m lacks of a_ij / b_j; antisymmetric, as m_ij + m_ji = 1 holds before and after rounding."""
+        s = range(self.stages)
+        low = [[mpf(0)] * self.stages for _ in s]
+        with workdps(DIGITS):
+            for i in s:
+                for j in range(i):
+                    low[i][j] = _lost(self.a[i][j] / self.b[j], self.m[i][j])
+                    low[j][i] = -low[i][j]
+        return low
+
     @property
     def text(self) -> dict[str, list]:
         """Shortest decimal literals that read back as the rounded doubles."""
-        matrices = {name: getattr(self, name) for name in ("a", "m", "a_squared", "extrapolation")}
+        vectors = {name: getattr(self, name) for name in VECTORS}
+        matrices = {name: getattr(self, name) for name in MATRICES}
         return {
-            "c": [repr(float(x)) for x in self.c],
-            "b": [repr(float(x)) for x in self.b],
-            **{name: [[repr(float(x)) for x in row] for row in rows] for name, rows in matrices.items()},
+            **{name: [_literal(x) for x in values] for name, values in vectors.items()},
+            **{name: [[_literal(x) for x in row] for row in rows] for name, rows in matrices.items()},
         }
+
+
+def _lost(exact: mpf, rounded: float) -> mpf:
+    with workdps(DIGITS):
+        lost = exact - mpf(rounded)
+        return lost if abs(lost) > mpf(10) ** (5 - DIGITS) else mpf(0)
+
+
+def _literal(x: mpf | float) -> str:
+    return repr(float(x) + 0.0)  # no −0.0
 
 
 def gauss(stages: int) -> Tableau:

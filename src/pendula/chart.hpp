@@ -56,20 +56,20 @@ constexpr int world_axis([[maybe_unused]] Chart chart, int k) {
 inline constexpr double chart_limit = 0.25;
 
 /// Direction of a link and its rate, in the axes of the world.
-template <class Space>
+template <class Space, class Real = double>
 struct Heading {
   using Link = typename Space::Link;
-  typename Link::template Cartesian<double> u, u_dot;
+  typename Link::template Cartesian<Real> u, u_dot;
 
-  Heading(Chart chart, const std::array<double, Space::dof>& q, const std::array<double, Space::dof>& v) {
-    typename Link::template Trig<double> trig;
+  Heading(Chart chart, const std::array<Real, Space::dof>& q, const std::array<Real, Space::dof>& v) {
+    typename Link::template Trig<Real> trig;
     Link::trig(q, trig);
     *this = of_trig(chart, trig, v);
   }
 
   /// The same from sines and cosines computed elsewhere.
-  static Heading of_trig(Chart chart, const typename Link::template Trig<double>& trig,
-                         const std::array<double, Space::dof>& v) {
+  static Heading of_trig(Chart chart, const typename Link::template Trig<Real>& trig,
+                         const std::array<Real, Space::dof>& v) {
     Heading heading;
     Link::direction(trig, heading.u);
     Link::velocity(trig, v, heading.u_dot);
@@ -83,23 +83,41 @@ struct Heading {
 };
 
 /// Angles and rates of one link as the user reads them.
-template <class Space>
+template <class Space, class Real = double>
 struct LinkAngles {
-  std::array<double, Space::dof> q, v;
+  std::array<Real, Space::dof> q, v;
 };
 
 namespace detail {
 
+template <class Real>
+Real half_turn() {
+  using std::acos;
+  if constexpr (std::is_floating_point_v<Real>) return std::numbers::pi_v<Real>;
+  return acos(Real(-1));
+}
+
+template <class Real>
+Real norm(const Real& x, const Real& y) {
+  using std::sqrt;
+  return sqrt(x * x + y * y);
+}
+
 /// x moved by full turns to within half a turn of `near`.
-inline double unwrapped(double x, double near) {
-  return x + 2 * std::numbers::pi * std::round((near - x) / (2 * std::numbers::pi));
+template <class Real>
+Real unwrapped(const Real& x, const Real& near) {
+  using std::round;
+  const Real turn = 2 * half_turn<Real>();
+  return x + turn * round((near - x) / turn);
 }
 
 /// Of (θ, φ) and (−θ, φ + π), which are the same direction, whichever lies nearer to `near`.
-inline std::array<double, 2> nearest_angles(const std::array<double, 2>& q, const std::array<double, 2>& near) {
-  const std::array<double, 2> same{unwrapped(q[0], near[0]), unwrapped(q[1], near[1])};
-  const std::array<double, 2> other{unwrapped(-q[0], near[0]), unwrapped(q[1] + std::numbers::pi, near[1])};
-  const auto distance = [&](const auto& x) { return std::hypot(x[0] - near[0], x[1] - near[1]); };
+template <class Real>
+std::array<Real, 2> nearest_angles(const std::array<Real, 2>& q, const std::array<Real, 2>& near) {
+  const Real minus_theta = -q[0], opposite = q[1] + half_turn<Real>();
+  const std::array<Real, 2> same{unwrapped(q[0], near[0]), unwrapped(q[1], near[1])};
+  const std::array<Real, 2> other{unwrapped(minus_theta, near[0]), unwrapped(opposite, near[1])};
+  const auto distance = [&](const auto& x) { return norm<Real>(x[0] - near[0], x[1] - near[1]); };
   return distance(other) < distance(same) ? other : same;
 }
 
@@ -107,22 +125,24 @@ inline std::array<double, 2> nearest_angles(const std::array<double, 2>& q, cons
 
 /// The user's θ, φ and their rates from a direction, continuous with the angles `near` of a moment before.
 ///
-/// At the pole (sin θ < 10⁻¹⁴) φ is the plane in which the link moves, or what it was if the link rests, and
+/// At the pole (sin θ < 32 ulp) φ is the plane in which the link moves, or what it was if the link rests, and
 /// φ̇ is zero.
-inline LinkAngles<Spatial> user_angles(const Heading<Spatial>& heading, const std::array<double, 2>& near) {
-  static constexpr double pole = 32 * std::numeric_limits<double>::epsilon();
+template <class Real>
+LinkAngles<Spatial, Real> user_angles(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
+  using std::atan2;
+  const Real pole = 32 * std::numeric_limits<Real>::epsilon();
   const auto& [u, u_dot] = heading;
-  LinkAngles<Spatial> angles;
+  LinkAngles<Spatial, Real> angles;
   Spatial::Link::coordinates(u, angles.q);
-  const bool at_pole = std::hypot(u[0], u[1]) < pole;
-  const bool rests = std::hypot(u_dot[0], u_dot[1]) < pole;
-  if (at_pole) angles.q[1] = rests ? near[1] : std::atan2(u_dot[1], u_dot[0]);
+  const bool at_pole = detail::norm(u[0], u[1]) < pole;
+  const bool rests = detail::norm(u_dot[0], u_dot[1]) < pole;
+  if (at_pole) angles.q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
   angles.q = detail::nearest_angles(angles.q, near);
-  Spatial::Link::Trig<double> trig;
-  double determinant;
+  Spatial::Link::Trig<Real> trig;
+  Real determinant;
   Spatial::Link::trig(angles.q, trig);
   Spatial::Link::metric_determinant(trig, determinant);
-  Spatial::Link::rates(trig, at_pole ? 0.0 : 1 / determinant, u_dot, angles.v);
+  Spatial::Link::rates(trig, at_pole ? Real(0) : Real(1 / determinant), u_dot, angles.v);
   return angles;
 }
 

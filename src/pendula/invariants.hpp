@@ -12,27 +12,27 @@ namespace pendula {
 namespace detail {
 
 /// û and û̇ of one link, from the generated link kernel.
-template <class Space>
+template <class Space, class Real>
 struct LinkMotion {
-  Eigen::Matrix<double, Space::dimension, 1> direction, rate;
+  Eigen::Matrix<Real, Space::dimension, 1> direction, rate;
 
   template <int N>
-  LinkMotion(const State<Space, N>& state, int link) {
+  LinkMotion(const State<Space, N, Real>& state, int link) {
     using Link = typename Space::Link;
-    std::array<double, Space::dof> q;
+    std::array<Real, Space::dof> q;
     for (int a = 0; a < Space::dof; ++a) q[static_cast<std::size_t>(a)] = state.q[a * state.links() + link];
-    typename Link::template Trig<double> trig;
+    typename Link::template Trig<Real> trig;
     Link::trig(q, trig);
-    std::array<double, Space::dimension> u;
-    std::array<std::array<double, Space::dimension>, Space::dof> u_a;
+    std::array<Real, Space::dimension> u;
+    std::array<std::array<Real, Space::dimension>, Space::dof> u_a;
     Link::direction(trig, u);
     Link::direction_first(trig, u_a);
-    direction = Eigen::Map<const Eigen::Matrix<double, Space::dimension, 1>>(u.data());
+    direction = Eigen::Map<const Eigen::Matrix<Real, Space::dimension, 1>>(u.data());
     rate.setZero();
     for (int a = 0; a < Space::dof; ++a) {
       const auto& derivative = u_a[static_cast<std::size_t>(a)];
       rate += state.v[a * state.links() + link] *
-              Eigen::Map<const Eigen::Matrix<double, Space::dimension, 1>>(derivative.data());
+              Eigen::Map<const Eigen::Matrix<Real, Space::dimension, 1>>(derivative.data());
     }
   }
 };
@@ -40,42 +40,44 @@ struct LinkMotion {
 }  // namespace detail
 
 /// Visits every bob from the pivot out: visit(i, position r_i [m], velocity ṙ_i [m/s]).
-template <class Space, int N, int M, class Visit>
-void for_each_bob(const Chain<Space, N>& chain, const State<Space, M>& state, Visit visit) {
-  Eigen::Matrix<double, Space::dimension, 1> position, velocity;
+template <class Space, int N, int M, class Real, class Visit>
+void for_each_bob(const Chain<Space, N>& chain, const State<Space, M, Real>& state, Visit visit) {
+  Eigen::Matrix<Real, Space::dimension, 1> position, velocity;
   position.setZero();
   velocity.setZero();
   for (int i = 0; i < chain.links(); ++i) {
-    const detail::LinkMotion<Space> link(state, i);
-    position += chain.lengths()[i] * link.direction;
-    velocity += chain.lengths()[i] * link.rate;
+    const detail::LinkMotion<Space, Real> link(state, i);
+    const Real l = Real(chain.lengths()[i]);
+    position += l * link.direction;
+    velocity += l * link.rate;
     visit(i, position, velocity);
   }
 }
 
 /// Positions r_i = Σ_{j≤i} l_j û_j, (dimension x n)  [m]  (paper eq. 1, 2; 24–26).
-template <class Space, int N, int M>
-Points<Space, N> bob_positions(const Chain<Space, N>& chain, const State<Space, M>& state) {
-  Points<Space, N> points(Space::dimension, chain.links());
+template <class Space, int N, int M, class Real>
+Points<Space, N, Real> bob_positions(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+  Points<Space, N, Real> points(Space::dimension, chain.links());
   for_each_bob(chain, state, [&](int i, const auto& position, const auto&) { points.col(i) = position; });
   return points;
 }
 
 /// Velocities of the bobs, (dimension x n)  [m/s].
-template <class Space, int N, int M>
-Points<Space, N> bob_velocities(const Chain<Space, N>& chain, const State<Space, M>& state) {
-  Points<Space, N> points(Space::dimension, chain.links());
+template <class Space, int N, int M, class Real>
+Points<Space, N, Real> bob_velocities(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+  Points<Space, N, Real> points(Space::dimension, chain.links());
   for_each_bob(chain, state, [&](int i, const auto&, const auto& velocity) { points.col(i) = velocity; });
   return points;
 }
 
 /// H = T + U  [J]  (paper eq. 4–6).
-template <class Space, int N, int M>
-double energy(const Chain<Space, N>& chain, const State<Space, M>& state) {
-  double energy = 0;
+template <class Space, int N, int M, class Real>
+Real energy(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+  Real energy(0);
+  const Real g = Real(chain.gravity());
   for_each_bob(chain, state, [&](int i, const auto& position, const auto& velocity) {
-    const double height = position[Space::dimension - 1];
-    energy += chain.masses()[i] * (velocity.squaredNorm() / 2 + chain.gravity() * height);
+    const Real m = Real(chain.masses()[i]), height = position[Space::dimension - 1];
+    energy += m * (velocity.squaredNorm() / 2 + g * height);
   });
   return energy;
 }
@@ -87,21 +89,21 @@ double energy_scale(const Chain<Space, N>& chain) {
 }
 
 /// Angular momentum about the vertical through the pivot, conserved in space without loads  [kg m²/s].
-template <int N, int M>
-double vertical_angular_momentum(const Chain<Spatial, N>& chain, const State<Spatial, M>& state) {
-  double momentum = 0;
+template <int N, int M, class Real>
+Real vertical_angular_momentum(const Chain<Spatial, N>& chain, const State<Spatial, M, Real>& state) {
+  Real momentum(0);
   for_each_bob(chain, state, [&](int i, const auto& r, const auto& v) {
-    momentum += chain.masses()[i] * (r[0] * v[1] - r[1] * v[0]);
+    momentum += Real(chain.masses()[i]) * (r[0] * v[1] - r[1] * v[0]);
   });
   return momentum;
 }
 
 /// Power that damping takes out, Σ λ_i |û̇_i|²  [W].
-template <class Space, int N, int M>
-double dissipation(const Chain<Space, N>& chain, const State<Space, M>& state) {
-  double power = 0;
+template <class Space, int N, int M, class Real>
+Real dissipation(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+  Real power(0);
   for (int i = 0; i < chain.links(); ++i) {
-    power += chain.damping()[i] * detail::LinkMotion<Space>(state, i).rate.squaredNorm();
+    power += Real(chain.damping()[i]) * detail::LinkMotion<Space, Real>(state, i).rate.squaredNorm();
   }
   return power;
 }

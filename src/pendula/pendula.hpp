@@ -4,6 +4,7 @@
 /// <pendula/kernels/planar_2.hpp>.
 
 #include <pendula/chain.hpp>
+#include <pendula/gauss/chain_solver.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/integrator.hpp>

@@ -30,16 +30,16 @@ template <class Space, int N>
 inline constexpr int coordinates_of = N == Eigen::Dynamic ? Eigen::Dynamic : Space::dof* N;
 
 /// One number a link, (n).
-template <int N>
-using LinkVector = Eigen::Matrix<double, N, 1>;
+template <int N, class Real = double>
+using LinkVector = Eigen::Matrix<Real, N, 1>;
 
 /// Coordinates or rates of a chain, (dof·n): θ_1..θ_n, then in space φ_1..φ_n.
-template <class Space, int N>
-using Coordinates = Eigen::Matrix<double, coordinates_of<Space, N>, 1>;
+template <class Space, int N, class Real = double>
+using Coordinates = Eigen::Matrix<Real, coordinates_of<Space, N>, 1>;
 
 /// One Cartesian point or velocity a bob, (dimension x n).
-template <class Space, int N>
-using Points = Eigen::Matrix<double, Space::dimension, N>;
+template <class Space, int N, class Real = double>
+using Points = Eigen::Matrix<Real, Space::dimension, N>;
 
 /// Torque on each link, (torque_components x n): in the plane a number, in space a vector  [N m].
 template <class Space, int N>

@@ -7,12 +7,12 @@
 
 namespace pendula {
 
-/// Angles and rates of a chain at one time, as users give and read them.
-template <class Space, int N = Eigen::Dynamic>
+/// Angles and rates of a chain at one time, as users give and read them, in any floating-point type.
+template <class Space, int N = Eigen::Dynamic, class Real = double>
 struct State {
-  double time = 0;          ///< s
-  Coordinates<Space, N> q;  ///< angles θ_1..θ_n, then in space φ_1..φ_n, (dof·n)  rad
-  Coordinates<Space, N> v;  ///< their rates, (dof·n)  rad/s
+  double time = 0;                ///< s
+  Coordinates<Space, N, Real> q;  ///< angles θ_1..θ_n, then in space φ_1..φ_n, (dof·n)  rad
+  Coordinates<Space, N, Real> v;  ///< their rates, (dof·n)  rad/s
 
   int links() const { return static_cast<int>(q.size()) / Space::dof; }
   auto theta() const { return q.head(links()); }
@@ -20,14 +20,22 @@ struct State {
   auto phi() const requires(Space::dof == 2) { return q.tail(links()); }
   auto phi_dot() const requires(Space::dof == 2) { return v.tail(links()); }
 
+  /// The same state in another number type, each number rounded to it.
+  template <class Other>
+  State<Space, N, Other> cast() const {
+    return {time, q.template cast<Other>(), v.template cast<Other>()};
+  }
+
   /// A planar state, at rest unless rates are given.
-  static State from_angles(const LinkVector<N>& theta, const LinkVector<N>& theta_dot = {}) requires(Space::dof == 1) {
+  static State from_angles(const LinkVector<N, Real>& theta,
+                           const LinkVector<N, Real>& theta_dot = {}) requires(Space::dof == 1) {
     return {0, theta, rates(theta_dot, theta.size())};
   }
 
   /// A spatial state, at rest unless rates are given.
-  static State from_angles(const LinkVector<N>& theta, const LinkVector<N>& phi, const LinkVector<N>& theta_dot = {},
-                           const LinkVector<N>& phi_dot = {}) requires(Space::dof == 2) {
+  static State from_angles(const LinkVector<N, Real>& theta, const LinkVector<N, Real>& phi,
+                           const LinkVector<N, Real>& theta_dot = {},
+                           const LinkVector<N, Real>& phi_dot = {}) requires(Space::dof == 2) {
     if (phi.size() != theta.size()) throw_sizes("phi", phi.size(), theta.size());
     State state;
     state.q.resize(2 * theta.size());
@@ -38,10 +46,10 @@ struct State {
   }
 
  private:
-  static LinkVector<N> rates(const LinkVector<N>& given, Eigen::Index links) {
+  static LinkVector<N, Real> rates(const LinkVector<N, Real>& given, Eigen::Index links) {
     if (given.size() == links) return given;
     if (given.size() != 0) throw_sizes("rates", given.size(), links);
-    return LinkVector<N>::Zero(links);
+    return LinkVector<N, Real>::Zero(links);
   }
 
   [[noreturn]] static void throw_sizes(const char* name, Eigen::Index got, Eigen::Index expected) {

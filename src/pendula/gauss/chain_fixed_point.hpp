@@ -10,10 +10,10 @@ namespace pendula {
 /// One fixed-point iteration on the stages of a chain, all stages in the lanes of SIMD registers:
 ///   Q = q + h A V,  P = p + h A f,  V ← velocities of momenta P at Q,  f ← their forces.
 /// It costs a fraction of a Newton iteration, and converges where the step is small against the chain's fastest motion.
-template <class Space, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
+template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
 class ChainFixedPoint {
  public:
-  using Stages = ChainStages<Space, S, N, Arch>;
+  using Stages = ChainStages<Space, S, N, Real, Arch>;
 
   explicit ChainFixedPoint(int links) : sweep_(links) {}
 
@@ -45,7 +45,7 @@ class ChainFixedPoint {
   }
 
   PENDULA_IN_REGISTERS Correction sweep_outward(Stages& stages) {
-    L change(0.0), scale(0.0);
+    L change(Real(0)), scale(Real(0));
     typename Sweep::Outward carried(stages.placed(0));
     for (int i = 0; i < stages.links(); ++i) {
       const auto at = stages.placed(i);
@@ -66,19 +66,19 @@ class ChainFixedPoint {
 
   // What is not a number reaches the last link, though not always the largest change.
   static double relative(const L& change, const L& scale, const Coordinates& last) {
-    alignas(pack_alignment) double changes[Z], scales[Z], lasts[Z];
-    L all_last(0.0);
+    alignas(pack_alignment) Real changes[Z], scales[Z], lasts[Z];
+    L all_last(Real(0));
     for (std::size_t a = 0; a < K; ++a) all_last = all_last + last[a];
     change.store(changes);
     scale.store(scales);
     all_last.store(lasts);
-    double largest_change = 0, largest_scale = 0;
+    Real largest_change(0), largest_scale(0);
     for (std::size_t k = 0; k < S; ++k) {
-      if (!std::isfinite(lasts[k])) return std::numeric_limits<double>::quiet_NaN();
+      if (!std::isfinite(static_cast<double>(lasts[k]))) return std::numeric_limits<double>::quiet_NaN();
       largest_change = std::max(largest_change, changes[k]);
       largest_scale = std::max(largest_scale, scales[k]);
     }
-    return largest_change > 0 ? largest_change / largest_scale : 0;
+    return largest_change > 0 ? static_cast<double>(largest_change / largest_scale) : 0;
   }
 
   MotionSweep<Space, L, N> sweep_;

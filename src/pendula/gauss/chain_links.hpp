@@ -18,42 +18,46 @@ namespace pendula {
 namespace detail {
 
 /// What workspaces hold before anybody wrote there: NaN where the build hunts for reads of it, otherwise zero.
+template <class Real>
+Real unwritten() {
 #ifdef EIGEN_INITIALIZE_MATRICES_BY_NAN
-inline constexpr double unwritten = std::numeric_limits<double>::quiet_NaN();
+  return std::numeric_limits<Real>::quiet_NaN();
 #else
-inline constexpr double unwritten = 0;
+  return Real(0);
 #endif
+}
 
 struct AlignedDelete {
-  void operator()(double* block) const { ::operator delete (block, std::align_val_t{pack_alignment}); }
+  void operator()(void* block) const { ::operator delete (block, std::align_val_t{pack_alignment}); }
 };
 
 /// `PerLink` numbers a link in one block aligned for packs; on the stack where the number of links N is known.
 /// Up to eight more numbers can be read after the last.
-template <int PerLink, int N>
+template <int PerLink, int N, class Real = double>
 class LinkArray {
+  static_assert(std::is_trivially_destructible_v<Real>);
   static constexpr int round_up(int count) { return (count + 7) / 8 * 8; }
   static constexpr bool fixed = N != Eigen::Dynamic;
 
  public:
-  explicit LinkArray(int links, double value = unwritten) {
+  explicit LinkArray(int links) {
     const int used = PerLink * links, held = round_up(used);
     if constexpr (!fixed) {
-      const auto bytes = static_cast<std::size_t>(held) * sizeof(double);
-      block_.reset(static_cast<double*>(::operator new (bytes, std::align_val_t{pack_alignment})));
+      const auto bytes = static_cast<std::size_t>(held) * sizeof(Real);
+      block_.reset(static_cast<Real*>(::operator new (bytes, std::align_val_t{pack_alignment})));
     }
-    for (int k = 0; k < used; ++k) data()[k] = value;
-    for (int k = used; k < held; ++k) data()[k] = 0;
+    std::uninitialized_fill(data(), data() + used, unwritten<Real>());
+    std::uninitialized_fill(data() + used, data() + held, Real(0));
   }
 
-  double* operator[](int link) { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
-  const double* operator[](int link) const { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
-  double* data() { return get(block_); }
-  const double* data() const { return get(block_); }
+  Real* operator[](int link) { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
+  const Real* operator[](int link) const { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
+  Real* data() { return get(block_); }
+  const Real* data() const { return get(block_); }
 
  private:
-  using Fixed = std::array<double, static_cast<std::size_t>(fixed ? round_up(PerLink* N) : 1)>;
-  using Block = std::conditional_t<fixed, Fixed, std::unique_ptr<double[], AlignedDelete>>;
+  using Fixed = std::array<Real, static_cast<std::size_t>(fixed ? round_up(PerLink* N) : 1)>;
+  using Block = std::conditional_t<fixed, Fixed, std::unique_ptr<Real[], AlignedDelete>>;
 
   template <class Held>
   static auto get(Held& block) {
@@ -129,31 +133,34 @@ std::array<Real, D> difference(const std::array<Real, D>& a, const std::array<Re
 
 /// What the sweeps along a chain need to know of one link. Low parts are what a number has lost to rounding: unlike
 /// that of a sum, it would act in the same sense step after step.
+template <class Real>
 struct LinkConstants {
-  double mass = 0, inverse_mass = 0;      ///< m, 1/m
-  double length = 0, inverse_length = 0;  ///< l, 1/l
-  double inverse_length_low = 0;
-  double moment = 0, moment_low = 0;  ///< M g l, M the mass that the rod carries
-  double damping = 0;                 ///< λ
+  Real mass{0}, inverse_mass{0};      ///< m, 1/m
+  Real length{0}, inverse_length{0};  ///< l, 1/l
+  Real inverse_length_low{0};
+  Real moment{0}, moment_low{0};  ///< M g l, M the mass that the rod carries
+  Real damping{0};                ///< λ
 
   /// x/l as if 1/l were exact.
-  template <class Real>
-  Real over_length(const Real& x) const {
-    return x * Real(inverse_length) + x * Real(inverse_length_low);
+  template <class Number>
+  Number over_length(const Number& x) const {
+    return x * Number(inverse_length) + x * Number(inverse_length_low);
   }
 };
 
-/// The constants of a chain link by link, and the load R on a link, f_a = y_a·(l G) + û_a·R, in any number type.
-template <class Space, int N = Eigen::Dynamic>
+/// The constants of a chain link by link, and the load R on a link, f_a = y_a·(l G) + û_a·R, for numbers or packs.
+template <class Space, int N = Eigen::Dynamic, class Real = double>
 class ChainLinks {
  public:
   using Link = typename Space::Link;
 
   explicit ChainLinks(const Chain<Space, N>& chain)
       : links_(chain.links()), loaded_(chain.loaded()), constants_(chain.links()) {
-    for (int i = 0; i < links(); ++i) {
-      const double m = chain.masses()[i], l = chain.lengths()[i];
-      constants_[i] = link_constants(m, l, chain.mass_below()[i], chain.gravity(), chain.damping()[i]);
+    Real carried(0);
+    for (int i = links(); i-- > 0;) {
+      const Real m = Real(chain.masses()[i]), l = Real(chain.lengths()[i]);
+      carried += m;
+      constants_[i] = link_constants(m, l, carried, Real(chain.gravity()), Real(chain.damping()[i]));
     }
   }
 
@@ -165,40 +172,42 @@ class ChainLinks {
     }
   }
   bool loaded() const { return loaded_; }
-  const LinkConstants& operator[](int link) const { return constants_[link]; }
+  const LinkConstants<Real>& operator[](int link) const { return constants_[link]; }
 
   /// Weight alone, in the axes of the world.
-  template <class Real>
-  typename Link::template Cartesian<Real> weight(int link) const {
-    typename Link::template Cartesian<Real> load;
-    Link::weight_load(Real(constants_[link].moment), load);
+  template <class Number>
+  typename Link::template Cartesian<Number> weight(int link) const {
+    typename Link::template Cartesian<Number> load;
+    Link::weight_load(Number(constants_[link].moment), load);
     return load;
   }
 
   /// Adds torque and drag to `load`; everything in the axes of the link's chart.
-  template <class Real>
-  void add_loads(int link, const typename Link::template Torque<Real>& torque,
-                 const typename Link::template Trig<Real>& trig, const typename Link::template Coordinates<Real>& v,
-                 typename Link::template Cartesian<Real>& load) const {
-    typename Link::template Cartesian<Real> u, u_dot, turning, drag;
+  template <class Number>
+  void add_loads(int link, const typename Link::template Torque<Number>& torque,
+                 const typename Link::template Trig<Number>& trig, const typename Link::template Coordinates<Number>& v,
+                 typename Link::template Cartesian<Number>& load) const {
+    typename Link::template Cartesian<Number> u, u_dot, turning, drag;
     Link::direction(trig, u);
     Link::velocity(trig, v, u_dot);
     Link::torque_load(torque, u, turning);
-    Link::drag_load(Real(constants_[link].damping), u_dot, drag);
+    Link::drag_load(Number(constants_[link].damping), u_dot, drag);
     load = sum(load, sum(turning, drag));
   }
 
  private:
-  static LinkConstants link_constants(double m, double l, double M, double g, double damping) {
-    const double inverse = 1 / l, inverse_low = std::fma(-l, inverse, 1) / l;
-    const double weight = M * g, weight_low = std::fma(M, g, -weight);
-    const double moment = weight * l, moment_low = std::fma(weight, l, -moment) + weight_low * l;
+  static LinkConstants<Real> link_constants(const Real& m, const Real& l, const Real& M, const Real& g,
+                                            const Real& damping) {
+    using std::fma;
+    const Real inverse = 1 / l, inverse_low = fma(-l, inverse, Real(1)) / l;
+    const Real weight = M * g, weight_low = fma(M, g, -weight);
+    const Real moment = weight * l, moment_low = fma(weight, l, -moment) + weight_low * l;
     return {m, 1 / m, l, inverse, inverse_low, moment, moment_low, damping};
   }
 
   int links_;
   bool loaded_;
-  detail::PerLink<LinkConstants, N> constants_;
+  detail::PerLink<LinkConstants<Real>, N> constants_;
 };
 
 }  // namespace pendula

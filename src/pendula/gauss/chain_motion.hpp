@@ -31,6 +31,7 @@ class MotionSweep {
 
  public:
   using Inward = typename TensionSweep<Space, Real, N>::Inward;
+  using Constants = LinkConstants<ScalarOf<Real>>;
 
   struct Outward {
     explicit Outward(const Placed<Space, Real>& first) : u(direction(first)) {}
@@ -42,7 +43,7 @@ class MotionSweep {
   explicit MotionSweep(int links) : tension_(links), inverse_determinant_(links) {}
 
   /// i = n−1 … 0.
-  void inward(Inward& next, int i, const LinkConstants& link, const Placed<Space, Real>& at,
+  void inward(Inward& next, int i, const Constants& link, const Placed<Space, Real>& at,
               const Momenta<Coordinates>& p) {
     Real determinant;
     Link::metric_determinant(at.trig, determinant);
@@ -58,7 +59,7 @@ class MotionSweep {
   /// i = 0 … n−1, with the link after it (of the last link: itself). load(chart, v) is the load R in the axes of the
   /// chart.
   template <class Load>
-  void outward(Outward& before, int i, const LinkConstants& link, const Placed<Space, Real>& at,
+  void outward(Outward& before, int i, const Constants& link, const Placed<Space, Real>& at,
                const Placed<Space, Real>& next, const Coordinates& p, Load load, Coordinates& v, Coordinates& f) {
     const Real inverse = inverse_determinant_[i];
     const Cartesian next_u = direction(next);
@@ -95,6 +96,7 @@ class MotionSweep<Planar, Real, N> {
   using Coordinates = typename Link::template Coordinates<Real>;
   using Cartesian = typename Link::template Cartesian<Real>;
   using At = Placed<Planar, Real>;
+  using Constants = LinkConstants<ScalarOf<Real>>;
 
   struct Frame {
     Cartesian u, t;
@@ -131,9 +133,9 @@ class MotionSweep<Planar, Real, N> {
     Real along{0.0}, aside{0.0};
   };
 
-  explicit MotionSweep(int links) : carried_(links) {}
+  explicit MotionSweep(int links) : carried_(links, unwritten()) {}
 
-  void inward(Inward& next, int i, const LinkConstants& link, const At& at, const Momenta<Coordinates>& p) {
+  void inward(Inward& next, int i, const Constants& link, const At& at, const Momenta<Coordinates>& p) {
     using std::fma;
     const Frame frame(at);
     const Turn turn(frame, next.u);
@@ -152,7 +154,7 @@ class MotionSweep<Planar, Real, N> {
   }
 
   template <class Load>
-  void outward(Outward& before, int i, const LinkConstants& link, const At& /*at*/, const At& next, const Coordinates&,
+  void outward(Outward& before, int i, const Constants& link, const At& /*at*/, const At& next, const Coordinates&,
                Load load, Coordinates& v, Coordinates& f) {
     const Carried& here = carried_[i];
     const Frame frame(before.at);
@@ -173,8 +175,13 @@ class MotionSweep<Planar, Real, N> {
 
  private:
   struct Carried {
-    Real free{detail::unwritten}, coupling{detail::unwritten}, pi{detail::unwritten}, gamma{detail::unwritten};
+    Real free, coupling, pi, gamma;
   };
+
+  static Carried unwritten() {
+    const Real none(detail::unwritten<ScalarOf<Real>>());
+    return {none, none, none, none};
+  }
 
   detail::PerLink<Carried, N> carried_;
 };

@@ -8,31 +8,33 @@ namespace pendula {
 
 namespace detail {
 
-/// Numbers in a pack that holds a row of `count`: a power of two, or a multiple of four.
-inline constexpr std::size_t padded_row(std::size_t count) {
+/// Numbers in a pack that holds a row of `count`: a power of two, or a multiple of four, where there are registers.
+template <class Real>
+constexpr std::size_t padded_row(std::size_t count) {
+  if (!has_registers<Real>) return count;
   return count <= 2 ? count : (count + 3) / 4 * 4;
 }
 
 /// A small matrix, row by row, its rows padded to packs.
-template <std::size_t Rows, std::size_t Columns>
+template <std::size_t Rows, std::size_t Columns, class Real>
 struct Block {
-  static constexpr std::size_t stride = padded_row(Columns);
-  using Row = Pack<static_cast<int>(stride)>;
+  static constexpr std::size_t stride = padded_row<Real>(Columns);
+  using Row = Pack<static_cast<int>(stride), RegisterFor<static_cast<int>(stride), Real>>;
 
-  alignas(pack_alignment) double values[Rows][stride] = {};
+  alignas(pack_alignment) Real values[Rows][stride] = {};
 
-  double* operator[](std::size_t row) { return values[row]; }
-  const double* operator[](std::size_t row) const { return values[row]; }
+  Real* operator[](std::size_t row) { return values[row]; }
+  const Real* operator[](std::size_t row) const { return values[row]; }
   Row row(std::size_t i) const { return Row::load(values[i]); }
   void set_row(std::size_t i, const Row& row) { row.store(values[i]); }
 };
 
 /// C += A B, row by row; two sums side by side, so that one does not wait for the other.
-template <std::size_t M, std::size_t Inner, std::size_t Columns>
-void add_product(const Block<M, Inner>& a, const Block<Inner, Columns>& b, Block<M, Columns>& c) {
-  using Row = typename Block<M, Columns>::Row;
+template <std::size_t M, std::size_t Inner, std::size_t Columns, class Real>
+void add_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Real>& b, Block<M, Columns, Real>& c) {
+  using Row = typename Block<M, Columns, Real>::Row;
   for (std::size_t i = 0; i < M; ++i) {
-    Row even = c.row(i), odd(0.0);
+    Row even = c.row(i), odd(Real(0));
     for (std::size_t k = 0; k + 1 < Inner; k += 2) {
       even = fma(Row(a[i][k]), b.row(k), even);
       odd = fma(Row(a[i][k + 1]), b.row(k + 1), odd);
@@ -43,8 +45,8 @@ void add_product(const Block<M, Inner>& a, const Block<Inner, Columns>& b, Block
 }
 
 /// y += A x.
-template <std::size_t M, std::size_t Columns>
-void add_product(const Block<M, Columns>& a, const double* x, double* y) {
+template <std::size_t M, std::size_t Columns, class Real>
+void add_product(const Block<M, Columns, Real>& a, const Real* x, Real* y) {
   for (std::size_t i = 0; i < M; ++i) {
     for (std::size_t k = 0; k < Columns; ++k) y[i] += a[i][k] * x[k];
   }
@@ -52,14 +54,14 @@ void add_product(const Block<M, Columns>& a, const double* x, double* y) {
 
 /// Replaces Y by −S⁻¹ Y and y by −S⁻¹ y. No pivoting: S is a mass matrix but for terms of the order of the step, and a
 /// step that spoils it does not converge and is halved.
-template <std::size_t M, std::size_t Columns>
-void solve_negated(Block<M, M>& S, Block<M, Columns>& Y, double* y) {
-  using Row = typename Block<M, Columns>::Row;
+template <std::size_t M, std::size_t Columns, class Real>
+void solve_negated(Block<M, M, Real>& S, Block<M, Columns, Real>& Y, Real* y) {
+  using Row = typename Block<M, Columns, Real>::Row;
   for (std::size_t k = 0; k < M; ++k) {
-    const double inverse = 1 / S[k][k];
+    const Real inverse = 1 / S[k][k];
     S[k][k] = inverse;
     for (std::size_t i = k + 1; i < M; ++i) {
-      const double factor = -S[i][k] * inverse;
+      const Real factor = -S[i][k] * inverse;
       for (std::size_t j = k + 1; j < M; ++j) S[i][j] += factor * S[k][j];
       Y.set_row(i, fma(Row(factor), Y.row(k), Y.row(i)));
       y[i] += factor * y[k];
@@ -67,7 +69,7 @@ void solve_negated(Block<M, M>& S, Block<M, Columns>& Y, double* y) {
   }
   for (std::size_t k = M; k-- > 0;) {
     Row row = -Y.row(k);
-    double sum = -y[k];
+    Real sum = -y[k];
     for (std::size_t j = k + 1; j < M; ++j) {
       row = fma(Row(-S[k][j]), Y.row(j), row);
       sum -= S[k][j] * y[j];
@@ -91,10 +93,10 @@ void solve_negated(Block<M, M>& S, Block<M, Columns>& Y, double* y) {
 /// δG_{i+1} = P δw_i + g from the link below and B = P + m I:
 ///   S = D + E B J,  K = −S⁻¹ E B,  k = −S⁻¹ (r + E g),  P ← B + B J K,  g ← g + B J k,
 /// and outward δV = k + K δw_{i−1}, δw_i = δw_{i−1} + J δV. At h = 0 this is the articulated-body recursion.
-template <class Space, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
+template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
 class ChainNewton {
  public:
-  using Stages = ChainStages<Space, S, N, Arch>;
+  using Stages = ChainStages<Space, S, N, Real, Arch>;
 
   explicit ChainNewton(int links) : gains_(links) {}
 
@@ -116,12 +118,12 @@ class ChainNewton {
 
   // A Newton term of every stage, where the blocks are made from.
   struct alignas(pack_alignment) PerStage {
-    double values[Z];
+    Real values[Z];
     PerStage& operator=(const L& lanes) {
       lanes.store(values);
       return *this;
     }
-    double operator[](std::size_t stage) const { return values[stage]; }
+    Real operator[](std::size_t stage) const { return values[stage]; }
   };
 
   struct Terms {
@@ -131,22 +133,22 @@ class ChainNewton {
   };
 
   struct Carried {  // δG = P δw + g
-    detail::Block<vectors, vectors> P;
-    alignas(pack_alignment) double g[vectors] = {};
+    detail::Block<vectors, vectors, Real> P;
+    alignas(pack_alignment) Real g[vectors] = {};
   };
 
   struct Gain {  // δV = K δw + k
-    detail::Block<unknowns, vectors> K;
-    alignas(pack_alignment) double k[unknowns] = {};
+    detail::Block<unknowns, vectors, Real> K;
+    alignas(pack_alignment) Real k[unknowns] = {};
   };
 
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     Carried carried;
     Cartesian G;
-    G.fill(L(0.0));
+    G.fill(L(Real(0)));
     Terms terms;
     for (int i = stages.links(); i-- > 0;) {
-      const double m = stages.constants(i).mass;
+      const Real m = stages.constants(i).mass;
       G = sum(G, scaled(L(m), stages.bob_velocity(i)));
       for (std::size_t k = 0; k < vectors; ++k) carried.P[k][k] += m;
       find_terms(stages, i, G, terms);
@@ -200,9 +202,9 @@ class ChainNewton {
 
   void eliminate(const Stages& stages, const Terms& terms, Carried& carried, Gain& gain) {
     const auto& columns = stages.columns();
-    detail::Block<vectors, unknowns> J, BJ;
-    detail::Block<unknowns, vectors> E;
-    detail::Block<unknowns, unknowns> S_block;
+    detail::Block<vectors, unknowns, Real> J, BJ;
+    detail::Block<unknowns, vectors, Real> E;
+    detail::Block<unknowns, unknowns, Real> S_block;
     fill_couplings(columns, terms, J, E);
     fill_diagonal(columns, terms, S_block);
     gain = Gain{};
@@ -218,8 +220,8 @@ class ChainNewton {
     add_product(BJ, gain.k, carried.g);
   }
 
-  static void fill_couplings(const detail::StageColumns<S>& columns, const Terms& terms,
-                             detail::Block<vectors, unknowns>& J, detail::Block<unknowns, vectors>& E) {
+  static void fill_couplings(const detail::StageColumns<S, Real>& columns, const Terms& terms,
+                             detail::Block<vectors, unknowns, Real>& J, detail::Block<unknowns, vectors, Real>& E) {
     for (std::size_t a = 0; a < K; ++a) {
       for (std::size_t d = 0; d < Dim; ++d) {
         for (std::size_t k = 0; k < s; ++k) {
@@ -234,15 +236,15 @@ class ChainNewton {
     }
   }
 
-  static void fill_diagonal(const detail::StageColumns<S>& columns, const Terms& terms,
-                            detail::Block<unknowns, unknowns>& D) {
+  static void fill_diagonal(const detail::StageColumns<S, Real>& columns, const Terms& terms,
+                            detail::Block<unknowns, unknowns, Real>& D) {
     for (std::size_t a = 0; a < K; ++a) {
       for (std::size_t c = 0; c < K; ++c) {
         for (std::size_t k = 0; k < s; ++k) {
-          double* row = D[a * s + k] + c * s;
+          Real* row = D[a * s + k] + c * s;
           for (std::size_t m = 0; m < s; ++m) row[m] = columns.ha(k, m) * (terms.T[a][c][k] - terms.T_minus[a][c][m]);
           for (std::size_t j = 0; j < s; ++j) {
-            const double bent = columns.ha(k, j) * terms.F[a][c][j];
+            const Real bent = columns.ha(k, j) * terms.F[a][c][j];
             for (std::size_t m = 0; m < s; ++m) row[m] -= bent * columns.ha(j, m);
           }
         }
@@ -251,57 +253,58 @@ class ChainNewton {
   }
 
   PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
-    alignas(pack_alignment) double dw[vectors] = {};
+    alignas(pack_alignment) Real dw[vectors] = {};
     Cartesian lanes_dw;
-    lanes_dw.fill(L(0.0));
-    double largest = 0, scale = 0;
+    lanes_dw.fill(L(Real(0)));
+    Real largest(0), scale(0);
     int at = -1;
     for (int i = 0; i < stages.links(); ++i) {
-      alignas(pack_alignment) double dV[K][Z] = {};
-      const double change = stage_changes(gains_[i], dw, dV);
+      alignas(pack_alignment) Real dV[K][Z] = {};
+      const Real change = stage_changes(gains_[i], dw, dV);
       if (!(change <= largest)) {  // also where it is not a number
         largest = change;
         at = i;
       }
       scale = std::max(scale, apply(stages, i, dV, lanes_dw));
       for (std::size_t d = 0; d < Dim; ++d) {
-        alignas(pack_alignment) double stored[Z];
+        alignas(pack_alignment) Real stored[Z];
         lanes_dw[d].store(stored);
         std::copy_n(stored, s, dw + d * s);
       }
     }
-    return {largest > 0 ? largest / scale : largest, at};
+    return {static_cast<double>(largest > 0 ? Real(largest / scale) : largest), at};
   }
 
   // δV = k + K δw; the largest of it, or NaN.
-  static double stage_changes(const Gain& gain, const double* dw, double (&dV)[K][Z]) {
-    double largest = 0;
+  static Real stage_changes(const Gain& gain, const Real* dw, Real (&dV)[K][Z]) {
+    using std::abs;
+    Real largest(0);
     for (std::size_t u = 0; u < unknowns; ++u) {
-      double change = gain.k[u];
+      Real change = gain.k[u];
       for (std::size_t k = 0; k < vectors; ++k) change += gain.K[u][k] * dw[k];
       dV[u / s][u % s] = change;
-      const double size = std::abs(change);
+      const Real size = abs(change);
       if (!(size <= largest)) largest = size;
     }
     return largest;
   }
 
   // V += δV, δw += l (û_a δV_a + y_a δQ_a); the largest V.
-  double apply(Stages& stages, int i, const double (&dV)[K][Z], Cartesian& dw) const {
+  Real apply(Stages& stages, int i, const Real (&dV)[K][Z], Cartesian& dw) const {
     const auto trig = stages.trig(i);
     Coordinates v = stages.rates(i), p, f;
     Cartesian none, dW;
-    none.fill(L(0.0));
-    dW.fill(L(0.0));
+    none.fill(L(Real(0)));
+    dW.fill(L(Real(0)));
     typename Link::template First<L> u, y;
     typename Link::template Symmetric<L> p_D_q, f_D_q;
     Link::newton_terms(trig, v, none, none, u, y, p, f, p_D_q, f_D_q);
-    double largest = 0;
+    Real largest(0);
     for (std::size_t a = 0; a < K; ++a) {
       const L change = L::load(dV[a]), moved = stages.columns().integral(change);
       for (std::size_t k = 0; k < Dim; ++k) dW[k] = dW[k] + (u[a][k] * change + y[a][k] * moved);
       v[a] = v[a] + change;
-      alignas(pack_alignment) double stored[Z];
+      alignas(pack_alignment) Real stored[Z];
       abs(v[a]).store(stored);
       for (std::size_t k = 0; k < s; ++k) largest = std::max(largest, stored[k]);
     }

@@ -87,13 +87,15 @@ class IterationChoice {
 };
 
 /// The stage equations of a chain in momentum form, solved in O(n) by exact Newton, by fixed point, or by whichever
-/// takes less: a StageSolver for GaussStepper. Poles are no obstacle.
-template <class SpaceType, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
+/// takes less: a StageSolver for GaussStepper. Poles are no obstacle. Real is any floating-point type; float and double
+/// go in SIMD registers.
+template <class SpaceType, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainSolver {
  public:
   using Space = SpaceType;
+  using Real = RealType;
   using Chain = pendula::Chain<Space, N>;
-  using State = pendula::State<Space, N>;
+  using State = pendula::State<Space, N, Real>;
 
   /// Throws std::invalid_argument unless `stages` is S.
   ChainSolver(const Chain& chain, int stages, Iteration iteration = Iteration::automatic)
@@ -164,13 +166,16 @@ class ChainSolver {
   // Slow contraction costs more than Newton; far from round-off, so that rounding is not taken for it.
   bool diverges(const Correction& correction) const {
     if (!std::isfinite(correction.relative)) return true;
-    const bool far = correction.relative > 1e-6;
+    const bool far = correction.relative > far_from_roundoff;
     return far && ((count_ > 3 && correction.relative > 0.7 * last_.relative) || count_ > 20);
   }
 
-  ChainStages<Space, S, N, Arch> stages_;
-  ChainNewton<Space, S, N, Arch> newton_;
-  ChainFixedPoint<Space, S, N, Arch> fixed_point_;
+  static inline const double far_from_roundoff =
+      67 * std::sqrt(static_cast<double>(std::numeric_limits<Real>::epsilon()));  // 1e-6 in double
+
+  ChainStages<Space, S, N, Real, Arch> stages_;
+  ChainNewton<Space, S, N, Real, Arch> newton_;
+  ChainFixedPoint<Space, S, N, Real, Arch> fixed_point_;
   IterationChoice choice_;
   Correction last_;
   int count_ = 0;

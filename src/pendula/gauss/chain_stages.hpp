@@ -19,21 +19,21 @@ namespace pendula {
 namespace detail {
 
 /// The coefficients of a step, one column a stage, padded to lanes.
-template <int S>
+template <int S, class Real>
 class StageColumns {
-  static constexpr std::size_t stages = S, Z = lanes_for(S);
-  using L = Lanes<S>;
+  using L = Lanes<S, Real>;
+  static constexpr std::size_t stages = S, Z = L::size;
 
  public:
-  StageColumns() : coefficients_(gauss_tableau<S>(S)) {
+  StageColumns() : coefficients_(gauss_tableau<S, Real>(S)) {
     for (int i = 0; i < S; ++i) {
       for (int j = 0; j < S; ++j) m_[j][i] = coefficients_.m(i, j);
     }
   }
 
-  void prepare(double h, double previous) {
+  void prepare(Real h, Real previous) {
     coefficients_.prepare(h, previous);
-    const double ratio = previous == 0 ? 1 : h / previous;
+    const Real ratio = previous == 0 ? Real(1) : Real(h / previous);
     if (h == h_ && ratio == ratio_) return;
     h_ = h;
     ratio_ = ratio;
@@ -43,23 +43,23 @@ class StageColumns {
     }
   }
 
-  double h() const { return h_; }
-  double hc(std::size_t i) const { return coefficients_.hc(static_cast<int>(i)); }
-  double hb(std::size_t j) const { return hb_[j]; }
-  double ha(std::size_t i, std::size_t j) const { return coefficients_.ha(static_cast<int>(i), static_cast<int>(j)); }
+  Real h() const { return h_; }
+  Real hc(std::size_t i) const { return coefficients_.hc(static_cast<int>(i)); }
+  Real hb(std::size_t j) const { return hb_[j]; }
+  Real ha(std::size_t i, std::size_t j) const { return coefficients_.ha(static_cast<int>(i), static_cast<int>(j)); }
 
   /// h Σ_j a_ij x_j for all i, as m_ij (h b_j x_j).
   L integral(const L& x) const {
-    alignas(pack_alignment) double weighted[Z];
+    alignas(pack_alignment) Real weighted[Z];
     (L::load(hb_) * x).store(weighted);
     return product(m_, weighted);
   }
 
   /// The polynomial through last step's stage values, at this step's stages.
-  L extrapolated(const double* last) const { return product(extrapolation_, last); }
+  L extrapolated(const Real* last) const { return product(extrapolation_, last); }
 
  private:
-  static L product(const double (&columns)[stages][Z], const double* x) {
+  static L product(const Real (&columns)[stages][Z], const Real* x) {
     L even = L(x[0]) * L::load(columns[0]);
     if constexpr (S == 1) return even;
     L odd = L(x[S > 1]) * L::load(columns[S > 1]);
@@ -70,18 +70,19 @@ class StageColumns {
     return even + odd;
   }
 
-  StepCoefficients<S> coefficients_;
-  double h_ = 0, ratio_ = 0;
-  alignas(pack_alignment) double m_[stages][Z] = {};
-  alignas(pack_alignment) double extrapolation_[stages][Z] = {};
-  alignas(pack_alignment) double hb_[Z] = {};
+  StepCoefficients<S, Real> coefficients_;
+  Real h_{0}, ratio_{0};
+  alignas(pack_alignment) Real m_[stages][Z] = {};
+  alignas(pack_alignment) Real extrapolation_[stages][Z] = {};
+  alignas(pack_alignment) Real hb_[Z] = {};
 };
 
 /// Adds an increment to a number carried as value + low part (Kahan–Neumaier).
-inline void add_compensated(double increment, double& value, double& low) {
-  const double wanted = low + increment;
-  const double sum = value + wanted;
-  const double kept = sum - value;
+template <class Real>
+void add_compensated(const Real& increment, Real& value, Real& low) {
+  const Real wanted = low + increment;
+  const Real sum = value + wanted;
+  const Real kept = sum - value;
   low = (value - (sum - kept)) + (wanted - kept);
   value = sum;
 }
@@ -91,13 +92,13 @@ inline void add_compensated(double increment, double& value, double& low) {
 /// What both iterations on the stages of a chain share: state, charts, stage values, predictor, update.
 ///
 /// In momentum form, q̇ = v, ṗ = f: stage i has position Q_i = q + h Σ_j a_ij V_j and momentum P_i = p + h Σ_j a_ij f_j.
-/// Arrays hold [link][coordinate][stage]; the stages of one number are a Lanes<S>, so that everything is done for all
-/// stages at once. q and p are kept in each link's chart, as value + low part.
-template <class Space, int S, int N = Eigen::Dynamic, class Arch = xsimd::default_arch>
+/// Arrays hold [link][coordinate][stage]; the stages of one number are a Lanes<S, Real>, so that everything is done for
+/// all stages at once. q and p are kept in each link's chart, as value + low part.
+template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
 class ChainStages {
  public:
   using Link = typename Space::Link;
-  using L = Lanes<S>;
+  using L = Lanes<S, Real>;
   using Coordinates = typename Link::template Coordinates<L>;
   using Cartesian = typename Link::template Cartesian<L>;
   using Trig = typename Link::template Trig<L>;
@@ -119,7 +120,7 @@ class ChainStages {
         w_(chain.links()),
         torque_(chain.loaded() ? chain.links() : 0),
         at_state_(chain.links()),
-        saved_{charts_, user_, detail::LinkArray<4 * K, N>(chain.links())},
+        saved_{charts_, user_, detail::LinkArray<4 * K, N, Real>(chain.links())},
         tried_(chain.links()) {
     if (constants_.loaded()) {
       for (int i = 0; i < links(); ++i) set_constant_torque(i);
@@ -127,12 +128,12 @@ class ChainStages {
   }
 
   int links() const { return constants_.links(); }
-  const LinkConstants& constants(int i) const { return constants_[i]; }
-  const detail::StageColumns<S>& columns() const { return columns_; }
+  const LinkConstants<Real>& constants(int i) const { return constants_[i]; }
+  const detail::StageColumns<S, Real>& columns() const { return columns_; }
   bool loaded() const { return constants_.loaded(); }
   Chart chart(int i) const { return charts_[i]; }
   std::int64_t chart_switches() const { return chart_switches_; }
-  double h() const { return columns_.h(); }
+  Real h() const { return columns_.h(); }
 
   // --- Values of one link at all stages ---
 
@@ -141,7 +142,7 @@ class ChainStages {
   Cartesian bob_velocity(int i) const { return load_each<D>(w_[i]); }
   void set_rates(int i, const Coordinates& v) { store_each(v, V_[i]); }
   void set_forces(int i, const Coordinates& f) { store_each(f, F_[i]); }
-  double* stored_rates(int i) { return V_[i]; }
+  Real* stored_rates(int i) { return V_[i]; }
 
   Trig trig(int i) const {
     Trig trig;
@@ -186,9 +187,9 @@ class ChainStages {
     double most = 0;
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < K * Z; ++k) {
-        const double change = std::abs(V_[i][k] - w_[i][k]);
+        const double change = std::abs(static_cast<double>(V_[i][k] - w_[i][k]));
         if (k % Z >= S) continue;
-        if (!std::isfinite(V_[i][k])) return i;
+        if (!std::isfinite(change)) return i;
         if (change <= most) continue;
         most = change;
         link = i;
@@ -200,7 +201,7 @@ class ChainStages {
   // --- A step ---
 
   /// Takes over a state. A link near the pole starts in its other chart.
-  void start(const State<Space, N>& state) {
+  void start(const State<Space, N, Real>& state) {
     chart_switches_ = 0;
     forget();
     for (int i = 0; i < links(); ++i) start_link(i, state);
@@ -211,7 +212,8 @@ class ChainStages {
   /// Predicts the stages of a step of size h: from the last step's, or cold where there was none like it.
   void prepare(double time, double h) {
     const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
-    columns_.prepare(h, alike ? last_h_ : 0);
+    columns_.prepare(Real(h), Real(alike ? last_h_ : 0));
+    step_ = h;
     if (chain_.driven()) set_driven_torques(time);
     if (!alike) return start_cold();
     for (int i = 0; i < links(); ++i) {
@@ -244,7 +246,7 @@ class ChainStages {
 
   void place_block(int end) {
     const int begin = block_before(end);
-    alignas(pack_alignment) double Q[placed_at_once * K * Z], Q_low[placed_at_once * K * Z];
+    alignas(pack_alignment) Real Q[placed_at_once * K * Z], Q_low[placed_at_once * K * Z];
     if (end - begin < placed_at_once) std::fill(Q, Q + placed_at_once * K * Z, 0.0);
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
@@ -260,8 +262,8 @@ class ChainStages {
     // What rounding the angle lost, which is most where links have turned often.
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
-        double* sine = sine_[i] + a * Z;
-        double* cosine = cosine_[i] + a * Z;
+        Real* sine = sine_[i] + a * Z;
+        Real* cosine = cosine_[i] + a * Z;
         const L s = L::load(sine), c = L::load(cosine);
         const L low = L::load(Q_low + (static_cast<std::size_t>(i - begin) * K + a) * Z);
         fma(c, low, s).store(sine);
@@ -303,32 +305,32 @@ class ChainStages {
 
   /// What the end of the step would have; the state stays where it is.
   double unexplained_energy() {
-    const EnergyTally<Space> start = loaded() ? tally_at_state() : run_start_;
-    for_each_saved(tried_, [](double& kept, double& value) { kept = value; });
+    const EnergyTally<Space, Real> start = loaded() ? tally_at_state() : run_start_;
+    for_each_saved(tried_, [](Real& kept, Real& value) { kept = value; });
     move();
-    const EnergyTally<Space> end = tally_at_state();
-    for_each_saved(tried_, [](double& kept, double& value) { value = kept; });
+    const EnergyTally<Space, Real> end = tally_at_state();
+    for_each_saved(tried_, [](Real& kept, Real& value) { value = kept; });
     return pendula::unexplained_energy(chain_, start, end);
   }
 
   /// Moves the state to the end of the step, and links that come near a pole to their other chart.
   void accept(bool forces_are_predicted) {
     move();
-    last_h_ = h();
+    last_h_ = step_;
     if constexpr (has_charts<Space>) change_charts(forces_are_predicted);
   }
 
   /// The next step starts cold.
   void forget() { last_h_ = 0; }
 
-  State<Space, N> state(double time) const {
-    State<Space, N> state;
+  State<Space, N, Real> state(double time) const {
+    State<Space, N, Real> state;
     state.time = time;
     state.q.resize(Space::dof * links());
     state.v.resize(Space::dof * links());
-    MotionSweep<Space, double, N> sweep(links());
+    MotionSweep<Space, Real, N> sweep(links());
     sweep_state(sweep, [&](int i, const Rates& v, const Rates&) {
-      const LinkAngles<Space> angles = read(i, v);
+      const LinkAngles<Space, Real> angles = read(i, v);
       for (std::size_t a = 0; a < K; ++a) {
         state.q[entry(i, a)] = angles.q[a];
         state.v[entry(i, a)] = angles.v[a];
@@ -341,47 +343,47 @@ class ChainStages {
   void save() {
     saved_.charts = charts_;
     saved_.user = user_;
-    for_each_saved(saved_.numbers, [](double& kept, double& value) { kept = value; });
+    for_each_saved(saved_.numbers, [](Real& kept, Real& value) { kept = value; });
   }
 
   void restore() {
     charts_ = saved_.charts;
     user_ = saved_.user;
-    for_each_saved(saved_.numbers, [](double& kept, double& value) { value = kept; });
+    for_each_saved(saved_.numbers, [](Real& kept, Real& value) { value = kept; });
     forget();
   }
 
  private:
-  using Rates = std::array<double, K>;
-  using PlainTrig = typename Link::template Trig<double>;
-  using PlainCartesian = typename Link::template Cartesian<double>;
+  using Rates = std::array<Real, K>;
+  using PlainTrig = typename Link::template Trig<Real>;
+  using PlainCartesian = typename Link::template Cartesian<Real>;
 
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
 
   // As few links as fill the widest registers, so that one link's sines are taken while the sweep waits for another's
   // division.
-  static constexpr int placed_at_once = K * Z < 8 ? static_cast<int>(8 / (K * Z)) : 1;
+  static constexpr int placed_at_once = detail::has_registers<Real> && K * Z < 8 ? static_cast<int>(8 / (K * Z)) : 1;
 
   struct Saved {
     detail::PerLink<Chart, N> charts;
     detail::PerLink<Rates, N> user;
-    detail::LinkArray<4 * K, N> numbers;
+    detail::LinkArray<4 * K, N, Real> numbers;
   };
 
   template <std::size_t Count>
-  static std::array<L, Count> load_each(const double* from) {
+  static std::array<L, Count> load_each(const Real* from) {
     std::array<L, Count> values;
     for (std::size_t k = 0; k < Count; ++k) values[k] = L::load(from + k * Z);
     return values;
   }
   template <std::size_t Count>
-  static void store_each(const std::array<L, Count>& values, double* to) {
+  static void store_each(const std::array<L, Count>& values, Real* to) {
     for (std::size_t k = 0; k < Count; ++k) values[k].store(to + k * Z);
   }
   static Cartesian zero() {
     Cartesian zero;
-    zero.fill(L(0.0));
+    zero.fill(L(Real(0)));
     return zero;
   }
 
@@ -413,7 +415,7 @@ class ChainStages {
     }
   }
 
-  void start_link(int i, const State<Space, N>& state) {
+  void start_link(int i, const State<Space, N, Real>& state) {
     Rates q, v;
     for (std::size_t a = 0; a < K; ++a) {
       q[a] = state.q[entry(i, a)];
@@ -424,7 +426,7 @@ class ChainStages {
     PlainTrig trig;
     Link::trig(q, trig);
     if (has_charts<Space> && metric_determinant(trig) < chart_limit) {
-      const Heading<Space> heading(0, q, v);
+      const Heading<Space, Real> heading(0, q, v);
       charts_[i] = 1;
       Link::coordinates(to_chart(Chart{1}, heading.u), q);
       Link::trig(q, trig);
@@ -438,7 +440,7 @@ class ChainStages {
   void set_momenta() {
     PlainCartesian w{}, G{};
     for (int i = 0; i < links(); ++i) {
-      const Heading<Space> heading(charts_[i], position(i), first_lane(V_[i]));
+      const Heading<Space, Real> heading(charts_[i], position(i), first_lane(V_[i]));
       w = sum(w, scaled(constants_[i].length, heading.u_dot));
       for (std::size_t k = 0; k < D; ++k) w_[i][k * Z] = w[k];
     }
@@ -451,7 +453,7 @@ class ChainStages {
 
   void set_momentum(int i, const Rates& q, const PlainCartesian& momentum) {
     PlainTrig trig;
-    typename Link::template First<double> u_a;
+    typename Link::template First<Real> u_a;
     Link::trig(q, trig);
     Link::direction_first(trig, u_a);
     for (std::size_t a = 0; a < K; ++a) {
@@ -460,23 +462,24 @@ class ChainStages {
     }
   }
 
-  EnergyTally<Space> tally_at_state() {
-    EnergyTally<Space> tally;
+  EnergyTally<Space, Real> tally_at_state() {
+    EnergyTally<Space, Real> tally;
     sweep_state(at_state_, [&](int i, const Rates& v, const Rates&) {
-      const Heading<Space> heading(charts_[i], position(i), v);
-      double torque = 0;
+      const Heading<Space, Real> heading(charts_[i], position(i), v);
+      using std::abs, std::sqrt;
+      Real squared_torque(0);
       if (loaded()) {
-        for (const double component : first_torque(i)) torque = std::hypot(torque, component);
+        for (const Real& component : first_torque(i)) squared_torque += component * component;
       }
-      tally.add(chain_, i, heading, std::abs(h()) * torque * std::sqrt(dot(heading.u_dot, heading.u_dot)));
+      tally.add(chain_, i, heading, abs(h()) * sqrt(squared_torque * dot(heading.u_dot, heading.u_dot)));
     });
     return tally;
   }
 
-  Heading<Space> stage_heading(int i, std::size_t j) const {
+  Heading<Space, Real> stage_heading(int i, std::size_t j) const {
     PlainTrig at;
     Link::trig_from(first_lane(sine_[i] + j), first_lane(cosine_[i] + j), at);
-    return Heading<Space>::of_trig(charts_[i], at, first_lane(V_[i] + j));
+    return Heading<Space, Real>::of_trig(charts_[i], at, first_lane(V_[i] + j));
   }
 
   // Increments are added one by one: that keeps their sum's rounding in the low part.
@@ -491,41 +494,42 @@ class ChainStages {
     }
   }
 
-  static Rates first_lane(const double* from) {
+  static Rates first_lane(const Real* from) {
     Rates values;
     for (std::size_t a = 0; a < K; ++a) values[a] = from[a * Z];
     return values;
   }
 
-  static double metric_determinant(const PlainTrig& trig) {
-    double determinant;
+  static Real metric_determinant(const PlainTrig& trig) {
+    Real determinant;
     Link::metric_determinant(trig, determinant);
     return determinant;
   }
 
-  Placed<Space, double> placed_at_state(int i) const {
+  Placed<Space, Real> placed_at_state(int i) const {
+    using std::cos, std::sin;
     Rates sine, cosine;
     for (std::size_t a = 0; a < K; ++a) {
-      const double s = std::sin(q_[i][a]), c = std::cos(q_[i][a]), low = q_low_[i][a];
+      const Real s = sin(q_[i][a]), c = cos(q_[i][a]), low = q_low_[i][a];
       sine[a] = s + c * low;
       cosine[a] = c - s * low;
     }
-    Placed<Space, double> at{charts_[i], {}};
+    Placed<Space, Real> at{charts_[i], {}};
     Link::trig_from(sine, cosine, at.trig);
     return at;
   }
 
   // Rates and forces of every link at (q, p), one stage wide: visit(i, v, f).
   template <class Visit>
-  void sweep_state(MotionSweep<Space, double, N>& sweep, Visit visit) const {
-    typename MotionSweep<Space, double, N>::Inward inward;
-    Placed<Space, double> at;
+  void sweep_state(MotionSweep<Space, Real, N>& sweep, Visit visit) const {
+    typename MotionSweep<Space, Real, N>::Inward inward;
+    Placed<Space, Real> at;
     for (int i = links(); i-- > 0;) {
       at = placed_at_state(i);
       sweep.inward(inward, i, constants_[i], at, {momentum(i), momentum_low(i)});
     }
-    typename MotionSweep<Space, double, N>::Outward outward(at);
-    Placed<Space, double> next = at;
+    typename MotionSweep<Space, Real, N>::Outward outward(at);
+    Placed<Space, Real> next = at;
     for (int i = 0; i < links(); ++i, at = next) {
       if (i + 1 < links()) next = placed_at_state(i + 1);
       Rates v, f;
@@ -537,38 +541,39 @@ class ChainStages {
   }
 
   PlainCartesian load_at_state(int i, const PlainTrig& trig, const Rates& v) const {
-    PlainCartesian load = to_chart(charts_[i], constants_.template weight<double>(i));
+    PlainCartesian load = to_chart(charts_[i], constants_.template weight<Real>(i));
     if (loaded()) constants_.add_loads(i, to_chart(charts_[i], first_torque(i)), trig, v, load);
     return load;
   }
 
-  typename Link::template Torque<double> first_torque(int i) const {
-    typename Link::template Torque<double> torque;
+  typename Link::template Torque<Real> first_torque(int i) const {
+    typename Link::template Torque<Real> torque;
     for (std::size_t k = 0; k < Space::torque_components; ++k) torque[k] = torque_[i][k * Z];
     return torque;
   }
 
   void set_constant_torque(int i) {
     for (std::size_t k = 0; k < Space::torque_components; ++k) {
-      L(chain_.constant_torque()(static_cast<Eigen::Index>(k), i)).store(torque_[i] + k * Z);
+      L(Real(chain_.constant_torque()(static_cast<Eigen::Index>(k), i))).store(torque_[i] + k * Z);
     }
   }
 
   void set_driven_torques(double time) {
+    using std::sin;
     for (const Drive<Space>& drive : chain_.drives()) set_constant_torque(drive.link);
     for (const Drive<Space>& drive : chain_.drives()) {
       for (std::size_t j = 0; j < S; ++j) {
-        const double wave = std::sin(drive.frequency * (time + columns_.hc(j)) + drive.phase);
+        const Real wave = sin(Real(drive.frequency) * (Real(time) + columns_.hc(j)) + Real(drive.phase));
         for (std::size_t k = 0; k < Space::torque_components; ++k) {
-          torque_[drive.link][k * Z + j] += wave * drive.amplitude[static_cast<Eigen::Index>(k)];
+          torque_[drive.link][k * Z + j] += wave * Real(drive.amplitude[static_cast<Eigen::Index>(k)]);
         }
       }
     }
   }
 
-  LinkAngles<Space> read(int i, const Rates& v) const {
+  LinkAngles<Space, Real> read(int i, const Rates& v) const {
     if constexpr (has_charts<Space>) {
-      if (charts_[i] == 1) return user_angles(Heading<Space>(1, position(i), v), user_[i]);
+      if (charts_[i] == 1) return user_angles(Heading<Space, Real>(1, position(i), v), user_[i]);
     }
     return {position(i), v};
   }
@@ -589,14 +594,14 @@ class ChainStages {
   }
 
   // The user's angles of a link in chart 1, kept up so that they stay continuous.
-  void follow(int i) { user_[i] = user_angles(Heading<Space>(1, position(i), last_rates(i)), user_[i]).q; }
+  void follow(int i) { user_[i] = user_angles(Heading<Space, Real>(1, position(i), last_rates(i)), user_[i]).q; }
 
   Rates last_rates(int i) const { return first_lane(V_[i] + (S - 1)); }
 
-  double last_determinant(int i) const {
+  Real last_determinant(int i) const {
     L determinant;
     Link::metric_determinant(trig(i), determinant);
-    alignas(pack_alignment) double stages[Z];
+    alignas(pack_alignment) Real stages[Z];
     determinant.store(stages);
     return stages[S - 1];
   }
@@ -611,7 +616,7 @@ class ChainStages {
     for (std::size_t a = 0; a < K; ++a) p[a] = p_[i][a] + p_low_[i][a];
     Link::trig(q, trig);
     Link::tangent_momentum(trig, 1 / metric_determinant(trig), p, across);
-    const Heading<Space> heading(from, q, last_rates(i));
+    const Heading<Space, Real> heading(from, q, last_rates(i));
     if (from == 0) user_[i] = q;
     Rates moved;
     if (to == 0) {
@@ -627,8 +632,9 @@ class ChainStages {
   }
 
   void change_stage(int i, std::size_t j, Chart to) {
-    const Heading<Space> heading = stage_heading(i, j);
-    LinkAngles<Space> angles;
+    using std::cos, std::sin;
+    const Heading<Space, Real> heading = stage_heading(i, j);
+    LinkAngles<Space, Real> angles;
     if (to == 0) {
       angles = user_angles(heading, user_[i]);
     } else {
@@ -639,15 +645,15 @@ class ChainStages {
     }
     for (std::size_t a = 0; a < K; ++a) {
       V_[i][a * Z + j] = angles.v[a];
-      sine_[i][a * Z + j] = std::sin(angles.q[a]);
-      cosine_[i][a * Z + j] = std::cos(angles.q[a]);
+      sine_[i][a * Z + j] = sin(angles.q[a]);
+      cosine_[i][a * Z + j] = cos(angles.q[a]);
     }
   }
 
   template <class Copy>
-  void for_each_saved(detail::LinkArray<4 * K, N>& numbers, Copy copy) {
+  void for_each_saved(detail::LinkArray<4 * K, N, Real>& numbers, Copy copy) {
     for (int i = 0; i < links(); ++i) {
-      double* kept = numbers[i];
+      Real* kept = numbers[i];
       for (auto* values : {&q_, &q_low_, &p_, &p_low_}) {
         for (std::size_t a = 0; a < K; ++a) copy(*kept++, (*values)[i][a]);
       }
@@ -655,19 +661,20 @@ class ChainStages {
   }
 
   Chain<Space, N> chain_;
-  ChainLinks<Space, N> constants_;
-  detail::StageColumns<S> columns_;
+  ChainLinks<Space, N, Real> constants_;
+  detail::StageColumns<S, Real> columns_;
   detail::PerLink<Chart, N> charts_;
   detail::PerLink<Rates, N> user_;  // the user's angles of links in chart 1, when they were last read
-  detail::LinkArray<K, N> q_, q_low_, p_, p_low_;
-  detail::LinkArray<K * Z, N> V_, F_, sine_, cosine_;
-  detail::LinkArray<D * Z, N> w_;
-  detail::LinkArray<Space::torque_components * Z, N> torque_;
-  MotionSweep<Space, double, N> at_state_;
-  EnergyTally<Space> run_start_;
+  detail::LinkArray<K, N, Real> q_, q_low_, p_, p_low_;
+  detail::LinkArray<K * Z, N, Real> V_, F_, sine_, cosine_;
+  detail::LinkArray<D * Z, N, Real> w_;
+  detail::LinkArray<Space::torque_components * Z, N, Real> torque_;
+  MotionSweep<Space, Real, N> at_state_;
+  EnergyTally<Space, Real> run_start_;
   Saved saved_;
-  detail::LinkArray<4 * K, N> tried_;  // the state, while the end of a step is looked at
-  double last_h_ = 0;                  // of the step that V and F belong to; 0: they belong to none
+  detail::LinkArray<4 * K, N, Real> tried_;  // the state, while the end of a step is looked at
+  double step_ = 0;                          // of the stages
+  double last_h_ = 0;                        // of the step that V and F belong to; 0: they belong to none
   std::int64_t chart_switches_ = 0;
 };
 

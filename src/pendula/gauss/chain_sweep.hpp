@@ -19,6 +19,7 @@ template <class Space, class Real, int N = Eigen::Dynamic>
 class TensionSweep {
  public:
   using Cartesian = typename Space::Link::template Cartesian<Real>;
+  using Constants = LinkConstants<ScalarOf<Real>>;
 
   /// What the inward sweep carries: of the link just done, direction and momentum below it where its rod rests. Below
   /// the last link there is nothing.
@@ -35,7 +36,7 @@ class TensionSweep {
   explicit TensionSweep(int links) : carried_(links, unwritten()) {}
 
   /// Inward, i = n−1 … 0: takes direction u and given momentum across the rod, both in the axes of the world.
-  void inward(Inward& next, int i, const LinkConstants& link, const Cartesian& u, const Cartesian& across) {
+  void inward(Inward& next, int i, const Constants& link, const Cartesian& u, const Cartesian& across) {
     const Real m(link.mass), inverse_m(link.inverse_mass);
     const Real cosine = dot(u, next.u), along = dot(u, next.resting);
     // The next rod's direction, and what is given of this bob's momentum, across this rod.
@@ -53,7 +54,7 @@ class TensionSweep {
 
   /// Outward, i = 0 … n−1, from what inward was given, and the next link's direction (of the last link: anything
   /// finite): gives the rate of the direction and the momentum G below the rod.
-  void outward(Outward& before, int i, const LinkConstants& link, const Cartesian& u, const Cartesian& next_u,
+  void outward(Outward& before, int i, const Constants& link, const Cartesian& u, const Cartesian& next_u,
                const Cartesian& across, Cartesian& u_dot, Cartesian& momentum) {
     const Carried& here = carried_[i];
     const Real along = dot(u, before.w);
@@ -77,7 +78,7 @@ class TensionSweep {
   };
 
   static Carried unwritten() {
-    const Real none(detail::unwritten);
+    const Real none(detail::unwritten<ScalarOf<Real>>());
     return {components<Space::dimension>([&](std::size_t) { return none; }), none, none, none};
   }
 

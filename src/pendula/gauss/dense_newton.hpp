@@ -57,6 +57,7 @@ class DenseStages {
   using Space = SpaceOf<Kernel>;
   using Chain = pendula::Chain<Space>;
   using State = pendula::State<Space>;
+  using Real = double;
   using Vector = typename Kernel::template Vector<double>;
   using Matrix = typename Kernel::template Matrix<double>;
   using Parameters = typename Kernel::template Parameters<double>;

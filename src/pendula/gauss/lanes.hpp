@@ -18,60 +18,75 @@ namespace pendula {
 
 namespace detail {
 
-// The widest register of doubles that divides a pack of `Size` numbers; double itself where there is none.
-template <int Size>
+// Numbers that processors have registers for; all others go one by one.
+template <class Real>
+inline constexpr bool has_registers = std::is_same_v<Real, double> || std::is_same_v<Real, float>;
+
+// The widest register that divides a pack of `Size` numbers; Real itself where there is none.
+template <int Size, class Real, std::size_t Width = 8>
 auto widest_register() {
-  constexpr bool has_eight = !std::is_void_v<xsimd::make_sized_batch_t<double, 8>>;
-  constexpr bool has_four = !std::is_void_v<xsimd::make_sized_batch_t<double, 4>>;
-  constexpr bool has_two = !std::is_void_v<xsimd::make_sized_batch_t<double, 2>>;
-  if constexpr (Size % 8 == 0 && has_eight) {
-    return std::type_identity<xsimd::make_sized_batch_t<double, 8>>{};
-  } else if constexpr (Size % 4 == 0 && has_four) {
-    return std::type_identity<xsimd::make_sized_batch_t<double, 4>>{};
-  } else if constexpr (Size % 2 == 0 && has_two) {
-    return std::type_identity<xsimd::make_sized_batch_t<double, 2>>{};
+  if constexpr (Width == 1 || !has_registers<Real>) {
+    return std::type_identity<Real>{};
+  } else if constexpr (static_cast<std::size_t>(Size) % Width == 0 &&
+                       !std::is_void_v<xsimd::make_sized_batch_t<Real, Width>>) {
+    return std::type_identity<xsimd::make_sized_batch_t<Real, Width>>{};
   } else {
-    return std::type_identity<double>{};
+    return widest_register<Size, Real, Width / 2>();
   }
 }
 
+// What is true of a register of one number, the number itself.
 template <class Register>
-inline constexpr int register_size = static_cast<int>(Register::size);
-template <>
-inline constexpr int register_size<double> = 1;
+struct RegisterTraits {
+  using Scalar = Register;
+  static constexpr int size = 1;
+};
+template <class Real, class Arch>
+struct RegisterTraits<xsimd::batch<Real, Arch>> {
+  using Scalar = Real;
+  static constexpr int size = static_cast<int>(xsimd::batch<Real, Arch>::size);
+};
 
-inline void load(const double* from, double& to) {
+template <class Register>
+inline constexpr int register_size = RegisterTraits<Register>::size;
+
+template <class Real>
+void load(const Real* from, Real& to) {
   to = *from;
 }
-inline void store(double* to, double from) {
+template <class Real>
+void store(Real* to, const Real& from) {
   *to = from;
 }
-template <class Arch>
-void load(const double* from, xsimd::batch<double, Arch>& to) {
-  to = xsimd::batch<double, Arch>::load_aligned(from);
+template <class Real, class Arch>
+void load(const Real* from, xsimd::batch<Real, Arch>& to) {
+  to = xsimd::batch<Real, Arch>::load_aligned(from);
 }
-template <class Arch>
-void store(double* to, const xsimd::batch<double, Arch>& from) {
+template <class Real, class Arch>
+void store(Real* to, const xsimd::batch<Real, Arch>& from) {
   from.store_aligned(to);
 }
 
 // x y + z, rounded once where the processor can. The one place with intrinsics: xsimd's rounds twice in registers of
 // two and, before version 11, of eight (its issue 884), and what a product loses to rounding could not be told.
-inline double fused(double x, double y, double z) {
+template <class Real>
+Real fused(const Real& x, const Real& y, const Real& z) {
 #ifdef FP_FAST_FMA
-  return std::fma(x, y, z);
-#else
-  return x * y + z;
+  if constexpr (has_registers<Real>) return std::fma(x, y, z);
 #endif
+  return x * y + z;
 }
-template <class Arch>
-xsimd::batch<double, Arch> fused(const xsimd::batch<double, Arch>& x, const xsimd::batch<double, Arch>& y,
-                                 const xsimd::batch<double, Arch>& z) {
+template <class Real, class Arch>
+xsimd::batch<Real, Arch> fused(const xsimd::batch<Real, Arch>& x, const xsimd::batch<Real, Arch>& y,
+                               const xsimd::batch<Real, Arch>& z) {
+  [[maybe_unused]] constexpr std::size_t bytes = sizeof(xsimd::batch<Real, Arch>);
+  [[maybe_unused]] constexpr bool wide = std::is_same_v<Real, double>;
 #ifdef __FMA__
-  if constexpr (xsimd::batch<double, Arch>::size == 2) return _mm_fmadd_pd(x, y, z);
+  if constexpr (wide && bytes == 16) return _mm_fmadd_pd(x, y, z);
+  if constexpr (!wide && bytes == 16) return _mm_fmadd_ps(x, y, z);
 #endif
 #ifdef __AVX512F__
-  if constexpr (xsimd::batch<double, Arch>::size == 8) return _mm512_fmadd_pd(x, y, z);
+  if constexpr (wide && bytes == 64) return _mm512_fmadd_pd(x, y, z);
 #endif
   return xsimd::fma(x, y, z);
 }
@@ -80,8 +95,8 @@ xsimd::batch<double, Arch> fused(const xsimd::batch<double, Arch>& x, const xsim
 
 /// The register that a pack of `Size` numbers is made of. It is a parameter of everything that is made of packs, so
 /// that code compiled for different processors has different names and cannot be mixed by a linker.
-template <int Size>
-using RegisterFor = typename decltype(detail::widest_register<Size>())::type;
+template <int Size, class Real = double>
+using RegisterFor = typename decltype(detail::widest_register<Size, Real>())::type;
 
 /// `Size` numbers in SIMD registers that the compiler's target decides on; arithmetic goes number by number.
 /// Loads and stores need addresses aligned to `pack_alignment`. More than one register is two packs, not an array:
@@ -100,10 +115,11 @@ class Pack {
   };
 
  public:
+  using Scalar = typename detail::RegisterTraits<Register>::Scalar;
   static constexpr int size = Size;
 
   Pack() = default;
-  explicit Pack(double value) {
+  explicit Pack(Scalar value) {
     if constexpr (split) {
       held_ = {Low(value), High(value)};
     } else {
@@ -111,7 +127,7 @@ class Pack {
     }
   }
 
-  static Pack load(const double* from) {
+  static Pack load(const Scalar* from) {
     Pack pack;
     if constexpr (split) {
       pack.held_ = {Low::load(from), High::load(from + low_size)};
@@ -120,7 +136,7 @@ class Pack {
     }
     return pack;
   }
-  void store(double* to) const {
+  void store(Scalar* to) const {
     if constexpr (split) {
       held_.low.store(to);
       held_.high.store(to + low_size);
@@ -189,14 +205,33 @@ class Pack {
 /// In bytes; enough for any register that xsimd knows.
 inline constexpr std::size_t pack_alignment = 64;
 
-/// Numbers in a pack that holds all `stages` of one quantity: the next power of two. The numbers after the last stage
-/// are computed like the others and never looked at.
-inline constexpr int lanes_for(int stages) {
+namespace detail {
+
+template <class Number>
+struct ScalarOf {
+  using type = Number;
+};
+template <int Size, class Register>
+struct ScalarOf<Pack<Size, Register>> {
+  using type = typename Pack<Size, Register>::Scalar;
+};
+
+}  // namespace detail
+
+/// The type of one number of a pack; of a number, the number's own.
+template <class Number>
+using ScalarOf = typename detail::ScalarOf<Number>::type;
+
+/// Numbers in a pack that holds all `stages` of one quantity: the next power of two where there are registers. The
+/// numbers after the last stage are computed like the others and never looked at.
+template <class Real = double>
+constexpr int lanes_for(int stages) {
+  if (!detail::has_registers<Real>) return stages;
   return stages <= 2 ? stages : stages <= 4 ? 4 : 8;
 }
 
 /// All stages of one quantity of one link.
-template <int S>
-using Lanes = Pack<lanes_for(S)>;
+template <int S, class Real = double>
+using Lanes = Pack<lanes_for<Real>(S), RegisterFor<lanes_for<Real>(S), Real>>;
 
 }  // namespace pendula

@@ -21,7 +21,9 @@ enum class Convergence {
 /// rate of convergence, because only rounding is left (Hairer, McLachlan, Razakarivony 2008; arXiv:1702.03354).
 class RoundoffStop {
  public:
-  explicit RoundoffStop(int links) : small_(std::max(1e-7, 1e-14 * links * links)) {}
+  /// `epsilon` is that of the numbers that are iterated on.
+  explicit RoundoffStop(int links, double epsilon = double_epsilon)
+      : epsilon_(epsilon), small_(std::max(1e-7 * std::sqrt(coarser()), 1e-14 * coarser() * links * links)) {}
 
   /// A new step begins. What Newton's constant C was is remembered from step to step.
   void restart() {
@@ -52,7 +54,7 @@ class RoundoffStop {
     if (count_ < 3) return false;
     if (pair == 0) return true;
     const double rate = pair / pair_before;
-    if (rate < 1 && pair * rate <= negligible) return true;
+    if (rate < 1 && pair * rate <= negligible()) return true;
     if (count_ == 3) first_ = best_ = pair_before;
     const bool stalled = has_stalled(last_[0] / last_[2], 2.0 / std::max(1, count_ - 3));
     best_ = std::min(best_, pair);
@@ -65,11 +67,11 @@ class RoundoffStop {
       first_ = best_ = correction;
       return correction == 0 || is_enough(correction);
     }
-    if (correction > noise) {
+    if (correction > noise()) {
       const double measured = correction / (last_[1] * last_[1]);
       constant_ = constant_ == 0 ? measured : std::max(measured, constant_ / 2);
     }
-    if (correction <= few_ulp || is_enough(correction)) return true;
+    if (correction <= 2 * epsilon_ || is_enough(correction)) return true;
     const bool stalled = has_stalled(correction / last_[1], 1.0 / std::max(1, count_ - 2));
     best_ = std::min(best_, correction);
     return stalled;
@@ -78,7 +80,7 @@ class RoundoffStop {
   // C from an earlier step may be out of date: now and then one more correction measures it again.
   bool is_enough(double correction) const {
     if (constant_ == 0 || (count_ == 1 && steps_ % check_interval == 0)) return false;
-    return safety * constant_ * correction * correction <= negligible;
+    return safety * constant_ * correction * correction <= negligible();
   }
 
   // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding.
@@ -87,15 +89,20 @@ class RoundoffStop {
     return suspicious && rate >= (1 + std::pow(best_ / first_, exponent)) / 2;
   }
 
-  static constexpr double few_ulp = 2 * std::numeric_limits<double>::epsilon();
-  static constexpr double negligible = 1e-20;
-  static constexpr double noise = 1e-12;  // corrections below may be rounding alone and say nothing of C
+  static constexpr double double_epsilon = std::numeric_limits<double>::epsilon();
+
+  double coarser() const { return epsilon_ / double_epsilon; }  // than double
+  double negligible() const { return 1e-20 * coarser(); }
+  // Corrections below may be rounding alone and say nothing of C.
+  double noise() const { return 1e-12 * coarser(); }
+
   static constexpr double safety = 10;
   static constexpr int check_interval = 32;
 
-  // No iteration that converges stops shrinking above this. The velocity of a link is the difference of momenta of all
-  // masses below it, a second one along the chain: rounding grows like the square of its length. (Measured in space:
-  // 8e-10, 9e-8 and 1e-5 for 10³, 10⁴ and 10⁵ links.)
+  double epsilon_;
+  // No iteration that converges stops shrinking above this: 1e-7 in double, more where links are many. The velocity of
+  // a link is the difference of momenta of all masses below it, a second one along the chain: rounding grows like the
+  // square of its length. (Measured in space: 8e-10, 9e-8 and 1e-5 for 10³, 10⁴ and 10⁵ links.)
   double small_;
   Convergence convergence_ = Convergence::quadratic;
   std::array<double, 4> last_{};  // the newest first

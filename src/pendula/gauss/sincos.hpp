@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <pendula/gauss/lanes.hpp>
+#include <tuple>
 #include <xsimd/xsimd.hpp>
 
 namespace pendula {
@@ -84,15 +85,24 @@ void sincos(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sin
     detail::sincos_of_large(x, sine, cosine);
 }
 
-inline void sincos(double x, double& sine, double& cosine) {
-  sine = std::sin(x);
-  cosine = std::cos(x);
+/// In single precision, to 1.25 ulp.
+template <class Arch>
+void sincos(const xsimd::batch<float, Arch>& x, xsimd::batch<float, Arch>& sine, xsimd::batch<float, Arch>& cosine) {
+  std::tie(sine, cosine) = xsimd::sincos(x);
+}
+
+template <class Real>
+void sincos(const Real& x, Real& sine, Real& cosine) {
+  using std::cos, std::sin;
+  sine = sin(x);
+  cosine = cos(x);
 }
 
 /// Sines and cosines of `count` numbers in a row. All three arrays are aligned and readable up to the next multiple of
 /// eight numbers.
-template <class Register = RegisterFor<8>>
-void sincos_all(const double* x, double* sine, double* cosine, std::ptrdiff_t count) {
+template <class Real>
+void sincos_all(const Real* x, Real* sine, Real* cosine, std::ptrdiff_t count) {
+  using Register = RegisterFor<8, Real>;
   for (std::ptrdiff_t i = 0; i < count; i += detail::register_size<Register>) {
     Register at, s, c;
     detail::load(x + i, at);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <pendula/gauss/compensated.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/options.hpp>
@@ -22,6 +23,7 @@ struct StepperOptions {
 ///
 /// A `StageSolver` owns the model and the workspace, is built from (chain, stages, options of its own…), and offers
 ///   using Chain, State;
+///   using Real;                            what it computes in: round-off is that of this type
 ///   Status start(const State&);            takes over a state; may find it singular
 ///   void prepare(double time, double h);   predicts the stages of the next step
 ///   Correction correct();                  improves the stages once
@@ -44,7 +46,7 @@ class GaussStepper {
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
   template <class... SolverOptions>
   GaussStepper(const Chain& chain, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
-      : solver_(chain, stages, solver_options...), options_(options), at_roundoff_(chain.links()) {}
+      : solver_(chain, stages, solver_options...), options_(options), at_roundoff_(chain.links(), epsilon()) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
@@ -73,6 +75,8 @@ class GaussStepper {
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
+  static double epsilon() { return static_cast<double>(std::numeric_limits<typename StageSolver::Real>::epsilon()); }
+
   // An iteration that goes farther than this from where it began, relative to the unknowns, may have come to a solution
   // of the stage equations that is not the motion: its energy is looked at.
   static constexpr double trusted_prediction = 0.02;

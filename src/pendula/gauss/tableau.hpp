@@ -13,50 +13,75 @@ namespace pendula {
 inline constexpr int max_stages = 8;
 
 /// One number a stage; S may be Eigen::Dynamic, the storage is on the stack either way.
-template <int S>
-using StageVector = Eigen::Matrix<double, S, 1, Eigen::ColMajor, S == Eigen::Dynamic ? max_stages : S, 1>;
+template <int S, class Real = double>
+using StageVector = Eigen::Matrix<Real, S, 1, Eigen::ColMajor, S == Eigen::Dynamic ? max_stages : S, 1>;
 
 /// One number for each pair of stages.
-template <int S>
-using StageMatrix = Eigen::Matrix<double, S, S, Eigen::ColMajor, S == Eigen::Dynamic ? max_stages : S,
+template <int S, class Real = double>
+using StageMatrix = Eigen::Matrix<Real, S, S, Eigen::ColMajor, S == Eigen::Dynamic ? max_stages : S,
                                   S == Eigen::Dynamic ? max_stages : S>;
 
-/// The Gauss–Legendre method of s stages and order 2s; s = 2 is paper eq. (48)–(51).
-template <int S = Eigen::Dynamic>
+/// The Gauss–Legendre method of s stages and order 2s; s = 2 is paper eq. (48)–(51). To the last bit of a Real of up to
+/// 106 bits, but for a_squared and extrapolation, where the bits of double are enough.
+template <int S = Eigen::Dynamic, class Real = double>
 struct Tableau {
-  StageVector<S> c, b;
-  StageMatrix<S> a;
-  StageMatrix<S> m;              ///< a_ij / b_j with m_ii = ½ and m_ij + m_ji = 1 exactly: what makes it symplectic
-  StageMatrix<S> a_squared;      ///< A², for the velocity form
-  StageMatrix<S> extrapolation;  ///< ℓ_j(1 + c_i): the last step's stage polynomial at this step's stages
+  StageVector<S, Real> c, b;
+  StageMatrix<S, Real> a;
+  StageMatrix<S, Real> m;              ///< a_ij / b_j, m_ii = ½ and m_ij + m_ji = 1 exactly: what makes it symplectic
+  StageMatrix<S, Real> a_squared;      ///< A², for the velocity form
+  StageMatrix<S, Real> extrapolation;  ///< ℓ_j(1 + c_i): the last step's stage polynomial at this step's stages
 
   int stages() const { return static_cast<int>(c.size()); }
 };
 
 namespace detail {
 
-template <std::size_t From, int S>
-void copy(const std::array<double, From>& from, StageVector<S>& to) {
-  to = Eigen::Map<const Eigen::Matrix<double, static_cast<int>(From), 1>>(from.data());
+template <std::size_t From, int S, class Real>
+void copy(const std::array<double, From>& from, StageVector<S, Real>& to) {
+  to = Eigen::Map<const Eigen::Matrix<double, static_cast<int>(From), 1>>(from.data()).template cast<Real>();
 }
 
-template <std::size_t From, int S>
-void copy(const std::array<std::array<double, From>, From>& from, StageMatrix<S>& to) {
+template <std::size_t From, int S, class Real>
+void copy(const std::array<std::array<double, From>, From>& from, StageMatrix<S, Real>& to) {
   constexpr auto size = static_cast<int>(From);
-  to = Eigen::Map<const Eigen::Matrix<double, size, size, size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>(
-      from[0].data());
+  to =
+      Eigen::Map<const Eigen::Matrix<double, size, size, size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>(from[0].data())
+          .template cast<Real>();
 }
 
-template <int From, int S>
-Tableau<S> make_tableau() {
+// m in the bits of Real. Of m_ij and m_ji the larger is rounded, and 1 minus it is exact (Sterbenz).
+template <int S, class Real>
+void round_symplectic(const StageMatrix<S, Real>& low, StageMatrix<S, Real>& m) {
+  const StageMatrix<S, Real> whole = m + low;
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    for (Eigen::Index j = 0; j < m.cols(); ++j) {
+      const bool larger = whole(i, j) > whole(j, i);
+      if (i != j) m(i, j) = larger ? whole(i, j) : Real(1) - whole(j, i);
+    }
+  }
+}
+
+template <int From, int S, class Real>
+Tableau<S, Real> make_tableau() {
   using Generated = kernels::GaussTableau<From>;
-  Tableau<S> tableau;
-  copy<static_cast<std::size_t>(From), S>(Generated::c, tableau.c);
-  copy<static_cast<std::size_t>(From), S>(Generated::b, tableau.b);
-  copy<static_cast<std::size_t>(From), S>(Generated::a, tableau.a);
-  copy<static_cast<std::size_t>(From), S>(Generated::m, tableau.m);
-  copy<static_cast<std::size_t>(From), S>(Generated::a_squared, tableau.a_squared);
-  copy<static_cast<std::size_t>(From), S>(Generated::extrapolation, tableau.extrapolation);
+  constexpr auto size = static_cast<std::size_t>(From);
+  Tableau<S, Real> tableau;
+  StageVector<S, Real> c_low, b_low;
+  StageMatrix<S, Real> a_low, m_low;
+  copy<size, S>(Generated::c, tableau.c);
+  copy<size, S>(Generated::c_low, c_low);
+  copy<size, S>(Generated::b, tableau.b);
+  copy<size, S>(Generated::b_low, b_low);
+  copy<size, S>(Generated::a, tableau.a);
+  copy<size, S>(Generated::a_low, a_low);
+  copy<size, S>(Generated::m, tableau.m);
+  copy<size, S>(Generated::m_low, m_low);
+  copy<size, S>(Generated::a_squared, tableau.a_squared);
+  copy<size, S>(Generated::extrapolation, tableau.extrapolation);
+  tableau.c += c_low;
+  tableau.b += b_low;
+  tableau.a += a_low;
+  round_symplectic<S>(m_low, tableau.m);
   return tableau;
 }
 
@@ -70,49 +95,50 @@ inline void require_stages(int stages) {
 }
 
 /// The tableau of `stages` stages; where S is fixed, `stages` must equal it. Throws std::invalid_argument.
-template <int S = Eigen::Dynamic>
-Tableau<S> gauss_tableau(int stages) {
+template <int S = Eigen::Dynamic, class Real = double>
+Tableau<S, Real> gauss_tableau(int stages) {
   require_stages(stages);
   if constexpr (S != Eigen::Dynamic) {
     if (stages != S) throw std::invalid_argument("stages: this solver is compiled for " + std::to_string(S));
-    return detail::make_tableau<S, S>();
+    return detail::make_tableau<S, S, Real>();
   } else {
-    static constexpr std::array<Tableau<S> (*)(), max_stages> make = {
-        &detail::make_tableau<1, S>, &detail::make_tableau<2, S>, &detail::make_tableau<3, S>,
-        &detail::make_tableau<4, S>, &detail::make_tableau<5, S>, &detail::make_tableau<6, S>,
-        &detail::make_tableau<7, S>, &detail::make_tableau<8, S>};
+    static constexpr std::array<Tableau<S, Real> (*)(), max_stages> make = {
+        &detail::make_tableau<1, S, Real>, &detail::make_tableau<2, S, Real>, &detail::make_tableau<3, S, Real>,
+        &detail::make_tableau<4, S, Real>, &detail::make_tableau<5, S, Real>, &detail::make_tableau<6, S, Real>,
+        &detail::make_tableau<7, S, Real>, &detail::make_tableau<8, S, Real>};
     return make[static_cast<std::size_t>(stages - 1)]();
   }
 }
 
 /// The tableau with the step size folded in, and the predictor for the ratio of this step to the last.
-template <int S = Eigen::Dynamic>
+template <int S = Eigen::Dynamic, class Real = double>
 class StepCoefficients {
  public:
-  explicit StepCoefficients(const Tableau<S>& tableau) : tableau_(tableau), extrapolation_(tableau.extrapolation) {
+  explicit StepCoefficients(const Tableau<S, Real>& tableau)
+      : tableau_(tableau), extrapolation_(tableau.extrapolation) {
     hb_.resizeLike(tableau.b);
     ha_.resizeLike(tableau.a);
     h2a2_.resizeLike(tableau.a);
   }
 
   /// Prepares for a step of `h` after one of `previous` (0: there is none).
-  void prepare(double h, double previous) {
+  void prepare(Real h, Real previous) {
     if (h != h_) fold(h);
-    const double ratio = previous == 0 ? 1 : h / previous;
+    const Real ratio = previous == 0 ? Real(1) : Real(h / previous);
     if (ratio != ratio_) extrapolate(ratio);
   }
 
   int stages() const { return tableau_.stages(); }
-  double h() const { return h_; }
-  double hc(int i) const { return h_ * tableau_.c[i]; }
-  double hb(int j) const { return hb_[j]; }  ///< h b_j, rounded so that they sum to h exactly
-  double m(int i, int j) const { return tableau_.m(i, j); }
-  double ha(int i, int j) const { return ha_(i, j); }  ///< m_ij · hb_j
-  double h2a2(int i, int j) const { return h2a2_(i, j); }
-  double extrapolation(int i, int j) const { return extrapolation_(i, j); }
+  Real h() const { return h_; }
+  Real hc(int i) const { return h_ * tableau_.c[i]; }
+  Real hb(int j) const { return hb_[j]; }  ///< h b_j, rounded so that they sum to h exactly
+  Real m(int i, int j) const { return tableau_.m(i, j); }
+  Real ha(int i, int j) const { return ha_(i, j); }  ///< m_ij · hb_j
+  Real h2a2(int i, int j) const { return h2a2_(i, j); }
+  Real extrapolation(int i, int j) const { return extrapolation_(i, j); }
 
  private:
-  void fold(double h) {
+  void fold(Real h) {
     h_ = h;
     hb_ = h * tableau_.b;
     make_sum_exact();
@@ -128,9 +154,9 @@ class StepCoefficients {
       hb_[0] = h_;
       return;
     }
-    double rest = h_;
+    Real rest = h_;
     for (Eigen::Index j = 1; j + 1 < s; ++j) {
-      const double sum = h_ + hb_[j];
+      const Real sum = h_ + hb_[j];
       hb_[j] = sum - h_;
       rest -= hb_[j];
     }
@@ -138,7 +164,7 @@ class StepCoefficients {
   }
 
   // ℓ_j(1 + ratio·c_i) on the nodes c.
-  void extrapolate(double ratio) {
+  void extrapolate(Real ratio) {
     ratio_ = ratio;
     if (ratio == 1) {
       extrapolation_ = tableau_.extrapolation;
@@ -149,19 +175,19 @@ class StepCoefficients {
     }
   }
 
-  double lagrange(int j, double x) const {
-    double value = 1;
+  Real lagrange(int j, Real x) const {
+    Real value(1);
     for (int k = 0; k < stages(); ++k) {
       if (k != j) value *= (x - tableau_.c[k]) / (tableau_.c[j] - tableau_.c[k]);
     }
     return value;
   }
 
-  Tableau<S> tableau_;
-  StageVector<S> hb_;
-  StageMatrix<S> ha_, h2a2_, extrapolation_;
-  double h_ = 0;
-  double ratio_ = 1;
+  Tableau<S, Real> tableau_;
+  StageVector<S, Real> hb_;
+  StageMatrix<S, Real> ha_, h2a2_, extrapolation_;
+  Real h_{0};
+  Real ratio_{1};
 };
 
 }  // namespace pendula
