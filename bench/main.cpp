@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
   benchmark::AddCustomContext("compiler", BENCH_COMPILER);
   benchmark::AddCustomContext("flags", BENCH_FLAGS);
   bench::register_unit();
-  bench::register_dense_steps();
+  bench::register_few_links();
   bench::register_chain_costs();
   bench::register_against_rk4imp();
   if (!races.empty()) bench::register_races(races, longest);

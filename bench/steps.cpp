@@ -1,11 +1,14 @@
 #include <benchmark/benchmark.h>
 
+#include <array>
 #include <chrono>
 #include <optional>
 #include <peers/pendula.hpp>
 #include <sstream>
 #include <steps.hpp>
+#include <string>
 #include <unit.hpp>
+#include <utility>
 
 namespace bench {
 namespace {
@@ -134,12 +137,18 @@ void add_chain_costs(int stages, Iteration iteration) {
 
 }  // namespace
 
-void register_dense_steps() {
+void register_few_links() {
+  const std::array<std::pair<std::string, RunOptions>, 3> solvers{{
+      {"dense, momentum", {.form = Form::momentum, .solver = Solver::dense}},
+      {"dense, velocity", {.form = Form::velocity, .solver = Solver::dense}},
+      {"chain", {.form = Form::momentum, .solver = Solver::chain}},
+  }};
   for (const auto& kernel : pendula::built_in_kernels()) {
     for (const int stages : {1, 2, 4, 8}) {
-      for (const Form form : {Form::momentum, Form::velocity}) {
-        const RunOptions options{.stages = stages, .form = form, .solver = Solver::dense, .step = usual_step(stages)};
-        const Case what{name_of("dense/", kernel.name, "/s=", stages, "/", form), kernel.links, options};
+      for (auto [solver, options] : solvers) {
+        options.stages = stages;
+        options.step = usual_step(stages);
+        const Case what{name_of("few/", kernel.name, "/s=", stages, "/", solver), kernel.links, options};
         if (kernel.space == Planar::name) {
           add<Planar>(what);
         } else {

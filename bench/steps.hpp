@@ -2,8 +2,9 @@
 
 namespace bench {
 
-/// Step times of the dense kernels: every kernel of the build, 1, 2, 4 and 8 stages, both forms.
-void register_dense_steps();
+/// Step times on few links: every kernel of the build, 1, 2, 4 and 8 stages, both forms, and the chain solver on the
+/// same.
+void register_few_links();
 
 /// Cost of the chain solver a link and iteration, from n = 2 to 10⁵.
 void register_chain_costs();

@@ -231,20 +231,17 @@ def chain(figures: Figures) -> str:
     return table(["sincos a link and iteration, n =", *map(str, LINKS)], rows)
 
 
-def dense(figures: Figures) -> str:
-    """Step times of the dense kernels: momentum form / velocity form, iterations of the first."""
-    kernels = sorted({name.split("/")[1] for name in figures.benchmarks if name.startswith("dense/")})
+def few(figures: Figures) -> str:
+    """Step times on few links: dense kernels in momentum and in velocity form, and the chain solver."""
+    kernels = sorted({name.split("/")[1] for name in figures.benchmarks if name.startswith("few/")})
     rows = []
     for kernel in kernels:
         cells = []
         for stages in (1, 2, 4, 8):
-            names = (f"dense/{kernel}/s={stages}/{form}" for form in ("momentum", "velocity"))
-            forms = [figures.benchmarks.get(name) for name in names]
-            if all(forms):
-                times = " / ".join(number(form["step_microseconds"]) for form in forms)
-                cells.append(f"{times} ({forms[0]['iterations_a_step']:.1f})")
-            else:
-                cells.append("–")
+            solvers = ("dense, momentum", "dense, velocity", "chain")
+            entries = [figures.benchmarks.get(f"few/{kernel}/s={stages}/{solver}") for solver in solvers]
+            times = (number(entry["step_microseconds"]) if entry else "–" for entry in entries)
+            cells.append(" / ".join(times))
         rows.append([kernel.replace("_", " "), *cells])
     head = ["µs a step", "s = 1, h = 1e-3", "s = 2, h = 1e-3", "s = 4, h = 5e-3", "s = 8, h = 1e-2"]
     return table(head, rows)
@@ -292,7 +289,7 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "steps": steps,
     "chain": chain,
     "simplified": simplified,
-    "dense": dense,
+    "few links": few,
 }
 
 

@@ -1,4 +1,5 @@
 #include <pendula/chain_integrator.hpp>
+#include <pendula/chart.hpp>
 #include <pendula/explicit_integrator.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/integrator.hpp>
@@ -39,12 +40,21 @@ std::unique_ptr<Integrator<Space>> make_explicit(const Chain<Space>& chain, cons
   return make_explicit_integrator<Space>(make_chain_forward_dynamics(chain), options, "");
 }
 
-// The chain solver at any size: it takes 0.3 to 0.8 of the dense solver's time in the plane from one link on, and in
-// space from two; one spatial link takes up to 1.4 of it, but the dense solver cannot pass a pole. The dense solver has
-// what the chain solver lacks, the velocity form.
-Solver solver_for(const RunOptions& options) {
+// Whether the dense solver is the faster one. It takes 0.5 to 0.96 of the chain solver's time here, 0.93 on three links
+// with one stage, and up to 6 times as much elsewhere (table "few links" in docs/benchmarks.md). On one spatial link it
+// leads, too, but cannot pass a pole.
+template <class Space>
+bool dense_is_faster(int links, int stages) {
+  return !has_charts<Space> && links <= 2 && stages <= 2;
+}
+
+// The velocity form is the dense solver's alone, and only it needs a kernel.
+template <class Space>
+Solver solver_for(int links, const RunOptions& options) {
   if (options.solver != Solver::automatic) return options.solver;
-  return options.form == Form::velocity ? Solver::dense : Solver::chain;
+  if (options.form == Form::velocity) return Solver::dense;
+  const bool dense_can = options.iteration != Iteration::fixed_point && find_kernel<Space>(links) != nullptr;
+  return dense_can && dense_is_faster<Space>(links, options.stages) ? Solver::dense : Solver::chain;
 }
 
 void require_newton(Iteration iteration) {
@@ -58,7 +68,7 @@ template <class Space>
 std::unique_ptr<Integrator<Space>> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
   if (options.method != Method::gauss) return make_explicit(chain, options);
   require_stages(options.stages);
-  if (solver_for(options) == Solver::chain) return make_chain_integrator(chain, options);
+  if (solver_for<Space>(chain.links(), options) == Solver::chain) return make_chain_integrator(chain, options);
   require_newton(options.iteration);
   return require_kernel<Space>(chain.links()).make(chain, options);
 }
