@@ -103,6 +103,12 @@ Real norm(const Real& x, const Real& y) {
   return sqrt(x * x + y * y);
 }
 
+/// Whether a vector is vertical, or nothing at all.
+template <class Real>
+bool at_pole(const std::array<Real, 3>& x) {
+  return norm(x[0], x[1]) < 32 * std::numeric_limits<Real>::epsilon();
+}
+
 /// x moved by full turns to within half a turn of `near`.
 template <class Real>
 Real unwrapped(const Real& x, const Real& near) {
@@ -123,26 +129,32 @@ std::array<Real, 2> nearest_angles(const std::array<Real, 2>& q, const std::arra
 
 }  // namespace detail
 
-/// The user's θ, φ and their rates from a direction, continuous with the angles `near` of a moment before.
+/// The user's θ, φ of a direction, continuous with the angles `near` of a moment before.
 ///
-/// At the pole (sin θ < 32 ulp) φ is the plane in which the link moves, or what it was if the link rests, and
-/// φ̇ is zero.
+/// At the pole (sin θ < 32 ulp) φ is the plane in which the link moves, or what it was if the link rests.
+template <class Real>
+std::array<Real, 2> user_coordinates(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
+  using std::atan2;
+  const auto& [u, u_dot] = heading;
+  std::array<Real, 2> q;
+  Spatial::Link::coordinates(u, q);
+  if (detail::at_pole(u)) {
+    const bool rests = detail::at_pole(u_dot);
+    q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
+  }
+  return detail::nearest_angles(q, near);
+}
+
+/// The same with their rates; at the pole φ̇ is zero.
 template <class Real>
 LinkAngles<Spatial, Real> user_angles(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
-  using std::atan2;
-  const Real pole = 32 * std::numeric_limits<Real>::epsilon();
-  const auto& [u, u_dot] = heading;
   LinkAngles<Spatial, Real> angles;
-  Spatial::Link::coordinates(u, angles.q);
-  const bool at_pole = detail::norm(u[0], u[1]) < pole;
-  const bool rests = detail::norm(u_dot[0], u_dot[1]) < pole;
-  if (at_pole) angles.q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
-  angles.q = detail::nearest_angles(angles.q, near);
+  angles.q = user_coordinates(heading, near);
   Spatial::Link::Trig<Real> trig;
   Real determinant;
   Spatial::Link::trig(angles.q, trig);
   Spatial::Link::metric_determinant(trig, determinant);
-  Spatial::Link::rates(trig, at_pole ? Real(0) : Real(1 / determinant), u_dot, angles.v);
+  Spatial::Link::rates(trig, detail::at_pole(heading.u) ? Real(0) : Real(1 / determinant), heading.u_dot, angles.v);
   return angles;
 }
 

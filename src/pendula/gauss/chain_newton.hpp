@@ -15,67 +15,120 @@ constexpr std::size_t padded_row(std::size_t count) {
   return count <= 2 ? count : (count + 3) / 4 * 4;
 }
 
-/// A small matrix, row by row, its rows padded to packs.
+/// A small matrix, row by row, its rows padded to packs. Rows are written whole where they are read whole soon after: a
+/// processor hands on what it has just stored, but not a row that was stored in pieces.
 template <std::size_t Rows, std::size_t Columns, class Real>
 struct Block {
   static constexpr std::size_t stride = padded_row<Real>(Columns);
-  using Row = Pack<static_cast<int>(stride), RegisterFor<static_cast<int>(stride), Real>>;
+  // Few numbers wait for each other, and registers of four are quicker then than registers of eight.
+  static constexpr int widest = stride <= 8 ? 4 : 8;
+  using Row = Pack<static_cast<int>(stride), RegisterFor<static_cast<int>(stride), Real, widest>>;
 
-  alignas(pack_alignment) Real values[Rows][stride] = {};
+  alignas(pack_alignment) Real values[Rows][stride];
 
   Real* operator[](std::size_t row) { return values[row]; }
   const Real* operator[](std::size_t row) const { return values[row]; }
   Row row(std::size_t i) const { return Row::load(values[i]); }
   void set_row(std::size_t i, const Row& row) { row.store(values[i]); }
+
+  /// x in column k, zero elsewhere.
+  static Row unit(std::size_t k, const Real& x) { return Row(x) * Row::load(units.values[k]); }
+
+ private:
+  struct Units {
+    alignas(pack_alignment) Real values[Columns][stride] = {};
+    Units() {
+      for (std::size_t k = 0; k < Columns; ++k) values[k][k] = Real(1);
+    }
+  };
+  static inline const Units units;
 };
 
-/// C += A B, row by row; two sums side by side, so that one does not wait for the other.
+/// Row i of A B for the columns of A that B has rows for, added to `start`; two sums side by side, so that one does not
+/// wait for the other.
+template <std::size_t Inner, std::size_t Columns, class Real>
+auto row_of_product(const Real* a, const Block<Inner, Columns, Real>& b,
+                    const typename Block<Inner, Columns, Real>::Row& start) {
+  using Row = typename Block<Inner, Columns, Real>::Row;
+  Row even = fma(Row(a[0]), b.row(0), start);
+  if constexpr (Inner == 1) return even;
+  Row odd = Row(a[1]) * b.row(1);
+  for (std::size_t k = 2; k + 1 < Inner; k += 2) {
+    even = fma(Row(a[k]), b.row(k), even);
+    odd = fma(Row(a[k + 1]), b.row(k + 1), odd);
+  }
+  if (Inner % 2 == 1) even = fma(Row(a[Inner - 1]), b.row(Inner - 1), even);
+  return even + odd;
+}
+
+/// C = A B.
+template <std::size_t M, std::size_t Inner, std::size_t Columns, class Real>
+void set_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Real>& b, Block<M, Columns, Real>& c) {
+  using Row = typename Block<M, Columns, Real>::Row;
+  for (std::size_t i = 0; i < M; ++i) c.set_row(i, row_of_product(a[i], b, Row(Real(0))));
+}
+
+/// C += A B.
 template <std::size_t M, std::size_t Inner, std::size_t Columns, class Real>
 void add_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Real>& b, Block<M, Columns, Real>& c) {
-  using Row = typename Block<M, Columns, Real>::Row;
-  for (std::size_t i = 0; i < M; ++i) {
-    Row even = c.row(i), odd(Real(0));
-    for (std::size_t k = 0; k + 1 < Inner; k += 2) {
-      even = fma(Row(a[i][k]), b.row(k), even);
-      odd = fma(Row(a[i][k + 1]), b.row(k + 1), odd);
-    }
-    if (Inner % 2 == 1) even = fma(Row(a[i][Inner - 1]), b.row(Inner - 1), even);
-    c.set_row(i, even + odd);
-  }
+  for (std::size_t i = 0; i < M; ++i) c.set_row(i, row_of_product(a[i], b, c.row(i)));
 }
 
-/// y += A x.
-template <std::size_t M, std::size_t Columns, class Real>
-void add_product(const Block<M, Columns, Real>& a, const Real* x, Real* y) {
-  for (std::size_t i = 0; i < M; ++i) {
-    for (std::size_t k = 0; k < Columns; ++k) y[i] += a[i][k] * x[k];
+/// Replaces the square of S from (k, k) on, of one row or of two, by the negative of its inverse: one division either
+/// way.
+template <std::size_t M, class Real>
+void invert_negated(Block<M, M, Real>& S, std::size_t k) {
+  if (k + 1 == M) {
+    S[k][k] = -1 / S[k][k];
+    return;
   }
+  const Real a = S[k][k], b = S[k][k + 1], c = S[k + 1][k], d = S[k + 1][k + 1];
+  const Real inverse = 1 / (b * c - a * d);
+  S[k][k] = d * inverse;
+  S[k][k + 1] = -b * inverse;
+  S[k + 1][k] = -c * inverse;
+  S[k + 1][k + 1] = a * inverse;
 }
 
-/// Replaces Y by −S⁻¹ Y and y by −S⁻¹ y. No pivoting: S is a mass matrix but for terms of the order of the step, and a
-/// step that spoils it does not converge and is halved.
+/// Y_i += a Y_k + b Y_{k+1}.
 template <std::size_t M, std::size_t Columns, class Real>
-void solve_negated(Block<M, M, Real>& S, Block<M, Columns, Real>& Y, Real* y) {
+void add_rows(Block<M, Columns, Real>& Y, std::size_t i, std::size_t k, const Real& a, const Real& b) {
   using Row = typename Block<M, Columns, Real>::Row;
-  for (std::size_t k = 0; k < M; ++k) {
-    const Real inverse = 1 / S[k][k];
-    S[k][k] = inverse;
-    for (std::size_t i = k + 1; i < M; ++i) {
-      const Real factor = -S[i][k] * inverse;
-      for (std::size_t j = k + 1; j < M; ++j) S[i][j] += factor * S[k][j];
-      Y.set_row(i, fma(Row(factor), Y.row(k), Y.row(i)));
-      y[i] += factor * y[k];
+  Y.set_row(i, fma(Row(a), Y.row(k), fma(Row(b), Y.row(k + 1), Y.row(i))));
+}
+
+/// Y_k from the rows after it, by row k of S, whose diagonal squares are negative inverses; of one row or of two.
+template <std::size_t M, std::size_t Columns, class Real>
+void substitute_back(const Block<M, M, Real>& S, Block<M, Columns, Real>& Y, std::size_t k) {
+  using Row = typename Block<M, Columns, Real>::Row;
+  Row first = Y.row(k);
+  if (k + 1 == M) return Y.set_row(k, Row(S[k][k]) * first);
+  Row second = Y.row(k + 1);
+  for (std::size_t j = k + 2; j < M; ++j) {
+    first = fma(Row(S[k][j]), Y.row(j), first);
+    second = fma(Row(S[k + 1][j]), Y.row(j), second);
+  }
+  Y.set_row(k, fma(Row(S[k][k]), first, Row(S[k][k + 1]) * second));
+  Y.set_row(k + 1, fma(Row(S[k + 1][k]), first, Row(S[k + 1][k + 1]) * second));
+}
+
+/// Replaces Y by −S⁻¹ Y and y by −S⁻¹ y, two rows at a time. No pivoting: S is a mass matrix but for terms of the order
+/// of the step, and a step that spoils it does not converge and is halved.
+template <std::size_t M, std::size_t Columns, class Real>
+void solve_negated(Block<M, M, Real>& S, Block<M, Columns, Real>& Y, Block<M, 1, Real>& y) {
+  for (std::size_t k = 0; k < M; k += 2) {
+    invert_negated(S, k);
+    for (std::size_t i = k + 2; i < M; ++i) {
+      const Real first = S[i][k] * S[k][k] + S[i][k + 1] * S[k + 1][k];
+      const Real second = S[i][k] * S[k][k + 1] + S[i][k + 1] * S[k + 1][k + 1];
+      for (std::size_t j = k + 2; j < M; ++j) S[i][j] += first * S[k][j] + second * S[k + 1][j];
+      add_rows(Y, i, k, first, second);
+      add_rows(y, i, k, first, second);
     }
   }
-  for (std::size_t k = M; k-- > 0;) {
-    Row row = -Y.row(k);
-    Real sum = -y[k];
-    for (std::size_t j = k + 1; j < M; ++j) {
-      row = fma(Row(-S[k][j]), Y.row(j), row);
-      sum -= S[k][j] * y[j];
-    }
-    Y.set_row(k, Row(S[k][k]) * row);
-    y[k] = S[k][k] * sum;
+  for (std::size_t done = M % 2 == 0 ? 2 : 1; done <= M; done += 2) {
+    substitute_back(S, Y, M - done);
+    substitute_back(S, y, M - done);
   }
 }
 
@@ -104,6 +157,7 @@ class ChainNewton {
   Correction correct(Stages& stages) {
     stages.place();
     stages.run_out();
+    set_coefficients(stages.columns());
     inward(stages);
     return outward(stages);
   }
@@ -124,23 +178,39 @@ class ChainNewton {
       return *this;
     }
     Real operator[](std::size_t stage) const { return values[stage]; }
+    L lanes() const { return L::load(values); }
   };
 
-  struct Terms {
+  struct Directions {
     PerStage u[K][Dim], y[K][Dim];  // l û_a, l y_a along the axes of the world
+  };
+
+  struct Terms : Directions {
     PerStage T[K][K], T_minus[K][K], F[K][K];
     PerStage residual[K];
   };
 
   struct Carried {  // δG = P δw + g
-    detail::Block<vectors, vectors, Real> P;
-    alignas(pack_alignment) Real g[vectors] = {};
+    detail::Block<vectors, vectors, Real> P{};
+    detail::Block<vectors, 1, Real> g{};
   };
 
   struct Gain {  // δV = K δw + k
     detail::Block<unknowns, vectors, Real> K;
-    alignas(pack_alignment) Real k[unknowns] = {};
+    detail::Block<unknowns, 1, Real> k;
   };
+
+  void set_coefficients(const detail::StageColumns<S, Real>& columns) {
+    if (columns.h() == h_) return;
+    h_ = columns.h();
+    for (std::size_t u = 0; u < unknowns; ++u) {
+      for (std::size_t j = 0; j < s; ++j) ha_[u][u / s * s + j] = columns.ha(u % s, j);
+    }
+    for (std::size_t k = 0; k < s; ++k) {
+      for (std::size_t j = 0; j < s; ++j) ha_lanes_[k].values[j] = columns.ha(k, j);
+      unit_[k].values[k] = Real(1);
+    }
+  }
 
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     Carried carried;
@@ -150,7 +220,7 @@ class ChainNewton {
     for (int i = stages.links(); i-- > 0;) {
       const Real m = stages.constants(i).mass;
       G = sum(G, scaled(L(m), stages.bob_velocity(i)));
-      for (std::size_t k = 0; k < vectors; ++k) carried.P[k][k] += m;
+      for (std::size_t k = 0; k < vectors; ++k) carried.P.set_row(k, carried.P.row(k) + carried.P.unit(k, m));
       find_terms(stages, i, G, terms);
       eliminate(stages, terms, carried, gains_[i]);
     }
@@ -166,12 +236,8 @@ class ChainNewton {
     typename Link::template Symmetric<L> p_D_q, f_D_q;
     Coordinates p, f;
     Link::newton_terms(trig, v, to_chart(chart, scaled(l, G)), load, u, y, p, f, p_D_q, f_D_q);
+    set_directions(chart, l, u, y, terms);
     for (std::size_t a = 0; a < K; ++a) {
-      for (std::size_t k = 0; k < Dim; ++k) {
-        const auto axis = static_cast<std::size_t>(world_axis<Space>(chart, static_cast<int>(k)));
-        terms.u[a][axis] = l * u[a][k];
-        terms.y[a][axis] = l * y[a][k];
-      }
       for (std::size_t c = 0; c < K; ++c) {
         terms.T[a][c] = p_D_q[a + c];  // θθ, θφ, φφ
         terms.T_minus[a][c] = p_D_q[a + c];
@@ -180,6 +246,17 @@ class ChainNewton {
       terms.residual[a] = stages.momentum_residual(i, a, p[a], f[a]);
     }
     if (stages.loaded()) add_load_terms(stages, i, u, y, p_D_q, f_D_q, terms);
+  }
+
+  static void set_directions(Chart chart, const L& l, const typename Link::template First<L>& u,
+                             const typename Link::template First<L>& y, Directions& directions) {
+    for (std::size_t a = 0; a < K; ++a) {
+      for (std::size_t k = 0; k < Dim; ++k) {
+        const auto axis = static_cast<std::size_t>(world_axis<Space>(chart, static_cast<int>(k)));
+        directions.u[a][axis] = l * u[a][k];
+        directions.y[a][axis] = l * y[a][k];
+      }
+    }
   }
 
   // Torque and drag turn with the link: û_a·∂R/∂q_c, and û_a·∂R/∂v_c.
@@ -202,61 +279,91 @@ class ChainNewton {
 
   void eliminate(const Stages& stages, const Terms& terms, Carried& carried, Gain& gain) {
     const auto& columns = stages.columns();
-    detail::Block<vectors, unknowns, Real> J, BJ;
+    using Jacobian = detail::Block<vectors, unknowns, Real>;
+    Jacobian J, BJ;
     detail::Block<unknowns, vectors, Real> E;
-    detail::Block<unknowns, unknowns, Real> S_block;
-    fill_couplings(columns, terms, J, E);
-    fill_diagonal(columns, terms, S_block);
-    gain = Gain{};
-    add_product(carried.P, J, BJ);
-    add_product(E, carried.P, gain.K);
-    add_product(E, BJ, S_block);
-    for (std::size_t a = 0; a < K; ++a) {
-      for (std::size_t k = 0; k < s; ++k) gain.k[a * s + k] = terms.residual[a][k];
+    detail::Block<unknowns, unknowns, Real> EBJ, D;
+    for (std::size_t d = 0; d < Dim; ++d) {
+      for (std::size_t k = 0; k < s; ++k) J.set_row(d * s + k, velocity_row(terms, d, k));
     }
+    fill_momentum_coupling(terms, E);
+    fill_diagonal(columns, terms, D);
+    set_product(carried.P, J, BJ);
+    set_product(E, carried.P, gain.K);
+    set_product(E, BJ, EBJ);
+    for (std::size_t u = 0; u < unknowns; ++u) gain.k[u][0] = terms.residual[u / s][u % s];
     add_product(E, carried.g, gain.k);
-    solve_negated(S_block, gain.K, gain.k);
+    for (std::size_t u = 0; u < unknowns; ++u) {
+      for (std::size_t c = 0; c < K; ++c) set_stages(D[u] + c * s, stages_of(D[u] + c * s) + stages_of(EBJ[u] + c * s));
+    }
+    solve_negated(D, gain.K, gain.k);
     add_product(BJ, gain.K, carried.P);
     add_product(BJ, gain.k, carried.g);
   }
 
-  static void fill_couplings(const detail::StageColumns<S, Real>& columns, const Terms& terms,
-                             detail::Block<vectors, unknowns, Real>& J, detail::Block<unknowns, vectors, Real>& E) {
+  // Row (d, k) of J: l û_a δ_km + h a_km l y_a(k) over (a, m).
+  auto velocity_row(const Terms& terms, std::size_t d, std::size_t k) const {
+    using Jacobian = detail::Block<vectors, unknowns, Real>;
+    auto row = Jacobian::unit(k, terms.u[0][d][k]) + typename Jacobian::Row(terms.y[0][d][k]) * ha_.row(k);
+    for (std::size_t a = 1; a < K; ++a) {
+      row = row + Jacobian::unit(a * s + k, terms.u[a][d][k]);
+      row = fma(typename Jacobian::Row(terms.y[a][d][k]), ha_.row(a * s + k), row);
+    }
+    return row;
+  }
+
+  // E: l û_a δ_kj − h a_kj l y_a(j).
+  void fill_momentum_coupling(const Terms& terms, detail::Block<unknowns, vectors, Real>& E) const {
     for (std::size_t a = 0; a < K; ++a) {
-      for (std::size_t d = 0; d < Dim; ++d) {
-        for (std::size_t k = 0; k < s; ++k) {
-          for (std::size_t j = 0; j < s; ++j) {
-            J[d * s + k][a * s + j] = columns.ha(k, j) * terms.y[a][d][k];
-            E[a * s + k][d * s + j] = -columns.ha(k, j) * terms.y[a][d][j];
-          }
-          J[d * s + k][a * s + k] += terms.u[a][d][k];
-          E[a * s + k][d * s + k] += terms.u[a][d][k];
+      for (std::size_t k = 0; k < s; ++k) {
+        for (std::size_t d = 0; d < Dim; ++d) {
+          const L u = terms.u[a][d].lanes(), y = terms.y[a][d].lanes();
+          set_stages(E[a * s + k] + d * s, unit_[k].lanes() * u - ha_lanes_[k].lanes() * y);
         }
       }
     }
   }
 
-  static void fill_diagonal(const detail::StageColumns<S, Real>& columns, const Terms& terms,
-                            detail::Block<unknowns, unknowns, Real>& D) {
+  void fill_diagonal(const detail::StageColumns<S, Real>& columns, const Terms& terms,
+                     detail::Block<unknowns, unknowns, Real>& D) const {
     for (std::size_t a = 0; a < K; ++a) {
       for (std::size_t c = 0; c < K; ++c) {
         for (std::size_t k = 0; k < s; ++k) {
-          Real* row = D[a * s + k] + c * s;
-          for (std::size_t m = 0; m < s; ++m) row[m] = columns.ha(k, m) * (terms.T[a][c][k] - terms.T_minus[a][c][m]);
+          L row = ha_lanes_[k].lanes() * (L(terms.T[a][c][k]) - terms.T_minus[a][c].lanes());
           for (std::size_t j = 0; j < s; ++j) {
-            const Real bent = columns.ha(k, j) * terms.F[a][c][j];
-            for (std::size_t m = 0; m < s; ++m) row[m] -= bent * columns.ha(j, m);
+            row = row - L(columns.ha(k, j) * terms.F[a][c][j]) * ha_lanes_[j].lanes();
           }
+          set_stages(D[a * s + k] + c * s, row);
         }
       }
+    }
+  }
+
+  // The stages of a pack in a row, whole where the pack holds nothing else.
+  static void set_stages(Real* row, const L& lanes) {
+    if constexpr (Z == s) {
+      lanes.store(row);
+    } else {
+      PerStage stored;
+      stored = lanes;
+      std::copy_n(stored.values, s, row);
+    }
+  }
+
+  static L stages_of(const Real* row) {
+    if constexpr (Z == s) {
+      return L::load(row);
+    } else {
+      PerStage stored{};
+      std::copy_n(row, s, stored.values);
+      return stored.lanes();
     }
   }
 
   PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
-    alignas(pack_alignment) Real dw[vectors] = {};
-    Cartesian lanes_dw;
-    lanes_dw.fill(L(Real(0)));
-    Real largest(0), scale(0);
+    Real dw[vectors] = {};
+    Real largest(0);
+    L scale(Real(0));
     int at = -1;
     for (int i = 0; i < stages.links(); ++i) {
       alignas(pack_alignment) Real dV[K][Z] = {};
@@ -265,14 +372,21 @@ class ChainNewton {
         largest = change;
         at = i;
       }
-      scale = std::max(scale, apply(stages, i, dV, lanes_dw));
-      for (std::size_t d = 0; d < Dim; ++d) {
-        alignas(pack_alignment) Real stored[Z];
-        lanes_dw[d].store(stored);
-        std::copy_n(stored, s, dw + d * s);
+      add_velocity(stages.columns(), directions(stages, i), dV, dw);
+      Coordinates v = stages.rates(i);
+      for (std::size_t a = 0; a < K; ++a) {
+        v[a] = v[a] + L::load(dV[a]);
+        scale = max(scale, abs(v[a]));
       }
+      stages.set_rates(i, v);
     }
-    return {static_cast<double>(largest > 0 ? Real(largest / scale) : largest), at};
+    return {static_cast<double>(largest > 0 ? Real(largest / largest_stage(scale)) : largest), at};
+  }
+
+  static Real largest_stage(const L& lanes) {
+    PerStage stored;
+    stored = lanes;
+    return *std::max_element(stored.values, stored.values + s);
   }
 
   // δV = k + K δw; the largest of it, or NaN.
@@ -280,8 +394,13 @@ class ChainNewton {
     using std::abs;
     Real largest(0);
     for (std::size_t u = 0; u < unknowns; ++u) {
-      Real change = gain.k[u];
-      for (std::size_t k = 0; k < vectors; ++k) change += gain.K[u][k] * dw[k];
+      Real even = gain.k[u][0], odd(0);
+      for (std::size_t k = 0; k + 1 < vectors; k += 2) {
+        even += gain.K[u][k] * dw[k];
+        odd += gain.K[u][k + 1] * dw[k + 1];
+      }
+      if (vectors % 2 == 1) even += gain.K[u][vectors - 1] * dw[vectors - 1];
+      const Real change = even + odd;
       dV[u / s][u % s] = change;
       const Real size = abs(change);
       if (!(size <= largest)) largest = size;
@@ -289,31 +408,36 @@ class ChainNewton {
     return largest;
   }
 
-  // V += δV, δw += l (û_a δV_a + y_a δQ_a); the largest V.
-  Real apply(Stages& stages, int i, const Real (&dV)[K][Z], Cartesian& dw) const {
-    const auto trig = stages.trig(i);
-    Coordinates v = stages.rates(i), p, f;
-    Cartesian none, dW;
+  Directions directions(const Stages& stages, int i) const {
+    Directions directions;
+    Cartesian none;
     none.fill(L(Real(0)));
-    dW.fill(L(Real(0)));
     typename Link::template First<L> u, y;
     typename Link::template Symmetric<L> p_D_q, f_D_q;
-    Link::newton_terms(trig, v, none, none, u, y, p, f, p_D_q, f_D_q);
-    Real largest(0);
+    Coordinates p, f;
+    Link::newton_terms(stages.trig(i), stages.rates(i), none, none, u, y, p, f, p_D_q, f_D_q);
+    set_directions(stages.chart(i), L(stages.constants(i).length), u, y, directions);
+    return directions;
+  }
+
+  // δw += l (û_a δV_a + y_a δQ_a), δQ = h A δV.
+  static void add_velocity(const detail::StageColumns<S, Real>& columns, const Directions& directions,
+                           const Real (&dV)[K][Z], Real* dw) {
     for (std::size_t a = 0; a < K; ++a) {
-      const L change = L::load(dV[a]), moved = stages.columns().integral(change);
-      for (std::size_t k = 0; k < Dim; ++k) dW[k] = dW[k] + (u[a][k] * change + y[a][k] * moved);
-      v[a] = v[a] + change;
-      alignas(pack_alignment) Real stored[Z];
-      abs(v[a]).store(stored);
-      for (std::size_t k = 0; k < s; ++k) largest = std::max(largest, stored[k]);
+      for (std::size_t k = 0; k < s; ++k) {
+        Real dQ(0);
+        for (std::size_t j = 0; j < s; ++j) dQ += columns.ha(k, j) * dV[a][j];
+        for (std::size_t d = 0; d < Dim; ++d) {
+          dw[d * s + k] += directions.u[a][d][k] * dV[a][k] + directions.y[a][d][k] * dQ;
+        }
+      }
     }
-    stages.set_rates(i, v);
-    dw = sum(dw, to_world(stages.chart(i), scaled(L(stages.constants(i).length), dW)));
-    return largest;
   }
 
   detail::PerLink<Gain, N> gains_;
+  detail::Block<unknowns, unknowns, Real> ha_{};  // (a, k): h a_km in the columns (a, m)
+  PerStage ha_lanes_[s]{}, unit_[s]{};            // of k: h a_kj, δ_kj
+  Real h_{0};                                     // that those belong to
 };
 
 }  // namespace pendula

@@ -593,8 +593,8 @@ class ChainStages {
     set_all_forces();
   }
 
-  // The user's angles of a link in chart 1, kept up so that they stay continuous.
-  void follow(int i) { user_[i] = user_angles(Heading<Space, Real>(1, position(i), last_rates(i)), user_[i]).q; }
+  // The user's angles of a link in chart 1 at the last stage, kept up so that they stay continuous.
+  void follow(int i) { user_[i] = user_coordinates(stage_heading(i, S - 1), user_[i]); }
 
   Rates last_rates(int i) const { return first_lane(V_[i] + (S - 1)); }
 
@@ -617,7 +617,7 @@ class ChainStages {
     Link::trig(q, trig);
     Link::tangent_momentum(trig, 1 / metric_determinant(trig), p, across);
     const Heading<Space, Real> heading(from, q, last_rates(i));
-    if (from == 0) user_[i] = q;
+    user_[i] = from == 0 ? q : user_coordinates(heading, user_[i]);
     Rates moved;
     if (to == 0) {
       moved = user_[i];
@@ -664,7 +664,7 @@ class ChainStages {
   ChainLinks<Space, N, Real> constants_;
   detail::StageColumns<S, Real> columns_;
   detail::PerLink<Chart, N> charts_;
-  detail::PerLink<Rates, N> user_;  // the user's angles of links in chart 1, when they were last read
+  detail::PerLink<Rates, N> user_;  // the user's angles of links in chart 1, shortly before
   detail::LinkArray<K, N, Real> q_, q_low_, p_, p_low_;
   detail::LinkArray<K * Z, N, Real> V_, F_, sine_, cosine_;
   detail::LinkArray<D * Z, N, Real> w_;

@@ -95,8 +95,8 @@ xsimd::batch<Real, Arch> fused(const xsimd::batch<Real, Arch>& x, const xsimd::b
 
 /// The register that a pack of `Size` numbers is made of. It is a parameter of everything that is made of packs, so
 /// that code compiled for different processors has different names and cannot be mixed by a linker.
-template <int Size, class Real = double>
-using RegisterFor = typename decltype(detail::widest_register<Size, Real>())::type;
+template <int Size, class Real = double, int Widest = 8>
+using RegisterFor = typename decltype(detail::widest_register<Size, Real, Widest>())::type;
 
 /// `Size` numbers in SIMD registers that the compiler's target decides on; arithmetic goes number by number.
 /// Loads and stores need addresses aligned to `pack_alignment`. More than one register is two packs, not an array:
