@@ -14,15 +14,16 @@
 namespace pendula {
 
 /// Cost of one Newton iteration on a chain in fixed-point iterations, by space and stages, as measured on ten links
-/// (AVX2, g++ 12). It grows with the cube of the blocks that Newton eliminates; the fixed point has a register to
-/// itself up to four stages and needs two above. On few links the fixed point mostly waits for its own divisions, and
-/// Newton costs fewer of its iterations: 0.69 of those on two planar links (AVX-512).
+/// (g++ 12; the mean of AVX2 and AVX-512, which are up to a third apart). It grows with the cube of the blocks that
+/// Newton eliminates. On few links the fixed point mostly waits for its own divisions, and Newton costs fewer of its
+/// iterations: on two links 0.7 of those in the plane and 0.8 in space.
 template <class Space>
 constexpr double newton_cost(int stages, int links) {
-  constexpr std::array<double, 8> planar{2.5, 3.6, 5.7, 7.4, 8.5, 10.8, 15.3, 18.5};
-  constexpr std::array<double, 8> spatial{2.5, 3.6, 8.4, 11.5, 12.4, 16.6, 26.1, 30.8};
-  const double waiting = Space::dof == 1 ? 0.9 : 0.4;  // in links
-  return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)] * links / (links + waiting);
+  constexpr std::array<double, 8> planar{2.1, 2.4, 5.3, 5.5, 9.6, 12.6, 16.9, 15.9};
+  constexpr std::array<double, 8> spatial{2.2, 3.4, 9.6, 9.6, 18.4, 21.6, 27.7, 26.5};
+  const double waiting = Space::dof == 1 ? 1.2 : 0.8;  // in links
+  const double of_ten = links * (10 + waiting) / (10 * (links + waiting));
+  return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)] * of_ten;
 }
 
 /// Chooses between the two iterations by what they take: iterations a step, counted while the run goes, times the cost

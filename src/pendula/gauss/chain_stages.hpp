@@ -247,7 +247,8 @@ class ChainStages {
   void place_block(int end) {
     const int begin = block_before(end);
     alignas(pack_alignment) Real Q[placed_at_once * K * Z], Q_low[placed_at_once * K * Z];
-    if (end - begin < placed_at_once) std::fill(Q, Q + placed_at_once * K * Z, 0.0);
+    const auto count = static_cast<std::size_t>(end - begin) * K * Z;
+    if (end - begin < placed_at_once) std::fill(Q + count, Q + std::min(count + 8, placed_at_once * K * Z), Real(0));
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
         const std::size_t at = (static_cast<std::size_t>(i - begin) * K + a) * Z;
@@ -258,7 +259,7 @@ class ChainStages {
       }
     }
     // Past the last link of the chain this writes what nobody reads.
-    sincos_all(Q, sine_[begin], cosine_[begin], placed_at_once * K * Z);
+    sincos_all(Q, sine_[begin], cosine_[begin], static_cast<std::ptrdiff_t>(count));
     // What rounding the angle lost, which is most where links have turned often.
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
@@ -361,9 +362,12 @@ class ChainStages {
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
 
-  // As few links as fill the widest registers, so that one link's sines are taken while the sweep waits for another's
-  // division.
-  static constexpr int placed_at_once = detail::has_registers<Real> && K * Z < 8 ? static_cast<int>(8 / (K * Z)) : 1;
+  // Links whose sines fill a few of the widest registers. Angles are stored in narrower ones, and a processor does not
+  // hand those on: the first have reached memory when the last are written. More would leave the sweep nothing to do
+  // while it waits for divisions.
+  static constexpr std::size_t angles_at_once = 32;
+  static constexpr int placed_at_once =
+      detail::has_registers<Real> && K * Z < angles_at_once ? static_cast<int>(angles_at_once / (K * Z)) : 1;
 
   struct Saved {
     detail::PerLink<Chart, N> charts;
