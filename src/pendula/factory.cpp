@@ -40,12 +40,12 @@ std::unique_ptr<Integrator<Space>> make_explicit(const Chain<Space>& chain, cons
   return make_explicit_integrator<Space>(make_chain_forward_dynamics(chain), options, "");
 }
 
-// Whether the dense solver is the faster one. It takes 0.5 to 0.96 of the chain solver's time here, 0.93 on three links
+// Whether the dense solver is the faster one. It takes 0.5 to 0.9 of the chain solver's time here, 0.97 on three links
 // with one stage, and up to 6 times as much elsewhere (table "few links" in docs/benchmarks.md). On one spatial link it
 // leads, too, but cannot pass a pole.
 template <class Space>
 bool dense_is_faster(int links, int stages) {
-  return !has_charts<Space> && links <= 2 && stages <= 2;
+  return !has_charts<Space> && links * stages <= 2;
 }
 
 // The velocity form is the dense solver's alone, and only it needs a kernel.
