@@ -37,15 +37,14 @@ struct Block {
  private:
   struct Units {
     alignas(pack_alignment) Real values[Columns][stride] = {};
-    Units() {
+    constexpr Units() {
       for (std::size_t k = 0; k < Columns; ++k) values[k][k] = Real(1);
     }
   };
   static inline const Units units;
 };
 
-/// Row i of A B for the columns of A that B has rows for, added to `start`; two sums side by side, so that one does not
-/// wait for the other.
+/// The row a times B, added to `start`; two sums side by side, so that one does not wait for the other.
 template <std::size_t Inner, std::size_t Columns, class Real>
 auto row_of_product(const Real* a, const Block<Inner, Columns, Real>& b,
                     const typename Block<Inner, Columns, Real>::Row& start) {
@@ -212,17 +211,19 @@ class ChainNewton {
     }
   }
 
+  // Carries the mass of the bob to come on the diagonal of P, where nothing has to wait for it.
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     Carried carried;
     Cartesian G;
     G.fill(L(Real(0)));
     Terms terms;
-    for (int i = stages.links(); i-- > 0;) {
-      const Real m = stages.constants(i).mass;
-      G = sum(G, scaled(L(m), stages.bob_velocity(i)));
-      for (std::size_t k = 0; k < vectors; ++k) carried.P.set_row(k, carried.P.row(k) + carried.P.unit(k, m));
+    const int last = stages.links() - 1;
+    for (std::size_t k = 0; k < vectors; ++k) carried.P[k][k] = stages.constants(last).mass;
+    for (int i = last; i >= 0; --i) {
+      G = sum(G, scaled(L(stages.constants(i).mass), stages.bob_velocity(i)));
       find_terms(stages, i, G, terms);
-      eliminate(stages, terms, carried, gains_[i]);
+      const Real mass_before = i > 0 ? stages.constants(i - 1).mass : Real(0);
+      eliminate(stages.columns(), terms, mass_before, carried, gains_[i]);
     }
   }
 
@@ -277,12 +278,12 @@ class ChainNewton {
     }
   }
 
-  void eliminate(const Stages& stages, const Terms& terms, Carried& carried, Gain& gain) {
-    const auto& columns = stages.columns();
+  void eliminate(const detail::StageColumns<S, Real>& columns, const Terms& terms, const Real& mass_before,
+                 Carried& carried, Gain& gain) const {
     using Jacobian = detail::Block<vectors, unknowns, Real>;
     Jacobian J, BJ;
     detail::Block<unknowns, vectors, Real> E;
-    detail::Block<unknowns, unknowns, Real> EBJ, D;
+    detail::Block<unknowns, unknowns, Real> D;
     for (std::size_t d = 0; d < Dim; ++d) {
       for (std::size_t k = 0; k < s; ++k) J.set_row(d * s + k, velocity_row(terms, d, k));
     }
@@ -290,14 +291,13 @@ class ChainNewton {
     fill_diagonal(columns, terms, D);
     set_product(carried.P, J, BJ);
     set_product(E, carried.P, gain.K);
-    set_product(E, BJ, EBJ);
+    add_product(E, BJ, D);  // now it is S
     for (std::size_t u = 0; u < unknowns; ++u) gain.k[u][0] = terms.residual[u / s][u % s];
     add_product(E, carried.g, gain.k);
-    for (std::size_t u = 0; u < unknowns; ++u) {
-      for (std::size_t c = 0; c < K; ++c) set_stages(D[u] + c * s, stages_of(D[u] + c * s) + stages_of(EBJ[u] + c * s));
-    }
     solve_negated(D, gain.K, gain.k);
-    add_product(BJ, gain.K, carried.P);
+    for (std::size_t k = 0; k < vectors; ++k) {
+      carried.P.set_row(k, row_of_product(BJ[k], gain.K, carried.P.row(k) + carried.P.unit(k, mass_before)));
+    }
     add_product(BJ, gain.k, carried.g);
   }
 
@@ -350,16 +350,7 @@ class ChainNewton {
     }
   }
 
-  static L stages_of(const Real* row) {
-    if constexpr (Z == s) {
-      return L::load(row);
-    } else {
-      PerStage stored{};
-      std::copy_n(row, s, stored.values);
-      return stored.lanes();
-    }
-  }
-
+  // Number by number, not in lanes: what a link waits for is short then, and lanes do not have to be taken apart.
   PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
     Real dw[vectors] = {};
     Real largest(0);
