@@ -10,6 +10,13 @@
 namespace pendula::test {
 namespace {
 
+// Without fused multiply-add nothing tells what a product loses.
+#ifdef FP_FAST_FMA
+constexpr bool products_keep_low_parts = true;
+#else
+constexpr bool products_keep_low_parts = false;
+#endif
+
 RunOptions along_chain(int stages, Iteration iteration = Iteration::automatic) {
   RunOptions options;
   options.stages = stages;
@@ -40,9 +47,8 @@ double published_run(double q_phi, double q_theta, double p_phi, double p_theta,
 // Published: 4.81e-15 with 6 stages. Rounding walks: from 40 starts up to 0.04 rad beside this one, the mean is 2.5e-15
 // with 6 stages and 1.9e-15 with 8. The rounding of θ, θ̇ and H in a row is in it.
 TEST(RoundOff, PublishedRegularRun) {
-  for (int stages : {6, 8}) {
-    EXPECT_LT(published_run(1.1, -1.1, 2.7746, 2.7746, stages, 524'288), 2e-15) << stages;  // measured 1.9e-15, 1.5e-15
-  }
+  const double bound = products_keep_low_parts ? 2e-15 : 4e-15;  // measured 1.9e-15, 1.5e-15; without 2.5e-15
+  for (int stages : {6, 8}) EXPECT_LT(published_run(1.1, -1.1, 2.7746, 2.7746, stages, 524'288), bound) << stages;
 }
 
 // Published: 1.48e-15 with 6 stages.
@@ -70,10 +76,12 @@ double error_in_floors(std::size_t which, int steps) {
 
 // Chains of 2 to 100 links, horizontal and at rest, against their ends in 128-bit arithmetic.
 TEST(RoundOff, EndsAtTheFloorOfItsData) {
+  // measured 0.8, 0.8, 0.4, 2.6, 2.5, 2.3, 4.1; with a tenth more steps at most 1.7, 0.8, 1.6, 3.6, 4.4, 3.2, 5.2;
+  // without fused multiply-add at most 30
+  constexpr double floors = products_keep_low_parts ? 8 : 60;
   constexpr std::array steps{504, 246, 1152, 169, 432, 792, 1451};  // D, P2, P5, P10, P20, P50, P100
   for (std::size_t which = 0; which < steps.size(); ++which) {
-    // measured 0.8, 0.8, 0.4, 2.6, 2.5, 3.2, 4.0; with a tenth more steps at most 1.7, 0.8, 1.6, 3.6, 4.4, 3.2, 5.2
-    EXPECT_LT(error_in_floors(which, steps[which]), 8) << bench::problems[which].name;
+    EXPECT_LT(error_in_floors(which, steps[which]), floors) << bench::problems[which].name;
   }
 }
 
@@ -96,7 +104,7 @@ TEST(RoundOff, ChaoticEnergyDoesNotDrift) {
   const auto tenth = static_cast<std::ptrdiff_t>(errors.size() / 10);
   const double first = median({errors.begin(), errors.begin() + tenth});
   const double last = median({errors.end() - tenth, errors.end()});
-  EXPECT_LT(last / first, 1.5);  // measured 0.72
+  EXPECT_LT(last / first, 1.5);  // measured 1.13; 0.72 before Newton rounded otherwise
 }
 
 /// L_0(x) … L_n(x), the Laguerre polynomials.
