@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <pendula/gauss/chain_solver.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/invariants.hpp>
-#include <string_view>
 
 #include "support/random_chain.hpp"
 
@@ -74,7 +74,7 @@ TYPED_TEST(NumberType, EndsWhereAWiderOneDoesInThePlane) {
   const auto expected = end_state<Planar, many_stages, long double>(chain, start, Iteration::newton, 1.0 / 128, 64);
   for (Iteration iteration : {Iteration::newton, Iteration::fixed_point, Iteration::automatic}) {
     const auto got = end_state<Planar, many_stages, TypeParam>(chain, start, iteration, 1.0 / 128, 64);
-    EXPECT_LT(distance_in_ulp(got, expected), 30) << iteration;  // measured 10
+    EXPECT_LT(distance_in_ulp(got, expected), 30) << iteration;  // measured 10, with three stages 13
   }
 }
 

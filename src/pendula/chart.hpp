@@ -103,9 +103,9 @@ Real norm(const Real& x, const Real& y) {
   return sqrt(x * x + y * y);
 }
 
-/// Whether a vector is vertical, or nothing at all.
+/// Whether a vector has no horizontal part, but for rounding.
 template <class Real>
-bool at_pole(const std::array<Real, 3>& x) {
+bool is_vertical(const std::array<Real, 3>& x) {
   return norm(x[0], x[1]) < 32 * std::numeric_limits<Real>::epsilon();
 }
 
@@ -138,8 +138,8 @@ std::array<Real, 2> user_coordinates(const Heading<Spatial, Real>& heading, cons
   const auto& [u, u_dot] = heading;
   std::array<Real, 2> q;
   Spatial::Link::coordinates(u, q);
-  if (detail::at_pole(u)) {
-    const bool rests = detail::at_pole(u_dot);
+  if (detail::is_vertical(u)) {
+    const bool rests = detail::is_vertical(u_dot);
     q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
   }
   return detail::nearest_angles(q, near);
@@ -154,7 +154,7 @@ LinkAngles<Spatial, Real> user_angles(const Heading<Spatial, Real>& heading, con
   Real determinant;
   Spatial::Link::trig(angles.q, trig);
   Spatial::Link::metric_determinant(trig, determinant);
-  Spatial::Link::rates(trig, detail::at_pole(heading.u) ? Real(0) : Real(1 / determinant), heading.u_dot, angles.v);
+  Spatial::Link::rates(trig, detail::is_vertical(heading.u) ? Real(0) : Real(1 / determinant), heading.u_dot, angles.v);
   return angles;
 }
 

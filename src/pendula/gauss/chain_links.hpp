@@ -156,7 +156,7 @@ class ChainLinks {
 
   explicit ChainLinks(const Chain<Space, N>& chain)
       : links_(chain.links()), loaded_(chain.loaded()), constants_(chain.links()) {
-    Real carried(0);
+    Real carried(0);  // Chain::mass_below in the bits of Real
     for (int i = links(); i-- > 0;) {
       const Real m = Real(chain.masses()[i]), l = Real(chain.lengths()[i]);
       carried += m;

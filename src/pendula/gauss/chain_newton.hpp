@@ -20,7 +20,7 @@ constexpr std::size_t padded_row(std::size_t count) {
 template <std::size_t Rows, std::size_t Columns, class Real>
 struct Block {
   static constexpr std::size_t stride = padded_row<Real>(Columns);
-  // Few numbers wait for each other, and registers of four are quicker then than registers of eight.
+  // Small blocks wait for one another, and registers of four hand on quicker than registers of eight.
   static constexpr int widest = stride <= 8 ? 4 : 8;
   using Row = Pack<static_cast<int>(stride), RegisterFor<static_cast<int>(stride), Real, widest>>;
 
@@ -150,7 +150,9 @@ class ChainNewton {
  public:
   using Stages = ChainStages<Space, S, N, Real, Arch>;
 
-  explicit ChainNewton(int links) : gains_(links) {}
+  explicit ChainNewton(int links) : gains_(links) {
+    for (std::size_t k = 0; k < s; ++k) unit_[k].values[k] = Real(1);
+  }
 
   /// Improves the stage velocities once.
   Correction correct(Stages& stages) {
@@ -207,7 +209,6 @@ class ChainNewton {
     }
     for (std::size_t k = 0; k < s; ++k) {
       for (std::size_t j = 0; j < s; ++j) ha_lanes_[k].values[j] = columns.ha(k, j);
-      unit_[k].values[k] = Real(1);
     }
   }
 
@@ -428,7 +429,7 @@ class ChainNewton {
   detail::PerLink<Gain, N> gains_;
   detail::Block<unknowns, unknowns, Real> ha_{};  // (a, k): h a_km in the columns (a, m)
   PerStage ha_lanes_[s]{}, unit_[s]{};            // of k: h a_kj, δ_kj
-  Real h_{0};                                     // that those belong to
+  Real h_{0};                                     // that all of them are for
 };
 
 }  // namespace pendula
