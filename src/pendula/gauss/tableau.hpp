@@ -119,6 +119,7 @@ class StepCoefficients {
     hb_.resizeLike(tableau.b);
     ha_.resizeLike(tableau.a);
     h2a2_.resizeLike(tableau.a);
+    fold(h_);  // resized storage is not written yet, and a first step of h_ would not write it
   }
 
   /// Prepares for a step of `h` after one of `previous` (0: there is none).
