@@ -66,19 +66,25 @@ class ChainFixedPoint {
 
   // What is not a number reaches the last link, though not always the largest change.
   static double relative(const L& change, const L& scale, const Coordinates& last) {
-    alignas(pack_alignment) Real changes[Z], scales[Z], lasts[Z];
-    L all_last(Real(0));
-    for (std::size_t a = 0; a < K; ++a) all_last = all_last + last[a];
-    change.store(changes);
-    scale.store(scales);
-    all_last.store(lasts);
-    Real largest_change(0), largest_scale(0);
-    for (std::size_t k = 0; k < S; ++k) {
-      if (!std::isfinite(static_cast<double>(lasts[k]))) return std::numeric_limits<double>::quiet_NaN();
-      largest_change = std::max(largest_change, changes[k]);
-      largest_scale = std::max(largest_scale, scales[k]);
+    L all_last = last[0];
+    for (std::size_t a = 1; a < K; ++a) all_last = all_last + last[a];
+    const auto plus = [](const Real& x, const Real& y) { return Real(x + y); };
+    const auto larger = [](const Real& x, const Real& y) { return x > y ? x : y; };
+    if (!std::isfinite(static_cast<double>(over_stages(all_last, plus))))
+      return std::numeric_limits<double>::quiet_NaN();
+    const Real largest_change = over_stages(change, larger);
+    return largest_change > 0 ? static_cast<double>(largest_change / over_stages(scale, larger)) : 0;
+  }
+
+  // Of all stages in halves: what is done first does not wait for all the others.
+  template <class Combine>
+  static Real over_stages(const L& lanes, Combine combine) {
+    alignas(pack_alignment) Real values[Z];
+    lanes.store(values);
+    for (std::size_t count = S; count > 1; count = (count + 1) / 2) {
+      for (std::size_t k = 0; k < count / 2; ++k) values[k] = combine(values[k], values[k + (count + 1) / 2]);
     }
-    return largest_change > 0 ? static_cast<double>(largest_change / largest_scale) : 0;
+    return values[0];
   }
 
   MotionSweep<Space, L, N> sweep_;

@@ -133,15 +133,21 @@ class MotionSweep<Planar, Real, N> {
     Real along{0.0}, aside{0.0};
   };
 
-  explicit MotionSweep(int links) : carried_(links, unwritten()) {}
+  explicit MotionSweep(int links) : last_(links - 1), carried_(links, unwritten()) {}
 
   void inward(Inward& next, int i, const Constants& link, const At& at, const Momenta<Coordinates>& p) {
     using std::fma;
     const Frame frame(at);
-    const Turn turn(frame, next.u);
     const Real inverse(link.inverse_length), inverse_low(link.inverse_length_low), m(link.mass);
     const Real across = p.value[0] * inverse;
     const Real across_low = fma(p.value[0], inverse, -across) + (p.value[0] * inverse_low + p.low[0] * inverse);
+    if (i == last_) {  // nothing hangs there, and nothing has to be divided
+      const Real free = (across + across_low) * Real(link.inverse_mass);
+      carried_[i] = {free, Real(0.0), m, Real(0.0)};
+      next = {frame.u, across, across_low, Real(0.0), m};
+      return;
+    }
+    const Turn turn(frame, next.u);
     const Real push = next.pi * turn.sine;
     const Real e = Real(1.0) / (m + push * turn.sine);
     const Real pull = push * turn.cosine;
@@ -183,6 +189,7 @@ class MotionSweep<Planar, Real, N> {
     return {none, none, none, none};
   }
 
+  int last_;
   detail::PerLink<Carried, N> carried_;
 };
 

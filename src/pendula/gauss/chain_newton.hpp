@@ -67,6 +67,13 @@ void set_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Rea
   for (std::size_t i = 0; i < M; ++i) c.set_row(i, row_of_product(a[i], b, Row(Real(0))));
 }
 
+/// C = a B.
+template <std::size_t M, std::size_t Columns, class Real>
+void set_scaled(const Real& a, const Block<M, Columns, Real>& b, Block<M, Columns, Real>& c) {
+  using Row = typename Block<M, Columns, Real>::Row;
+  for (std::size_t i = 0; i < M; ++i) c.set_row(i, Row(a) * b.row(i));
+}
+
 /// C += A B.
 template <std::size_t M, std::size_t Inner, std::size_t Columns, class Real>
 void add_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Real>& b, Block<M, Columns, Real>& c) {
@@ -111,24 +118,20 @@ void substitute_back(const Block<M, M, Real>& S, Block<M, Columns, Real>& Y, std
   Y.set_row(k + 1, fma(Row(S[k + 1][k]), first, Row(S[k + 1][k + 1]) * second));
 }
 
-/// Replaces Y by −S⁻¹ Y and y by −S⁻¹ y, two rows at a time. No pivoting: S is a mass matrix but for terms of the order
-/// of the step, and a step that spoils it does not converge and is halved.
-template <std::size_t M, std::size_t Columns, class Real>
-void solve_negated(Block<M, M, Real>& S, Block<M, Columns, Real>& Y, Block<M, 1, Real>& y) {
+/// Replaces every Y by −S⁻¹ Y, two rows at a time. No pivoting: S is a mass matrix but for terms of the order of the
+/// step, and a step that spoils it does not converge and is halved.
+template <std::size_t M, class Real, std::size_t... Columns>
+void solve_negated(Block<M, M, Real>& S, Block<M, Columns, Real>&... Y) {
   for (std::size_t k = 0; k < M; k += 2) {
     invert_negated(S, k);
     for (std::size_t i = k + 2; i < M; ++i) {
       const Real first = S[i][k] * S[k][k] + S[i][k + 1] * S[k + 1][k];
       const Real second = S[i][k] * S[k][k + 1] + S[i][k + 1] * S[k + 1][k + 1];
       for (std::size_t j = k + 2; j < M; ++j) S[i][j] += first * S[k][j] + second * S[k + 1][j];
-      add_rows(Y, i, k, first, second);
-      add_rows(y, i, k, first, second);
+      (add_rows(Y, i, k, first, second), ...);
     }
   }
-  for (std::size_t done = M % 2 == 0 ? 2 : 1; done <= M; done += 2) {
-    substitute_back(S, Y, M - done);
-    substitute_back(S, y, M - done);
-  }
+  for (std::size_t done = M % 2 == 0 ? 2 : 1; done <= M; done += 2) (substitute_back(S, Y, M - done), ...);
 }
 
 }  // namespace detail
@@ -197,8 +200,8 @@ class ChainNewton {
   };
 
   struct Gain {  // δV = K δw + k
-    detail::Block<unknowns, vectors, Real> K;
-    detail::Block<unknowns, 1, Real> k;
+    detail::Block<unknowns, vectors, Real> K{};
+    detail::Block<unknowns, 1, Real> k{};
   };
 
   void set_coefficients(const detail::StageColumns<S, Real>& columns) {
@@ -223,8 +226,7 @@ class ChainNewton {
     for (int i = last; i >= 0; --i) {
       G = sum(G, scaled(L(stages.constants(i).mass), stages.bob_velocity(i)));
       find_terms(stages, i, G, terms);
-      const Real mass_before = i > 0 ? stages.constants(i - 1).mass : Real(0);
-      eliminate(stages.columns(), terms, mass_before, carried, gains_[i]);
+      eliminate(stages, i, terms, carried);
     }
   }
 
@@ -279,8 +281,10 @@ class ChainNewton {
     }
   }
 
-  void eliminate(const detail::StageColumns<S, Real>& columns, const Terms& terms, const Real& mass_before,
-                 Carried& carried, Gain& gain) const {
+  // Nothing moves before the first link, K stays zero there; below the last one there is its own bob, P = m I.
+  void eliminate(const Stages& stages, int i, const Terms& terms, Carried& carried) {
+    const bool first = i == 0, last = i + 1 == stages.links();
+    Gain& gain = gains_[i];
     using Jacobian = detail::Block<vectors, unknowns, Real>;
     Jacobian J, BJ;
     detail::Block<unknowns, vectors, Real> E;
@@ -289,13 +293,15 @@ class ChainNewton {
       for (std::size_t k = 0; k < s; ++k) J.set_row(d * s + k, velocity_row(terms, d, k));
     }
     fill_momentum_coupling(terms, E);
-    fill_diagonal(columns, terms, D);
-    set_product(carried.P, J, BJ);
-    set_product(E, carried.P, gain.K);
+    fill_diagonal(stages.columns(), terms, D);
+    last ? set_scaled(carried.P[0][0], J, BJ) : set_product(carried.P, J, BJ);
     add_product(E, BJ, D);  // now it is S
     for (std::size_t u = 0; u < unknowns; ++u) gain.k[u][0] = terms.residual[u / s][u % s];
     add_product(E, carried.g, gain.k);
+    if (first) return solve_negated(D, gain.k);
+    last ? set_scaled(carried.P[0][0], E, gain.K) : set_product(E, carried.P, gain.K);
     solve_negated(D, gain.K, gain.k);
+    const Real& mass_before = stages.constants(i - 1).mass;
     for (std::size_t k = 0; k < vectors; ++k) {
       carried.P.set_row(k, row_of_product(BJ[k], gain.K, carried.P.row(k) + carried.P.unit(k, mass_before)));
     }

@@ -246,31 +246,10 @@ class ChainStages {
 
   void place_block(int end) {
     const int begin = block_before(end);
-    alignas(pack_alignment) Real Q[placed_at_once * K * Z], Q_low[placed_at_once * K * Z];
-    const auto count = static_cast<std::size_t>(end - begin) * K * Z;
-    if (end - begin < placed_at_once) std::fill(Q + count, Q + std::min(count + 8, placed_at_once * K * Z), Real(0));
-    for (int i = begin; i < end; ++i) {
-      for (std::size_t a = 0; a < K; ++a) {
-        const std::size_t at = (static_cast<std::size_t>(i - begin) * K + a) * Z;
-        const L q(q_[i][a]), moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
-        const L placed = q + moved;
-        placed.store(Q + at);
-        ((q - placed) + moved).store(Q_low + at);
-      }
+    if constexpr (!fills_registers) {
+      if (end - begin > placed_one_by_one) return place_together(begin, end);
     }
-    // Past the last link of the chain this writes what nobody reads.
-    sincos_all(Q, sine_[begin], cosine_[begin], static_cast<std::ptrdiff_t>(count));
-    // What rounding the angle lost, which is most where links have turned often.
-    for (int i = begin; i < end; ++i) {
-      for (std::size_t a = 0; a < K; ++a) {
-        Real* sine = sine_[i] + a * Z;
-        Real* cosine = cosine_[i] + a * Z;
-        const L s = L::load(sine), c = L::load(cosine);
-        const L low = L::load(Q_low + (static_cast<std::size_t>(i - begin) * K + a) * Z);
-        fma(c, low, s).store(sine);
-        fma(-s, low, c).store(cosine);
-      }
-    }
+    place_one_by_one(begin, end);
   }
 
   /// Velocities of the bobs at the placed stages, w_i = w_{i−1} + l Σ_a V_a û_a.
@@ -368,6 +347,59 @@ class ChainStages {
   static constexpr std::size_t angles_at_once = 32;
   static constexpr int placed_at_once =
       detail::has_registers<Real> && K * Z < angles_at_once ? static_cast<int>(angles_at_once / (K * Z)) : 1;
+
+  // Stages that fill the widest register have nothing to be gathered with, and a few links cost more to gather, in
+  // time that everything waits, than their sines.
+  static constexpr bool fills_registers =
+      detail::register_size<RegisterFor<static_cast<int>(Z), Real>> == detail::register_size<RegisterFor<8, Real>>;
+  static constexpr int placed_one_by_one = 4;
+
+  struct Angle {  // a rounded sum, and what it lost: most where links have turned often
+    L value, low;
+  };
+
+  Angle stage_angle(int i, std::size_t a) const {
+    const L q(q_[i][a]), moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
+    const L placed = q + moved;
+    return {placed, (q - placed) + moved};
+  }
+
+  void set_trig(int i, std::size_t a, const L& sine, const L& cosine, const L& low) {
+    fma(cosine, low, sine).store(sine_[i] + a * Z);
+    (cosine - sine * low).store(cosine_[i] + a * Z);
+  }
+
+  void place_one_by_one(int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        const Angle angle = stage_angle(i, a);
+        L sine, cosine;
+        sincos(angle.value, sine, cosine);
+        set_trig(i, a, sine, cosine, angle.low);
+      }
+    }
+  }
+
+  void place_together(int begin, int end) {
+    alignas(pack_alignment) Real Q[placed_at_once * K * Z], Q_low[placed_at_once * K * Z];
+    const auto count = static_cast<std::size_t>(end - begin) * K * Z;
+    if (end - begin < placed_at_once) std::fill(Q + count, Q + std::min(count + 8, placed_at_once * K * Z), Real(0));
+    const auto at = [&](int i, std::size_t a) { return (static_cast<std::size_t>(i - begin) * K + a) * Z; };
+    for (int i = begin; i < end; ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        const Angle angle = stage_angle(i, a);
+        angle.value.store(Q + at(i, a));
+        angle.low.store(Q_low + at(i, a));
+      }
+    }
+    // Past the last link of the chain this writes what nobody reads.
+    sincos_all(Q, sine_[begin], cosine_[begin], static_cast<std::ptrdiff_t>(count));
+    for (int i = begin; i < end; ++i) {
+      for (std::size_t a = 0; a < K; ++a) {
+        set_trig(i, a, L::load(sine_[i] + a * Z), L::load(cosine_[i] + a * Z), L::load(Q_low + at(i, a)));
+      }
+    }
+  }
 
   struct Saved {
     detail::PerLink<Chart, N> charts;

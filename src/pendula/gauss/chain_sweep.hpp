@@ -12,9 +12,9 @@ namespace pendula {
 /// along the rod it is a tension that the sweep finds, because a rod hands on nothing but what lies along it: the
 /// matrix that the general elimination carries from link to link is of rank one here,
 ///   G_i = (π_i (u_i·before.w{i−1}) + γ_i) u_i + across_i.
-/// One division a link, and no coordinates. What a sweep carries from link to link is the caller's, so that it can stay
-/// in registers. Between the sweeps a link keeps three numbers and a vector, no more: on
-/// long chains what costs is memory. Directions are cheaper made again than kept.
+/// One division a link but the last, and no coordinates. What a sweep carries from link to link is the caller's, so
+/// that it can stay in registers. Between the sweeps a link keeps three numbers and a vector, no more: on long chains
+/// what costs is memory. Directions are cheaper made again than kept.
 template <class Space, class Real, int N = Eigen::Dynamic>
 class TensionSweep {
  public:
@@ -33,11 +33,16 @@ class TensionSweep {
     Cartesian w = zero();
   };
 
-  explicit TensionSweep(int links) : carried_(links, unwritten()) {}
+  explicit TensionSweep(int links) : last_(links - 1), carried_(links, unwritten()) {}
 
   /// Inward, i = n−1 … 0: takes direction u and given momentum across the rod, both in the axes of the world.
   void inward(Inward& next, int i, const Constants& link, const Cartesian& u, const Cartesian& across) {
     const Real m(link.mass), inverse_m(link.inverse_mass);
+    if (i == last_) {  // nothing hangs there, and nothing has to be divided
+      carried_[i] = {scaled(inverse_m, across), Real(0.0), m, Real(0.0)};
+      next = {u, across, m};
+      return;
+    }
     const Real cosine = dot(u, next.u), along = dot(u, next.resting);
     // The next rod's direction, and what is given of this bob's momentum, across this rod.
     const Cartesian side = difference(next.u, scaled(cosine, u));
@@ -57,6 +62,12 @@ class TensionSweep {
   void outward(Outward& before, int i, const Constants& link, const Cartesian& u, const Cartesian& next_u,
                const Cartesian& across, Cartesian& u_dot, Cartesian& momentum) {
     const Carried& here = carried_[i];
+    if (i == 0) {  // nothing moves before
+      u_dot = scaled(Real(link.inverse_length), here.free);
+      momentum = sum(scaled(here.gamma, u), across);
+      before.w = here.free;
+      return;
+    }
     const Real along = dot(u, before.w);
     const Real aside = along * here.coupling;
     const Real onward = along + aside * dot(u, next_u);
@@ -82,6 +93,7 @@ class TensionSweep {
     return {components<Space::dimension>([&](std::size_t) { return none; }), none, none, none};
   }
 
+  int last_;
   detail::PerLink<Carried, N> carried_;
 };
 

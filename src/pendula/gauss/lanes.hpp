@@ -161,6 +161,17 @@ class Pack {
     return each([](const auto& x) { return -x; }, a);
   }
 
+  /// operation(x, a, b) on every register: two results of one argument.
+  template <class Operation>
+  friend void for_each_register(Operation operation, const Pack& x, Pack& a, Pack& b) {
+    if constexpr (split) {
+      for_each_register(operation, x.held_.low, a.held_.low, b.held_.low);
+      for_each_register(operation, x.held_.high, a.held_.high, b.held_.high);
+    } else {
+      operation(x.held_, a.held_, b.held_);
+    }
+  }
+
   /// a b + c, with one rounding where the processor has such an instruction.
   friend Pack fma(const Pack& a, const Pack& b, const Pack& c) {
     return each([](const Register& x, const Register& y, const Register& z) { return detail::fused(x, y, z); }, a, b,

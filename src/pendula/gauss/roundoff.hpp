@@ -36,8 +36,7 @@ class RoundoffStop {
   bool reached(double correction, Convergence convergence) {
     if (convergence != convergence_) restart();  // other iterations shrink at other rates
     convergence_ = convergence;
-    std::shift_right(last_.begin(), last_.end(), 1);
-    last_[0] = correction;
+    last_ = {correction, last_[0], last_[1], last_[2]};
     ++count_;
     return convergence == Convergence::linear ? linear_done() : quadratic_done();
   }

@@ -19,7 +19,7 @@ struct ReducedSinCos {
 
   ReducedSinCos(const Batch& r, const Batch& low) {
     const Batch z = r * r;
-    const Batch z_low = fused(r, r, -z);
+    const Batch minus_z_low = fused(-r, r, z);
     const Batch z2 = z * z;
     const Batch p01 = fused(z, Batch(8.33333333332248946124e-03), Batch(-1.66666666666666324348e-01));
     const Batch p23 = fused(z, Batch(2.75573137070700676789e-06), Batch(-1.98412698298579493134e-04));
@@ -32,7 +32,7 @@ struct ReducedSinCos {
     const Batch half = Batch(0.5) * z;
     const Batch one_less_half = Batch(1.0) - half;
     sine = r + fused(r * z, p, low * one_less_half);
-    const Batch tail = fused(-r, low, ((Batch(1.0) - one_less_half) - half)) - Batch(0.5) * z_low;
+    const Batch tail = ((Batch(1.0) - one_less_half) - half) - r * low + Batch(0.5) * minus_z_low;
     cosine = one_less_half + fused(z2, q, tail);
   }
 };
@@ -97,6 +97,11 @@ void sincos(const Real& x, Real& sine, Real& cosine) {
   using std::cos, std::sin;
   sine = sin(x);
   cosine = cos(x);
+}
+
+template <int Size, class Register>
+void sincos(const Pack<Size, Register>& x, Pack<Size, Register>& sine, Pack<Size, Register>& cosine) {
+  for_each_register([](const Register& at, Register& s, Register& c) { sincos(at, s, c); }, x, sine, cosine);
 }
 
 /// Sines and cosines of `count` numbers in a row. All three arrays are aligned and readable up to the next multiple of
