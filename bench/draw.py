@@ -40,6 +40,7 @@ PEERS = {
     "CVODE Adams": "#b08800",
     "MuJoCo RK4": "#a371f7",
     "GSL rk4imp": "#db61a2",
+    "heyoka": "#8b5e3c",
 }
 OURS = {
     "pendula s = 8 fixed point": "#1f9d55",

@@ -3,11 +3,14 @@
 #include <chrono>
 #include <contestant.hpp>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <race.hpp>
 #include <references.hpp>
+#include <sstream>
 
 namespace bench {
 namespace {
@@ -91,6 +94,25 @@ nlohmann::json json_of(const std::vector<Trial>& trials) {
   return list;
 }
 
+/// The problem, for contestants that do not run here; its end in decimals, which have more digits than a double.
+nlohmann::json json_of(const Problem& problem, const Reference& reference) {
+  auto end = nlohmann::json::array();
+  for (const long double value : reference.values) {
+    std::ostringstream digits;
+    digits << std::setprecision(std::numeric_limits<long double>::max_digits10) << value;
+    end.push_back(digits.str());
+  }
+  return {{"links", problem.links},
+          {"mass", problem.mass},
+          {"length", problem.length},
+          {"gravity", problem.gravity},
+          {"angle", problem.angle},
+          {"duration", problem.duration},
+          {"floor", reference.floor},
+          {"end", end},
+          {"trials", nlohmann::json::object()}};
+}
+
 }  // namespace
 
 void register_races(const std::string& file, double longest) {
@@ -99,8 +121,7 @@ void register_races(const std::string& file, double longest) {
   for (std::size_t i = 0; i < problems.size(); ++i) {
     const Problem& problem = problems[i];
     const Reference& reference = references[i];
-    nlohmann::json& entry =
-        kept[std::string(problem.name)] = {{"floor", reference.floor}, {"trials", nlohmann::json::object()}};
+    nlohmann::json& entry = kept[std::string(problem.name)] = json_of(problem, reference);
     for (const Contestant& contestant : contestants) {
       if (!contestant.enters(problem)) continue;
       std::vector<Trial> trials;

@@ -24,7 +24,7 @@ double order(const State<Space>& start, int stages, double duration, const std::
     ladder.steps.push_back(step);
     ladder.errors.push_back(distance(final_state(chain, start, along_chain(stages), step, duration), reference));
   }
-  return ladder.slope(1e-15);
+  return ladder.slope(3e-15);  // angles go up to eight radians, whose last place is 9e-16
 }
 
 class ChainOrder : public ::testing::TestWithParam<int> {};
@@ -43,7 +43,7 @@ TEST_P(ChainOrder, IsTwiceTheStagesInThePlane) {
   const double slope = stages < 5    ? order(two, stages, 1, counts(stages))
                        : stages == 5 ? order(one, stages, 2, {8, 9, 10, 11, 12, 14})
                                      : order(one, stages, 2, {7, 8, 9, 10, 11});
-  EXPECT_NEAR(slope, 2 * stages, 0.3);  // measured within 0.20
+  EXPECT_NEAR(slope, 2 * stages, 0.3);  // measured within 0.20, without fused multiply-add 0.23
 }
 
 TEST_P(ChainOrder, IsTwiceTheStagesInSpace) {
@@ -55,7 +55,7 @@ TEST_P(ChainOrder, IsTwiceTheStagesInSpace) {
   const double slope = stages < 5    ? order(two, stages, 1, counts(stages))
                        : stages == 5 ? order(one, stages, 2, {14, 16, 18, 20, 24, 28})
                                      : order(one, stages, 2, {14, 16, 18, 20, 22, 24});
-  EXPECT_NEAR(slope, 2 * stages, 0.3);  // measured within 0.22
+  EXPECT_NEAR(slope, 2 * stages, 0.3);  // measured within 0.15
 }
 
 }  // namespace

@@ -246,7 +246,7 @@ class ChainStages {
 
   void place_block(int end) {
     const int begin = block_before(end);
-    if constexpr (!fills_registers) {
+    if constexpr (!fills_register) {
       if (end - begin > placed_one_by_one) return place_together(begin, end);
     }
     place_one_by_one(begin, end);
@@ -349,19 +349,19 @@ class ChainStages {
       detail::has_registers<Real> && K * Z < angles_at_once ? static_cast<int>(angles_at_once / (K * Z)) : 1;
 
   // Stages that fill the widest register have nothing to be gathered with, and a few links cost more to gather, in
-  // time that everything waits, than their sines.
-  static constexpr bool fills_registers =
-      detail::register_size<RegisterFor<static_cast<int>(Z), Real>> == detail::register_size<RegisterFor<8, Real>>;
-  static constexpr int placed_one_by_one = 4;
+  // time that everything waits, than their sines. Stages of several registers would not leave their sines enough of
+  // them.
+  static constexpr int widest = detail::register_size<RegisterFor<8, Real>>;
+  static constexpr bool fills_register = static_cast<int>(Z) == widest;
+  static constexpr int placed_one_by_one = static_cast<int>(Z) < widest ? 4 : 0;
 
-  struct Angle {  // a rounded sum, and what it lost: most where links have turned often
-    L value, low;
-  };
-
-  Angle stage_angle(int i, std::size_t a) const {
+  // Hands on the stages of an angle, rounded sums, and what they lost: most where links have turned often. (Returned in
+  // a struct, compilers send packs of several registers through memory.)
+  template <class Take>
+  void take_angle(int i, std::size_t a, Take take) const {
     const L q(q_[i][a]), moved = columns_.integral(L::load(V_[i] + a * Z)) + L(q_low_[i][a]);
     const L placed = q + moved;
-    return {placed, (q - placed) + moved};
+    take(placed, (q - placed) + moved);
   }
 
   void set_trig(int i, std::size_t a, const L& sine, const L& cosine, const L& low) {
@@ -372,10 +372,11 @@ class ChainStages {
   void place_one_by_one(int begin, int end) {
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
-        const Angle angle = stage_angle(i, a);
-        L sine, cosine;
-        sincos(angle.value, sine, cosine);
-        set_trig(i, a, sine, cosine, angle.low);
+        take_angle(i, a, [&](const L& angle, const L& low) {
+          L sine, cosine;
+          sincos(angle, sine, cosine);
+          set_trig(i, a, sine, cosine, low);
+        });
       }
     }
   }
@@ -387,9 +388,10 @@ class ChainStages {
     const auto at = [&](int i, std::size_t a) { return (static_cast<std::size_t>(i - begin) * K + a) * Z; };
     for (int i = begin; i < end; ++i) {
       for (std::size_t a = 0; a < K; ++a) {
-        const Angle angle = stage_angle(i, a);
-        angle.value.store(Q + at(i, a));
-        angle.low.store(Q_low + at(i, a));
+        take_angle(i, a, [&](const L& angle, const L& low) {
+          angle.store(Q + at(i, a));
+          low.store(Q_low + at(i, a));
+        });
       }
     }
     // Past the last link of the chain this writes what nobody reads.
