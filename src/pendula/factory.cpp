@@ -40,12 +40,11 @@ std::unique_ptr<Integrator<Space>> make_explicit(const Chain<Space>& chain, cons
   return make_explicit_integrator<Space>(make_chain_forward_dynamics(chain), options, "");
 }
 
-// Whether the dense solver is the faster one. It takes 0.57 to 0.86 of the chain solver's time here, as much on three
-// links with one stage, and up to 25 times as much elsewhere (table "few links" in docs/benchmarks.md). On one spatial
-// link it leads, too, but cannot pass a pole.
+// Whether the dense solver is the faster one. It takes 0.87 of the chain solver's time there, between 1.05 and 30 times
+// as much elsewhere (table "few links" in docs/benchmarks.md).
 template <class Space>
 bool dense_is_faster(int links, int stages) {
-  return !has_charts<Space> && links * stages <= 2;
+  return !has_charts<Space> && links == 1 && stages == 1;
 }
 
 // The velocity form is the dense solver's alone, and only it needs a kernel.

@@ -288,7 +288,7 @@ class ChainNewton {
     using Jacobian = detail::Block<vectors, unknowns, Real>;
     Jacobian J, BJ;
     detail::Block<unknowns, vectors, Real> E;
-    detail::Block<unknowns, unknowns, Real> D;
+    detail::Block<unknowns, unknowns, Real> D{};  // beyond its columns, too: denormal numbers there would be slow
     for (std::size_t d = 0; d < Dim; ++d) {
       for (std::size_t k = 0; k < s; ++k) J.set_row(d * s + k, velocity_row(terms, d, k));
     }
@@ -299,7 +299,7 @@ class ChainNewton {
     for (std::size_t u = 0; u < unknowns; ++u) gain.k[u][0] = terms.residual[u / s][u % s];
     add_product(E, carried.g, gain.k);
     if (first) return solve_negated(D, gain.k);
-    last ? set_scaled(carried.P[0][0], E, gain.K) : set_product(E, carried.P, gain.K);
+    set_product(E, carried.P, gain.K);
     solve_negated(D, gain.K, gain.k);
     const Real& mass_before = stages.constants(i - 1).mass;
     for (std::size_t k = 0; k < vectors; ++k) {

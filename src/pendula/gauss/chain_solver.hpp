@@ -15,13 +15,13 @@ namespace pendula {
 
 /// Cost of one Newton iteration on a chain in fixed-point iterations, by space and stages, as measured on ten links
 /// (g++ 12; the mean of AVX2 and AVX-512, which are up to a third apart). It grows with the cube of the blocks that
-/// Newton eliminates. On few links the fixed point mostly waits for its own divisions, and Newton costs fewer of its
-/// iterations: on two links 0.7 of those in the plane and 0.8 in space.
+/// Newton eliminates. On few links the fixed point waits for its own divisions, and with four stages or more Newton
+/// costs fewer of its iterations: three quarters as many on two links. With fewer stages Newton waits as much.
 template <class Space>
 constexpr double newton_cost(int stages, int links) {
-  constexpr std::array<double, 8> planar{2.1, 2.4, 5.3, 5.5, 9.6, 12.6, 16.9, 15.9};
-  constexpr std::array<double, 8> spatial{2.2, 3.4, 9.6, 9.6, 18.4, 21.6, 27.7, 26.5};
-  const double waiting = Space::dof == 1 ? 1.2 : 0.8;  // in links
+  constexpr std::array<double, 8> planar{2.1, 2.6, 4.6, 5.4, 8.4, 9.0, 14.3, 14.7};
+  constexpr std::array<double, 8> spatial{2.3, 3.9, 6.9, 9.8, 12.8, 14.9, 22.9, 24.3};
+  const double waiting = stages <= 3 ? 0.0 : 0.8;  // in links
   const double of_ten = links * (10 + waiting) / (10 * (links + waiting));
   return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)] * of_ten;
 }

@@ -1,0 +1,181 @@
+"""Sends heyoka into the races of races.json and adds it there and to benchmarks.json.
+
+usage: python bench/heyoka_races.py FIGURES_FOLDER [--repetitions N] [--longest SECONDS]
+
+heyoka (Biscani, Izzo 2021; doi:10.1093/mnras/stab1032) compiles the Taylor recursions of the equations that
+it is given while the program runs. It comes as a Python package, so it races in a process of its own, on the
+problems that pendula_bench left in races.json; a run is one call into compiled code, and compiling is not
+counted.
+"""
+
+import argparse
+import json
+import math
+import statistics
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+
+NAME = "heyoka"
+TOLERANCES = (1e-8, 1e-10, 1e-12, 1e-13, 1e-14, 1e-15, 1e-16, 1e-17)
+ALLOWED_FLOORS = 10
+# Longer chains take minutes to compile unless the code is made of loops, which runs at half the speed.
+UNROLLED_LINKS = 20
+
+
+@dataclass
+class Problem:
+    """A chain of equal links, all horizontal and at rest, and where it ends."""
+
+    links: int
+    mass: float
+    length: float
+    gravity: float
+    angle: float
+    duration: float
+    floor: float
+    end: list[str]
+    trials: dict = field(default_factory=dict)
+
+    def start(self) -> np.ndarray:
+        """Angles and rates at the start."""
+        return np.concatenate([np.full(self.links, self.angle), np.zeros(self.links)])
+
+    def error(self, state: np.ndarray) -> float:
+        """As error_of in problems.hpp."""
+        reference = np.array([np.longdouble(value) for value in self.end])
+        off = np.abs(state.astype(np.longdouble) - reference)
+        off[self.links :] /= np.abs(reference[self.links :]).max()
+        return float(off.max()) if np.isfinite(off).all() else math.inf
+
+
+def equations(problem: Problem) -> list[tuple]:
+    """The chain by the tensions of its rods, whose equations are tridiagonal: O(n), and n small divisions.
+
+    Bob i accelerates by (T_{i+1} u_{i+1} − T_i u_i)/m + g; along rod i, u_i·(a_i − a_{i−1}) = −l θ̇_i², across
+    it l θ̈_i.
+    """
+    n, m, length, g = problem.links, problem.mass, problem.length, problem.gravity
+    theta = hy.make_vars(*(f"theta_{i}" for i in range(n)))
+    theta_dot = hy.make_vars(*(f"theta_dot_{i}" for i in range(n)))
+    sine, cosine = [hy.sin(angle) for angle in theta], [hy.cos(angle) for angle in theta]
+    # Of the angle between a rod and the next one.
+    along = [(cosine[i] * cosine[i + 1] + sine[i] * sine[i + 1]) / m for i in range(n - 1)]
+    across = [(sine[i] * cosine[i + 1] - cosine[i] * sine[i + 1]) / m for i in range(n - 1)]
+    diagonal = [hy.expression((1 if i == 0 else 2) / m) for i in range(n)]
+    right = [length * rate * rate for rate in theta_dot]
+    right[0] = right[0] + g * cosine[0]
+    for i in reversed(range(n - 1)):
+        factor = along[i] / diagonal[i + 1]
+        diagonal[i] = diagonal[i] - factor * along[i]
+        right[i] = right[i] + factor * right[i + 1]
+    tension = [right[0] / diagonal[0]]
+    for i in range(1, n):
+        tension.append((right[i] + along[i - 1] * tension[i - 1]) / diagonal[i])
+    acceleration = [-g * sine[0] if i == 0 else tension[i - 1] * across[i - 1] for i in range(n)]
+    for i in range(n - 1):
+        acceleration[i] = acceleration[i] - tension[i + 1] * across[i]
+    rates = list(zip(theta, theta_dot, strict=True))
+    return rates + [(rate, a / length) for rate, a in zip(theta_dot, acceleration, strict=True)]
+
+
+class Run:
+    """One whole run, made ready."""
+
+    def __init__(self, problem: Problem, tolerance: float) -> None:
+        """Compiles."""
+        self.problem = problem
+        self.start = problem.start()
+        self.integrator = hy.taylor_adaptive(
+            equations(problem), self.start.copy(), tol=tolerance, compact_mode=problem.links > UNROLLED_LINKS
+        )
+
+    def __call__(self) -> float:
+        """Start to end; seconds."""
+        begin = time.perf_counter()
+        self.integrator.time = 0.0
+        self.integrator.state[:] = self.start
+        self.integrator.propagate_until(self.problem.duration)
+        return time.perf_counter() - begin
+
+    def error(self) -> float:
+        """Of the last run."""
+        return self.problem.error(self.integrator.state)
+
+
+def attempt(run: Run) -> float:
+    """The best of a few runs, about 20 ms of them; seconds."""
+    best = spent = run()
+    while spent < 0.02:
+        again = run()
+        best = min(best, again)
+        spent += again
+    return best
+
+
+def scan(problem: Problem, longest: float) -> tuple[list[dict], Run, dict]:
+    """Every setting; then run and trial that count: the cheapest good one, or the most accurate."""
+    trials, runs = [], []
+    for tolerance in TOLERANCES:
+        run = Run(problem, tolerance)
+        seconds = attempt(run)
+        trials.append({"setting": tolerance, "milliseconds": seconds * 1e3, "error": run.error()})
+        runs.append(run)
+        if seconds > longest:
+            break
+    good = [t for t in trials if t["error"] <= ALLOWED_FLOORS * problem.floor]
+    chosen = min(good, key=lambda t: t["milliseconds"]) if good else min(trials, key=lambda t: t["error"])
+    return trials, runs[trials.index(chosen)], chosen
+
+
+def measure(run: Run, repetitions: int) -> tuple[float, float]:
+    """Median milliseconds of a run over repetitions of about 20 ms each, and their relative spread."""
+    times = []
+    for _ in range(repetitions):
+        seconds = [run()]
+        while sum(seconds) < 0.02:
+            seconds.append(run())
+        times.append(1e3 * statistics.fmean(seconds))
+    spread = statistics.stdev(times) / statistics.fmean(times) if repetitions > 1 else 0.0
+    return statistics.median(times), round(spread, 4)
+
+
+def finite(trial: dict) -> dict:
+    """JSON knows no infinity."""
+    return {**trial, "error": trial["error"] if math.isfinite(trial["error"]) else None}
+
+
+def main() -> None:
+    """Reads both files, adds heyoka, writes them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--repetitions", type=int, default=9)
+    parser.add_argument("--longest", type=float, default=2)
+    options = parser.parse_args()
+    files = [options.folder / name for name in ("races.json", "benchmarks.json")]
+    races, kept = (json.loads(file.read_text(encoding="utf-8")) for file in files)
+    for name, race in races.items():
+        problem = Problem(**race)
+        trials, run, chosen = scan(problem, options.longest)
+        race["trials"][NAME] = {"knob": "tolerance", "runs": [finite(trial) for trial in trials]}
+        milliseconds, spread = measure(run, options.repetitions)
+        kept["benchmarks"][f"race/{name}/{NAME}"] = {
+            "time": milliseconds,
+            "time_unit": "ms",
+            "error": chosen["error"],
+            "floor": problem.floor,
+            "setting": chosen["setting"],
+            "relative_spread": spread,
+        }
+        floors = chosen["error"] / problem.floor
+        setting = f"tolerance {chosen['setting']:g}"
+        print(f"{name}, {NAME}: {setting}, {milliseconds:.3g} ms, error {floors:.3g} floors", flush=True)
+    for file, content in zip(files, (races, kept), strict=True):
+        file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
