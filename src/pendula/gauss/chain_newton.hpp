@@ -195,7 +195,7 @@ class ChainNewton {
   };
 
   struct Carried {  // δG = P δw + g
-    detail::Block<vectors, vectors, Real> P{};
+    detail::Block<vectors, vectors, Real> P;
     detail::Block<vectors, 1, Real> g{};
   };
 
@@ -222,7 +222,7 @@ class ChainNewton {
     G.fill(L(Real(0)));
     Terms terms;
     const int last = stages.links() - 1;
-    for (std::size_t k = 0; k < vectors; ++k) carried.P[k][k] = stages.constants(last).mass;
+    for (std::size_t k = 0; k < vectors; ++k) carried.P.set_row(k, carried.P.unit(k, stages.constants(last).mass));
     for (int i = last; i >= 0; --i) {
       G = sum(G, scaled(L(stages.constants(i).mass), stages.bob_velocity(i)));
       find_terms(stages, i, G, terms);
