@@ -5,7 +5,9 @@ usage: python bench/draw.py FIGURES_FOLDER IMAGES_FOLDER
 Everything is drawn in middle tones on a transparent ground, to be read on light and on dark pages alike.
 """
 
+import itertools
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -34,6 +36,7 @@ STYLE = {
     "legend.fontsize": 8.5,
 }
 BESIDE = "our O(n) dynamics"
+LEAP = 5  # decades
 PEERS = {
     "GSL rk8pd": "#e5484d",
     "odeint fehlberg78": "#d98324",
@@ -64,6 +67,16 @@ def appearance(name: str) -> dict:
     return {"color": color, "linewidth": 1.2, "linestyle": "--" if BESIDE in name else "-"}
 
 
+def broken(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The same with gaps where the error leaps: a run that ended elsewhere is a point of its own."""
+    shown = points[:1]
+    for before, point in itertools.pairwise(points):
+        if abs(math.log10(point[0] / before[0])) > LEAP:
+            shown.append((math.nan, math.nan))
+        shown.append(point)
+    return shown
+
+
 def draw_race(axes: Axes, title: str, race: dict) -> None:
     """Time against error of every contestant, one point a setting."""
     for name, contestant in race["trials"].items():
@@ -72,7 +85,7 @@ def draw_race(axes: Axes, title: str, race: dict) -> None:
         runs = contestant["runs"]
         points = [(run["error"], run["milliseconds"]) for run in runs if run["error"] and run["error"] < 0.1]
         if points:
-            errors, times = zip(*points, strict=True)
+            errors, times = zip(*broken(points), strict=True)
             axes.loglog(errors, times, marker="o", markersize=2.5, label=name, **appearance(name))
     limit = 10 * race["floor"]
     axes.axvline(limit, color=INK, linestyle=":", linewidth=1)

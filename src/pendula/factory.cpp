@@ -40,20 +40,11 @@ std::unique_ptr<Integrator<Space>> make_explicit(const Chain<Space>& chain, cons
   return make_explicit_integrator<Space>(make_chain_forward_dynamics(chain), options, "");
 }
 
-// Whether the dense solver is the faster one. It takes 0.87 of the chain solver's time there, between 1.05 and 30 times
-// as much elsewhere (table "few links" in docs/benchmarks.md).
-template <class Space>
-bool dense_is_faster(int links, int stages) {
-  return !has_charts<Space> && links == 1 && stages == 1;
-}
-
-// The velocity form is the dense solver's alone, and only it needs a kernel.
-template <class Space>
-Solver solver_for(int links, const RunOptions& options) {
+// In momentum form the chain solver is the faster one on any number of links, with any number of stages (table "few
+// links" in docs/benchmarks.md). The velocity form is the dense solver's alone, and only that needs a kernel.
+Solver solver_for(const RunOptions& options) {
   if (options.solver != Solver::automatic) return options.solver;
-  if (options.form == Form::velocity) return Solver::dense;
-  const bool dense_can = options.iteration != Iteration::fixed_point && find_kernel<Space>(links) != nullptr;
-  return dense_can && dense_is_faster<Space>(links, options.stages) ? Solver::dense : Solver::chain;
+  return options.form == Form::velocity ? Solver::dense : Solver::chain;
 }
 
 void require_newton(Iteration iteration) {
@@ -67,7 +58,7 @@ template <class Space>
 std::unique_ptr<Integrator<Space>> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
   if (options.method != Method::gauss) return make_explicit(chain, options);
   require_stages(options.stages);
-  if (solver_for<Space>(chain.links(), options) == Solver::chain) return make_chain_integrator(chain, options);
+  if (solver_for(options) == Solver::chain) return make_chain_integrator(chain, options);
   require_newton(options.iteration);
   return require_kernel<Space>(chain.links()).make(chain, options);
 }
