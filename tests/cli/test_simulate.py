@@ -108,10 +108,10 @@ def test_summary_says_what_auto_ran(pendula, double):
         summary = pendula("simulate", double, "--json", *settings(*given)).json
         return summary["solver"], summary["iteration"], summary["kernel"]
 
-    dense = ("dense", "newton", "planar_2")
-    assert ran("run.stages=1") == dense
-    assert ran() in [("chain", "newton", None), ("chain", "fixed-point", None)]
-    assert ran("run.form=velocity") == dense
+    chain = [("chain", "newton", None), ("chain", "fixed-point", None)]
+    assert ran() in chain
+    assert ran("run.stages=1") in chain
+    assert ran("run.form=velocity") == ("dense", "newton", "planar_2")
 
 
 @pytest.mark.parametrize("iteration", ["newton", "fixed-point"])
