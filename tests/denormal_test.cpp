@@ -1,5 +1,6 @@
 // No step along the chain computes with denormal numbers: what stands beyond the last column of a block or after the
-// last stage of a pack is never looked at, but processors take a hundred times as long over such numbers.
+// last stage of a pack is never looked at, but processors are slow with such numbers: Newton took up to 15 times as
+// long.
 
 #if defined(__SSE2__)
 

@@ -3,7 +3,6 @@
 #include <pendula/chain_integrator.hpp>
 #include <pendula/gauss/chain_solver.hpp>
 #include <pendula/gauss/dense_newton.hpp>
-#include <utility>
 
 #include "support/kernels.hpp"
 #include "support/run.hpp"
@@ -50,19 +49,6 @@ TEST(Factory, ChoosesTheChainSolverForAnyNumberOfLinks) {
   options.form = Form::velocity;
   options.solver = Solver::chain;
   EXPECT_THROW(make_integrator(equal_chain<Spatial>(40), options), std::invalid_argument);
-}
-
-// The two that "auto" chooses between are the same run, where they are about as fast.
-TEST(Factory, ChoosesBetweenEqualsToRoundOff) {
-  for (const auto& [links, stages] : {std::pair{1, 1}, {1, 2}, {2, 1}}) {
-    RunOptions options;
-    options.stages = stages;
-    options.solver = Solver::dense;
-    const auto dense = final_state(equal_chain<Planar>(links), swinging(links), options, 0.01, 1);
-    options.solver = Solver::chain;
-    const auto chain = final_state(equal_chain<Planar>(links), swinging(links), options, 0.01, 1);
-    EXPECT_LT(distance(dense, chain), 3e-15) << links << " links, " << stages << " stages";  // measured 4e-16
-  }
 }
 
 TEST(Factory, FixedSizeSteppersAgreeWithIt) {

@@ -40,8 +40,9 @@ std::unique_ptr<Integrator<Space>> make_explicit(const Chain<Space>& chain, cons
   return make_explicit_integrator<Space>(make_chain_forward_dynamics(chain), options, "");
 }
 
-// In momentum form the chain solver is the faster one on any number of links, with any number of stages (table "few
-// links" in docs/benchmarks.md). The velocity form is the dense solver's alone, and only that needs a kernel.
+// In momentum form the chain solver is the faster one, on one spatial link with one stage as fast as the dense one,
+// which cannot pass a pole (table "few links" in docs/benchmarks.md). The velocity form is the dense solver's alone,
+// and only that needs a kernel.
 Solver solver_for(const RunOptions& options) {
   if (options.solver != Solver::automatic) return options.solver;
   return options.form == Form::velocity ? Solver::dense : Solver::chain;
