@@ -63,7 +63,7 @@ TYPED_TEST(NumberType, EndsWhereAWiderOneDoesInSpace) {
   const auto expected = end_state<Spatial, 2, long double>(chain, start, Iteration::newton, 1.0 / 128, 64);
   for (Iteration iteration : {Iteration::newton, Iteration::fixed_point, Iteration::automatic}) {
     const auto got = end_state<Spatial, 2, TypeParam>(chain, start, iteration, 1.0 / 128, 64);
-    EXPECT_LT(distance_in_ulp(got, expected), 100) << iteration;  // measured 39 in both types
+    EXPECT_LT(distance_in_ulp(got, expected), 100) << iteration;  // measured 56
   }
 }
 
