@@ -1,6 +1,6 @@
-// Spatial chains at and through the pole, where (θ, φ) fail: charts, what the user reads there, what is conserved.
+// Spatial chains at and through the pole, where (θ, φ) fail: what the user reads there, what is conserved.
 
-#include <pendula/chart.hpp>
+#include <pendula/heading.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"
@@ -23,7 +23,7 @@ Chain<Spatial> unequal_chain() {
   return Chain<Spatial>(parameters);
 }
 
-/// Falls through the neighbourhood of the pole: two changes of chart in the first second.
+/// Falls through the neighbourhood of the pole, twice in the first second.
 State<Spatial> through_the_pole() {
   return State<Spatial>::from_angles(Eigen::Vector2d(0.9, 0.8), Eigen::Vector2d(0.2, -0.4), Eigen::Vector2d::Zero(),
                                      Eigen::Vector2d(0.9, -0.8));
@@ -112,10 +112,9 @@ TEST(Pole, MotionInAPlaneIsPlanarMotion) {
     EXPECT_LT((got.theta() - expected->state().q).cwiseAbs().maxCoeff(), 4e-13);  // measured 3.4e-14
     EXPECT_LT((got.phi().array() - 0.7).abs().maxCoeff(), 1e-10);                 // measured 5e-12
   }
-  EXPECT_GT(integrator->statistics().chart_switches, 0) << "the links that start far from the pole change charts";
 }
 
-TEST(Pole, EnergyAndAngularMomentumSurviveManyChartSwitches) {
+TEST(Pole, EnergyAndAngularMomentumAreKept) {
   const Chain<Spatial> chain = unequal_chain();
   const auto start = State<Spatial>::from_angles(Eigen::Vector3d(1.4, 0.6, 1.0), Eigen::Vector3d(0.3, 1.0, -0.5),
                                                  Eigen::Vector3d(0.3, -0.2, 0.4), Eigen::Vector3d(0.5, 0.8, -0.3));
@@ -128,7 +127,6 @@ TEST(Pole, EnergyAndAngularMomentumSurviveManyChartSwitches) {
           momentum_error, std::abs(vertical_angular_momentum(chain, state) - vertical_angular_momentum(chain, start)));
     });
     ASSERT_TRUE(result.outcome) << result.outcome;
-    EXPECT_GE(integrator->statistics().chart_switches, 100);
     EXPECT_LT(energy_error, 3e-14 * energy_scale(chain)) << iteration;    // measured 5e-13 J of 61 J
     EXPECT_LT(momentum_error, 3e-14 * energy_scale(chain)) << iteration;  // measured 6.4e-14 kg m²/s
   }
@@ -139,7 +137,6 @@ TEST(Pole, TimeReversalReturnsThroughThePole) {
   const auto integrator = make_integrator(chain, along_chain(4));
   ASSERT_TRUE(integrator->start(through_the_pole()));
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(integrator->step(0.01));
-  EXPECT_GT(integrator->statistics().chart_switches, 0);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(integrator->step(-0.01));
   EXPECT_LT(bob_distance(chain, integrator->state(), through_the_pole()), 2e-14);  // measured 1.4e-15
 }
@@ -160,12 +157,12 @@ TEST(Pole, AnglesThatUsersReadAreContinuous) {
   }
 }
 
-TEST(Charts, AnglesAtThePoleAreDefined) {
-  const Heading<Spatial> resting(0, {0.0, 0.3}, {0.0, 5.0});
+TEST(Pole, AnglesAtThePoleAreDefined) {
+  const Heading<Spatial> resting({0.0, 0.3}, {0.0, 5.0});
   const LinkAngles<Spatial> rest = user_angles(resting, {0.0, 0.3});
   EXPECT_EQ(rest.q, (std::array<double, 2>{0.0, 0.3}));
   EXPECT_EQ(rest.v, (std::array<double, 2>{0.0, 0.0})) << "φ̇ means nothing at the pole";
-  const Heading<Spatial> moving(0, {0.0, 0.3}, {-2.0, 0.0});
+  const Heading<Spatial> moving({0.0, 0.3}, {-2.0, 0.0});
   const LinkAngles<Spatial> move = user_angles(moving, {0.01, 0.3});
   EXPECT_LT(std::abs(move.q[1] - 0.3), 1e-15);   // measured 2e-16
   EXPECT_LT(std::abs(move.v[0] - -2.0), 1e-15);  // measured 0

@@ -49,7 +49,7 @@ Summary summary_of_a_run() {
   summary.description = {"dense", "newton", "spatial_2"};
   summary.duration = 10;
   summary.every = 5;
-  summary.statistics = {1000, 2, 3000, 4};
+  summary.statistics = {1000, 2, 3000};
   summary.wall_seconds = 0.25;
   summary.energy_error = {-1.5, 100, 1e-12};
   summary.energy_final = -1.25;
@@ -73,7 +73,6 @@ TEST(Summary, JsonHasTheKeysOfTheInterface) {
   EXPECT_EQ(read.at("steps"), 1000);
   EXPECT_EQ(read.at("rejected_steps"), 2);
   EXPECT_EQ(read.at("newton_iterations"), 3000);
-  EXPECT_EQ(read.at("chart_switches"), 4);
   EXPECT_EQ(read.at("energy_initial"), -1.5);
   EXPECT_EQ(read.at("energy_final"), -1.25);
   EXPECT_EQ(read.at("energy_error_max"), 1e-12);

@@ -176,7 +176,6 @@ std::string statistics(const Summary& summary) {
     text += line("iterations", std::to_string(counts.newton_iterations),
                  rounded(a_step(static_cast<double>(counts.newton_iterations)), 4) + " a step");
   }
-  if (counts.chart_switches > 0) text += line("chart switches", std::to_string(counts.chart_switches));
   return text + line("stepping time", duration_text(summary.wall_seconds),
                      duration_text(a_step(summary.wall_seconds)) + " a step");
 }
@@ -237,7 +236,6 @@ std::string to_json(const Summary& summary) {
                   {"steps", summary.statistics.steps},
                   {"rejected_steps", summary.statistics.rejected_steps},
                   {"newton_iterations", summary.statistics.newton_iterations},
-                  {"chart_switches", summary.statistics.chart_switches},
                   {"rows", summary.rows},
                   {"trajectory", or_null(summary.trajectory)},
                   {"energy_initial", summary.energy_error.initial},

@@ -1,5 +1,4 @@
 #include <pendula/chain_integrator.hpp>
-#include <pendula/chart.hpp>
 #include <pendula/explicit_integrator.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/integrator.hpp>

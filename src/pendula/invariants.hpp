@@ -70,16 +70,29 @@ Points<Space, N, Real> bob_velocities(const Chain<Space, N>& chain, const State<
   return points;
 }
 
-/// H = T + U  [J]  (paper eq. 4–6).
+/// T and U  [J]  (paper eq. 4–6).
+template <class Real>
+struct Energies {
+  Real kinetic{0}, potential{0};
+  Real total() const { return kinetic + potential; }
+};
+
 template <class Space, int N, int M, class Real>
-Real energy(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
-  Real energy(0);
+Energies<Real> energies(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+  Energies<Real> energies;
   const Real g = Real(chain.gravity());
   for_each_bob(chain, state, [&](int i, const auto& position, const auto& velocity) {
-    const Real m = Real(chain.masses()[i]), height = position[Space::dimension - 1];
-    energy += m * (velocity.squaredNorm() / 2 + g * height);
+    const Real m = Real(chain.masses()[i]);
+    energies.kinetic += m * velocity.squaredNorm() / 2;
+    energies.potential += m * g * position[Space::dimension - 1];
   });
-  return energy;
+  return energies;
+}
+
+/// H = T + U  [J].
+template <class Space, int N, int M, class Real>
+Real energy(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+  return energies(chain, state).total();
 }
 
 /// What energies are compared to: Σ M_i |g| l_i  [J]; zero without gravity.
@@ -104,6 +117,23 @@ Real dissipation(const Chain<Space, N>& chain, const State<Space, M, Real>& stat
   Real power(0);
   for (int i = 0; i < chain.links(); ++i) {
     power += Real(chain.damping()[i]) * detail::LinkMotion<Space, Real>(state, i).rate.squaredNorm();
+  }
+  return power;
+}
+
+/// Power that torque and damping bring, Σ torque_i·(û_i × û̇_i) − λ_i |û̇_i|²  [W]; torque: (torque_components x n).
+template <class Space, int N, int M, class Real, class Derived>
+Real load_power(const Chain<Space, N>& chain, const State<Space, M, Real>& state,
+                const Eigen::MatrixBase<Derived>& torque) {
+  Real power = -dissipation(chain, state);
+  for (int i = 0; i < chain.links(); ++i) {
+    const detail::LinkMotion<Space, Real> link(state, i);
+    typename Space::Link::template Torque<Real> on_link;
+    std::array<Real, Space::dimension> u, load;
+    for (std::size_t k = 0; k < on_link.size(); ++k) on_link[k] = Real(torque(static_cast<Eigen::Index>(k), i));
+    for (std::size_t k = 0; k < u.size(); ++k) u[k] = link.direction[static_cast<Eigen::Index>(k)];
+    Space::Link::torque_load(on_link, u, load);
+    for (std::size_t k = 0; k < u.size(); ++k) power += load[k] * link.rate[static_cast<Eigen::Index>(k)];
   }
   return power;
 }

@@ -86,7 +86,6 @@ struct Statistics {
   std::int64_t steps = 0;              ///< accepted steps
   std::int64_t rejected_steps = 0;     ///< attempts that were not accepted
   std::int64_t newton_iterations = 0;  ///< Newton or fixed-point iterations, all attempts
-  std::int64_t chart_switches = 0;     ///< links moved to their other chart
 };
 
 }  // namespace pendula

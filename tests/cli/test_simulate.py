@@ -131,7 +131,6 @@ def test_spatial_chains_pass_the_pole(pendula, spherical):
     """Started at rest, one link swings in a plane through the pole, as in the plane."""
     at_rest = settings("start.theta=1.0", "start.theta_dot=0", "start.phi_dot=0", "run.stages=6")
     space = pendula("simulate", spherical, "--json", *at_rest).json
-    assert space["chart_switches"] > 0
     flat = settings("chain.space=planar", "start={theta=1.0}", "run.stages=6")
     plane = pendula("simulate", spherical, "--json", *flat).json
     (x, y, z), (across, up) = space["final"]["bobs"][0], plane["final"]["bobs"][0]

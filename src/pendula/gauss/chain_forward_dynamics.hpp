@@ -1,17 +1,18 @@
 #pragma once
 
-#include <algorithm>
 #include <pendula/forward_dynamics.hpp>
-#include <pendula/gauss/chain_sweep.hpp>
+#include <pendula/gauss/chain_links.hpp>
+#include <pendula/gauss/multipliers.hpp>
+#include <pendula/heading.hpp>
 #include <vector>
 
 namespace pendula {
 
-/// Accelerations of a chain in O(n), by the sweep that gives velocities from momenta.
+/// Accelerations of a chain in O(n), by the elimination that gives rates from momenta.
 ///
-/// With p_a = l û_a·G, the rate of p and the force f share y_a·(l G), and what remains is û_a·(l Ġ) = û_a·R, R the
-/// load. The bobs accelerate by ẇ_i = Σ_{j≤i} l_j (Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b), so that q̈ belongs to the momentum
-/// û_a·(R − l Σ_{j≥i} m_j b_j), b the accelerations that q̈ = 0 would give.
+/// Bob i is accelerated by what its two rods hand on, T_i ξ_i with tensions T, and by torque and damping across them:
+///   ξ̈_i = b_i − b_{i−1} − δ_{i1} g up,  b_i = (F_i − F_{i+1})/m_i,  F_i = T_i ξ_i + (torque_i × ξ_i − λ_i ξ̇_i)/l_i²,
+/// and T keeps the lengths: ξ_i·ξ̈_i = −|ξ̇_i|².
 template <class Space>
 class ChainForwardDynamics : public ForwardDynamics<Space> {
   using Link = typename Space::Link;
@@ -22,40 +23,36 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
 
  public:
   explicit ChainForwardDynamics(const Chain<Space>& chain)
-      : chain_(chain), constants_(chain), sweep_(chain.links()), motions_(static_cast<std::size_t>(chain.links())) {
+      : chain_(chain), constants_(chain), motions_(static_cast<std::size_t>(chain.links())) {
     chain_.torque(0, torque_);
   }
 
   void acceleration(double time, const Vector& q, const Vector& v, Vector& acceleration) override {
     if (chain_.driven()) chain_.torque(time, torque_);
-    Cartesian b{}, below{};
+    for (int i = 0; i < chain_.links(); ++i) place(i, rates_of(i, q), rates_of(i, v));
+    eliminate();
+    double tension = motions_.front().row.offset;
+    Cartesian before{};
     for (int i = 0; i < chain_.links(); ++i) {
-      motion(i).trig = trig_of(i, q);
-      b = sum(b, scaled(chain_.lengths()[i], turning(motion(i).trig, rates_of(i, v))));
-      motion(i).b = b;
-    }
-    typename TensionSweep<Space, double>::Inward next;
-    for (int i = chain_.links(); i-- > 0;) {
-      below = sum(below, scaled(chain_.masses()[i], motion(i).b));
-      inward(next, i, below, rates_of(i, v));
-    }
-    typename TensionSweep<Space, double>::Outward before;
-    for (int i = 0; i < chain_.links(); ++i) {
-      const Motion& here = motion(i);
-      Cartesian u_ddot, G;
-      Rates a;
-      sweep_.outward(before, i, constants_[i], here.u, motion(std::min(i + 1, chain_.links() - 1)).u, here.across,
-                     u_ddot, G);
-      Link::rates(here.trig, here.inverse_determinant, u_ddot, a);
-      for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
+      const bool last = i + 1 == chain_.links();
+      const double next = last ? 0 : motion(i + 1).row.offset - motion(i + 1).row.coupling * tension;
+      Cartesian bond = scaled(tension, motion(i).rod);
+      if (!last) bond = difference(bond, scaled(next, motion(i + 1).rod));
+      bond = scaled(constants_[i].inverse_mass.value, bond);
+      const Cartesian rod_acceleration = sum(motion(i).free, difference(bond, before));
+      set_coordinates(i, rates_of(i, v), scaled(constants_[i].inverse_length, rod_acceleration), acceleration);
+      before = bond;
+      tension = next;
     }
   }
 
  private:
   struct Motion {
     Trig trig;
-    Cartesian b, u, across;
-    double inverse_determinant;
+    Cartesian rod, rate;
+    Cartesian load;  // across the rod, over l²
+    Cartesian free;  // its acceleration without tensions
+    MultiplierRow<double> row;
   };
 
   Motion& motion(int i) { return motions_[static_cast<std::size_t>(i)]; }
@@ -67,10 +64,51 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     return rates;
   }
 
-  Trig trig_of(int i, const Vector& q) const {
-    Trig trig;
-    Link::trig(rates_of(i, q), trig);
-    return trig;
+  void place(int i, const Rates& q, const Rates& v) {
+    Motion& here = motion(i);
+    Link::trig(q, here.trig);
+    Link::direction(here.trig, here.rod);
+    Link::velocity(here.trig, v, here.rate);
+    here.rod = scaled(chain_.lengths()[i], here.rod);
+    here.rate = scaled(chain_.lengths()[i], here.rate);
+    typename Link::template Torque<double> torque;
+    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = torque_(static_cast<Eigen::Index>(k), i);
+    Link::torque_load(torque, here.rod, here.load);
+    here.load = difference(scaled(constants_[i].inverse_square, here.load), scaled(constants_[i].drag, here.rate));
+  }
+
+  // Tensions, from the tip to the pivot.
+  void eliminate() {
+    MultiplierRow<double> row;
+    double beyond = 0;
+    for (int i = chain_.links(); i-- > 0;) {
+      Motion& here = motion(i);
+      here.free = scaled(constants_[i].inverse_masses, here.load);
+      if (i + 1 < chain_.links()) {
+        here.free = difference(here.free, scaled(constants_[i].inverse_mass.value, motion(i + 1).load));
+      }
+      double before = 0;
+      if (i == 0) {
+        here.free.back() -= chain_.gravity();
+      } else {
+        const double inverse_mass = constants_[i - 1].inverse_mass.value;
+        here.free = difference(here.free, scaled(inverse_mass, motion(i - 1).load));
+        before = -inverse_mass * dot(motion(i - 1).rod, here.rod);
+      }
+      const double right = -(dot(here.rod, here.free) + dot(here.rate, here.rate));
+      here.row = row = row.next(constants_[i].inverse_masses * dot(here.rod, here.rod), beyond, before, right);
+      beyond = before;
+    }
+  }
+
+  // û̈ = Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b.
+  void set_coordinates(int i, const Rates& v, const Cartesian& direction_acceleration, Vector& acceleration) {
+    const Trig& trig = motion(i).trig;
+    double determinant;
+    Link::metric_determinant(trig, determinant);
+    Rates a;
+    Link::rates(trig, 1 / determinant, difference(direction_acceleration, turning(trig, v)), a);
+    for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
   }
 
   // Σ_ab û_ab v_a v_b, each pair of different coordinates counted twice.
@@ -87,29 +125,8 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     return turning;
   }
 
-  void inward(typename TensionSweep<Space, double>::Inward& next, int i, const Cartesian& below, const Rates& v) {
-    const Trig& trig = motion(i).trig;
-    Cartesian load = constants_.template weight<double>(i);
-    typename Link::template Torque<double> torque;
-    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = torque_(static_cast<Eigen::Index>(k), i);
-    if (chain_.loaded()) constants_.add_loads(i, torque, trig, v, load);
-    load = sum(load, scaled(-chain_.lengths()[i], below));
-
-    double determinant;
-    Link::metric_determinant(trig, determinant);
-    motion(i).inverse_determinant = 1 / determinant;
-    typename Link::template First<double> u_a;
-    Link::direction_first(trig, u_a);
-    Rates p;
-    for (std::size_t a = 0; a < p.size(); ++a) p[a] = dot(u_a[a], load) * constants_[i].inverse_length;
-    Link::direction(trig, motion(i).u);
-    Link::tangent_momentum(trig, motion(i).inverse_determinant, p, motion(i).across);
-    sweep_.inward(next, i, constants_[i], motion(i).u, motion(i).across);
-  }
-
   Chain<Space> chain_;
   ChainLinks<Space> constants_;
-  TensionSweep<Space, double> sweep_;
   std::vector<Motion> motions_;
   Torque<Space, Eigen::Dynamic> torque_;
 };

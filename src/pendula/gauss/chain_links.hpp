@@ -8,6 +8,7 @@
 #include <memory>
 #include <new>
 #include <pendula/chain.hpp>
+#include <pendula/gauss/compensated.hpp>
 #include <pendula/gauss/lanes.hpp>
 #include <type_traits>
 #include <utility>
@@ -32,7 +33,7 @@ struct AlignedDelete {
 };
 
 /// `PerLink` numbers a link in one block aligned for packs; on the stack where the number of links N is known.
-/// Up to eight more numbers can be read after the last.
+/// Up to eight more numbers can be read after the last. Arrays of as many links can be assigned, without allocation.
 template <int PerLink, int N, class Real = double>
 class LinkArray {
   static_assert(std::is_trivially_destructible_v<Real>);
@@ -40,15 +41,21 @@ class LinkArray {
   static constexpr bool fixed = N != Eigen::Dynamic;
 
  public:
-  explicit LinkArray(int links) {
-    const int used = PerLink * links, held = round_up(used);
-    if constexpr (!fixed) {
-      const auto bytes = static_cast<std::size_t>(held) * sizeof(Real);
-      block_.reset(static_cast<Real*>(::operator new (bytes, std::align_val_t{pack_alignment})));
-    }
+  explicit LinkArray(int links) : held_(round_up(PerLink * links)) {
+    const int used = PerLink * links;
+    allocate();
     std::uninitialized_fill(data(), data() + used, unwritten<Real>());
-    std::uninitialized_fill(data() + used, data() + held, Real(0));
+    std::uninitialized_fill(data() + used, data() + held_, Real(0));
   }
+  LinkArray(const LinkArray& other) : held_(other.held_) {
+    allocate();
+    std::uninitialized_copy_n(other.data(), held_, data());
+  }
+  LinkArray& operator=(const LinkArray& other) {
+    if (this != &other) std::copy_n(other.data(), held_, data());
+    return *this;
+  }
+  ~LinkArray() = default;
 
   Real* operator[](int link) { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
   const Real* operator[](int link) const { return data() + static_cast<std::ptrdiff_t>(PerLink) * link; }
@@ -59,6 +66,13 @@ class LinkArray {
   using Fixed = std::array<Real, static_cast<std::size_t>(fixed ? round_up(PerLink* N) : 1)>;
   using Block = std::conditional_t<fixed, Fixed, std::unique_ptr<Real[], AlignedDelete>>;
 
+  void allocate() {
+    if constexpr (!fixed) {
+      const auto bytes = static_cast<std::size_t>(held_) * sizeof(Real);
+      block_.reset(static_cast<Real*>(::operator new (bytes, std::align_val_t{pack_alignment})));
+    }
+  }
+
   template <class Held>
   static auto get(Held& block) {
     if constexpr (fixed) {
@@ -68,6 +82,7 @@ class LinkArray {
     }
   }
 
+  int held_;
   alignas(pack_alignment) Block block_;
 };
 
@@ -131,36 +146,35 @@ std::array<Real, D> difference(const std::array<Real, D>& a, const std::array<Re
   return components<D>([&](std::size_t k) { return a[k] - b[k]; });
 }
 
-/// What the sweeps along a chain need to know of one link. Low parts are what a number has lost to rounding: unlike
-/// that of a sum, it would act in the same sense step after step.
+/// What the sweeps along a chain need to know of one link.
 template <class Real>
 struct LinkConstants {
-  Real mass{0}, inverse_mass{0};      ///< m, 1/m
-  Real length{0}, inverse_length{0};  ///< l, 1/l
-  Real inverse_length_low{0};
-  Real moment{0}, moment_low{0};  ///< M g l, M the mass that the rod carries
-  Real damping{0};                ///< λ
-
-  /// x/l as if 1/l were exact.
-  template <class Number>
-  Number over_length(const Number& x) const {
-    return x * Number(inverse_length) + x * Number(inverse_length_low);
-  }
+  Real mass{0}, length{0};
+  Real inverse_length{0}, inverse_square{0};  ///< 1/l, 1/l²
+  Twofold<Real> inverse_mass;                 ///< 1/m
+  Real inverse_masses{0};                     ///< 1/m_i + 1/m_{i−1}, of the bobs at both ends of the rod; 1/m_0 = 0
+  Real drag{0};                               ///< λ/l²
+  Real weight{0};                             ///< M g, M the mass that the rod carries
 };
 
-/// The constants of a chain link by link, and the load R on a link, f_a = y_a·(l G) + û_a·R, for numbers or packs.
+/// The constants of a chain link by link.
 template <class Space, int N = Eigen::Dynamic, class Real = double>
 class ChainLinks {
  public:
-  using Link = typename Space::Link;
-
   explicit ChainLinks(const Chain<Space, N>& chain)
       : links_(chain.links()), loaded_(chain.loaded()), constants_(chain.links()) {
     Real carried(0);  // Chain::mass_below in the bits of Real
     for (int i = links(); i-- > 0;) {
-      const Real m = Real(chain.masses()[i]), l = Real(chain.lengths()[i]);
-      carried += m;
-      constants_[i] = link_constants(m, l, carried, Real(chain.gravity()), Real(chain.damping()[i]));
+      LinkConstants<Real>& link = constants_[i];
+      const Real l = Real(chain.lengths()[i]);
+      link.mass = Real(chain.masses()[i]);
+      link.length = l;
+      link.inverse_length = 1 / l;
+      link.inverse_square = 1 / (l * l);
+      link.inverse_mass = reciprocal(link.mass);
+      link.inverse_masses = link.inverse_mass.value + (i == 0 ? Real(0) : Real(1 / Real(chain.masses()[i - 1])));
+      link.drag = Real(chain.damping()[i]) * link.inverse_square;
+      link.weight = (carried += link.mass) * Real(chain.gravity());
     }
   }
 
@@ -174,37 +188,7 @@ class ChainLinks {
   bool loaded() const { return loaded_; }
   const LinkConstants<Real>& operator[](int link) const { return constants_[link]; }
 
-  /// Weight alone, in the axes of the world.
-  template <class Number>
-  typename Link::template Cartesian<Number> weight(int link) const {
-    typename Link::template Cartesian<Number> load;
-    Link::weight_load(Number(constants_[link].moment), load);
-    return load;
-  }
-
-  /// Adds torque and drag to `load`; everything in the axes of the link's chart.
-  template <class Number>
-  void add_loads(int link, const typename Link::template Torque<Number>& torque,
-                 const typename Link::template Trig<Number>& trig, const typename Link::template Coordinates<Number>& v,
-                 typename Link::template Cartesian<Number>& load) const {
-    typename Link::template Cartesian<Number> u, u_dot, turning, drag;
-    Link::direction(trig, u);
-    Link::velocity(trig, v, u_dot);
-    Link::torque_load(torque, u, turning);
-    Link::drag_load(Number(constants_[link].damping), u_dot, drag);
-    load = sum(load, sum(turning, drag));
-  }
-
  private:
-  static LinkConstants<Real> link_constants(const Real& m, const Real& l, const Real& M, const Real& g,
-                                            const Real& damping) {
-    using std::fma;
-    const Real inverse = 1 / l, inverse_low = fma(-l, inverse, Real(1)) / l;
-    const Real weight = M * g, weight_low = fma(M, g, -weight);
-    const Real moment = weight * l, moment_low = fma(weight, l, -moment) + weight_low * l;
-    return {m, 1 / m, l, inverse, inverse_low, moment, moment_low, damping};
-  }
-
   int links_;
   bool loaded_;
   detail::PerLink<LinkConstants<Real>, N> constants_;

@@ -102,7 +102,6 @@ class ChainSolver {
   ChainSolver(const Chain& chain, int stages, Iteration iteration = Iteration::automatic)
       : stages_(chain),
         newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
-        fixed_point_(iteration == Iteration::newton ? 0 : chain.links()),
         choice_(iteration, newton_cost<Space>(S, chain.links()), S) {
     gauss_tableau<S>(stages);
   }
@@ -136,31 +135,28 @@ class ChainSolver {
   }
 
   /// The fixed point takes no note of where it changes what; one more iteration tells.
-  int worst_link() {
-    if (choice_.active() == Iteration::newton) return last_.link;
-    stages_.keep_rates();
-    fixed_point_.correct(stages_);
-    return stages_.most_changed_link();
-  }
+  int worst_link() { return choice_.active() == Iteration::newton ? last_.link : fixed_point_.worst_link(stages_); }
 
   int singular_link() const { return -1; }
-  double unexplained_energy() {
-    if (choice_.active() == Iteration::newton) stages_.find_forces();
-    return stages_.unexplained_energy();
+  static constexpr double largest_turn = 3;
+  double turn() const { return stages_.turn(); }
+  double work() const { return static_cast<double>(stages_.work()); }
+  bool continues() const { return choice_.active() == Iteration::fixed_point || newton_.positive(); }
+  double energy_defect() {
+    if (choice_.active() == Iteration::newton) newton_.find_multipliers(stages_);
+    return stages_.energy_defect();
   }
 
   void accept() {
-    const bool newton = choice_.active() == Iteration::newton;
-    if (newton) stages_.find_forces();
+    if (choice_.active() == Iteration::newton) newton_.find_multipliers(stages_);
     choice_.end_step();
-    stages_.accept(choice_.is_automatic() || !newton);
+    stages_.accept();
   }
 
   State state(double time) const { return stages_.state(time); }
   void save() { stages_.save(); }
   void restore() { stages_.restore(); }
 
-  std::int64_t chart_switches() const { return stages_.chart_switches(); }
   Iteration iteration() const { return choice_.preferred(); }
 
  private:

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
 namespace pendula {
 
 /// A sum carried as value + compensation, so that many small steps lose nothing to rounding (Kahan–Neumaier).
@@ -24,5 +28,104 @@ struct Compensated {
     value = sum;
   }
 };
+
+namespace detail {
+
+/// x, rounded here and now: the compiler does not fuse the product that x is with a sum that it goes into. Clang fuses
+/// within one expression only.
+template <class Real>
+Real rounded(Real x) {
+#if defined(__GNUC__) && !defined(__clang__)
+  return __builtin_assoc_barrier(x);
+#else
+  return x;
+#endif
+}
+
+template <class Real>
+inline constexpr bool has_fast_fma = false;
+#ifdef FP_FAST_FMA
+template <>
+inline constexpr bool has_fast_fma<double> = true;
+#endif
+#ifdef FP_FAST_FMAF
+template <>
+inline constexpr bool has_fast_fma<float> = true;
+#endif
+
+}  // namespace detail
+
+/// A number as the sum of two, with about twice the digits of one.
+template <class Real>
+struct Twofold {
+  Real value{0}, low{0};
+
+  /// The same sum with low below the last bit of value; |value| ≥ |low| before.
+  Twofold settled() const {
+    const Real sum = value + low;
+    return {sum, low - (sum - value)};
+  }
+
+  Real rounded() const { return value + low; }
+
+  friend Twofold operator-(const Twofold& x) { return {-x.value, -x.low}; }
+};
+
+/// a + b without loss (Knuth).
+template <class Real>
+Twofold<Real> exact_sum(const Real& a, const Real& b) {
+  const Real sum = a + b;
+  const Real kept = sum - a;
+  return {sum, (a - (sum - kept)) + (b - kept)};
+}
+
+/// a b without loss (Dekker, where the processor has no fused multiply-add).
+template <class Real>
+Twofold<Real> exact_product(const Real& a, const Real& b) {
+  const Real product = detail::rounded(Real(a * b));
+  if constexpr (detail::has_fast_fma<Real>) {
+    return {product, std::fma(a, b, -product)};
+  } else {
+    const auto high_bits = [](const Real& x) {
+      using std::ldexp;
+      const Real spread = detail::rounded(Real(x * (ldexp(Real(1), (std::numeric_limits<Real>::digits + 1) / 2) + 1)));
+      return spread - (spread - x);
+    };
+    const Real a_high = high_bits(a), b_high = high_bits(b);
+    const Real a_low = a - a_high, b_low = b - b_high;
+    return {product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low};
+  }
+}
+
+template <class Real>
+Twofold<Real> operator+(const Twofold<Real>& a, const Twofold<Real>& b) {
+  const Twofold<Real> sum = exact_sum(a.value, b.value);
+  return Twofold<Real>{sum.value, sum.low + (a.low + b.low)}.settled();
+}
+
+template <class Real>
+Twofold<Real> operator-(const Twofold<Real>& a, const Twofold<Real>& b) {
+  return a + -b;
+}
+
+template <class Real>
+Twofold<Real> operator*(const Twofold<Real>& a, const Twofold<Real>& b) {
+  const Twofold<Real> product = exact_product(a.value, b.value);
+  return Twofold<Real>{product.value, product.low + (a.value * b.low + a.low * b.value)}.settled();
+}
+
+template <class Real>
+Twofold<Real> operator*(const Real& a, const Twofold<Real>& b) {
+  const Twofold<Real> product = exact_product(a, b.value);
+  return Twofold<Real>{product.value, product.low + a * b.low}.settled();
+}
+
+/// 1/x.
+template <class Real>
+Twofold<Real> reciprocal(const Real& x) {
+  const Real quotient = 1 / x;
+  const Twofold<Real> product = exact_product(quotient, x);
+  return {quotient, ((1 - product.value) - product.low) * quotient};
+}
 
 }  // namespace pendula

@@ -6,11 +6,11 @@
 #include <limits>
 #include <pendula/chain.hpp>
 #include <pendula/gauss/compensated.hpp>
-#include <pendula/gauss/energy_tally.hpp>
 #include <pendula/gauss/linear_system.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/gauss/tableau.hpp>
+#include <pendula/invariants.hpp>
 #include <pendula/kernel_traits.hpp>
 #include <pendula/outcome.hpp>
 #include <pendula/state.hpp>
@@ -64,8 +64,9 @@ class DenseStages {
   using KernelTorque = typename Kernel::template Torque<double>;
   static constexpr Convergence convergence() { return Convergence::quadratic; }
   static constexpr Iteration iteration() { return Iteration::newton; }
-  static constexpr std::int64_t chart_switches() { return 0; }
   static constexpr int worst_link() { return -1; }
+  static constexpr bool continues() { return true; }
+  static constexpr double largest_turn = 1;  // near a pole φ moves faster than anything is resolved
 
   /// Link whose coordinates fail at the last evaluated stages, −1 where none does.
   int singular_link() const { return singular_link_; }
@@ -129,26 +130,22 @@ class DenseStages {
     return worst;
   }
 
-  /// Energy of the chain at (q, v), and the work that torques may do there.
-  EnergyTally<Space> tally(const Vector& q, const Vector& v, const KernelTorque& torque) const {
-    EnergyTally<Space> tally;
-    for (int link = 0; link < Kernel::links; ++link) {
-      std::array<double, Space::dof> at, rate;
-      for (int a = 0; a < Space::dof; ++a) {
-        at[static_cast<std::size_t>(a)] = q[a * Kernel::links + link];
-        rate[static_cast<std::size_t>(a)] = v[a * Kernel::links + link];
-      }
-      const Heading<Space> heading(0, at, rate);
-      const double power = torque.col(link).norm() * std::sqrt(dot(heading.u_dot, heading.u_dot));
-      tally.add(chain_, link, heading, std::abs(coefficients_.h()) * power);
-    }
-    return tally;
+  /// Energy at (q, v) less that at the start of the step and what loads bring, at stages (positions, velocities), in
+  /// units of all that the chain has.
+  double energy_defect(const Vector& q_start, const Vector& v_start, const Vector& q, const Vector& v, double brought) {
+    const Energies<double> start = energies(chain_, at(q_start, v_start)), end = energies(chain_, at(q, v));
+    const double scale = start.kinetic + energy_scale(chain_) + std::abs(brought);
+    return (end.total() - start.total() - brought) / (scale > 0 ? scale : 1);
   }
 
-  /// What the end of the step would have, at (q, v); the step starts at (q_start, v_start).
-  double unexplained(const Vector& q_start, const Vector& v_start, const Vector& q, const Vector& v) const {
-    const EnergyTally<Space> start = chain_.loaded() ? tally(q_start, v_start, torque_[0]) : run_start_;
-    return pendula::unexplained_energy(chain_, start, tally(q, v, torque_[0]));
+  /// Energy that torque and damping bring in the step  [J].
+  double work_at(const PerStage<Vector, S>& positions, const PerStage<Vector, S>& velocities) const {
+    double work = 0;
+    if (!chain_.loaded()) return work;
+    for (int i = 0; i < stages(); ++i) {
+      work += coefficients_.hb(i) * load_power(chain_, at(positions[i], velocities[i]), torque_[i]);
+    }
+    return work;
   }
 
   // At a pole, one coordinate of a link carries no mass while its other one does. The mass ratio is sin²θ; below this
@@ -166,13 +163,21 @@ class DenseStages {
     }
   }
 
+  /// The most that a coordinate changes in the step  [rad].
+  double turn_of(const PerStage<Vector, S>& velocities) const {
+    double turn = 0;
+    for (int i = 0; i < stages(); ++i) turn += std::abs(coefficients_.hb(i)) * velocities[i].cwiseAbs().maxCoeff();
+    return turn;
+  }
+
+  static pendula::State<Space, Kernel::links> at(const Vector& q, const Vector& v) { return {0, q, v}; }
+
   static int link_of(const Vector& with_non_finite) {
     int i = 0;
     while (i + 1 < Kernel::coordinates && std::isfinite(with_non_finite[i])) ++i;
     return i % Kernel::links;
   }
 
-  EnergyTally<Space> run_start_;
   Chain chain_;
   Parameters parameters_;
   StepCoefficients<S> coefficients_;
@@ -215,7 +220,6 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
     Kernel::momentum_from_velocity(parameters_, q, velocity_, p);
     q_.assign(q);
     p_.assign(p);
-    this->run_start_ = this->tally(q, velocity_, torque_[0]);
     return singular_link_ < 0 ? Status::ok : Status::singular_mass_matrix;
   }
 
@@ -234,14 +238,17 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
     return this->apply_correction(0);
   }
 
-  double unexplained_energy() {
+  double energy_defect() {
     const auto [moved, pushed] = increments();
     const Vector q = q_.value + moved, p = p_.value + pushed;
     Vector v_start, v;
     Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v_start);
     Kernel::velocity_from_momentum(parameters_, q, p, v);
-    return this->unexplained(q_.value, v_start, q, v);
+    return Base::energy_defect(q_.value, v_start, q, v, work());
   }
+
+  double work() const { return this->work_at(position_, unknown_); }
+  double turn() const { return this->turn_of(unknown_); }
 
   void accept() {
     const auto [moved, pushed] = increments();
@@ -352,7 +359,6 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
     if (singular_link_ >= 0) return Status::singular_mass_matrix;
     chain_.torque(state.time, torque_[0]);
     Kernel::acceleration(parameters_, q_.value, v_.value, torque_[0], acceleration_);
-    this->run_start_ = this->tally(q_.value, v_.value, torque_[0]);
     return Status::ok;
   }
 
@@ -371,10 +377,13 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
     return this->apply_correction(v_.value.cwiseAbs().maxCoeff() / std::abs(coefficients_.h()));
   }
 
-  double unexplained_energy() {
+  double energy_defect() {
     const auto [moved, pushed] = increments();
-    return this->unexplained(q_.value, v_.value, q_.value + moved, v_.value + pushed);
+    return Base::energy_defect(q_.value, v_.value, q_.value + moved, v_.value + pushed, work());
   }
+
+  double work() const { return this->work_at(position_, velocity_); }
+  double turn() const { return this->turn_of(velocity_); }
 
   void accept() {
     const auto [moved, pushed] = increments();

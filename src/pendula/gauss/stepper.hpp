@@ -30,11 +30,15 @@ struct StepperOptions {
 ///   Convergence convergence() const;       how its corrections shrink; may change from one to the next
 ///   int worst_link();                      where a correction was largest that did not say; where a step failed only
 ///   int singular_link() const;             link whose coordinates fail at the stages, −1 where none does
-///   double unexplained_energy();           that the end of the step would have: energy_tally.hpp
+///   double turn() const;                   the most that a coordinate turns in the step  [rad]
+///   static double largest_turn;            beyond which its stage equations have solutions that are not the motion
+///   bool continues() const;                false where the stages cannot be those of the motion: Newton's pivots
+///   double energy_defect();                of the end of the step against its start and the work of loads, relative to
+///                                          all energy that the chain has
+///   double work() const;                   what torque and damping bring in the step  [J]
 ///   void accept();                         moves the state to the end of the step
 ///   void save(); void restore();           keep a state and go back to it; neither allocates
 ///   State state(double time) const;        the state as users read it
-///   std::int64_t chart_switches() const;   links moved to other coordinates since the start
 ///   Iteration iteration() const;           what it iterates by
 /// and the stepper does not know which one it has.
 template <class StageSolver>
@@ -60,9 +64,8 @@ class GaussStepper {
   /// `smallest_part`; if that fails too, the state is left as it was and the outcome says why.
   Outcome step(double h) {
     Outcome outcome = attempt(h);
-    if (!outcome && outcome.status != Status::singular_mass_matrix) outcome = step_in_parts(h);
+    if (!outcome) outcome = step_in_parts(h);
     if (outcome) ++statistics_.steps;
-    statistics_.chart_switches = solver_.chart_switches();
     return outcome;
   }
 
@@ -77,9 +80,10 @@ class GaussStepper {
  private:
   static double epsilon() { return static_cast<double>(std::numeric_limits<typename StageSolver::Real>::epsilon()); }
 
-  // An iteration that goes farther than this from where it began, relative to the unknowns, may have come to a solution
-  // of the stage equations that is not the motion: its energy is looked at.
-  static constexpr double trusted_prediction = 0.02;
+  // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
+  // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
+  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
+  static constexpr double largest_defect = 0.02;
 
   /// One step of exactly h; on failure the state is what it was.
   Outcome attempt(double h) {
@@ -93,10 +97,17 @@ class GaussStepper {
       if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
       if (iteration == 1) far = correction.relative > trusted_prediction;
       if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
-      if (far && solver_.unexplained_energy() > 1) return failure(Status::wrong_root, h, iteration, correction);
+      if (!is_motion(far)) return failure(Status::wrong_root, h, iteration, correction);
       return accept(h, iteration, correction);
     }
     return failure(Status::not_converged, h, options_.max_iterations, correction);
+  }
+
+  // Whether the stages are the solution that continues from a step of no length.
+  bool is_motion(bool far) {
+    const double turn = solver_.turn();
+    if (!solver_.continues() || !(turn < StageSolver::largest_turn)) return false;
+    return (!far && turn < trusted_turn) || std::abs(solver_.energy_defect()) < largest_defect;
   }
 
   // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
@@ -110,7 +121,7 @@ class GaussStepper {
         done += part;
         const bool fits = std::fmod(done, 2 * part) == 0 && part < 0.5;
         if (fits) part *= 2;
-      } else if (part > smallest_part && outcome.status != Status::singular_mass_matrix) {
+      } else if (part > smallest_part) {
         part /= 2;
       } else {
         solver_.restore();

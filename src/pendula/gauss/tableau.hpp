@@ -26,6 +26,7 @@ using StageMatrix = Eigen::Matrix<Real, S, S, Eigen::ColMajor, S == Eigen::Dynam
 template <int S = Eigen::Dynamic, class Real = double>
 struct Tableau {
   StageVector<S, Real> c, b;
+  StageVector<S, Real> c_low;  ///< what c lost to rounding
   StageMatrix<S, Real> a;
   StageMatrix<S, Real> m;              ///< a_ij / b_j, m_ii = ½ and m_ij + m_ji = 1 exactly: what makes it symplectic
   StageMatrix<S, Real> a_squared;      ///< A², for the velocity form
@@ -66,10 +67,10 @@ Tableau<S, Real> make_tableau() {
   using Generated = kernels::GaussTableau<From>;
   constexpr auto size = static_cast<std::size_t>(From);
   Tableau<S, Real> tableau;
-  StageVector<S, Real> c_low, b_low;
+  StageVector<S, Real> c, b_low;
   StageMatrix<S, Real> a_low, m_low;
-  copy<size, S>(Generated::c, tableau.c);
-  copy<size, S>(Generated::c_low, c_low);
+  copy<size, S>(Generated::c, c);
+  copy<size, S>(Generated::c_low, tableau.c_low);
   copy<size, S>(Generated::b, tableau.b);
   copy<size, S>(Generated::b_low, b_low);
   copy<size, S>(Generated::a, tableau.a);
@@ -78,7 +79,8 @@ Tableau<S, Real> make_tableau() {
   copy<size, S>(Generated::m_low, m_low);
   copy<size, S>(Generated::a_squared, tableau.a_squared);
   copy<size, S>(Generated::extrapolation, tableau.extrapolation);
-  tableau.c += c_low;
+  tableau.c = c + tableau.c_low;
+  tableau.c_low += c - tableau.c;
   tableau.b += b_low;
   tableau.a += a_low;
   round_symplectic<S>(m_low, tableau.m);
@@ -132,11 +134,23 @@ class StepCoefficients {
   int stages() const { return tableau_.stages(); }
   Real h() const { return h_; }
   Real hc(int i) const { return h_ * tableau_.c[i]; }
+  Real b(int j) const { return tableau_.b[j]; }
+  Real c(int i) const { return tableau_.c[i]; }
+  Real c_low(int i) const { return tableau_.c_low[i]; }
   Real hb(int j) const { return hb_[j]; }  ///< h b_j, rounded so that they sum to h exactly
   Real m(int i, int j) const { return tableau_.m(i, j); }
   Real ha(int i, int j) const { return ha_(i, j); }  ///< m_ij · hb_j
   Real h2a2(int i, int j) const { return h2a2_(i, j); }
   Real extrapolation(int i, int j) const { return extrapolation_(i, j); }
+
+  /// ℓ_j(x) on the nodes c: the polynomial through stage values, x in steps from the start of theirs.
+  Real lagrange(int j, Real x) const {
+    Real value(1);
+    for (int k = 0; k < stages(); ++k) {
+      if (k != j) value *= (x - tableau_.c[k]) / (tableau_.c[j] - tableau_.c[k]);
+    }
+    return value;
+  }
 
  private:
   void fold(Real h) {
@@ -174,14 +188,6 @@ class StepCoefficients {
     for (int i = 0; i < stages(); ++i) {
       for (int j = 0; j < stages(); ++j) extrapolation_(i, j) = lagrange(j, 1 + ratio * tableau_.c[i]);
     }
-  }
-
-  Real lagrange(int j, Real x) const {
-    Real value(1);
-    for (int k = 0; k < stages(); ++k) {
-      if (k != j) value *= (x - tableau_.c[k]) / (tableau_.c[j] - tableau_.c[k]);
-    }
-    return value;
   }
 
   Tableau<S, Real> tableau_;

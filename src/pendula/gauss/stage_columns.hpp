@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <pendula/gauss/compensated.hpp>
+#include <pendula/gauss/lanes.hpp>
+#include <pendula/gauss/tableau.hpp>
+
+namespace pendula::detail {
+
+/// The coefficients of a step, one column a stage, padded to lanes.
+template <int S, class Real>
+class StageColumns {
+  using L = Lanes<S, Real>;
+  static constexpr std::size_t stages = S, Z = L::size;
+
+ public:
+  StageColumns() : coefficients_(gauss_tableau<S, Real>(S)) {
+    for (int i = 0; i < S; ++i) {
+      for (int j = 0; j < S; ++j) m_[j][i] = coefficients_.m(i, j);
+    }
+    fold();
+  }
+
+  /// For a step of `h` after one of `previous` (0: there is none).
+  void prepare(Real h, Real previous) {
+    const Real ratio = previous == 0 ? Real(1) : Real(h / previous);
+    coefficients_.prepare(h, previous);
+    if (h != h_) {
+      h_ = h;
+      fold();
+    } else if (ratio == ratio_) {
+      return;
+    }
+    ratio_ = ratio;
+    extrapolate();
+  }
+
+  Real h() const { return h_; }
+  Real c(std::size_t i) const { return coefficients_.c(static_cast<int>(i)); }
+  Real m(std::size_t i, std::size_t j) const { return coefficients_.m(static_cast<int>(i), static_cast<int>(j)); }
+  Real hb(std::size_t j) const { return hb_[j]; }
+  Real ha(std::size_t i, std::size_t j) const { return coefficients_.ha(static_cast<int>(i), static_cast<int>(j)); }
+
+  L hb() const { return L::load(hb_); }          ///< h b
+  L hc() const { return L::load(hc_); }          ///< h c
+  L hc_low() const { return L::load(hc_low_); }  ///< what hc lost to rounding
+
+  /// Σ_j m_ij x_j for all i, with x already times h b_j.
+  L integral(const Real* x) const { return product(m_, x); }
+  L integral(const L& x) const {
+    alignas(pack_alignment) Real stored[Z];
+    x.store(stored);
+    return product(m_, stored);
+  }
+
+  /// The polynomial through the last step's stage values, at this step's stages.
+  L extrapolated(const Real* last) const { return product(extrapolation_, last); }
+
+  /// The same of values that hold the factor h b of their step.
+  L extrapolated_increments(const Real* last) const { return product(increments_, last); }
+
+  /// That polynomial in the middle of this step.
+  Real at_half(const Real* last) const {
+    Real sum = half_[0] * last[0];
+    for (std::size_t j = 1; j < stages; ++j) sum += half_[j] * last[j];
+    return sum;
+  }
+
+ private:
+  static L product(const Real (&columns)[stages][Z], const Real* x) {
+    L even = L(x[0]) * L::load(columns[0]);
+    if constexpr (S == 1) return even;
+    L odd = L(x[S > 1]) * L::load(columns[S > 1]);
+    for (std::size_t j = 2; j < S; j += 2) {
+      even = fma(L(x[j]), L::load(columns[j]), even);
+      if (j + 1 < S) odd = fma(L(x[j + 1]), L::load(columns[j + 1]), odd);
+    }
+    return even + odd;
+  }
+
+  void fold() {
+    for (int i = 0; i < S; ++i) {
+      const Twofold<Real> exact = exact_product(h_, coefficients_.c(i));
+      hc_[i] = exact.value;
+      hc_low_[i] = exact.low + h_ * coefficients_.c_low(i);
+      hb_[i] = coefficients_.hb(i);
+    }
+  }
+
+  // b_i/b_j, not of h b: of a step of no length that would be no number.
+  void extrapolate() {
+    for (int j = 0; j < S; ++j) {
+      half_[j] = coefficients_.lagrange(j, 1 + ratio_ / 2);
+      for (int i = 0; i < S; ++i) {
+        extrapolation_[j][i] = coefficients_.extrapolation(i, j);
+        increments_[j][i] = ratio_ * (coefficients_.b(i) / coefficients_.b(j)) * extrapolation_[j][i];
+      }
+    }
+  }
+
+  StepCoefficients<S, Real> coefficients_;
+  Real h_{0}, ratio_{0};
+  alignas(pack_alignment) Real m_[stages][Z] = {};
+  alignas(pack_alignment) Real extrapolation_[stages][Z] = {};
+  alignas(pack_alignment) Real increments_[stages][Z] = {};
+  alignas(pack_alignment) Real hb_[Z] = {};
+  alignas(pack_alignment) Real hc_[Z] = {};
+  alignas(pack_alignment) Real hc_low_[Z] = {};
+  Real half_[stages] = {};
+};
+
+}  // namespace pendula::detail

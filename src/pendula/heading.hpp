@@ -1,0 +1,158 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <pendula/space.hpp>
+#include <type_traits>
+
+namespace pendula {
+
+/// Direction of a link and its rate, along the axes of the world.
+template <class Space, class Real = double>
+struct Heading {
+  using Link = typename Space::Link;
+  typename Link::template Cartesian<Real> u, u_dot;
+
+  Heading() = default;
+  Heading(const std::array<Real, Space::dof>& q, const std::array<Real, Space::dof>& v) {
+    typename Link::template Trig<Real> trig;
+    Link::trig(q, trig);
+    Link::direction(trig, u);
+    Link::velocity(trig, v, u_dot);
+  }
+};
+
+/// Angles and rates of one link as the user reads them.
+template <class Space, class Real = double>
+struct LinkAngles {
+  std::array<Real, Space::dof> q, v;
+};
+
+namespace detail {
+
+template <class Real>
+Real half_turn() {
+  using std::acos;
+  if constexpr (std::is_floating_point_v<Real>) return std::numbers::pi_v<Real>;
+  return acos(Real(-1));
+}
+
+template <class Real>
+Real norm(const Real& x, const Real& y) {
+  using std::sqrt;
+  return sqrt(x * x + y * y);
+}
+
+/// Whether a vector has no horizontal part, but for rounding.
+template <class Real>
+bool is_vertical(const std::array<Real, 3>& x) {
+  return norm(x[0], x[1]) < 32 * std::numeric_limits<Real>::epsilon();
+}
+
+/// x moved by full turns to within half a turn of `near`.
+template <class Real>
+Real unwrapped(const Real& x, const Real& near) {
+  using std::round;
+  const Real turn = 2 * half_turn<Real>();
+  return x + turn * round((near - x) / turn);
+}
+
+/// Of (θ, φ) and (−θ, φ + π), which are the same direction, whichever lies nearer to `near`.
+template <class Real>
+std::array<Real, 2> nearest_angles(const std::array<Real, 2>& q, const std::array<Real, 2>& near) {
+  const Real minus_theta = -q[0], opposite = q[1] + half_turn<Real>();
+  const std::array<Real, 2> same{unwrapped(q[0], near[0]), unwrapped(q[1], near[1])};
+  const std::array<Real, 2> other{unwrapped(minus_theta, near[0]), unwrapped(opposite, near[1])};
+  const auto distance = [&](const auto& x) { return norm<Real>(x[0] - near[0], x[1] - near[1]); };
+  return distance(other) < distance(same) ? other : same;
+}
+
+}  // namespace detail
+
+/// The user's θ of a direction, continuous with the angle `near` of a moment before.
+template <class Real>
+std::array<Real, 1> user_coordinates(const Heading<Planar, Real>& heading, const std::array<Real, 1>& near) {
+  std::array<Real, 1> q;
+  Planar::Link::coordinates(heading.u, q);
+  return {detail::unwrapped(q[0], near[0])};
+}
+
+/// The user's θ, φ of a direction, continuous with the angles `near` of a moment before.
+///
+/// At the pole (sin θ < 32 ulp) φ is the plane in which the link moves, or what it was if the link rests.
+template <class Real>
+std::array<Real, 2> user_coordinates(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
+  using std::atan2;
+  const auto& [u, u_dot] = heading;
+  std::array<Real, 2> q;
+  Spatial::Link::coordinates(u, q);
+  if (detail::is_vertical(u)) {
+    const bool rests = detail::is_vertical(u_dot);
+    q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
+  }
+  return detail::nearest_angles(q, near);
+}
+
+/// The same with their rates; at the pole of space φ̇ is zero.
+template <class Space, class Real>
+LinkAngles<Space, Real> user_angles(const Heading<Space, Real>& heading, const std::array<Real, Space::dof>& near) {
+  using Link = typename Space::Link;
+  LinkAngles<Space, Real> angles;
+  angles.q = user_coordinates(heading, near);
+  typename Link::template Trig<Real> trig;
+  Link::trig(angles.q, trig);
+  Real inverse(1);
+  if constexpr (Space::dof == 2) {
+    Real determinant;
+    Link::metric_determinant(trig, determinant);
+    inverse = detail::is_vertical(heading.u) ? Real(0) : Real(1 / determinant);
+  }
+  Link::rates(trig, inverse, heading.u_dot, angles.v);
+  return angles;
+}
+
+/// A direction whose angles are known, from which those of later directions are counted on: full turns, and through
+/// which side of a pole, only the motion tells.
+template <class Space, class Real = double>
+class AngleAnchor {
+  using Cartesian = typename Space::Link::template Cartesian<Real>;
+  using Angles = std::array<Real, Space::dof>;
+
+ public:
+  void set(const Cartesian& u, const Angles& q) {
+    u_ = u;
+    q_ = q;
+    set_reach();
+  }
+
+  /// The link has moved on to u, not far from where it was last followed to.
+  void follow(const Cartesian& u) {
+    Real squared(0);
+    for (std::size_t k = 0; k < u.size(); ++k) squared += (u[k] - u_[k]) * (u[k] - u_[k]);
+    if (squared <= reach_squared_) return;
+    Heading<Space, Real> heading;
+    heading.u = u;
+    heading.u_dot.fill(Real(0));
+    set(u, user_coordinates(heading, q_));
+  }
+
+  const Angles& angles() const { return q_; }
+
+ private:
+  // Within it, angles near the anchor's are the only ones: in space a quarter of the distance from the axis.
+  void set_reach() {
+    if constexpr (Space::dof == 1) {
+      reach_squared_ = Real(1);
+    } else {
+      reach_squared_ = (u_[0] * u_[0] + u_[1] * u_[1]) / 16;
+    }
+  }
+
+  Cartesian u_;
+  Angles q_;
+  Real reach_squared_;
+};
+
+}  // namespace pendula
