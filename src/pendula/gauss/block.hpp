@@ -81,8 +81,8 @@ void add_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Rea
 
 /// Replaces the square of S from (k, k) on, of one row or of two, by the negative of its inverse: one division either
 /// way. Tells whether its pivots are positive.
-template <std::size_t M, class Real>
-bool invert_negated(Block<M, M, Real>& S, std::size_t k) {
+template <std::size_t M, std::size_t Wide, class Real>
+bool invert_negated(Block<M, Wide, Real>& S, std::size_t k) {
   if (k + 1 == M) {
     const bool positive = S[k][k] > 0;
     S[k][k] = -1 / S[k][k];
@@ -105,36 +105,55 @@ void add_rows(Block<M, Columns, Real>& Y, std::size_t i, std::size_t k, const Re
   Y.set_row(i, fma(Row(a), Y.row(k), fma(Row(b), Y.row(k + 1), Y.row(i))));
 }
 
-/// Y_k from the rows after it, by row k of S, whose diagonal squares are negative inverses; of one row or of two.
+/// Row k of S from the diagonal on, and the row after it: what back substitution needs of them.
+template <std::size_t M, class Real>
+struct PivotRows {
+  Real values[2][M];
+
+  template <std::size_t Wide>
+  PivotRows(const Block<M, Wide, Real>& S, std::size_t k) {
+    for (std::size_t row = 0; row < 2 && k + row < M; ++row) {
+      for (std::size_t j = k; j < M; ++j) values[row][j] = S[k + row][j];
+    }
+  }
+};
+
+/// Y_k from the rows after it, by rows of S whose diagonal squares are negative inverses; of one row or of two.
 template <std::size_t M, std::size_t Columns, class Real>
-void substitute_back(const Block<M, M, Real>& S, Block<M, Columns, Real>& Y, std::size_t k) {
+void substitute_back(const PivotRows<M, Real>& pivot, Block<M, Columns, Real>& Y, std::size_t k) {
   using Row = typename Block<M, Columns, Real>::Row;
+  const auto& S = pivot.values;
   Row first = Y.row(k);
-  if (k + 1 == M) return Y.set_row(k, Row(S[k][k]) * first);
+  if (k + 1 == M) return Y.set_row(k, Row(S[0][k]) * first);
   Row second = Y.row(k + 1);
   for (std::size_t j = k + 2; j < M; ++j) {
-    first = fma(Row(S[k][j]), Y.row(j), first);
-    second = fma(Row(S[k + 1][j]), Y.row(j), second);
+    first = fma(Row(S[0][j]), Y.row(j), first);
+    second = fma(Row(S[1][j]), Y.row(j), second);
   }
-  Y.set_row(k, fma(Row(S[k][k]), first, Row(S[k][k + 1]) * second));
-  Y.set_row(k + 1, fma(Row(S[k + 1][k]), first, Row(S[k + 1][k + 1]) * second));
+  Y.set_row(k, fma(Row(S[0][k]), first, Row(S[0][k + 1]) * second));
+  Y.set_row(k + 1, fma(Row(S[1][k]), first, Row(S[1][k + 1]) * second));
 }
 
-/// Replaces every Y by −S⁻¹ Y, two rows at a time. No pivoting: S is positive definite but for terms of the order of
-/// the step. Tells whether all pivots are positive, as they are of steps that are not too large.
-template <std::size_t M, class Real, std::size_t... Columns>
-bool solve_negated(Block<M, M, Real>& S, Block<M, Columns, Real>&... Y) {
+/// Replaces every Y by −S⁻¹ Y, two rows at a time, and the columns of S behind its square too. No pivoting: S is
+/// positive definite but for terms of the order of the step. Tells whether all pivots are positive, as they are of
+/// steps that are not too large.
+template <std::size_t M, std::size_t Wide, class Real, std::size_t... Columns>
+bool solve_negated(Block<M, Wide, Real>& S, Block<M, Columns, Real>&... Y) {
   bool positive = true;
   for (std::size_t k = 0; k < M; k += 2) {
     positive = invert_negated(S, k) && positive;
     for (std::size_t i = k + 2; i < M; ++i) {
       const Real first = S[i][k] * S[k][k] + S[i][k + 1] * S[k + 1][k];
       const Real second = S[i][k] * S[k][k + 1] + S[i][k + 1] * S[k + 1][k + 1];
-      for (std::size_t j = k + 2; j < M; ++j) S[i][j] += first * S[k][j] + second * S[k + 1][j];
+      add_rows(S, i, k, first, second);
       (add_rows(Y, i, k, first, second), ...);
     }
   }
-  for (std::size_t done = M % 2 == 0 ? 2 : 1; done <= M; done += 2) (substitute_back(S, Y, M - done), ...);
+  for (std::size_t done = M % 2 == 0 ? 2 : 1; done <= M; done += 2) {
+    const PivotRows<M, Real> pivot(S, M - done);
+    if constexpr (Wide > M) substitute_back(pivot, S, M - done);
+    (substitute_back(pivot, Y, M - done), ...);
+  }
   return positive;
 }
 

@@ -64,10 +64,9 @@ class ChainNewton {
   static constexpr std::size_t D = Stages::D, Lanes = Stages::Z, s = S;
   static constexpr std::size_t tangents = D - 1, unknowns = tangents * s, vectors = D * s;
 
-  using Square = detail::Block<s, s, Real>;
-  using Column = detail::Block<vectors, 1, Real>;
-  using Vectors = detail::Block<vectors, vectors, Real>;
-  using Tangents = detail::Block<vectors, unknowns, Real>;
+  template <std::size_t Rows, std::size_t Columns>
+  using Block = detail::Block<Rows, Columns, Real>;
+  using Tangents = Block<vectors, unknowns + 1>;  // Z, and v₀ in the last column
 
   // A number at every stage, from which the blocks are made.
   struct alignas(pack_alignment) PerStage {
@@ -84,17 +83,18 @@ class ChainNewton {
     PerStage rod[D], velocity[D], dual[D];  // X, V, X̂
     PerStage tangent[tangents][D];
     PerStage tau, residual[D], slip;  // slip: X·V
-    Square inverse;                   // −E₂⁻¹
+    Block<s, s> inverse;              // −E₂⁻¹
   };
 
   struct Carried {  // δG = P δw + g
-    Vectors P;
-    Column g{};
+    Block<vectors, vectors> P;
+    Real g[vectors] = {};
   };
 
-  struct Gain {  // δV = M δw + a
-    Vectors M{};
-    Column a{};
+  struct Gain {  // δV = v₀ + Z (K δw + k)
+    Tangents Z;
+    Block<unknowns, vectors> K{};
+    Real k[unknowns] = {};
   };
 
   static Vector zero() {
@@ -185,10 +185,10 @@ class ChainNewton {
 
   // τ, −E₂⁻¹ and the residual q.
   void find_multiplier(Stages& stages, int i, const Vector& G, Terms& terms) {
-    Square E2;
+    Block<s, s> E2;
     for (std::size_t k = 0; k < s; ++k) {
-      set_stages(E2[k], unit_[k].lanes() - coupling(k, terms.dual, terms.velocity));
-      set_stages(terms.inverse[k], unit_[k].lanes());
+      set_stages(E2, k, 0, unit_[k].lanes() - coupling(k, terms.dual, terms.velocity));
+      set_stages(terms.inverse, k, 0, unit_[k].lanes());
     }
     positive_ = detail::solve_negated(E2, terms.inverse) && positive_;
     const Vector pushed = stages.impulse_without_multiplier(i, stages.kept_rod(i));
@@ -215,154 +215,144 @@ class ChainNewton {
   void eliminate(const Stages& stages, int i, const Terms& terms, Carried& carried) {
     const bool first = i == 0, last = i + 1 == stages.links();
     Gain& gain = gains_[i];
-    Tangents Z, BZ, NZ;
-    Column v0, Bv0, Nv0;
-    detail::Block<unknowns, vectors, Real> across;  // L
-    find_null_space(terms, Z, v0);
+    Tangents BZ, own;
+    Block<unknowns, vectors> across;       // L
+    Block<unknowns, unknowns + 1> pivots;  // S, and what k is made of
+    find_null_space(terms, gain.Z);
     find_annihilator(terms, across);
-    last ? set_scaled(carried.P[0][0], Z, BZ) : set_product(carried.P, Z, BZ);
-    last ? set_scaled(carried.P[0][0], v0, Bv0) : set_product(carried.P, v0, Bv0);
-    subtract_own(stages, i, terms, Z, BZ, NZ);
-    subtract_own(stages, i, terms, v0, Bv0, Nv0);
+    last ? set_scaled(carried.P[0][0], gain.Z, BZ) : set_product(carried.P, gain.Z, BZ);
+    subtract_own(stages, i, terms, gain.Z, BZ, own);
     for (std::size_t u = 0; u < vectors; ++u) {
-      Nv0[u][0] += carried.g[u][0] - terms.residual[u / s][u % s];
-      carried.g[u][0] += Bv0[u][0];
+      const Real rest = carried.g[u] - terms.residual[u / s][u % s];
+      own.set_row(u, own.row(u) + Tangents::unit(unknowns, rest));
     }
-    detail::Block<unknowns, unknowns, Real> pivots;
-    detail::Block<unknowns, 1, Real> k;
-    set_product(across, NZ, pivots);
-    set_product(across, Nv0, k);
+    set_product(across, own, pivots);
     if (first) {
-      positive_ = detail::solve_negated(pivots, k) && positive_;
+      positive_ = detail::solve_negated(pivots) && positive_;
     } else {
-      detail::Block<unknowns, vectors, Real> K;
-      last ? set_scaled(carried.P[0][0], across, K) : set_product(across, carried.P, K);
-      positive_ = detail::solve_negated(pivots, K, k) && positive_;
-      set_product(Z, K, gain.M);
-      const Real& mass_before = stages.constants(i - 1).mass;
-      for (std::size_t u = 0; u < vectors; ++u) {
-        const auto row = carried.P.row(u) + carried.P.unit(u, mass_before);
-        carried.P.set_row(u, detail::row_of_product(BZ[u], K, row));
-      }
-      add_product(BZ, k, carried.g);
+      last ? set_scaled(carried.P[0][0], across, gain.K) : set_product(across, carried.P, gain.K);
+      positive_ = detail::solve_negated(pivots, gain.K) && positive_;
     }
-    gain.a = v0;
-    add_product(Z, k, gain.a);
+    for (std::size_t u = 0; u < unknowns; ++u) gain.k[u] = pivots[u][unknowns];
+    if (!first) hand_on(BZ, gain, stages.constants(i - 1).mass, carried);
   }
 
-  // Z = T − X̂ E⁻¹ W and v₀ = −X̂ E⁻¹ (X·V).
-  void find_null_space(const Terms& terms, Tangents& Z, Column& v0) {
-    Square E;
-    detail::Block<s, unknowns, Real> W{};  // beyond its columns, too: denormal numbers there would be slow
-    detail::Block<s, 1, Real> slip;
-    for (std::size_t k = 0; k < s; ++k) {
-      set_stages(E[k], unit_[k].lanes() + coupling(k, terms.velocity, terms.dual));
-      for (std::size_t b = 0; b < tangents; ++b) {
-        set_stages(W[k] + b * s, coupling(k, terms.velocity, terms.tangent[b]));
+  // P ← B + B Z K with the mass of the bob before on its diagonal, g ← g + B (v₀ + Z k).
+  static void hand_on(const Tangents& BZ, const Gain& gain, const Real& mass_before, Carried& carried) {
+    using Row = typename Block<vectors, vectors>::Row;
+    for (std::size_t u = 0; u < vectors; ++u) {
+      Row row = carried.P.row(u) + carried.P.unit(u, mass_before);
+      Real rest = carried.g[u] + BZ[u][unknowns];
+      for (std::size_t v = 0; v < unknowns; ++v) {
+        row = fma(Row(BZ[u][v]), gain.K.row(v), row);
+        rest += BZ[u][v] * gain.k[v];
       }
-      slip[k][0] = terms.slip[k];
+      carried.P.set_row(u, row);
+      carried.g[u] = rest;
     }
-    positive_ = detail::solve_negated(E, W, slip) && positive_;
+  }
+
+  // Z = T − X̂ E⁻¹ W, and v₀ = −X̂ E⁻¹ (X·V).
+  void find_null_space(const Terms& terms, Tangents& Z) {
+    Block<s, s> E;
+    Block<s, unknowns + 1> W;
     using Row = typename Tangents::Row;
+    for (std::size_t k = 0; k < s; ++k) {
+      set_stages(E, k, 0, unit_[k].lanes() + coupling(k, terms.velocity, terms.dual));
+      W.set_row(k, Row(Real(0)));
+      for (std::size_t b = 0; b < tangents; ++b) {
+        set_stages(W, k, b * s, coupling(k, terms.velocity, terms.tangent[b]));
+      }
+      W[k][unknowns] = terms.slip[k];
+    }
+    positive_ = detail::solve_negated(E, W) && positive_;
     for (std::size_t d = 0; d < D; ++d) {
       for (std::size_t k = 0; k < s; ++k) {
-        const Real& dual = terms.dual[d].values[k];
-        auto row = Row(dual) * Row::load(W[k]);
+        Row row = Row(terms.dual[d].values[k]) * W.row(k);
         for (std::size_t b = 0; b < tangents; ++b) row = row + Tangents::unit(b * s + k, terms.tangent[b][d][k]);
         Z.set_row(d * s + k, row);
-        v0[d * s + k][0] = dual * slip[k][0];
       }
     }
   }
 
   // L = Tᵀ + F E₂⁻¹ X̂ᵀ.
-  void find_annihilator(const Terms& terms, detail::Block<unknowns, vectors, Real>& across) const {
+  void find_annihilator(const Terms& terms, Block<unknowns, vectors>& across) const {
     for (std::size_t b = 0; b < tangents; ++b) {
       for (std::size_t k = 0; k < s; ++k) {
         PerStage F;
         F = coupling(k, terms.tangent[b], terms.velocity);
         L through(Real(0));  // −F E₂⁻¹
-        for (std::size_t j = 0; j < s; ++j) through = fma(L(F[j]), load_stages(terms.inverse[j]), through);
-        Real* row = across[b * s + k];
+        for (std::size_t j = 0; j < s; ++j) through = fma(L(F[j]), stages_of(terms.inverse, j), through);
+        const std::size_t u = b * s + k;
+        if (Block<unknowns, vectors>::stride > vectors) across.set_row(u, across.unit(0, Real(0)));
         for (std::size_t d = 0; d < D; ++d) {
           const L own = unit_[k].lanes() * L(terms.tangent[b][d][k]);
-          set_stages(row + d * s, own - through * terms.dual[d].lanes());
+          set_stages(across, u, d * s, own - through * terms.dual[d].lanes());
         }
-        std::fill(row + vectors, row + detail::Block<unknowns, vectors, Real>::stride, Real(0));
       }
     }
   }
 
-  // NY ← BY − N Y.
-  template <std::size_t Columns>
-  void subtract_own(const Stages& stages, int i, const Terms& terms, const detail::Block<vectors, Columns, Real>& Y,
-                    const detail::Block<vectors, Columns, Real>& BY, detail::Block<vectors, Columns, Real>& NY) const {
+  // own ← BZ − N Z.
+  void subtract_own(const Stages& stages, int i, const Terms& terms, const Tangents& Z, const Tangents& BZ,
+                    Tangents& own) const {
     const Real& drag = stages.constants(i).drag;
     for (std::size_t k = 0; k < s; ++k) {
-      Real minus_own[s];
-      for (std::size_t j = 0; j < s; ++j) minus_own[j] = ha_[k][j] * (terms.tau[j] + drag - terms.tau[k]);
+      Real minus[s];
+      for (std::size_t j = 0; j < s; ++j) minus[j] = ha_[k][j] * (terms.tau[j] + drag - terms.tau[k]);
       for (std::size_t d = 0; d < D; ++d) {
-        auto row = BY.row(d * s + k);
-        for (std::size_t j = 0; j < s; ++j) {
-          row = fma(typename detail::Block<vectors, Columns, Real>::Row(minus_own[j]), Y.row(d * s + j), row);
-        }
-        NY.set_row(d * s + k, row);
+        own.set_row(d * s + k, row_of_product<s>(minus, Z, d * s, BZ.row(d * s + k)));
       }
     }
-    if (stages.loaded()) subtract_torque(stages, i, Y, NY);
+    if (stages.loaded()) subtract_torque(stages, i, Z, own);
+  }
+
+  // Σ_j a_j times row (begin + j) of B, added to `start`.
+  template <std::size_t Count, class B>
+  static typename B::Row row_of_product(const Real* a, const B& b, std::size_t begin, typename B::Row start) {
+    for (std::size_t j = 0; j < Count; ++j) start = fma(typename B::Row(a[j]), b.row(begin + j), start);
+    return start;
   }
 
   // The torque's part of N: H (torque/l² ×) H.
-  template <std::size_t Columns>
-  void subtract_torque(const Stages& stages, int i, const detail::Block<vectors, Columns, Real>& Y,
-                       detail::Block<vectors, Columns, Real>& NY) const {
-    using Row = typename detail::Block<vectors, Columns, Real>::Row;
+  void subtract_torque(const Stages& stages, int i, const Tangents& Z, Tangents& own) const {
+    using Row = typename Tangents::Row;
     for (std::size_t e = 0; e < D; ++e) {
       Vector axis = zero(), turned;
       axis[e] = L(Real(1));
       Space::Link::torque_load(stages.torque(i), axis, turned);
-      detail::Block<s, Columns, Real> HY;
-      for (std::size_t j = 0; j < s; ++j) {
-        Row row = Row(ha_[j][0]) * Y.row(e * s);
-        for (std::size_t m = 1; m < s; ++m) row = fma(Row(ha_[j][m]), Y.row(e * s + m), row);
-        HY.set_row(j, row);
-      }
+      Block<s, unknowns + 1> HZ;
+      for (std::size_t j = 0; j < s; ++j) HZ.set_row(j, row_of_product<s>(ha_[j].values, Z, e * s, Row(Real(0))));
       for (std::size_t d = 0; d < D; ++d) {
         PerStage torque;  // times h b
         torque = turned[d];
         for (std::size_t k = 0; k < s; ++k) {
-          Row row = NY.row(d * s + k);
-          for (std::size_t j = 0; j < s; ++j) {
-            row = row - Row(stages.columns().m(k, j) * torque[j]) * HY.row(j);
-          }
-          NY.set_row(d * s + k, row);
+          Real minus[s];
+          for (std::size_t j = 0; j < s; ++j) minus[j] = -stages.columns().m(k, j) * torque[j];
+          own.set_row(d * s + k, row_of_product<s>(minus, HZ, 0, own.row(d * s + k)));
         }
       }
     }
   }
 
-  // The stages of a pack in a row, whole where the pack holds nothing else.
-  static void set_stages(Real* row, const L& lanes) {
-    if constexpr (Lanes == s) {
-      lanes.store(row);
+  // The stages of a pack in a row from a column on: whole where there is room for what stands behind the last stage,
+  // which the columns after overwrite.
+  template <class B>
+  static void set_stages(B& block, std::size_t row, std::size_t column, const L& lanes) {
+    if (Lanes == s || column + Lanes <= B::stride) {
+      lanes.store_unaligned(block[row] + column);
     } else {
       PerStage stored;
       stored = lanes;
-      std::copy_n(stored.values, s, row);
+      std::copy_n(stored.values, s, block[row] + column);
     }
   }
-  static L load_stages(const Real* row) {
-    if constexpr (Lanes == s) {
-      return L::load(row);
-    } else {
-      PerStage stored;
-      stored = L(Real(0));
-      std::copy_n(row, s, stored.values);
-      return stored.lanes();
-    }
+  static L stages_of(const Block<s, s>& block, std::size_t row) {
+    static_assert(Block<s, s>::stride == Lanes);
+    return L::load(block[row]);
   }
 
-  // δV = M δw + a, number by number, not in lanes: what a link waits for is short then.
+  // Number by number, not in lanes: what a link waits for is short then.
   PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
     using std::abs;
     const auto& columns = stages.columns();
@@ -398,14 +388,20 @@ class ChainNewton {
   }
 
   static void stage_changes(const Gain& gain, const Real* dw, Real (&dV)[D][Lanes]) {
-    for (std::size_t u = 0; u < vectors; ++u) {
-      Real even = gain.a[u][0], odd(0);
+    Real alpha[unknowns];
+    for (std::size_t u = 0; u < unknowns; ++u) {
+      Real even = gain.k[u], odd(0);
       for (std::size_t k = 0; k + 1 < vectors; k += 2) {
-        even += gain.M[u][k] * dw[k];
-        odd += gain.M[u][k + 1] * dw[k + 1];
+        even += gain.K[u][k] * dw[k];
+        odd += gain.K[u][k + 1] * dw[k + 1];
       }
-      if (vectors % 2 == 1) even += gain.M[u][vectors - 1] * dw[vectors - 1];
-      dV[u / s][u % s] = even + odd;
+      if (vectors % 2 == 1) even += gain.K[u][vectors - 1] * dw[vectors - 1];
+      alpha[u] = even + odd;
+    }
+    for (std::size_t v = 0; v < vectors; ++v) {
+      Real change = gain.Z[v][unknowns];
+      for (std::size_t u = 0; u < unknowns; ++u) change += gain.Z[v][u] * alpha[u];
+      dV[v / s][v % s] = change;
     }
   }
 

@@ -58,6 +58,14 @@ template <class Real>
 void store(Real* to, const Real& from) {
   *to = from;
 }
+template <class Real>
+void store_unaligned(Real* to, const Real& from) {
+  *to = from;
+}
+template <class Real, class Arch>
+void store_unaligned(Real* to, const xsimd::batch<Real, Arch>& from) {
+  from.store_unaligned(to);
+}
 template <class Real, class Arch>
 void load(const Real* from, xsimd::batch<Real, Arch>& to) {
   to = xsimd::batch<Real, Arch>::load_aligned(from);
@@ -142,6 +150,14 @@ class Pack {
       held_.high.store(to + low_size);
     } else {
       detail::store(to, held_);
+    }
+  }
+  void store_unaligned(Scalar* to) const {
+    if constexpr (split) {
+      held_.low.store_unaligned(to);
+      held_.high.store_unaligned(to + low_size);
+    } else {
+      detail::store_unaligned(to, held_);
     }
   }
 
