@@ -148,6 +148,13 @@ TEST(Summary, AFailedStepIsToldInFull) {
   EXPECT_NE(to_text(summary).find("ended early"), std::string::npos);
 }
 
+TEST(Summary, WarningsAreSentencesInAnArray) {
+  Summary summary = summary_of_a_run();
+  EXPECT_EQ(json::parse(to_json(summary)).at("warnings"), json::array());
+  summary.warnings = {"The energy went \"up\".", "So did the step."};
+  EXPECT_EQ(json::parse(to_json(summary)).at("warnings"), json({"The energy went \"up\".", "So did the step."}));
+}
+
 TEST(Summary, NamesThatAreNoUtf8DoNotBreakTheJson) {
   Summary summary = summary_of_a_run();
   summary.model.scenario = "\xff.toml";

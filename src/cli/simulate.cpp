@@ -13,11 +13,11 @@
 #include <string>
 #include <system_error>
 #include <variant>
-#include <vector>
 
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
+#include "cli/warnings.hpp"
 #include "io/input_error.hpp"
 #include "io/number.hpp"
 #include "io/run_record.hpp"
@@ -68,7 +68,10 @@ class Run {
         options_(options),
         integrator_(make(scenario, options)),
         file_(open_trajectory<Space>(options, scenario.chain.links())),
-        record_(scenario.chain, scenario.duration) {}
+        record_(scenario.chain, scenario.duration),
+        warnings_(!options.quiet) {
+    for (const std::string& warning : scenario.warnings) warnings_.add(warning);
+  }
 
   /// Never throws for a run that fails: the summary says so.
   io::Summary run() {
@@ -124,6 +127,7 @@ class Run {
     summary.duration = scenario_.duration;
     summary.every = scenario_.every;
     summary.ending = ending;
+    summary.warnings = warnings_.sentences();
     summary.statistics = integrator_->statistics();
     summary.wall_seconds = wall_seconds_;
     summary.energy_error = record_.energy_error();
@@ -140,12 +144,9 @@ class Run {
   std::unique_ptr<Integrator<Space>> integrator_;
   std::unique_ptr<io::TrajectoryFile<Space>> file_;
   io::RunRecord<Space> record_;
+  Warnings warnings_;
   double wall_seconds_ = std::nan("");  // unknown where a row ended the run
 };
-
-void warn(const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings) std::cerr << "pendula: warning: " << warning << '\n';
-}
 
 }  // namespace
 
@@ -153,7 +154,6 @@ ExitStatus simulate(const SimulateOptions& options) {
   const io::AnyScenario any = io::read_scenario(options.scenario, options.overrides);
   return std::visit(
       [&]<class Space>(const io::Scenario<Space>& scenario) {
-        if (!options.quiet) warn(scenario.warnings);
         const io::Summary summary = Run<Space>(scenario, options).run();
         if (options.json) {
           std::cout << io::to_json(summary);

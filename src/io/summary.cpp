@@ -245,6 +245,7 @@ std::string to_json(const Summary& summary) {
                   {"energy_error_max", summary.energy_error.largest},
                   {"wall_seconds", summary.wall_seconds},
                   {"outcome", to_json(summary.ending)},
+                  {"warnings", summary.warnings},
                   {"final", to_json(summary.final)}};
   constexpr int one_line = -1;
   return json.dump(one_line, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -53,6 +53,7 @@ struct Summary {
   double duration = 0;      ///< as asked for
   std::int64_t every = 0;
   Ending ending;
+  std::vector<std::string> warnings;  ///< sentences; the text leaves them out, since they were told as they came
   Statistics statistics;
   double wall_seconds = 0;  ///< in the stepping loop alone
   EnergyError energy_error;

@@ -298,13 +298,17 @@ def test_json_is_alone_on_standard_output(pendula, double):
 def test_json_stays_pure_beside_warnings(pendula, double):
     run = pendula("simulate", double, "--json", *settings("run.tolerance=1e-6"))
     assert run.json["outcome"]["status"] == "ok"
-    assert "run.tolerance: has no effect with method gauss" in run.err
+    [warning] = run.json["warnings"]
+    assert warning == "--set run.tolerance=1e-6: run.tolerance: has no effect with method gauss"
+    assert run.err == f"pendula: warning: {warning}\n"
+    assert pendula("simulate", double, "--json").json["warnings"] == []
 
 
 def test_quiet_prints_nothing(pendula, double):
     run = pendula("simulate", double, "--quiet", *settings("run.tolerance=1e-6"))
     assert (run.status, run.out, run.err) == (0, "", "")
-    assert pendula("simulate", double, "--quiet", "--json").json["steps"] == 200
+    loud = pendula("simulate", double, "--quiet", "--json", *settings("run.tolerance=1e-6"))
+    assert (loud.json["steps"], len(loud.json["warnings"]), loud.err) == (200, 1, "")
 
 
 def test_text_summary_tells_settings_counts_energy_and_last_bob(pendula, double):
