@@ -309,6 +309,61 @@ TEST(Scenario, TextThatIsNoTomlIsToldByItsLine) {
   begins("[chain]\nspace = \"\xff\"\n", "file.toml:2: expected valid TOML, got: ");
 }
 
+TEST(Scenario, NestingThatWouldExhaustTheStackIsAnError) {
+  const auto repeated = [](const std::string& piece, int times) {
+    std::string text;
+    for (int i = 0; i < times; ++i) text += piece;
+    return text;
+  };
+  constexpr int many = 40'000;
+  const std::string message = ": expected keys and values nested at most 16 deep, got more";
+  for (const std::string& text :
+       {"a" + repeated(".a", many) + " = 1", "[a" + repeated(".a", many) + "]", "a = " + repeated("[", many),
+        "a = " + repeated("{a=", many), "a = " + repeated("{a.a.a.a = ", many), "a" + repeated(".\"a\"", many) + " = 1",
+        "a" + repeated(" . a", many) + " = 1"}) {
+    EXPECT_EQ(error_of(planar_text + text), "file.toml:8" + message);
+  }
+  EXPECT_TRUE(error_of(planar_text, {"a" + repeated(".a", many) + "=1"}).ends_with(message));
+  EXPECT_TRUE(error_of(planar_text, {"chain.drive=" + repeated("[", many)}).ends_with(message));
+  EXPECT_EQ(error_of(planar_text + "a" + repeated(".a", 15) + " = 1").find("nested"), std::string::npos);
+  // What stands in strings and comments is not nested.
+  const std::string marks = repeated("[", 100) + repeated(".", 100);
+  for (const std::string& text :
+       {"# " + marks + "\nb = 1", "b = \"" + marks + "\"", "b = '" + marks + "'", "b = \"\\\"" + marks + "\"",
+        "b = \"\"\"" + marks + "\n\\\"\"\"" + marks + "\"\"\"", "b = '''" + marks + "'" + marks + "'''"}) {
+    EXPECT_NE(error_of(planar_text + text).find("got the unknown key \"b\""), std::string::npos) << text;
+  }
+}
+
+TEST(Scenario, NumbersBeyondTheirTypeAreTold) {
+  const auto with_length = [](const std::string& length) {
+    return error_of(edited(planar_text, "lengths = 1", "lengths = " + length));
+  };
+  EXPECT_EQ(with_length("1e400"), "file.toml:4: expected a number, got 1e400, too large for a double");
+  EXPECT_EQ(with_length("[1, -1_0e400]"), "file.toml:4: expected a number, got -1_0e400, too large for a double");
+  EXPECT_EQ(with_length("99999999999999999999"),
+            "file.toml:4: expected a number, got 99999999999999999999, too large for an integer; with a point it is a "
+            "float");
+  EXPECT_EQ(error_of(planar_text, {"chain.lengths=+1e400"}),
+            "--set chain.lengths=+1e400: expected a number, got +1e400, too large for a double");
+  // One too small for a double is rounded to zero, as any number is to the nearest double.
+  EXPECT_EQ(parsed<Planar>(planar_text, {"chain.gravity=1e-400"}).chain.gravity(), 0);
+}
+
+TEST(Scenario, TextsAreShownOnOneLineAndCut) {
+  const auto in_space = [](const std::string& text) {
+    return error_of(edited(planar_text, "\"planar\"", "\"" + text + "\""));
+  };
+  const std::string expected = "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got ";
+  EXPECT_EQ(in_space(std::string(100, 'x')), expected + "\"" + std::string(60, 'x') + "...\"");
+  EXPECT_EQ(in_space("\\u001b[2J\\n"), expected + "\"?[2J?\"");
+  std::string umlauts = "a";
+  for (int i = 0; i < 40; ++i) umlauts += "\u00fc";
+  EXPECT_EQ(in_space(umlauts), expected + "\"" + umlauts.substr(0, 59) + "...\"");  // never half a character
+  EXPECT_EQ(error_of(planar_text, {"chain.space=" + std::string(100, 'x')}).substr(0, 70),
+            "--set chain.space=" + std::string(48, 'x') + "...:");
+}
+
 TEST(Scenario, PlanarChainsHaveNoPhi) {
   EXPECT_EQ(error_of(planar_text + "phi = 0.1\n"),
             "file.toml:8: start.phi: expected no such key in a planar scenario, got 0.1");
@@ -356,7 +411,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run..step=1", "--set run..step=1: expected KEY=VALUE such as run.step=1e-4, got \"run..step=1\""},
       {"run.step=", "--set run.step=: expected a TOML value after '=', got \"\""},
       {"run.step=1e-", "--set run.step=1e-: expected a TOML value after '=', got \"1e-\""},
-      {"run.step=1\nevery=2", "--set run.step=1\nevery=2: expected a TOML value after '=', got \"1\nevery=2\""},
+      {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
        "--set run.method=eulr: run.method: expected \"gauss\" or \"rk4\" or \"dopri5\" or "
        "\"fehlberg78\", got \"eulr\""},
