@@ -28,9 +28,6 @@
 namespace pendula::cli {
 namespace {
 
-/// Thrown out of a row to end the run there.
-struct Interrupted {};
-
 /// The integrator that a scenario asks for. What the runtime says of an option, `key: …`, is said at the place of that
 /// key. Throws io::InputError.
 template <class Space>
@@ -51,12 +48,12 @@ std::unique_ptr<Integrator<Space>> make(const io::Scenario<Space>& scenario, con
 /// Opens the trajectory file where one is asked for. Throws io::InputError, also where that would destroy the scenario.
 template <class Space>
 std::unique_ptr<io::TrajectoryFile<Space>> open_trajectory(const SimulateOptions& options, int links) {
-  if (options.output.empty()) return nullptr;
+  if (!options.output) return nullptr;
   std::error_code none_there;
-  if (std::filesystem::equivalent(options.output, options.scenario, none_there)) {
-    throw io::InputError(options.output + ": expected a file for the trajectory, got the scenario itself");
+  if (std::filesystem::equivalent(*options.output, options.scenario, none_there)) {
+    throw io::InputError(*options.output + ": expected a file for the trajectory, got the scenario itself");
   }
-  return std::make_unique<io::TrajectoryFile<Space>>(options.output, links);
+  return std::make_unique<io::TrajectoryFile<Space>>(*options.output, links);
 }
 
 /// One run: who takes the rows, and how it ended.
@@ -87,25 +84,30 @@ class Run {
     const InterruptGuard guard;
     Progress progress(scenario_.duration, !options_.quiet);
     try {
-      const RunResult result =
-          simulate(*integrator_, scenario_.start, {largest_step, scenario_.duration, scenario_.every},
-                   [&](const State<Space>& state) {
-                     take(state);
-                     progress.at(state.time);
-                     if (guard.interrupted()) throw Interrupted();
-                   });
+      const RunResult result = simulate(
+          *integrator_, scenario_.start, {largest_step, scenario_.duration, scenario_.every},
+          [&](const State<Space>& state) {
+            take(state);
+            progress.at(state.time);
+          },
+          [&] { return guard.interrupted(); });
       wall_seconds_ = result.stepping_seconds;
-      return io::ending_of(result.outcome);
-    } catch (const Interrupted&) {
+      if (!result.outcome || !result.stopped) return io::ending_of(result.outcome);
       return {"interrupted", "interrupted at t = " + io::shortest(record_.last().time), {}};
+    } catch (const io::Ending& ending) {
+      return ending;
     } catch (const io::OutputError& error) {
       return {"output_failed", error.what(), {}};
     }
   }
 
+  /// Throws io::Ending rather than take a row that is not finite; the energy is not wherever anything else is not.
   void take(const State<Space>& state) {
     const Points<Space, Eigen::Dynamic> bobs = bob_positions(scenario_.chain, state);
     const double energy = pendula::energy(scenario_.chain, state);
+    if (!std::isfinite(energy)) {
+      throw io::Ending{"not_finite", "at t = " + io::shortest(state.time) + ": the energy is not a finite number", {}};
+    }
     record_.add(state, bobs, energy);
     if (file_) file_->write(state, bobs, energy);
   }
@@ -133,9 +135,10 @@ class Run {
     summary.energy_error = record_.energy_error();
     summary.energy_final = record_.energy();
     summary.table = record_.table();
-    summary.final = io::snapshot(scenario_.chain, record_.last());
+    summary.final = io::snapshot(scenario_.chain, record_.rows() > 0 ? record_.last() : scenario_.start);
     summary.rows = record_.rows();
     summary.trajectory = options_.output;
+    summary.rows_written = file_ ? file_->rows() : 0;
     return summary;
   }
 
@@ -155,10 +158,11 @@ ExitStatus simulate(const SimulateOptions& options) {
   return std::visit(
       [&]<class Space>(const io::Scenario<Space>& scenario) {
         const io::Summary summary = Run<Space>(scenario, options).run();
+        std::ostream& out = options.output == "-" ? std::cerr : std::cout;
         if (options.json) {
-          std::cout << io::to_json(summary);
+          out << io::to_json(summary);
         } else if (!options.quiet) {
-          std::cout << io::to_text(summary);
+          out << io::to_text(summary);
         }
         if (summary.ending.ok()) return done;
         std::cerr << "pendula: " << summary.ending.message << '\n';

@@ -117,8 +117,10 @@ def test_a_folder_is_no_scenario(pendula, tmp_path):
 def test_an_output_that_cannot_be_opened(pendula, double):
     run = pendula("simulate", double, "-o", "no/such/folder/out.csv")
     assert (run.status, run.out) == (2, "")
-    reason = "expected a file that can be written, got: No such file or directory"
+    reason = "expected a file that can be written, got: no/such/folder/ does not exist"
     assert run.err == f"pendula: no/such/folder/out.csv: {reason}\n"
+    run = pendula("simulate", double, "-o", ".")
+    assert run.err == "pendula: .: expected a file that can be written, got: Is a directory\n"
 
 
 def test_the_scenario_is_not_overwritten(pendula, double):
@@ -156,6 +158,14 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
         (["simulate", "a", "--otput=b"], " simulate", "unknown option --otput=b (did you mean --output?)"),
         (["simulate", "a.toml", "b.toml"], " simulate", "unknown argument b.toml"),
         (["check", "--space", "flat"], " check", "--space: flat not in {planar,spatial}"),
+        *(
+            (
+                ["check", "--links", links],
+                " check",
+                f"--links: expected a whole number of links, 1 or more, got {links}",
+            )
+            for links in ("-1", "0", "1.5", "two", "99999999999")
+        ),
         (["kernels", "--all"], " kernels", "unknown option --all"),
     ],
 )
