@@ -127,6 +127,30 @@ bool is_bare_word(std::string_view text) {
          std::ranges::all_of(text, [](char c) { return is_key_character(c) || c == '.'; });
 }
 
+/// A number and whatever stands behind it, as in "90 deg".
+struct Quantity {
+  double value = 0;
+  std::string_view unit;
+};
+
+std::optional<Quantity> read_quantity(std::string_view text) {
+  text = trimmed(text);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  Quantity quantity;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), quantity.value);
+  if (error != std::errc()) return std::nullopt;
+  quantity.unit = trimmed(text.substr(static_cast<std::size_t>(end - text.data())));
+  return quantity;
+}
+
+/// What a shell user types for a string: a word, or a number with a unit, whose quotes the shell takes.
+bool is_bare_string(std::string_view text) {
+  if (is_bare_word(text)) return true;
+  const auto in_a_unit = [](char c) { return (c >= 'a' && c <= 'z') || c == '/'; };
+  const std::optional<Quantity> quantity = read_quantity(text);
+  return quantity && !quantity->unit.empty() && std::ranges::all_of(quantity->unit, in_a_unit);
+}
+
 /// The value of an override in a table of its own, under the key "value".
 toml::table parse_value(std::string_view value, const std::string& where) {
   const std::string text(value);
@@ -134,7 +158,7 @@ toml::table parse_value(std::string_view value, const std::string& where) {
     toml::table table = toml::parse("value = " + text, where);
     if (table.size() == 1) return table;  // not "1 \n another = 2"
   } catch (const toml::parse_error&) {
-    if (is_bare_word(value)) return toml::parse("value = \"" + text + '"', where);
+    if (is_bare_string(value)) return toml::parse("value = \"" + text + '"', where);
   }
   const std::string number = impossible_number(value);
   throw InputError(where + ": expected " +
@@ -165,16 +189,22 @@ void apply_override(toml::table& root, const std::string& text) {
   table->insert_or_assign(path.back(), std::move(*value.get("value")));
 }
 
-std::string expected_number(Sign sign) {
-  switch (sign) {
-    case Sign::any:
-      return "a finite number";
-    case Sign::not_negative:
-      return "a finite number >= 0";
-    case Sign::positive:
-      return "a finite number > 0";
+std::string expected_number(Sign sign, Units units) {
+  std::string expected = "a finite number";
+  if (sign == Sign::not_negative) expected += " >= 0";
+  if (sign == Sign::positive) expected += " > 0";
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    expected += (i == 0 ? " or a string in " : " or ") + std::string(units[i].name);
   }
-  return {};
+  return expected;
+}
+
+/// The number in a text such as "90 deg".
+std::optional<double> with_unit(std::string_view text, Units units) {
+  const std::optional<Quantity> quantity = read_quantity(text);
+  if (!quantity) return std::nullopt;
+  const auto unit = std::ranges::find(units, quantity->unit, &Unit::name);
+  return unit == units.end() ? std::nullopt : std::optional(quantity->value * unit->size);
 }
 
 bool fits(double value, Sign sign) {
@@ -242,9 +272,12 @@ void Entry::fail(const std::string& expected) const {
   throw InputError(where(), key_, expected, shown(*node_));
 }
 
-double Entry::number(Sign sign) const {
-  const std::optional<double> value = is_number() ? node_->value<double>() : std::nullopt;
-  if (!value || !fits(*value, sign)) fail(expected_number(sign));
+double Entry::number(Sign sign, Units units) const {
+  const auto* text = node_->as_string();
+  const std::optional<double> value = is_number() ? node_->value<double>()
+                                      : text      ? with_unit(text->get(), units)
+                                                  : std::nullopt;
+  if (!value || !fits(*value, sign)) fail(expected_number(sign, units));
   return *value;
 }
 
@@ -265,14 +298,16 @@ std::size_t Entry::choice(std::span<const std::string_view> choices) const {
   throw InputError(where(), key_, expected, shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
 }
 
-Eigen::VectorXd Entry::per_link(const LinkCount& count, Sign sign) const {
-  if (is_number()) return Eigen::VectorXd::Constant(count.links, number(sign));
+Eigen::VectorXd Entry::per_link(const LinkCount& count, Sign sign, Units units) const {
+  if (is_number() || (node_->is_string() && !units.empty())) {
+    return Eigen::VectorXd::Constant(count.links, number(sign, units));
+  }
   if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
-    fail(expected_number(sign) + " for all links, or an array of " + std::to_string(count.links) +
+    fail(expected_number(sign, units) + " for all links, or an array of " + std::to_string(count.links) +
          (key_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
   }
   Eigen::VectorXd values(count.links);
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(sign);
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(sign, units);
   return values;
 }
 

@@ -304,6 +304,32 @@ def test_json_stays_pure_beside_warnings(pendula, double):
     assert pendula("simulate", double, "--json").json["warnings"] == []
 
 
+def test_degrees_are_radians_in_other_words(pendula, double):
+    def final(*start):
+        return pendula("simulate", double, "--json", *settings(*start)).json["final"]
+
+    assert final("start.theta=90 deg") == final()  # the same bits
+    assert final('start.theta_dot=["180 deg/s", 1]') == final(f"start.theta_dot=[{math.pi}, 1]")
+
+
+def test_momenta_at_the_start(pendula, spherical):
+    """p_θ = m l² θ̇ and p_φ = m l² sin²θ φ̇ of one link."""
+    given = settings("chain.masses=2.0", "chain.lengths=0.5", "run.duration=0")
+    by_momenta = spherical.with_name("momenta.toml")
+    text = spherical.read_text().replace("theta_dot = 0.4", "p_theta = 0.2")
+    by_momenta.write_text(text.replace("phi_dot   = 0.9", f"p_phi = {0.45 * math.sin(1.2) ** 2}"))
+    final = pendula("simulate", by_momenta, "--json", *given).json["final"]
+    assert final["theta_dot"] == pytest.approx([0.4], abs=1e-15)  # measured 0
+    assert final["phi_dot"] == pytest.approx([0.9], abs=1e-15)  # measured 1.1e-16
+
+
+def test_an_angle_that_looks_like_degrees_is_warned_of(pendula, double):
+    run = pendula("simulate", double, "--json", *settings("start.theta=90"))
+    [warning] = run.json["warnings"]
+    assert warning.endswith('start.theta: 90 rad is more than two turns; did you mean "90 deg"?')
+    assert (run.status, run.err) == (0, f"pendula: warning: {warning}\n")
+
+
 def test_quiet_prints_nothing(pendula, double):
     run = pendula("simulate", double, "--quiet", *settings("run.tolerance=1e-6"))
     assert (run.status, run.out, run.err) == (0, "", "")
