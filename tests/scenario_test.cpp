@@ -616,5 +616,11 @@ TEST(NaturalUnits, NeedGravity) {
             "file.toml:5: chain.gravity: expected a number > 0, which natural units need, got -9.81");
 }
 
+TEST(NaturalUnits, AreRefusedWhereADoubleCannotHoldThem) {
+  EXPECT_EQ(error_of(edited(natural_text, "[0.8, 0.6]", "1e-300")),
+            "file.toml:8: chain.units: expected masses, lengths and gravity whose natural units a double can hold, got "
+            "\"natural\"");
+}
+
 }  // namespace
 }  // namespace pendula::io

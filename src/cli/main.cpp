@@ -53,7 +53,9 @@ CommandLine::CommandLine() {
   app.footer("Exit status: 0 done, 1 the computation failed (rows already computed are kept), 2 the input was wrong.");
 
   simulate = app.add_subcommand("simulate", "Run a scenario; write its trajectory, print a summary");
-  simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file")->required();
+  simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file; - is standard input")
+      ->required()
+      ->check(not_empty);
   simulate
       ->add_option("--set", simulate_options.overrides,
                    "Replace a key of the scenario, as in --set run.step=1e-4 or --set run.method=rk4; repeatable")
@@ -118,6 +120,13 @@ ExitStatus dispatch(const CommandLine& line) {
   return wrong_input;
 }
 
+/// The status, unless what was printed could not be written.
+ExitStatus flushed(ExitStatus status) {
+  if (std::cout.flush()) return status;
+  std::cerr << "pendula: standard output could not be written\n";
+  return failed;
+}
+
 /// Standard streams that are closed: a file opened later must not become one of them. They stay unwritable.
 void keep_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
@@ -133,15 +142,12 @@ ExitStatus run(int argc, char** argv) {
     line.app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
     line.app.exit(asked);
-    return done;
+    return flushed(done);
   } catch (const CLI::ParseError& error) {
     std::cerr << complaint(line, error.what());
     return wrong_input;
   }
-  const ExitStatus status = dispatch(line);
-  if (std::cout.flush()) return status;
-  std::cerr << "pendula: standard output could not be written\n";
-  return failed;
+  return flushed(dispatch(line));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ namespace {
 std::string reason(const std::string& name, int error) {
   const std::filesystem::path folder = std::filesystem::path(name).parent_path();
   std::error_code unknown;
-  if (error == ENOENT && !folder.empty() && !std::filesystem::exists(folder, unknown)) {
+  if ((error == ENOENT || error == EISDIR) && !folder.empty() && !std::filesystem::exists(folder, unknown)) {
     return folder.string() + "/ does not exist";
   }
   return std::strerror(error);

@@ -2,10 +2,11 @@
 
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <iostream>
 #include <limits>
 #include <numbers>
 #include <pendula/momenta.hpp>
@@ -219,6 +220,9 @@ std::optional<NaturalUnits> make_natural(const Section& chain, ChainParameters<S
     (gravity ? *gravity : *requested).fail("a number > 0, which natural units need");
   }
   const NaturalUnits units = natural_units(parameters);
+  if (!std::isnormal(units.energy()) || !std::isnormal(units.damping())) {
+    requested->fail("masses, lengths and gravity whose natural units a double can hold");
+  }
   parameters = in_units(units, std::move(parameters));
   return units;
 }
@@ -364,16 +368,30 @@ Scenario<Space> read(const Sections& sections) {
   return scenario;
 }
 
-std::string read_text(const std::filesystem::path& file) {
-  const auto reject = [&](const std::string& why) {
-    throw InputError(file.string() + ": expected a scenario file that can be read, got: " + why);
-  };
-  if (std::filesystem::is_directory(file)) reject("a folder");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) reject(std::strerror(errno));
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) reject("a read error");
+/// Longest scenario that is read: ten numbers for each of `max_links` fit in, a device that never ends does not.
+constexpr std::size_t max_text = std::size_t{256} << 20;
+
+[[noreturn]] void reject_file(const std::string& name, const std::string& why) {
+  throw InputError(name + ": expected a scenario file that can be read, got: " + why);
+}
+
+std::string read_stream(std::istream& stream, const std::string& name) {
+  std::string text;
+  std::vector<char> block(std::size_t{1} << 16);
+  do {
+    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
+    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > max_text) reject_file(name, "more than " + std::to_string(max_text >> 20) + " MiB");
+  } while (stream);
+  if (stream.bad()) reject_file(name, "a read error");
   return text;
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) reject_file(file.string(), "a folder");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) reject_file(file.string(), std::strerror(errno));
+  return read_stream(stream, file.string());
 }
 
 }  // namespace
@@ -387,6 +405,8 @@ AnyScenario parse_scenario(std::string_view text, std::string_view name, std::sp
 }
 
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides) {
+  const std::string standard_input = "standard input";
+  if (file == "-") return parse_scenario(read_stream(std::cin, standard_input), standard_input, overrides);
   return parse_scenario(read_text(file), file.string(), overrides);
 }
 

@@ -127,10 +127,11 @@ def test_a_full_disk_is_reported(pendula, double):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs the device that is always full")
-def test_a_summary_that_cannot_be_written_is_reported(double):
+@pytest.mark.parametrize("command", ["simulate", "kernels", "--version", "--help"])
+def test_what_cannot_be_printed_is_reported(double, command):
     with open("/dev/full", "w") as full:
         run = subprocess.run(
-            [program(), "simulate", double],
+            [program(), command, *([double] if command == "simulate" else [])],
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,

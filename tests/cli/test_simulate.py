@@ -1,9 +1,11 @@
 """Runs that succeed: reference values, summary, trajectory."""
 
+import json
 import math
+import subprocess
 
 import pytest
-from conftest import Trajectory, settings
+from conftest import Trajectory, program, settings
 
 # Double pendulum, m = l = 1, g = 9.81, released from the horizontal, after 10 s.
 DOUBLE_X, DOUBLE_Y = -1.0407657832461712, -1.7073476624693271
@@ -369,6 +371,26 @@ def test_overrides_replace_keys_of_the_file(pendula, double):
         *settings("run.stages=3", "run.form=velocity", "start.theta=[0.1, 0.2]", "run.duration=0"),
     ).json
     assert (summary["stages"], summary["form"], summary["final"]["theta"]) == (3, "velocity", [0.1, 0.2])
+
+
+def test_a_scenario_from_standard_input(double):
+    def simulate(text):
+        command = [program(), "simulate", "-", "--json"]
+        return subprocess.run(command, input=text, capture_output=True, text=True, timeout=60, check=False)
+
+    run = simulate(double.read_text())
+    assert (run.returncode, json.loads(run.stdout)["scenario"]) == (0, "-")
+    run = simulate("[chain]\nspace = 1\n")
+    assert run.returncode == 2
+    assert run.stderr.startswith("pendula: standard input:2: chain.space: expected ")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_any_editor_may_have_written_the_scenario(pendula, double, tmp_path, encoding, newline):
+    (tmp_path / "größe ☃.toml").write_bytes(double.read_text().replace("\n", newline).encode(encoding))
+    run = pendula("simulate", "größe ☃.toml", "--json")
+    assert (run.status, run.json["steps"], run.json["scenario"]) == (0, 200, "größe ☃.toml")
 
 
 def test_overrides_may_stand_before_the_scenario(pendula, double):

@@ -104,8 +104,8 @@ def count_tests(_: list[str]) -> list[str]:
 
 
 def run_cmake(commands: list[str]) -> list[str]:
-    """Installs what the demo has built, into another home. Or only configures, elsewhere: the demo builds a kernel
-    that generated/ lacks."""
+    """Installs what the demo has built, into another home. Or only configures, elsewhere: it is the demo that
+    builds a kernel that generated/ lacks."""
     with tempfile.TemporaryDirectory() as folder:
         if "--install" in commands[0]:
             shell([*commands, "~/.local/bin/pendula --version"], ROOT, HOME=folder)
