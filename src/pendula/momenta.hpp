@@ -75,7 +75,7 @@ class LinkRates {
 
   /// The rates where the bob before moves with V; V becomes the velocity of the bob of this link.
   Rates operator()(Vector& V) const {
-    const Rates rates = constant_ - D_inverse_ * (BJ_.transpose() * V);
+    Rates rates = constant_ - D_inverse_ * (BJ_.transpose() * V);
     V += J_ * rates;
     return rates;
   }
