@@ -5,6 +5,11 @@
 include_guard(GLOBAL)
 include("${CMAKE_CURRENT_LIST_DIR}/PendulaPython.cmake")
 
+# The committed kernels are derived in seconds, spatial:8 in 18 (docs/generation.md); time and code grow faster than the
+# square of the links, and long chains need no kernel. So a slip of the keyboard is told, not generated for ever.
+set(PENDULA_MAX_KERNEL_LINKS 32 CACHE STRING "Most links that a fixed-n kernel is made for")
+mark_as_advanced(PENDULA_MAX_KERNEL_LINKS)
+
 # INCLUDE   folder that holds pendula/kernels/<space>_<n>.hpp, to be used in place (installed package), or empty
 # GENERATED folder that holds <space>_<n>.hpp, to be copied into the build (checkout), or empty
 # CODEGEN   folder that holds the Python package pendula_codegen and its requirements.txt
@@ -72,6 +77,10 @@ function(pendula_check_kernel space links out_problem)
     set(problem "expected the space planar or spatial, got \"${space}\"")
   elseif(NOT links MATCHES "^[1-9][0-9]*$")
     set(problem "expected a number of links, 1 or more, got \"${links}\"")
+  elseif(NOT links MATCHES "^[0-9][0-9]?[0-9]?[0-9]?$" OR links GREATER PENDULA_MAX_KERNEL_LINKS)
+    string(CONCAT problem
+           "expected at most ${PENDULA_MAX_KERNEL_LINKS} links, got \"${links}\": a larger kernel takes long to derive "
+           "and compile, and the chain solver needs none; -DPENDULA_MAX_KERNEL_LINKS=${links} has it all the same")
   endif()
   set(${out_problem} "${problem}" PARENT_SCOPE)
 endfunction()

@@ -20,8 +20,10 @@ endfunction()
 _pendula_committed_kernels(_pendula_default_kernels)
 set(PENDULA_KERNELS "${_pendula_default_kernels}" CACHE STRING "Fixed-n kernels to build in: <space>:<links>;...")
 
-# Sets OUT_PAIRS to PENDULA_KERNELS, checked, sorted, each once.
+# Sets OUT_KERNELS to PENDULA_KERNELS, checked, sorted, each once; blanks and empty elements do not count.
 function(_pendula_checked_kernels out_kernels)
+  list(TRANSFORM PENDULA_KERNELS STRIP)
+  list(FILTER PENDULA_KERNELS EXCLUDE REGEX "^$")
   foreach(kernel IN LISTS PENDULA_KERNELS)
     set(problem "expected <space>:<links>, such as spatial:3")
     if(kernel MATCHES "^([^:]*):([^:]*)$")

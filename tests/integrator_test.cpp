@@ -213,6 +213,18 @@ TEST(Simulation, RowsAreEveryFewStepsAndTheLast) {
   EXPECT_EQ(row_times({0.25, 0.0, 3}), (std::vector<double>{0}));
 }
 
+TEST(Simulation, StopsAfterTheStepInWhichItIsAsked) {
+  const auto integrator = make_integrator(equal_chain<Planar>(1), gauss(2));
+  std::vector<double> times;
+  int steps = 0;
+  const RunResult result = simulate(
+      *integrator, swinging(1), {0.25, 10, 1'000'000}, [&](const auto& state) { times.push_back(state.time); },
+      [&] { return ++steps == 3; });
+  EXPECT_TRUE(result.outcome);
+  EXPECT_TRUE(result.stopped);
+  EXPECT_EQ(times, (std::vector<double>{0, 0.75}));  // its last state is a row
+}
+
 TEST(Simulation, TheLastStepIsCut) {
   const std::vector<double> times = row_times({0.3, 1.0, 1});
   ASSERT_EQ(times.size(), 5u);

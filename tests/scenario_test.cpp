@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <pendula/invariants.hpp>
+#include <pendula/momenta.hpp>
 #include <string>
 #include <vector>
 
@@ -150,7 +152,7 @@ TEST(Scenario, NamesOfSettingsMeanTheirEnumerators) {
 TEST(Scenario, AnyArrayTellsTheNumberOfLinks) {
   const std::string text = "[chain]\nspace = \"spatial\"\nmasses = 1\nlengths = 1\n[start]\ntheta = 1\n";
   for (const std::string key : {"chain.masses", "chain.lengths", "chain.damping", "start.theta", "start.phi",
-                                "start.theta_dot", "start.phi_dot"}) {
+                                "start.theta_dot", "start.phi_dot", "start.p_theta", "start.p_phi"}) {
     EXPECT_EQ(parsed<Spatial>(text, {key + "=[1, 2, 3, 4]"}).chain.links(), 4) << key;
   }
   EXPECT_EQ(parsed<Spatial>(text, {"chain.torque=[[0, 0, 1], [0, 1, 0]]"}).chain.links(), 2);
@@ -221,7 +223,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
        "file.toml:15: chain.drive[1].delay: expected one of link, amplitude, frequency, "
        "phase, got the unknown key \"delay\""},
       {"theta_dot =", "theta_dto =",
-       "file.toml:20: start.theta_dto: expected one of theta, phi, theta_dot, phi_dot, got "
+       "file.toml:20: start.theta_dto: expected one of theta, phi, theta_dot, phi_dot, p_theta, p_phi, got "
        "the unknown key \"theta_dto\" (did you mean theta_dot?)"},
       // missing keys
       {"space   = \"spatial\"", "", "file.toml:1: chain.space: expected \"planar\" or \"spatial\", got no such key"},
@@ -253,7 +255,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
        "file.toml:4: chain.masses: expected a finite number > 0 for all "
        "links, or an array of 3 (the links that chain.links tells), got [1.0, 0.5]"},
       {"phi_dot   = [1, 2, 3]", "phi_dot = []",
-       "file.toml:21: start.phi_dot: expected a finite number for all links, or an "
+       "file.toml:21: start.phi_dot: expected a finite number or a string in rad/s or deg/s for all links, or an "
        "array of 3 (the links that chain.links tells), got []"},
       {"[0.0, 0.0, 0.3]", "[0.0, 0.3]", "file.toml:8: chain.torque: expected a vector [x, y, z], got [0.0, 0.3]"},
       {"[0.0, 0.0, 0.3]", "[[0, 0, 1]]",
@@ -272,7 +274,8 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       {"lengths = 1.5", "lengths = inf", "file.toml:5: chain.lengths: expected a finite number > 0, got inf"},
       {"gravity = 9.8", "gravity = nan", "file.toml:6: chain.gravity: expected a finite number, got nan"},
       {"[0.0, 0.1, 0.2]", "-0.1", "file.toml:7: chain.damping: expected a finite number >= 0, got -0.1"},
-      {"[1.0, 0.5, 0.2]", "[1.0, -inf, 0.2]", "file.toml:18: start.theta[2]: expected a finite number, got -inf"},
+      {"[1.0, 0.5, 0.2]", "[1.0, -inf, 0.2]",
+       "file.toml:18: start.theta[2]: expected a finite number or a string in rad or deg, got -inf"},
       {"link = 2", "link = 4", "file.toml:12: chain.drive[1].link: expected an integer from 1 to 3, got 4"},
       {"link = 2", "link = 0", "file.toml:12: chain.drive[1].link: expected an integer from 1 to 3, got 0"},
       {"links   = 3", "links = 0", "file.toml:3: chain.links: expected an integer from 1 to 1000000, got 0"},
@@ -307,6 +310,125 @@ TEST(Scenario, TextThatIsNoTomlIsToldByItsLine) {
   begins(edited(spatial_text, "links   = 3", "links = 3\nlinks = 4"), "file.toml:4: expected valid TOML, got: ");
   begins(edited(spatial_text, "[start]", "[start"), "file.toml:17: expected valid TOML, got: ");
   begins("[chain]\nspace = \"\xff\"\n", "file.toml:2: expected valid TOML, got: ");
+}
+
+TEST(Scenario, NestingThatWouldExhaustTheStackIsAnError) {
+  const auto repeated = [](const std::string& piece, int times) {
+    std::string text;
+    for (int i = 0; i < times; ++i) text += piece;
+    return text;
+  };
+  constexpr int many = 40'000;
+  const std::string message = ": expected keys and values nested at most 16 deep, got more";
+  for (const std::string& text :
+       {"a" + repeated(".a", many) + " = 1", "[a" + repeated(".a", many) + "]", "a = " + repeated("[", many),
+        "a = " + repeated("{a=", many), "a = " + repeated("{a.a.a.a = ", many), "a" + repeated(".\"a\"", many) + " = 1",
+        "a" + repeated(" . a", many) + " = 1"}) {
+    EXPECT_EQ(error_of(planar_text + text), "file.toml:8" + message);
+  }
+  EXPECT_TRUE(error_of(planar_text, {"a" + repeated(".a", many) + "=1"}).ends_with(message));
+  EXPECT_TRUE(error_of(planar_text, {"chain.drive=" + repeated("[", many)}).ends_with(message));
+  EXPECT_EQ(error_of(planar_text + "a" + repeated(".a", 15) + " = 1").find("nested"), std::string::npos);
+  // What stands in strings and comments is not nested.
+  const std::string marks = repeated("[", 100) + repeated(".", 100);
+  for (const std::string& text :
+       {"# " + marks + "\nb = 1", "b = \"" + marks + "\"", "b = '" + marks + "'", "b = \"\\\"" + marks + "\"",
+        "b = \"\"\"" + marks + "\n\\\"\"\"" + marks + "\"\"\"", "b = '''" + marks + "'" + marks + "'''"}) {
+    EXPECT_NE(error_of(planar_text + text).find("got the unknown key \"b\""), std::string::npos) << text;
+  }
+}
+
+TEST(Scenario, NumbersBeyondTheirTypeAreTold) {
+  const auto with_length = [](const std::string& length) {
+    return error_of(edited(planar_text, "lengths = 1", "lengths = " + length));
+  };
+  EXPECT_EQ(with_length("1e400"), "file.toml:4: expected a number, got 1e400, too large for a double");
+  EXPECT_EQ(with_length("[1, -1_0e400]"), "file.toml:4: expected a number, got -1_0e400, too large for a double");
+  EXPECT_EQ(with_length("99999999999999999999"),
+            "file.toml:4: expected a number, got 99999999999999999999, too large for an integer; with a point it is a "
+            "float");
+  EXPECT_EQ(error_of(planar_text, {"chain.lengths=+1e400"}),
+            "--set chain.lengths=+1e400: expected a number, got +1e400, too large for a double");
+  // One too small for a double is rounded to zero, as any number is to the nearest double.
+  EXPECT_EQ(parsed<Planar>(planar_text, {"chain.gravity=1e-400"}).chain.gravity(), 0);
+}
+
+TEST(Scenario, TextsAreShownOnOneLineAndCut) {
+  const auto in_space = [](const std::string& text) {
+    return error_of(edited(planar_text, "\"planar\"", "\"" + text + "\""));
+  };
+  const std::string expected = "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got ";
+  EXPECT_EQ(in_space(std::string(100, 'x')), expected + "\"" + std::string(60, 'x') + "...\"");
+  EXPECT_EQ(in_space("\\u001b[2J\\n"), expected + "\"?[2J?\"");
+  std::string umlauts = "a";
+  for (int i = 0; i < 40; ++i) umlauts += "\u00fc";
+  EXPECT_EQ(in_space(umlauts), expected + "\"" + umlauts.substr(0, 59) + "...\"");  // never half a character
+  EXPECT_EQ(error_of(planar_text, {"chain.space=" + std::string(100, 'x')}).substr(0, 70),
+            "--set chain.space=" + std::string(48, 'x') + "...:");
+}
+
+TEST(Scenario, AnglesAndRatesMayHaveUnits) {
+  const auto start = [](const Overrides& overrides) { return parsed<Spatial>(spatial_text, overrides).start; };
+  const double pi = std::numbers::pi;
+  const auto angles = start({"start.theta=[\"90 deg\", \"180deg\", \"-.5 rad\"]", "start.phi=\" 30  deg \""});
+  EXPECT_EQ(angles.theta(), numbers({pi / 2, pi, -0.5}));
+  EXPECT_EQ(angles.phi(), numbers({pi / 6, pi / 6, pi / 6}));
+  const auto rates = start({"start.theta_dot=\"+360 deg/s\"", "start.phi_dot=[1, \"1e-1 rad/s\", \"90 deg/s\"]"});
+  EXPECT_EQ(rates.theta_dot(), numbers({2 * pi, 2 * pi, 2 * pi}));
+  EXPECT_EQ(rates.phi_dot(), numbers({1, 0.1, pi / 2}));
+  EXPECT_EQ(start({"start.theta=90 deg"}).theta(), numbers({pi / 2, pi / 2, pi / 2}));  // the shell takes the quotes
+  EXPECT_EQ(parsed<Planar>(planar_text, {"start.theta=[\"45 deg\", 1]"}).start.theta(), numbers({pi / 4, 1}));
+}
+
+TEST(Scenario, TextsThatAreNoAnglesAreTold) {
+  const std::string expected = ": expected a finite number or a string in rad or deg";
+  for (const std::string text : {"90", "deg", "90 grad", "90 deg deg", "90 deg/s", "nan deg", "inf rad", "1e400 deg",
+                                 "", "--1 deg", "+-1 deg", "9 0 deg"}) {
+    const std::string override = "start.theta=[1, 2, \"" + text + "\"]";
+    EXPECT_EQ(error_of(spatial_text, {override}),
+              "--set " + override + ": start.theta[3]" + expected + ", got \"" + text + "\"");
+  }
+  EXPECT_EQ(error_of(spatial_text, {"start.phi=\"1 rad/s\""}),
+            "--set start.phi=\"1 rad/s\": start.phi" + expected + ", got \"1 rad/s\"");
+  EXPECT_EQ(error_of(spatial_text, {"start.theta_dot=\"1 deg\""}),
+            "--set start.theta_dot=\"1 deg\": start.theta_dot: expected a finite number or a string in rad/s or deg/s, "
+            "got \"1 deg\"");
+}
+
+TEST(Scenario, MomentaStandInPlaceOfRates) {
+  const auto scenario = parsed<Spatial>(edited(edited(spatial_text, "theta_dot = 1", "p_theta = [1.0, 2, -0.5]"),
+                                               "phi_dot   = [1, 2, 3]", "p_phi = 0.25"));
+  const Coordinates<Spatial, Eigen::Dynamic> p = momenta(scenario.chain, scenario.start);
+  EXPECT_LT((p - numbers({1, 2, -0.5, 0.25, 0.25, 0.25})).cwiseAbs().maxCoeff(), 2e-14);  // measured 1.3e-15
+  const auto planar = parsed<Planar>(edited(planar_text, "theta = [0.5, -0.25]", "theta = 0.0\np_theta = [6.0, 0.0]"));
+  EXPECT_LT((momenta(planar.chain, planar.start) - numbers({6, 0})).cwiseAbs().maxCoeff(), 1e-14);  // measured 0
+  const std::string one = "[chain]\nspace=\"spatial\"\nmasses=[2.0]\nlengths=3.0\n[start]\ntheta=\"90 deg\"\np_phi=9.0";
+  EXPECT_LT((parsed<Spatial>(one).start.v - numbers({0, 0.5})).norm(), 1e-15);  // p_φ = m l² sin²θ φ̇; measured 0
+}
+
+TEST(Scenario, MomentaThatMakeNoSenseAreTold) {
+  EXPECT_EQ(error_of(planar_text + "p_theta = 1\ntheta_dot = 2.0\n"),
+            "file.toml:9: start.theta_dot: expected no rates beside the momenta start.p_theta, got 2.0");
+  EXPECT_EQ(error_of(planar_text + "p_phi = 1\n"),
+            "file.toml:8: start.p_phi: expected no such key in a planar scenario, got 1");
+  EXPECT_EQ(error_of(planar_text + "p_theta = \"1 rad\"\n"),
+            "file.toml:8: start.p_theta: expected a finite number for all links, or an array of 2 (the links that "
+            "chain.masses tells), got \"1 rad\"");
+  const std::string pole = "[chain]\nspace=\"spatial\"\nmasses=[1, 1]\nlengths=1\n[start]\ntheta=[1, \"180 deg\"]\n";
+  EXPECT_EQ(error_of(pole + "p_phi = 1"), "file.toml:7: start.p_phi: link 2: expected 0 where sin(theta) = 0");
+  EXPECT_EQ(parsed<Spatial>(pole + "p_phi = [1, 0]\np_theta = 1").start.v[3], 0);
+}
+
+TEST(Scenario, AnglesThatLookLikeDegreesAreWarnedOf) {
+  const auto warnings = [](const Overrides& overrides) { return parsed<Spatial>(spatial_text, overrides).warnings; };
+  EXPECT_EQ(warnings({"start.theta=90"}),
+            Overrides{"--set start.theta=90: start.theta: 90 rad is more than two turns; did you mean \"90 deg\"?"});
+  EXPECT_EQ(warnings({"start.theta=[1, -45.5, 90]", "start.phi=[1, 2, 12.6]"}),
+            (Overrides{"--set start.theta=[1, -45.5, 90]: start.theta[2]: -45.5 rad is more than two turns; did you "
+                       "mean \"-45.5 deg\"?",
+                       "--set start.phi=[1, 2, 12.6]: start.phi[3]: 12.6 rad is more than two turns; did you mean "
+                       "\"12.6 deg\"?"}));
+  EXPECT_TRUE(warnings({"start.theta=[12.56, \"90 deg\", \"90 rad\"]"}).empty());
 }
 
 TEST(Scenario, PlanarChainsHaveNoPhi) {
@@ -356,7 +478,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run..step=1", "--set run..step=1: expected KEY=VALUE such as run.step=1e-4, got \"run..step=1\""},
       {"run.step=", "--set run.step=: expected a TOML value after '=', got \"\""},
       {"run.step=1e-", "--set run.step=1e-: expected a TOML value after '=', got \"1e-\""},
-      {"run.step=1\nevery=2", "--set run.step=1\nevery=2: expected a TOML value after '=', got \"1\nevery=2\""},
+      {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
        "--set run.method=eulr: run.method: expected \"gauss\" or \"rk4\" or \"dopri5\" or "
        "\"fehlberg78\", got \"eulr\""},
@@ -448,6 +570,20 @@ TEST(NaturalUnits, OnlyWhatStandsAboveUnitsIsConverted) {
   EXPECT_EQ(natural.duration, 3);
 }
 
+TEST(NaturalUnits, MomentaAreNaturalAndStringsSayTheirUnit) {
+  const std::string rates = edited(natural_text, "theta_dot = [0.3, 0.7]", "theta_dot = [\"90 deg/s\", \"2 rad/s\"]");
+  const auto si = parsed<Planar>(rates, {"chain.units=SI"});
+  const auto natural = parsed<Planar>(rates);
+  EXPECT_EQ(si.start.v, numbers({std::numbers::pi / 2, 2}));
+  EXPECT_LT((natural.start.v - natural.natural->time * si.start.v).norm(), 1e-15);  // measured 4.5e-17
+  const auto by_momenta = parsed<Planar>(edited(natural_text, "theta_dot = [0.3, 0.7]", "p_theta = [0.25, -0.125]"));
+  EXPECT_LT((momenta(by_momenta.chain, by_momenta.start) - numbers({0.25, -0.125})).norm(), 1e-15);  // measured 0
+  const auto in_si =
+      momenta(si.chain, State<Planar>{0, by_momenta.start.q, by_momenta.start.v / by_momenta.natural->time});
+  const double unit = natural.natural->energy() * natural.natural->time;  // M_1 l_1² / time
+  EXPECT_LT((in_si / unit - numbers({0.25, -0.125})).norm(), 1e-15);      // measured 5.6e-17
+}
+
 TEST(NaturalUnits, LoadsAndEnergyAreEqualAfterScalingBack) {
   const auto natural = parsed<Planar>(natural_text);
   const auto si = parsed<Planar>(natural_text, {"chain.units=SI"});
@@ -478,6 +614,12 @@ TEST(NaturalUnits, NeedGravity) {
             "file.toml:5: chain.gravity: expected a number > 0, which natural units need, got 0");
   EXPECT_EQ(error_of(edited(natural_text, "9.81", "-9.81")),
             "file.toml:5: chain.gravity: expected a number > 0, which natural units need, got -9.81");
+}
+
+TEST(NaturalUnits, AreRefusedWhereADoubleCannotHoldThem) {
+  EXPECT_EQ(error_of(edited(natural_text, "[0.8, 0.6]", "1e-300")),
+            "file.toml:8: chain.units: expected masses, lengths and gravity whose natural units a double can hold, got "
+            "\"natural\"");
 }
 
 }  // namespace

@@ -133,6 +133,24 @@ TEST(Summary, NumbersThatAreNotFiniteAreNull) {
   EXPECT_EQ(read.at("final").at("theta").at(0), nullptr);
 }
 
+TEST(Summary, RowsAreThoseInTheFile) {
+  Summary summary = summary_of_a_run();
+  EXPECT_EQ(json::parse(to_json(summary)).at("rows"), 201);
+  summary.trajectory = "out.csv";
+  summary.rows_written = 150;  // the disk is full
+  EXPECT_EQ(json::parse(to_json(summary)).at("rows"), 150);
+  EXPECT_NE(to_text(summary).find("over 201 rows"), std::string::npos);
+  EXPECT_NE(to_text(summary).find("out.csv, 150 rows"), std::string::npos);
+}
+
+TEST(Summary, EnergiesThatAreNotKnownAreADash) {
+  Summary summary = summary_of_a_run();
+  summary.energy_error = {};
+  summary.energy_final = -std::numeric_limits<double>::quiet_NaN();
+  const std::string text = to_text(summary);
+  EXPECT_NE(text.find("energy at start    - J\nenergy at end      - J\n"), std::string::npos) << text;
+}
+
 TEST(Summary, AFailedStepIsToldInFull) {
   Summary summary = summary_of_a_run();
   summary.ending = ending_of({Status::not_converged, 0.5, 0.25, 50, 1e-3, 1});
@@ -145,6 +163,13 @@ TEST(Summary, AFailedStepIsToldInFull) {
   EXPECT_EQ(outcome.at("link"), 2);  // counted from 1
   EXPECT_FALSE(outcome.at("message").get<std::string>().empty());
   EXPECT_NE(to_text(summary).find("ended early"), std::string::npos);
+}
+
+TEST(Summary, WarningsAreSentencesInAnArray) {
+  Summary summary = summary_of_a_run();
+  EXPECT_EQ(json::parse(to_json(summary)).at("warnings"), json::array());
+  summary.warnings = {"The energy went \"up\".", "So did the step."};
+  EXPECT_EQ(json::parse(to_json(summary)).at("warnings"), json({"The energy went \"up\".", "So did the step."}));
 }
 
 TEST(Summary, NamesThatAreNoUtf8DoNotBreakTheJson) {

@@ -16,12 +16,13 @@ enum ExitStatus {
 struct SimulateOptions {
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
-  std::string output;                  ///< trajectory file, empty for none
+  std::optional<std::string> output;   ///< trajectory file; "-" is standard output
   bool json = false;                   ///< summary as JSON
   bool quiet = false;                  ///< no summary, progress or warnings; JSON is still printed where asked for
 };
 
-/// Runs a scenario: trajectory to the file, summary to standard output, progress and warnings to standard error.
+/// Runs a scenario: trajectory to the file, summary to standard output (or to standard error where that is the file),
+/// progress and warnings to standard error.
 /// Throws io::InputError.
 ExitStatus simulate(const SimulateOptions& options);
 

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
+#include <csignal>
+
 namespace pendula::cli {
 
-/// While it lives, the first interrupt (Ctrl-C) or request to end is noted, so that the run can stop at its next row
-/// and keep what it has; the second ends the program at once.
+/// While it lives, the first interrupt (Ctrl-C), hang-up or request to end is noted, so that the run can stop at its
+/// next step and keep what it has; the second ends the program at once.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -12,6 +15,11 @@ class InterruptGuard {
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
   bool interrupted() const;
+
+ private:
+  static constexpr std::array<int, 3> signals = {SIGINT, SIGTERM, SIGHUP};
+
+  std::array<struct sigaction, signals.size()> before_ = {};
 };
 
 }  // namespace pendula::cli

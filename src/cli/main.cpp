@@ -1,10 +1,16 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <charconv>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <new>
 #include <pendula/version.hpp>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "cli/commands.hpp"
@@ -27,13 +33,29 @@ struct CommandLine {
   CheckOptions check_options;
 };
 
+/// A check of an option's text: what is expected where `accept` says no.
+CLI::Validator expect(const std::string& expected, bool (*accept)(const std::string&)) {
+  return {[=](const std::string& text) {
+            return accept(text) ? "" : "expected " + expected + ", got " + (text.empty() ? "an empty text" : text);
+          },
+          ""};
+}
+
 CommandLine::CommandLine() {
+  const CLI::Validator not_empty = expect("the name of a file", [](const std::string& text) { return !text.empty(); });
+  const CLI::Validator one_or_more = expect("a whole number of links, 1 or more", [](const std::string& text) {
+    int links = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), links);
+    return error == std::errc() && end == text.data() + text.size() && links >= 1;
+  });
   app.set_version_flag("--version", "pendula " + std::string(version), "Print the version and end");
   app.set_help_flag("-h,--help", "Print this help and end");
   app.footer("Exit status: 0 done, 1 the computation failed (rows already computed are kept), 2 the input was wrong.");
 
   simulate = app.add_subcommand("simulate", "Run a scenario; write its trajectory, print a summary");
-  simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file")->required();
+  simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file; - is standard input")
+      ->required()
+      ->check(not_empty);
   simulate
       ->add_option("--set", simulate_options.overrides,
                    "Replace a key of the scenario, as in --set run.step=1e-4 or --set run.method=rk4; repeatable")
@@ -41,8 +63,12 @@ CommandLine::CommandLine() {
       ->expected(1)
       ->take_all()
       ->allow_extra_args(false);
-  simulate->add_option("-o,--output", simulate_options.output, "Write the trajectory to this file, as CSV")
-      ->type_name("FILE");
+  simulate
+      ->add_option("-o,--output", simulate_options.output,
+                   "Write the trajectory to this file, as CSV; - is standard output, and standard error then has the "
+                   "summary")
+      ->type_name("FILE")
+      ->check(not_empty);
   simulate->add_flag("--json", simulate_options.json, "Print the summary as one JSON object");
   simulate->add_flag("--quiet", simulate_options.quiet, "Print errors only (and the JSON object, where asked for)");
   simulate->footer("Example: pendula simulate double.toml --set run.step=1e-4 -o out.csv");
@@ -50,7 +76,9 @@ CommandLine::CommandLine() {
   check = app.add_subcommand("check", "Test the kernels and methods of this build on themselves");
   check->add_option("--space", check_options.space, "Only kernels of this space")
       ->check(CLI::IsMember({"planar", "spatial"}));
-  check->add_option("--links", check_options.links, "Only kernels of this many links")->check(CLI::PositiveNumber);
+  check->add_option("--links", check_options.links, "Only kernels of this many links")
+      ->type_name("N")
+      ->check(one_or_more);
 
   kernels = app.add_subcommand("kernels", "List the fixed-n kernels of this build");
 }
@@ -92,21 +120,34 @@ ExitStatus dispatch(const CommandLine& line) {
   return wrong_input;
 }
 
+/// The status, unless what was printed could not be written.
+ExitStatus flushed(ExitStatus status) {
+  if (std::cout.flush()) return status;
+  std::cerr << "pendula: standard output could not be written\n";
+  return failed;
+}
+
+/// Standard streams that are closed: a file opened later must not become one of them. They stay unwritable.
+void keep_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) < 0) static_cast<void>(open("/dev/null", O_RDONLY));  // takes the lowest free number
+  }
+}
+
 ExitStatus run(int argc, char** argv) {
+  keep_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is a full disk: writing fails, the run ends in order
   CommandLine line;
   try {
     line.app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
     line.app.exit(asked);
-    return done;
+    return flushed(done);
   } catch (const CLI::ParseError& error) {
     std::cerr << complaint(line, error.what());
     return wrong_input;
   }
-  const ExitStatus status = dispatch(line);
-  if (std::cout.flush()) return status;
-  std::cerr << "pendula: standard output could not be written\n";
-  return failed;
+  return flushed(dispatch(line));
 }
 
 }  // namespace

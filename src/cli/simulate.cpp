@@ -13,11 +13,11 @@
 #include <string>
 #include <system_error>
 #include <variant>
-#include <vector>
 
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
+#include "cli/warnings.hpp"
 #include "io/input_error.hpp"
 #include "io/number.hpp"
 #include "io/run_record.hpp"
@@ -27,9 +27,6 @@
 
 namespace pendula::cli {
 namespace {
-
-/// Thrown out of a row to end the run there.
-struct Interrupted {};
 
 /// The integrator that a scenario asks for. What the runtime says of an option, `key: …`, is said at the place of that
 /// key. Throws io::InputError.
@@ -51,12 +48,12 @@ std::unique_ptr<Integrator<Space>> make(const io::Scenario<Space>& scenario, con
 /// Opens the trajectory file where one is asked for. Throws io::InputError, also where that would destroy the scenario.
 template <class Space>
 std::unique_ptr<io::TrajectoryFile<Space>> open_trajectory(const SimulateOptions& options, int links) {
-  if (options.output.empty()) return nullptr;
+  if (!options.output) return nullptr;
   std::error_code none_there;
-  if (std::filesystem::equivalent(options.output, options.scenario, none_there)) {
-    throw io::InputError(options.output + ": expected a file for the trajectory, got the scenario itself");
+  if (std::filesystem::equivalent(*options.output, options.scenario, none_there)) {
+    throw io::InputError(*options.output + ": expected a file for the trajectory, got the scenario itself");
   }
-  return std::make_unique<io::TrajectoryFile<Space>>(options.output, links);
+  return std::make_unique<io::TrajectoryFile<Space>>(*options.output, links);
 }
 
 /// One run: who takes the rows, and how it ended.
@@ -68,7 +65,10 @@ class Run {
         options_(options),
         integrator_(make(scenario, options)),
         file_(open_trajectory<Space>(options, scenario.chain.links())),
-        record_(scenario.chain, scenario.duration) {}
+        record_(scenario.chain, scenario.duration),
+        warnings_(!options.quiet) {
+    for (const std::string& warning : scenario.warnings) warnings_.add(warning);
+  }
 
   /// Never throws for a run that fails: the summary says so.
   io::Summary run() {
@@ -84,25 +84,30 @@ class Run {
     const InterruptGuard guard;
     Progress progress(scenario_.duration, !options_.quiet);
     try {
-      const RunResult result =
-          simulate(*integrator_, scenario_.start, {largest_step, scenario_.duration, scenario_.every},
-                   [&](const State<Space>& state) {
-                     take(state);
-                     progress.at(state.time);
-                     if (guard.interrupted()) throw Interrupted();
-                   });
+      const RunResult result = simulate(
+          *integrator_, scenario_.start, {largest_step, scenario_.duration, scenario_.every},
+          [&](const State<Space>& state) {
+            take(state);
+            progress.at(state.time);
+          },
+          [&] { return guard.interrupted(); });
       wall_seconds_ = result.stepping_seconds;
-      return io::ending_of(result.outcome);
-    } catch (const Interrupted&) {
+      if (!result.outcome || !result.stopped) return io::ending_of(result.outcome);
       return {"interrupted", "interrupted at t = " + io::shortest(record_.last().time), {}};
+    } catch (const io::Ending& ending) {
+      return ending;
     } catch (const io::OutputError& error) {
       return {"output_failed", error.what(), {}};
     }
   }
 
+  /// Throws io::Ending rather than take a row that is not finite; the energy is not wherever anything else is not.
   void take(const State<Space>& state) {
     const Points<Space, Eigen::Dynamic> bobs = bob_positions(scenario_.chain, state);
     const double energy = pendula::energy(scenario_.chain, state);
+    if (!std::isfinite(energy)) {
+      throw io::Ending{"not_finite", "at t = " + io::shortest(state.time) + ": the energy is not a finite number", {}};
+    }
     record_.add(state, bobs, energy);
     if (file_) file_->write(state, bobs, energy);
   }
@@ -124,14 +129,16 @@ class Run {
     summary.duration = scenario_.duration;
     summary.every = scenario_.every;
     summary.ending = ending;
+    summary.warnings = warnings_.sentences();
     summary.statistics = integrator_->statistics();
     summary.wall_seconds = wall_seconds_;
     summary.energy_error = record_.energy_error();
     summary.energy_final = record_.energy();
     summary.table = record_.table();
-    summary.final = io::snapshot(scenario_.chain, record_.last());
+    summary.final = io::snapshot(scenario_.chain, record_.rows() > 0 ? record_.last() : scenario_.start);
     summary.rows = record_.rows();
     summary.trajectory = options_.output;
+    summary.rows_written = file_ ? file_->rows() : 0;
     return summary;
   }
 
@@ -140,12 +147,9 @@ class Run {
   std::unique_ptr<Integrator<Space>> integrator_;
   std::unique_ptr<io::TrajectoryFile<Space>> file_;
   io::RunRecord<Space> record_;
+  Warnings warnings_;
   double wall_seconds_ = std::nan("");  // unknown where a row ended the run
 };
-
-void warn(const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings) std::cerr << "pendula: warning: " << warning << '\n';
-}
 
 }  // namespace
 
@@ -153,12 +157,12 @@ ExitStatus simulate(const SimulateOptions& options) {
   const io::AnyScenario any = io::read_scenario(options.scenario, options.overrides);
   return std::visit(
       [&]<class Space>(const io::Scenario<Space>& scenario) {
-        if (!options.quiet) warn(scenario.warnings);
         const io::Summary summary = Run<Space>(scenario, options).run();
+        std::ostream& out = options.output == "-" ? std::cerr : std::cout;
         if (options.json) {
-          std::cout << io::to_json(summary);
+          out << io::to_json(summary);
         } else if (!options.quiet) {
-          std::cout << io::to_text(summary);
+          out << io::to_text(summary);
         }
         if (summary.ending.ok()) return done;
         std::cerr << "pendula: " << summary.ending.message << '\n';

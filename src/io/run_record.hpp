@@ -11,8 +11,8 @@ namespace pendula::io {
 
 /// Energy errors |H − H₀|, relative to Σ M_i |g| l_i, or to |H₀| where there is no gravity.
 struct EnergyError {
-  double initial = 0;  ///< H₀
-  double scale = 0;    ///< what errors are divided by
+  double initial = std::nan("");  ///< H₀, NaN before the first row
+  double scale = 0;               ///< what errors are divided by
   double largest = 0;  ///< over the rows so far; NaN, and so to stay, where the scale is zero and an error is not
 
   /// The relative error of one energy.
@@ -70,7 +70,7 @@ class RunRecord {
   double place_ = -1;
   std::int64_t rows_ = 0;
   EnergyError error_;
-  double energy_ = 0;
+  double energy_ = std::nan("");
   State<Space> last_;
   TableRow last_row_;
   std::vector<TableRow> table_;

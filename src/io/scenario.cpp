@@ -2,11 +2,14 @@
 
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <iostream>
 #include <limits>
+#include <numbers>
+#include <pendula/momenta.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -22,13 +25,16 @@ constexpr std::array<std::string_view, 4> section_names = {"chain", "start", "ru
 constexpr std::array<std::string_view, 9> chain_keys = {"space",   "links",  "masses", "lengths", "gravity",
                                                         "damping", "torque", "units",  "drive"};
 constexpr std::array<std::string_view, 4> drive_keys = {"link", "amplitude", "frequency", "phase"};
-constexpr std::array<std::string_view, 4> start_keys = {"theta", "phi", "theta_dot", "phi_dot"};
+constexpr std::array<std::string_view, 2> angle_keys = {"theta", "phi"};
+constexpr std::array<std::string_view, 2> rate_keys = {"theta_dot", "phi_dot"};
+constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
+constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
 constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "form",      "solver",
                                                       "iteration", "step",   "tolerance", "duration"};
 constexpr std::array<std::string_view, 1> output_keys = {"every"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 26> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 28> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -45,6 +51,8 @@ constexpr std::array<std::string_view, 26> all_keys = {"chain.space",
                                                        "start.phi",
                                                        "start.theta_dot",
                                                        "start.phi_dot",
+                                                       "start.p_theta",
+                                                       "start.p_phi",
                                                        "run.method",
                                                        "run.stages",
                                                        "run.form",
@@ -99,7 +107,7 @@ LinkCount link_count(const Sections& sections) {
   if (const auto entry = sections.chain.find("links")) {
     return {static_cast<int>(entry->integer(1, max_links)), entry->key(), entry->place()};
   }
-  const std::array<std::pair<const Section*, std::string_view>, 8> arrays = {{
+  const std::array<std::pair<const Section*, std::string_view>, 10> arrays = {{
       {&sections.chain, "masses"},
       {&sections.chain, "lengths"},
       {&sections.chain, "damping"},
@@ -108,6 +116,8 @@ LinkCount link_count(const Sections& sections) {
       {&sections.start, "phi"},
       {&sections.start, "theta_dot"},
       {&sections.start, "phi_dot"},
+      {&sections.start, "p_theta"},
+      {&sections.start, "p_phi"},
   }};
   for (const auto& [section, key] : arrays) {
     const std::optional<Entry> entry = section->find(key);
@@ -129,9 +139,9 @@ void require_keys(const Sections& sections) {
 
 /// One number a link, or `otherwise` for all where the key is not there.
 Eigen::VectorXd per_link(const Section& section, std::string_view key, const LinkCount& count, double otherwise,
-                         Sign sign = Sign::any) {
+                         Sign sign = Sign::any, Units units = {}) {
   const std::optional<Entry> entry = section.find(key);
-  return entry ? entry->per_link(count, sign) : Eigen::VectorXd::Constant(count.links, otherwise);
+  return entry ? entry->per_link(count, sign, units) : Eigen::VectorXd::Constant(count.links, otherwise);
 }
 
 /// Constant torque on each link: in the plane a number, in space a vector, or one of them for all links.
@@ -210,22 +220,79 @@ std::optional<NaturalUnits> make_natural(const Section& chain, ChainParameters<S
     (gravity ? *gravity : *requested).fail("a number > 0, which natural units need");
   }
   const NaturalUnits units = natural_units(parameters);
+  if (!std::isnormal(units.energy()) || !std::isnormal(units.damping())) {
+    requested->fail("masses, lengths and gravity whose natural units a double can hold");
+  }
   parameters = in_units(units, std::move(parameters));
   return units;
 }
 
+constexpr double degree = std::numbers::pi / 180;
+
+/// One number a link of each coordinate, (dof·n); 0 where a key is not there.
 template <class Space>
-State<Space> read_start(const Section& start, const LinkCount& count) {
-  const Eigen::VectorXd theta = start.find("theta")->per_link(count);
-  const Eigen::VectorXd theta_dot = per_link(start, "theta_dot", count, 0);
-  if constexpr (Space::dof == 2) {
-    return State<Space>::from_angles(theta, per_link(start, "phi", count, 0), theta_dot,
-                                     per_link(start, "phi_dot", count, 0));
-  } else {
-    for (const std::string_view key : {"phi", "phi_dot"}) {
-      if (const auto entry = start.find(key)) entry->fail("no such key in a planar scenario");
+Coordinates<Space, Eigen::Dynamic> read_coordinates(const Section& start, Names keys, const LinkCount& count,
+                                                    Units units) {
+  Coordinates<Space, Eigen::Dynamic> values(Space::dof * count.links);
+  for (int a = 0; a < Space::dof; ++a) {
+    values.segment(a * count.links, count.links) =
+        per_link(start, keys[static_cast<std::size_t>(a)], count, 0, Sign::any, units);
+  }
+  return values;
+}
+
+/// The first key of [start] out of `keys` that is there.
+std::optional<Entry> first_of(const Section& start, Names keys) {
+  for (const std::string_view key : keys) {
+    if (std::optional<Entry> entry = start.find(key)) return entry;
+  }
+  return std::nullopt;
+}
+
+/// The rates that go with the momenta in [start].
+template <class Space>
+Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Section& start, const LinkCount& count,
+                                                      const Chain<Space>& chain,
+                                                      const Coordinates<Space, Eigen::Dynamic>& q) {
+  const Entry given = *first_of(start, momentum_keys);
+  if (const auto rate = first_of(start, rate_keys)) rate->fail("no rates beside the momenta " + given.key());
+  const auto p = read_coordinates<Space>(start, momentum_keys, count, {});
+  try {
+    return pendula::rates_from_momenta(chain, q, p);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(start.find("p_phi")->place() + ": " + error.what());
+  }
+}
+
+/// time_unit  what rates without a unit are in  [s]
+template <class Space>
+State<Space> read_start(const Section& start, const LinkCount& count, const Chain<Space>& chain, double time_unit) {
+  if (Space::dof == 1) {
+    constexpr std::array<std::string_view, 3> spatial_keys = {"phi", "phi_dot", "p_phi"};
+    if (const auto entry = first_of(start, spatial_keys)) entry->fail("no such key in a planar scenario");
+  }
+  const std::array<Unit, 2> angles = {{{"rad", 1}, {"deg", degree}}};
+  const std::array<Unit, 2> rates = {{{"rad/s", time_unit}, {"deg/s", degree * time_unit}}};
+  const auto q = read_coordinates<Space>(start, angle_keys, count, angles);
+  if (first_of(start, momentum_keys)) return {0, q, rates_from_momenta(start, count, chain, q)};
+  return {0, q, read_coordinates<Space>(start, rate_keys, count, rates)};
+}
+
+/// Angles that are given without a unit and beyond two turns: degrees, most likely.
+void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
+  const auto check = [&](const Entry& entry) {
+    const double angle = entry.is_number() ? entry.number() : 0;
+    if (std::abs(angle) <= 4 * std::numbers::pi) return false;
+    warnings.push_back(entry.place() + ": " + shortest(angle) + " rad is more than two turns; did you mean \"" +
+                       shortest(angle) + " deg\"?");
+    return true;
+  };
+  for (const std::string_view key : angle_keys) {
+    const std::optional<Entry> entry = start.find(key);
+    if (!entry || check(*entry)) continue;
+    for (std::size_t i = 0; i < entry->size(); ++i) {
+      if (check(entry->element(i))) break;  // once a key
     }
-    return State<Space>::from_angles(theta, theta_dot);
   }
 }
 
@@ -280,15 +347,17 @@ Scenario<Space> read(const Sections& sections) {
   const LinkCount count = link_count<Space>(sections);
   ChainParameters<Space> parameters = read_chain<Space>(sections.chain, count);
   const std::optional<NaturalUnits> natural = make_natural(sections.chain, parameters);
+  const Chain<Space> chain = build_chain(sections.chain, std::move(parameters));
   const RunOptions run = read_run(sections.run);
-  Scenario<Space> scenario{build_chain(sections.chain, std::move(parameters)),
-                           read_start<Space>(sections.start, count),
+  Scenario<Space> scenario{chain,
+                           read_start(sections.start, count, chain, natural ? natural->time : 1),
                            run,
                            read_duration(sections.run, run),
                            10,
                            natural,
                            unused_keys(sections.run, run.method),
                            {}};
+  warn_of_degrees(sections.start, scenario.warnings);
   if (const auto every = sections.output.find("every")) {
     scenario.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
   }
@@ -299,16 +368,30 @@ Scenario<Space> read(const Sections& sections) {
   return scenario;
 }
 
-std::string read_text(const std::filesystem::path& file) {
-  const auto reject = [&](const std::string& why) {
-    throw InputError(file.string() + ": expected a scenario file that can be read, got: " + why);
-  };
-  if (std::filesystem::is_directory(file)) reject("a folder");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) reject(std::strerror(errno));
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) reject("a read error");
+/// Longest scenario that is read: ten numbers for each of `max_links` fit in, a device that never ends does not.
+constexpr std::size_t max_text = std::size_t{256} << 20;
+
+[[noreturn]] void reject_file(const std::string& name, const std::string& why) {
+  throw InputError(name + ": expected a scenario file that can be read, got: " + why);
+}
+
+std::string read_stream(std::istream& stream, const std::string& name) {
+  std::string text;
+  std::vector<char> block(std::size_t{1} << 16);
+  do {
+    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
+    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > max_text) reject_file(name, "more than " + std::to_string(max_text >> 20) + " MiB");
+  } while (stream);
+  if (stream.bad()) reject_file(name, "a read error");
   return text;
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) reject_file(file.string(), "a folder");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) reject_file(file.string(), std::strerror(errno));
+  return read_stream(stream, file.string());
 }
 
 }  // namespace
@@ -322,6 +405,8 @@ AnyScenario parse_scenario(std::string_view text, std::string_view name, std::sp
 }
 
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides) {
+  const std::string standard_input = "standard input";
+  if (file == "-") return parse_scenario(read_stream(std::cin, standard_input), standard_input, overrides);
   return parse_scenario(read_text(file), file.string(), overrides);
 }
 

@@ -47,7 +47,7 @@ using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>>;
 /// Throws InputError with a message `name:line: key: expected …, got …`, or `--set key.path=value: key: …`.
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {});
 
-/// The same from a file; a file that cannot be read is an InputError too.
+/// The same from a file, "-" being standard input; a file that cannot be read is an InputError too.
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides = {});
 
 }  // namespace pendula::io

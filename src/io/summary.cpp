@@ -183,8 +183,8 @@ std::string statistics(const Summary& summary) {
 std::string energies(const Summary& summary) {
   const std::string unit(unit_names(summary.model.natural).energy);
   const std::string of = summary.model.gravity != 0 ? "of the sum of M_i g l_i" : "of the energy at the start";
-  return line("energy at start", rounded(summary.energy_error.initial, 12) + unit) +
-         line("energy at end", rounded(summary.energy_final, 12) + unit) +
+  return line("energy at start", shown_or_dash(summary.energy_error.initial, 12) + unit) +
+         line("energy at end", shown_or_dash(summary.energy_final, 12) + unit) +
          line("largest " + error_name(summary), shown_or_dash(summary.energy_error.largest, 3),
               of + ", over " + plural(summary.rows, "row"));
 }
@@ -200,7 +200,7 @@ std::string ending(const Summary& summary) {
   }
   std::string text = line("last bob", position + std::string(unit.length) +
                                           " at t = " + rounded(summary.final.time, 12) + std::string(unit.time));
-  if (!summary.trajectory.empty()) text += line("trajectory", summary.trajectory + ", " + plural(summary.rows, "row"));
+  if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));
   if (!summary.ending.ok()) text += line("ended early", summary.ending.message);
   return text;
 }
@@ -236,13 +236,14 @@ std::string to_json(const Summary& summary) {
                   {"steps", summary.statistics.steps},
                   {"rejected_steps", summary.statistics.rejected_steps},
                   {"newton_iterations", summary.statistics.newton_iterations},
-                  {"rows", summary.rows},
-                  {"trajectory", or_null(summary.trajectory)},
+                  {"rows", summary.trajectory ? summary.rows_written : summary.rows},
+                  {"trajectory", or_null(summary.trajectory.value_or(""))},
                   {"energy_initial", summary.energy_error.initial},
                   {"energy_final", summary.energy_final},
                   {"energy_error_max", summary.energy_error.largest},
                   {"wall_seconds", summary.wall_seconds},
                   {"outcome", to_json(summary.ending)},
+                  {"warnings", summary.warnings},
                   {"final", to_json(summary.final)}};
   constexpr int one_line = -1;
   return json.dump(one_line, ' ', false, Json::error_handler_t::replace) + "\n";

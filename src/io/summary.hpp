@@ -53,14 +53,16 @@ struct Summary {
   double duration = 0;      ///< as asked for
   std::int64_t every = 0;
   Ending ending;
+  std::vector<std::string> warnings;  ///< sentences; the text leaves them out, since they were told as they came
   Statistics statistics;
   double wall_seconds = 0;  ///< in the stepping loop alone
   EnergyError energy_error;
   double energy_final = 0;
   std::vector<TableRow> table;
-  Snapshot final;  ///< the last state reached
-  std::int64_t rows = 0;
-  std::string trajectory;  ///< the file that holds the rows; empty for none
+  Snapshot final;                         ///< the last state reached
+  std::int64_t rows = 0;                  ///< that were taken
+  std::optional<std::string> trajectory;  ///< the file that they were written to; "-" is standard output
+  std::int64_t rows_written = 0;          ///< that are in this file: fewer, where the disk is full
 };
 
 /// How a run ended that ended with `outcome`.

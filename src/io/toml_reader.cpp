@@ -1,19 +1,42 @@
 #include "io/toml_reader.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
+#include <system_error>
 
 #include "io/nearest_name.hpp"
 #include "io/number.hpp"
+#include "io/toml_nesting.hpp"
 
 namespace pendula::io {
 namespace {
 
 constexpr std::string_view override_prefix = "--set ";
 
+constexpr std::size_t longest_shown = 60;
+
+/// The beginning of a text that is too long for a message, and never half a character of it.
+std::string cut(std::string_view text) {
+  if (text.size() <= longest_shown) return std::string(text);
+  std::size_t end = longest_shown;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  return std::string(text.substr(0, end)) + "...";
+}
+
+/// A text on one line, cut where it is long.
+std::string printable(std::string_view text) {
+  std::string shown = cut(text);
+  for (char& c : shown) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';  // nothing that steers a terminal
+  }
+  return shown;
+}
+
 std::string quoted(std::string_view text) {
-  return '"' + std::string(text) + '"';
+  return '"' + printable(text) + '"';
 }
 
 bool is_key_character(char c) {
@@ -38,11 +61,62 @@ std::vector<std::string_view> key_path(std::string_view key) {
   return path;
 }
 
+/// Where a line of `name` is, as messages begin: `file:line`, or `--set key=value`.
+std::string line_place(const std::string& name, std::int64_t line) {
+  return name.starts_with(override_prefix) ? name : name + ":" + std::to_string(line);
+}
+
+/// What is wrong with a number that C++ has no room for; empty where nothing is.
+std::string number_problem(std::string token) {
+  std::erase(token, '_');
+  const bool is_integer = token.find_first_not_of("+-0123456789") == std::string::npos;
+  const char* const first = token.data() + (token.starts_with('+') ? 1 : 0);
+  const char* const last = token.data() + token.size();
+  const auto out_of_range = [&](auto value) {
+    return std::from_chars(first, last, value).ec == std::errc::result_out_of_range;
+  };
+  if (is_integer) return out_of_range(std::int64_t()) ? "too large for an integer; with a point it is a float" : "";
+  if (!out_of_range(double())) return "";
+  return std::abs(std::strtod(first, nullptr)) > 1 ? "too large for a double" : "too small for a double";
+}
+
+/// The first number in a line of text that C++ has no room for, and why: `1e400, too large for a double`; empty where
+/// there is none.
+std::string impossible_number(std::string_view line) {
+  constexpr std::string_view digits = "0123456789", in_a_number = "0123456789+-._eE";
+  for (std::size_t begin = 0; begin < line.size();) {
+    const std::size_t end = std::min(line.find_first_not_of(in_a_number, begin), line.size());
+    const std::string_view token = line.substr(begin, end - begin);
+    const std::string problem = token.find_first_of(digits) < 2 ? number_problem(std::string(token)) : "";
+    if (!problem.empty()) return cut(token) + ", " + problem;
+    begin = end + 1;
+  }
+  return {};
+}
+
+/// A line of text, counted from 1.
+std::string_view line_of(std::string_view text, std::int64_t number) {
+  for (; number > 1; --number) text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
+  return text.substr(0, text.find('\n'));
+}
+
+/// Throws InputError on text that would exhaust the parser's stack.
+void require_shallow(std::string_view text, const std::string& name) {
+  const int line = line_nested_too_deep(text);
+  if (line == 0) return;
+  throw InputError(line_place(name, line) + ": expected keys and values nested at most " + std::to_string(max_nesting) +
+                   " deep, got more");
+}
+
 toml::table parse(std::string_view text, const std::string& name) {
+  require_shallow(text, name);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
-    throw InputError(location(error.source()) + ": expected valid TOML, got: " + std::string(error.description()));
+    const std::string number = impossible_number(line_of(text, error.source().begin.line));
+    throw InputError(
+        location(error.source()) + ": expected " +
+        (number.empty() ? "valid TOML, got: " + std::string(error.description()) : "a number, got " + number));
   }
 }
 
@@ -53,20 +127,47 @@ bool is_bare_word(std::string_view text) {
          std::ranges::all_of(text, [](char c) { return is_key_character(c) || c == '.'; });
 }
 
+/// A number and whatever stands behind it, as in "90 deg".
+struct Quantity {
+  double value = 0;
+  std::string_view unit;
+};
+
+std::optional<Quantity> read_quantity(std::string_view text) {
+  text = trimmed(text);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  Quantity quantity;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), quantity.value);
+  if (error != std::errc()) return std::nullopt;
+  quantity.unit = trimmed(text.substr(static_cast<std::size_t>(end - text.data())));
+  return quantity;
+}
+
+/// What a shell user types for a string: a word, or a number with a unit, whose quotes the shell takes.
+bool is_bare_string(std::string_view text) {
+  if (is_bare_word(text)) return true;
+  const auto in_a_unit = [](char c) { return (c >= 'a' && c <= 'z') || c == '/'; };
+  const std::optional<Quantity> quantity = read_quantity(text);
+  return quantity && !quantity->unit.empty() && std::ranges::all_of(quantity->unit, in_a_unit);
+}
+
 /// The value of an override in a table of its own, under the key "value".
 toml::table parse_value(std::string_view value, const std::string& where) {
-  const std::string assignment = "value = " + std::string(value);
+  const std::string text(value);
   try {
-    toml::table table = toml::parse(assignment, where);
+    toml::table table = toml::parse("value = " + text, where);
     if (table.size() == 1) return table;  // not "1 \n another = 2"
   } catch (const toml::parse_error&) {
-    if (is_bare_word(value)) return toml::parse("value = " + quoted(value), where);
+    if (is_bare_string(value)) return toml::parse("value = \"" + text + '"', where);
   }
-  throw InputError(where + ": expected a TOML value after '=', got " + quoted(value));
+  const std::string number = impossible_number(value);
+  throw InputError(where + ": expected " +
+                   (number.empty() ? "a TOML value after '=', got " + quoted(value) : "a number, got " + number));
 }
 
 void apply_override(toml::table& root, const std::string& text) {
-  const std::string where = std::string(override_prefix) + text;
+  const std::string where = std::string(override_prefix) + printable(text);
+  require_shallow(text, where);
   const std::size_t equals = text.find('=');
   const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
   const std::vector<std::string_view> path = key_path(key);
@@ -80,7 +181,7 @@ void apply_override(toml::table& root, const std::string& text) {
     if (!table->contains(path[i])) table->insert(path[i], std::move(*parse("t = {}", where).get("t")));
     toml::node* next = table->get(path[i]);
     if (!next->is_table()) {
-      throw InputError(where, std::string(key), "a table before the last dot (an array is set as a whole)",
+      throw InputError(where, printable(key), "a table before the last dot (an array is set as a whole)",
                        std::string(path[i]) + " = " + shown(*next));
     }
     table = next->as_table();
@@ -88,16 +189,22 @@ void apply_override(toml::table& root, const std::string& text) {
   table->insert_or_assign(path.back(), std::move(*value.get("value")));
 }
 
-std::string expected_number(Sign sign) {
-  switch (sign) {
-    case Sign::any:
-      return "a finite number";
-    case Sign::not_negative:
-      return "a finite number >= 0";
-    case Sign::positive:
-      return "a finite number > 0";
+std::string expected_number(Sign sign, Units units) {
+  std::string expected = "a finite number";
+  if (sign == Sign::not_negative) expected += " >= 0";
+  if (sign == Sign::positive) expected += " > 0";
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    expected += (i == 0 ? " or a string in " : " or ") + std::string(units[i].name);
   }
-  return {};
+  return expected;
+}
+
+/// The number in a text such as "90 deg".
+std::optional<double> with_unit(std::string_view text, Units units) {
+  const std::optional<Quantity> quantity = read_quantity(text);
+  if (!quantity) return std::nullopt;
+  const auto unit = std::ranges::find(units, quantity->unit, &Unit::name);
+  return unit == units.end() ? std::nullopt : std::optional(quantity->value * unit->size);
 }
 
 bool fits(double value, Sign sign) {
@@ -112,11 +219,10 @@ std::string shown_float(double value) {
 }
 
 std::string shown_array(const toml::array& array) {
-  constexpr std::size_t longest = 60;
   std::string text = "[";
   for (const toml::node& element : array) {
     if (text.size() > 1) text += ", ";
-    if (text.size() > longest) return text + "...] (" + std::to_string(array.size()) + " values)";
+    if (text.size() > longest_shown) return text + "...] (" + std::to_string(array.size()) + " values)";
     text += shown(element);
   }
   return text + "]";
@@ -145,8 +251,7 @@ toml::table parse_toml(std::string_view text, std::string_view name, std::span<c
 }
 
 std::string location(const toml::source_region& source) {
-  const std::string name = source.path ? *source.path : std::string("scenario");
-  return name.starts_with(override_prefix) ? name : name + ":" + std::to_string(source.begin.line);
+  return line_place(source.path ? *source.path : std::string("scenario"), source.begin.line);
 }
 
 std::string shown(const toml::node& node) {
@@ -167,9 +272,12 @@ void Entry::fail(const std::string& expected) const {
   throw InputError(where(), key_, expected, shown(*node_));
 }
 
-double Entry::number(Sign sign) const {
-  const std::optional<double> value = is_number() ? node_->value<double>() : std::nullopt;
-  if (!value || !fits(*value, sign)) fail(expected_number(sign));
+double Entry::number(Sign sign, Units units) const {
+  const auto* text = node_->as_string();
+  const std::optional<double> value = is_number() ? node_->value<double>()
+                                      : text      ? with_unit(text->get(), units)
+                                                  : std::nullopt;
+  if (!value || !fits(*value, sign)) fail(expected_number(sign, units));
   return *value;
 }
 
@@ -190,14 +298,16 @@ std::size_t Entry::choice(std::span<const std::string_view> choices) const {
   throw InputError(where(), key_, expected, shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
 }
 
-Eigen::VectorXd Entry::per_link(const LinkCount& count, Sign sign) const {
-  if (is_number()) return Eigen::VectorXd::Constant(count.links, number(sign));
+Eigen::VectorXd Entry::per_link(const LinkCount& count, Sign sign, Units units) const {
+  if (is_number() || (node_->is_string() && !units.empty())) {
+    return Eigen::VectorXd::Constant(count.links, number(sign, units));
+  }
   if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
-    fail(expected_number(sign) + " for all links, or an array of " + std::to_string(count.links) +
+    fail(expected_number(sign, units) + " for all links, or an array of " + std::to_string(count.links) +
          (key_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
   }
   Eigen::VectorXd values(count.links);
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(sign);
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(sign, units);
   return values;
 }
 
@@ -229,7 +339,7 @@ void Section::read(const Entry& entry, std::span<const std::string_view> known,
   if (table_ == nullptr) entry.fail("a table");
   for (const auto& [key, node] : *table_) {
     if (std::ranges::find(known, key.str()) != known.end()) continue;
-    throw InputError(location(node.source()), dotted(key.str()), "one of " + joined(known, ", "),
+    throw InputError(location(node.source()), dotted(printable(key.str())), "one of " + joined(known, ", "),
                      "the unknown key " + quoted(key.str()) + hint_at_key(key.str(), known, elsewhere));
   }
 }

@@ -27,6 +27,13 @@ std::string shown(const toml::node& node);
 /// What a number must be besides finite.
 enum class Sign { any, not_negative, positive };
 
+/// A unit that a number may be given in, by a string such as "90 deg".
+struct Unit {
+  std::string_view name;
+  double size;  ///< in the unit of numbers without one
+};
+using Units = std::span<const Unit>;
+
 /// Number of links, and what told it.
 struct LinkCount {
   int links = 0;
@@ -50,12 +57,13 @@ class Entry {
   /// Element of an array, counted from 0 here and from 1 in messages, as links are.
   Entry element(std::size_t index) const;
 
-  double number(Sign sign = Sign::any) const;
+  /// A number; where there are `units`, also a string of a number and one of them.
+  double number(Sign sign = Sign::any, Units units = {}) const;
   std::int64_t integer(std::int64_t least, std::int64_t most) const;
   /// A string out of `choices`, as its index there.
   std::size_t choice(std::span<const std::string_view> choices) const;
   /// One number a link; a single number stands for every link.  (n)
-  Eigen::VectorXd per_link(const LinkCount& count, Sign sign = Sign::any) const;
+  Eigen::VectorXd per_link(const LinkCount& count, Sign sign = Sign::any, Units units = {}) const;
   /// A vector of `components` numbers.  (components)
   Eigen::VectorXd vector(Eigen::Index components) const;
 

@@ -1,21 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <filesystem>
-#include <memory>
 #include <pendula/space.hpp>
 #include <pendula/state.hpp>
-#include <stdexcept>
 #include <string>
 
-namespace pendula::io {
+#include "io/line_file.hpp"
 
-/// Rows could not be written, although the file could be opened: the disk is full, say.
-class OutputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+namespace pendula::io {
 
 /// Appends the header row of a trajectory: `t`, per link `theta_i` (`phi_i`) `theta_dot_i` (`phi_dot_i`), bobs `x_i`
 /// `y_i` (`z_i`), `energy`.
@@ -27,36 +20,27 @@ void append_header(std::string& text, int links);
 template <class Space>
 void append_row(std::string& text, const State<Space>& state, const Points<Space, Eigen::Dynamic>& bobs, double energy);
 
-/// A trajectory as a CSV file. Rows are collected and written in large blocks; `close` writes the rest and tells
-/// whether all went well, the destructor does so silently, so that rows survive whatever ends the run.
+/// A trajectory as a CSV file of whole rows.
 template <class Space>
 class TrajectoryFile {
  public:
-  /// Opens the file, replacing one that is there, and writes the header. Throws InputError where it cannot be opened.
-  TrajectoryFile(const std::filesystem::path& file, int links);
-  ~TrajectoryFile();
-  TrajectoryFile(const TrajectoryFile&) = delete;
-  TrajectoryFile& operator=(const TrajectoryFile&) = delete;
+  /// Opens the file, as LineFile does, and begins it with the header. Throws InputError where it cannot be opened.
+  TrajectoryFile(const std::string& file, int links) : file_(file) { append_header<Space>(file_.pending(), links); }
 
-  /// Throws OutputError where a block cannot be written.
-  void write(const State<Space>& state, const Points<Space, Eigen::Dynamic>& bobs, double energy);
+  /// Throws OutputError where rows cannot be written.
+  void write(const State<Space>& state, const Points<Space, Eigen::Dynamic>& bobs, double energy) {
+    append_row(file_.pending(), state, bobs, energy);
+    file_.flush_if_due();
+  }
 
   /// Writes what is left and closes the file. Throws OutputError.
-  void close();
+  void close() { file_.close(); }
 
-  std::int64_t rows() const { return rows_; }
+  /// Rows that are in the file.
+  std::int64_t rows() const { return std::max<std::int64_t>(file_.lines() - 1, 0); }
 
  private:
-  struct Close {
-    void operator()(std::FILE* stream) const { std::fclose(stream); }
-  };
-
-  void flush();
-
-  std::filesystem::path file_;
-  std::unique_ptr<std::FILE, Close> stream_;
-  std::string block_;
-  std::int64_t rows_ = 0;
+  LineFile file_;
 };
 
 }  // namespace pendula::io

@@ -11,10 +11,11 @@ namespace pendula {
 
 namespace detail {
 
-/// û and û̇ of one link, from the generated link kernel.
+/// û, ∂û/∂q and û̇ of one link, from the generated link kernel.
 template <class Space, class Real>
 struct LinkMotion {
   Eigen::Matrix<Real, Space::dimension, 1> direction, rate;
+  Eigen::Matrix<Real, Space::dimension, Space::dof> derivatives;
 
   template <int N>
   LinkMotion(const State<Space, N, Real>& state, int link) {
@@ -31,8 +32,8 @@ struct LinkMotion {
     rate.setZero();
     for (int a = 0; a < Space::dof; ++a) {
       const auto& derivative = u_a[static_cast<std::size_t>(a)];
-      rate += state.v[a * state.links() + link] *
-              Eigen::Map<const Eigen::Matrix<Real, Space::dimension, 1>>(derivative.data());
+      derivatives.col(a) = Eigen::Map<const Eigen::Matrix<Real, Space::dimension, 1>>(derivative.data());
+      rate += state.v[a * state.links() + link] * derivatives.col(a);
     }
   }
 };

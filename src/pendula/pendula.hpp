@@ -9,6 +9,7 @@
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/integrator.hpp>
 #include <pendula/invariants.hpp>
+#include <pendula/momenta.hpp>
 #include <pendula/options.hpp>
 #include <pendula/outcome.hpp>
 #include <pendula/simulation.hpp>

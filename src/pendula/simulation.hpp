@@ -22,6 +22,7 @@ struct Schedule {
 /// What came of a run.
 struct RunResult {
   Outcome outcome;              ///< of the step that ended it
+  bool stopped = false;         ///< whether it was asked to end before its time
   double stepping_seconds = 0;  ///< wall time inside the integrator, without rows
 };
 
@@ -48,28 +49,36 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 }  // namespace detail
 
 /// Runs `integrator` from `start` over `schedule`, and calls on_row(const State<Space>&) at the start, every
-/// `schedule.every` accepted steps, and at the last state, also where the run fails. Throws std::invalid_argument on a
-/// schedule that makes no sense.
-template <class Space, class OnRow>
-RunResult simulate(Integrator<Space>& integrator, const State<Space>& start, const Schedule& schedule, OnRow on_row) {
+/// `schedule.every` accepted steps, and at the last state, also where the run fails or is stopped: bool stop() is asked
+/// after every step. Throws std::invalid_argument on a schedule that makes no sense.
+template <class Space, class OnRow, class Stop>
+RunResult simulate(Integrator<Space>& integrator, const State<Space>& start, const Schedule& schedule, OnRow on_row,
+                   Stop stop) {
   using Clock = std::chrono::steady_clock;
   detail::require(schedule);
-  RunResult result{integrator.start(start), 0};
+  RunResult result{integrator.start(start)};
   on_row(start);
   std::int64_t since_row = 0;
-  while (result.outcome && !detail::at_end(schedule, integrator.time() - start.time)) {
+  while (result.outcome && !result.stopped && !detail::at_end(schedule, integrator.time() - start.time)) {
     const auto begin = Clock::now();
-    while (since_row < schedule.every && result.outcome) {
+    while (since_row < schedule.every && result.outcome && !result.stopped) {
       const double elapsed = integrator.time() - start.time;
       if (detail::at_end(schedule, elapsed)) break;
       result.outcome = integrator.step(detail::next_step(schedule, elapsed));
       if (result.outcome) ++since_row;
+      result.stopped = stop();
     }
     result.stepping_seconds += std::chrono::duration<double>(Clock::now() - begin).count();
     if (since_row > 0) on_row(integrator.state());
     since_row = 0;
   }
   return result;
+}
+
+/// The same to the end of the schedule.
+template <class Space, class OnRow>
+RunResult simulate(Integrator<Space>& integrator, const State<Space>& start, const Schedule& schedule, OnRow on_row) {
+  return simulate(integrator, start, schedule, on_row, [] { return false; });
 }
 
 }  // namespace pendula

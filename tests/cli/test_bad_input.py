@@ -3,6 +3,8 @@
 Every kind is tested on the parser itself (scenario_test.cpp); here they are as users meet them.
 """
 
+import sys
+
 import pytest
 from conftest import settings
 
@@ -114,11 +116,23 @@ def test_a_folder_is_no_scenario(pendula, tmp_path):
     assert run.err.endswith("expected a scenario file that can be read, got: a folder\n")
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a device that never ends")
+def test_a_scenario_without_end_is_refused(pendula):
+    run = pendula("simulate", "/dev/zero")
+    assert run.status == 2
+    reason = "expected a scenario file that can be read, got: more than 256 MiB"
+    assert run.err == f"pendula: /dev/zero: {reason}\n"
+
+
 def test_an_output_that_cannot_be_opened(pendula, double):
     run = pendula("simulate", double, "-o", "no/such/folder/out.csv")
     assert (run.status, run.out) == (2, "")
-    reason = "expected a file that can be written, got: No such file or directory"
+    reason = "expected a file that can be written, got: no/such/folder/ does not exist"
     assert run.err == f"pendula: no/such/folder/out.csv: {reason}\n"
+    run = pendula("simulate", double, "-o", "out/")
+    assert run.err == "pendula: out/: expected a file that can be written, got: out/ does not exist\n"
+    run = pendula("simulate", double, "-o", ".")
+    assert run.err == "pendula: .: expected a file that can be written, got: Is a directory\n"
 
 
 def test_the_scenario_is_not_overwritten(pendula, double):
@@ -152,10 +166,19 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),
         (["simulate"], " simulate", "SCENARIO is required"),
+        (["simulate", ""], " simulate", "SCENARIO: expected the name of a file, got an empty text"),
         (["simulate", "a.toml", "--jsno"], " simulate", "unknown option --jsno (did you mean --json?)"),
         (["simulate", "a", "--otput=b"], " simulate", "unknown option --otput=b (did you mean --output?)"),
         (["simulate", "a.toml", "b.toml"], " simulate", "unknown argument b.toml"),
         (["check", "--space", "flat"], " check", "--space: flat not in {planar,spatial}"),
+        *(
+            (
+                ["check", "--links", links],
+                " check",
+                f"--links: expected a whole number of links, 1 or more, got {links}",
+            )
+            for links in ("-1", "0", "1.5", "two", "99999999999")
+        ),
         (["kernels", "--all"], " kernels", "unknown option --all"),
     ],
 )

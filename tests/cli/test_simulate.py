@@ -1,9 +1,11 @@
 """Runs that succeed: reference values, summary, trajectory."""
 
+import json
 import math
+import subprocess
 
 import pytest
-from conftest import Trajectory, settings
+from conftest import Trajectory, program, settings
 
 # Double pendulum, m = l = 1, g = 9.81, released from the horizontal, after 10 s.
 DOUBLE_X, DOUBLE_Y = -1.0407657832461712, -1.7073476624693271
@@ -297,13 +299,43 @@ def test_json_is_alone_on_standard_output(pendula, double):
 def test_json_stays_pure_beside_warnings(pendula, double):
     run = pendula("simulate", double, "--json", *settings("run.tolerance=1e-6"))
     assert run.json["outcome"]["status"] == "ok"
-    assert "run.tolerance: has no effect with method gauss" in run.err
+    [warning] = run.json["warnings"]
+    assert warning == "--set run.tolerance=1e-6: run.tolerance: has no effect with method gauss"
+    assert run.err == f"pendula: warning: {warning}\n"
+    assert pendula("simulate", double, "--json").json["warnings"] == []
+
+
+def test_degrees_are_radians_in_other_words(pendula, double):
+    def final(*start):
+        return pendula("simulate", double, "--json", *settings(*start)).json["final"]
+
+    assert final("start.theta=90 deg") == final()  # the same bits
+    assert final('start.theta_dot=["180 deg/s", 1]') == final(f"start.theta_dot=[{math.pi}, 1]")
+
+
+def test_momenta_at_the_start(pendula, spherical):
+    """p_θ = m l² θ̇ and p_φ = m l² sin²θ φ̇ of one link."""
+    given = settings("chain.masses=2.0", "chain.lengths=0.5", "run.duration=0")
+    by_momenta = spherical.with_name("momenta.toml")
+    text = spherical.read_text().replace("theta_dot = 0.4", "p_theta = 0.2")
+    by_momenta.write_text(text.replace("phi_dot   = 0.9", f"p_phi = {0.45 * math.sin(1.2) ** 2}"))
+    final = pendula("simulate", by_momenta, "--json", *given).json["final"]
+    assert final["theta_dot"] == pytest.approx([0.4], abs=1e-15)  # measured 1.1e-16
+    assert final["phi_dot"] == pytest.approx([0.9], abs=1e-15)  # measured 1.1e-16
+
+
+def test_an_angle_that_looks_like_degrees_is_warned_of(pendula, double):
+    run = pendula("simulate", double, "--json", *settings("start.theta=90"))
+    [warning] = run.json["warnings"]
+    assert warning.endswith('start.theta: 90 rad is more than two turns; did you mean "90 deg"?')
+    assert (run.status, run.err) == (0, f"pendula: warning: {warning}\n")
 
 
 def test_quiet_prints_nothing(pendula, double):
     run = pendula("simulate", double, "--quiet", *settings("run.tolerance=1e-6"))
     assert (run.status, run.out, run.err) == (0, "", "")
-    assert pendula("simulate", double, "--quiet", "--json").json["steps"] == 200
+    loud = pendula("simulate", double, "--quiet", "--json", *settings("run.tolerance=1e-6"))
+    assert (loud.json["steps"], len(loud.json["warnings"]), loud.err) == (200, 1, "")
 
 
 def test_text_summary_tells_settings_counts_energy_and_last_bob(pendula, double):
@@ -338,6 +370,26 @@ def test_overrides_replace_keys_of_the_file(pendula, double):
         *settings("run.stages=3", "run.form=velocity", "start.theta=[0.1, 0.2]", "run.duration=0"),
     ).json
     assert (summary["stages"], summary["form"], summary["final"]["theta"]) == (3, "velocity", [0.1, 0.2])
+
+
+def test_a_scenario_from_standard_input(double):
+    def simulate(text):
+        command = [program(), "simulate", "-", "--json"]
+        return subprocess.run(command, input=text, capture_output=True, text=True, timeout=60, check=False)
+
+    run = simulate(double.read_text())
+    assert (run.returncode, json.loads(run.stdout)["scenario"]) == (0, "-")
+    run = simulate("[chain]\nspace = 1\n")
+    assert run.returncode == 2
+    assert run.stderr.startswith("pendula: standard input:2: chain.space: expected ")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_any_editor_may_have_written_the_scenario(pendula, double, tmp_path, encoding, newline):
+    (tmp_path / "größe ☃.toml").write_bytes(double.read_text().replace("\n", newline).encode(encoding))
+    run = pendula("simulate", "größe ☃.toml", "--json")
+    assert (run.status, run.json["steps"], run.json["scenario"]) == (0, 200, "größe ☃.toml")
 
 
 def test_overrides_may_stand_before_the_scenario(pendula, double):

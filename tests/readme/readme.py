@@ -1,4 +1,4 @@
-"""The README's commands: what they print now, and whether that is what the README shows.
+"""The README's commands, typed into a shell: what they print now, and whether that is what the README shows.
 
 `python tests/readme/readme.py` writes the present output into the README; test_readme.py compares.
 Environment: PENDULA_PROGRAM, the program to run; PENDULA_BUILD, the build folder whose tests are counted.
@@ -9,6 +9,8 @@ import re
 import shlex
 import subprocess
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,25 +45,52 @@ def program() -> str:
     return os.environ["PENDULA_PROGRAM"]
 
 
-def run_pendula(command: str) -> list[str]:
-    """Both streams of the program, called in a folder with the examples and an empty out/."""
+@contextmanager
+def fresh_checkout() -> Iterator[Path]:
+    """A folder that has what a checkout has, and nothing that a command made."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "examples").symlink_to(ROOT / "examples")
-        (Path(folder) / "out").mkdir()
-        words = [program(), *shlex.split(command)[1:]]
-        done = subprocess.run(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        for name in ("examples", "scripts"):
+            (Path(folder) / name).symlink_to(ROOT / name)
+        yield Path(folder)
+
+
+def shell(lines: list[str], folder: Path, check: bool = True, **environment: str) -> list[str]:
+    """What both streams of the lines hold, typed into a shell."""
+    done = subprocess.run(
+        ["bash", "-ec", "\n".join(lines)],
+        cwd=folder,
+        env=os.environ | environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=check,
+    )
     return done.stdout.rstrip("\n").split("\n")
 
 
-def run_demo(command: str) -> list[str]:
+def run_pendula(commands: list[str]) -> list[str]:
+    """The program is on the path; one of its calls shows an error."""
+    with fresh_checkout() as folder:
+        path = f"{Path(program()).parent}:{os.environ['PATH']}"
+        return shell(commands, folder, check=False, PATH=path)
+
+
+def run_demo(commands: list[str]) -> list[str]:
     """What the demo says from the program's call on; what comes before that differs by machine."""
-    done = subprocess.run(shlex.split(command), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(shlex.split(commands[0]), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     lines = done.stdout.rstrip("\n").split("\n")
     start = next(i for i, line in enumerate(lines) if line.startswith("+ build/release/bin/pendula"))
     return [ELLIPSIS, *lines[start:]]
 
 
-def count_tests(_: str) -> list[str]:
+def set_path(commands: list[str]) -> list[str]:
+    """In a shell with this path the program is the one that the demo has built."""
+    found = shell([*commands, "command -v pendula"], ROOT)
+    assert found == [str(ROOT / "build/release/bin/pendula")], found
+    return []
+
+
+def count_tests(_: list[str]) -> list[str]:
     """The line that ctest ends with when every test of the build passes: this runs inside one of them."""
     listed = subprocess.run(
         ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N"],
@@ -74,19 +103,30 @@ def count_tests(_: str) -> list[str]:
     return [ELLIPSIS, f"100% tests passed, 0 tests failed out of {total[1]}", ELLIPSIS]
 
 
-def configure(command: str) -> list[str]:
-    """Only configures, elsewhere: the demo builds a kernel that generated/ lacks."""
+def run_cmake(commands: list[str]) -> list[str]:
+    """Installs what the demo has built, into another home. Or only configures, elsewhere: it is the demo that
+    builds a kernel that generated/ lacks."""
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([*shlex.split(command), "-B", folder], cwd=ROOT, stdout=subprocess.DEVNULL, check=True)
+        if "--install" in commands[0]:
+            shell([*commands, "~/.local/bin/pendula --version"], ROOT, HOME=folder)
+        else:
+            shell([f"{commands[0]} -B {shlex.quote(folder)}"], ROOT)
+            assert commands[1:] == ["cmake --build build/release"]
     return []
 
 
-RUNNERS = {"pendula": run_pendula, "scripts/demo": run_demo, "scripts/test": count_tests, "cmake": configure}
+RUNNERS = {
+    "pendula": run_pendula,
+    "scripts/demo": run_demo,
+    "scripts/test": count_tests,
+    "cmake": run_cmake,
+    "export": set_path,
+}
 
 
 def output(session: Session) -> list[str]:
-    command = session.commands[0]
-    return RUNNERS[shlex.split(command)[0]](command)
+    """Of all commands; the last one tells which kind they are."""
+    return RUNNERS[session.commands[-1].split()[0]](session.commands)
 
 
 def same_word(shown: str, now: str, relative: float) -> bool:

@@ -8,7 +8,7 @@ import pytest
 import readme
 
 
-@pytest.mark.parametrize("session", readme.sessions(), ids=lambda session: session.commands[0])
+@pytest.mark.parametrize("session", readme.sessions(), ids=lambda session: session.commands[-1])
 def test_console_blocks_show_what_is_printed(session: readme.Session) -> None:
     now = readme.output(session)
     refresh = "refresh with: python tests/readme/readme.py"

@@ -1,0 +1,40 @@
+# What PENDULA_KERNELS may say: cmake -D SOURCE=… -P kernel_list.cmake
+cmake_minimum_required(VERSION 3.25)
+
+if(DEFINED ENV{PENDULA_TEST_KERNELS})  # called by itself, below: one list, checked as a build checks it
+  set(PROJECT_SOURCE_DIR "${SOURCE}")
+  set(PROJECT_BINARY_DIR "${SOURCE}/no build")
+  set(PENDULA_KERNELS "$ENV{PENDULA_TEST_KERNELS}")
+  include("${SOURCE}/cmake/PendulaKernels.cmake")
+  include("${SOURCE}/cmake/PendulaRegistry.cmake")
+  list(JOIN PENDULA_KERNELS " " kernels)
+  message(STATUS "[${kernels}]")
+  return()
+endif()
+
+# What a list comes to, or the words of the error, must hold EXPECTED.
+function(expect list expected)
+  set(ENV{PENDULA_TEST_KERNELS} "${list}")
+  execute_process(COMMAND "${CMAKE_COMMAND}" -D "SOURCE=${SOURCE}" ${ARGN} -P "${CMAKE_CURRENT_LIST_FILE}"
+                  OUTPUT_VARIABLE output ERROR_VARIABLE output TIMEOUT 60)
+  string(REGEX REPLACE "[ \n]+" " " output "${output}")
+  string(FIND "${output}" "${expected}" found)
+  if(found EQUAL -1)
+    message(FATAL_ERROR "PENDULA_KERNELS=\"${list}\": expected \"${expected}\", got: ${output}")
+  endif()
+endfunction()
+
+expect("planar:2;spatial:3" "[planar:2 spatial:3]")
+expect("planar:12;planar:2;planar:2" "[planar:2 planar:12]")
+expect("planar:2;" "[planar:2]")
+expect(" ; planar:2 ;; spatial:1" "[planar:2 spatial:1]")
+expect(";" "[]")
+expect("planar" "\"planar\": expected <space>:<links>, such as spatial:3")
+expect("round:3" "expected the space planar or spatial, got \"round\"")
+expect("planar:0" "expected a number of links, 1 or more, got \"0\"")
+expect("planar:-1" "expected a number of links, 1 or more, got \"-1\"")
+expect("planar:32" "[planar:32]")
+expect("planar:33" "expected at most 32 links, got \"33\"")
+expect("planar:100000" "-DPENDULA_MAX_KERNEL_LINKS=100000 has it all the same")
+expect("spatial:99999999999999999999" "expected at most 32 links")
+expect("planar:33" "[planar:33]" -D PENDULA_MAX_KERNEL_LINKS=33)
