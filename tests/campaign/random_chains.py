@@ -238,14 +238,23 @@ def compare(case: Case, options: str, command: list) -> Verdict:
     words = run.stderr.strip()
     if run.returncode == 1 and words:
         return Verdict(case, options, "refused", math.inf, words)
-    if run.returncode != 0:
-        sys.exit(f"chain {case.number}: exit status {run.returncode}: {words}")
+    if run.returncode == 2:
+        sys.exit(f"chain {case.number} is no scenario: {words}")
+    if run.returncode != 0:  # a crash
+        return Verdict(case, options, "SILENT", math.inf, f"exit status {run.returncode} {words}")
     summary = json.loads(run.stdout)
-    error = case.end.distance(summary["final"]["bobs"], summary["final"]["velocities"], case.chain)
+    error = case.end.distance(
+        *map(finite, (summary["final"]["bobs"], summary["final"]["velocities"])), case.chain
+    )
     warned = bool(summary.get("warnings"))
     if error <= RIGHT:
         return Verdict(case, options, "false alarm" if warned else "right", error, words)
     return Verdict(case, options, "warned" if warned else "SILENT", error, words)
+
+
+def finite(points: list[list[float | None]]) -> list[list[float]]:
+    """What JSON has no number for is none."""
+    return [[math.nan if component is None else component for component in point] for point in points]
 
 
 def toml(tables: dict) -> str:
@@ -311,6 +320,9 @@ def main() -> None:
     words.add_argument("--processes", type=int, default=2)
     words.add_argument("--verdicts", type=Path, help="a line of JSON for each run")
     given = words.parse_args()
+    for file in (given.program, given.reference):
+        if not os.access(file, os.X_OK):
+            words.error(f"{file} is no program; build the targets pendula_cli and chain_reference")
     os.nice(10)
     verdicts = run(given)
     if given.verdicts:

@@ -76,6 +76,21 @@ def test_a_program_that_refuses_is_not_silent(campaign, tmp_path):
     assert all(counted(run.stdout, options)[3] > 0 for options in random_chains.OPTIONS)
 
 
+@pytest.mark.parametrize(
+    "end", ["kill -SEGV $$", standing([]).replace("[0.0]", "[None]")], ids=["crash", "null"]
+)
+def test_a_program_that_gives_no_number_is_found(campaign, tmp_path, end):
+    run = campaign(pretender(tmp_path / "broken", end), count=1)
+    assert run.returncode == 1, run.stderr
+    assert all(counted(run.stdout, options) == [0, 0, 0, 0, 1] for options in random_chains.OPTIONS)
+
+
+def test_a_program_that_is_not_there_is_told(campaign, tmp_path):
+    run = campaign(tmp_path / "nowhere")
+    assert run.returncode == 2
+    assert "nowhere is no program" in run.stderr
+
+
 def test_the_same_seed_draws_the_same_chains():
     assert random_chains.draw(3, 5).scenario == random_chains.draw(3, 5).scenario
     assert random_chains.draw(3, 5).scenario != random_chains.draw(4, 5).scenario
