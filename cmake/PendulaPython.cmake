@@ -1,4 +1,4 @@
-# The Python that generates kernels: one that has the pinned packages beside the generator.
+# The Python that generates kernels: one that has its packages.
 include_guard(GLOBAL)
 
 set(PENDULA_PYTHON "" CACHE FILEPATH "Python with the generator's packages (empty: .venv of pendula, else python3)")

@@ -9,6 +9,6 @@ execute_process(COMMAND "${CLANG_FORMAT}" --dry-run --Werror ${files} RESULT_VAR
 list(LENGTH files count)
 if(NOT result EQUAL 0)
   message("${complaints}")
-  message(FATAL_ERROR "clang-format would change some of ${count} files; run clang-format -i on them")
+  message(FATAL_ERROR "clang-format would change some of ${count} files; run ${CLANG_FORMAT} -i on them")
 endif()
 message(STATUS "${count} files")

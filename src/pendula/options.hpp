@@ -16,7 +16,7 @@ enum class Solver { automatic, chain, dense };
 /// How the stage equations are iterated.
 enum class Iteration { automatic, newton, fixed_point };
 
-inline constexpr bool is_adaptive(Method method) {
+constexpr bool is_adaptive(Method method) {
   return method == Method::dopri5 || method == Method::fehlberg78;
 }
 

@@ -76,7 +76,8 @@ void store(Real* to, const xsimd::batch<Real, Arch>& from) {
 }
 
 // x y + z, rounded once where the processor can. The one place with intrinsics: xsimd's rounds twice in registers of
-// two and, before version 11, of eight (its issue 884), and what a product loses to rounding could not be told.
+// two, in those of four where the processor has AVX-VNNI and, before version 11, in those of eight (its issue 884), and
+// what a product loses to rounding could not be told.
 template <class Real>
 Real fused(const Real& x, const Real& y, const Real& z) {
 #ifdef FP_FAST_FMA
@@ -92,6 +93,8 @@ xsimd::batch<Real, Arch> fused(const xsimd::batch<Real, Arch>& x, const xsimd::b
 #ifdef __FMA__
   if constexpr (wide && bytes == 16) return _mm_fmadd_pd(x, y, z);
   if constexpr (!wide && bytes == 16) return _mm_fmadd_ps(x, y, z);
+  if constexpr (wide && bytes == 32) return _mm256_fmadd_pd(x, y, z);
+  if constexpr (!wide && bytes == 32) return _mm256_fmadd_ps(x, y, z);
 #endif
 #ifdef __AVX512F__
   if constexpr (wide && bytes == 64) return _mm512_fmadd_pd(x, y, z);

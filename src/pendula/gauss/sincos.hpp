@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <pendula/gauss/lanes.hpp>
@@ -72,15 +73,15 @@ void sincos(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sin
   const Batch low = detail::fused(n, Batch(-0x1.3198a2e037073p-69), (y - r) - middle);
   const detail::ReducedSinCos<Arch> reduced(r, low);
 
-  const auto bits = [](const Batch& value) { return xsimd::bitwise_cast<Integers>(value); };
+  const auto bits = [](const Batch& value) { return std::bit_cast<Integers>(value); };
   const Integers quadrant = bits(shifted);
   const Integers sign(INT64_MIN);
   const Integers swap = Integers(0) - (quadrant & Integers(1));  // all ones in odd quadrants
   const Integers difference = (bits(reduced.sine) ^ bits(reduced.cosine)) & swap;
   const Integers sine_sign = (Integers(0) - (quadrant & Integers(2))) & sign;  // −2 has the sign bit
   const Integers cosine_sign = sine_sign ^ (swap & sign);
-  sine = xsimd::bitwise_cast<Batch>((bits(reduced.sine) ^ difference) ^ sine_sign);
-  cosine = xsimd::bitwise_cast<Batch>((bits(reduced.cosine) ^ difference) ^ cosine_sign);
+  sine = std::bit_cast<Batch>((bits(reduced.sine) ^ difference) ^ sine_sign);
+  cosine = std::bit_cast<Batch>((bits(reduced.cosine) ^ difference) ^ cosine_sign);
 
   if (!xsimd::all(xsimd::abs(x) < Batch(1e5))) [[unlikely]]
     detail::sincos_of_large(x, sine, cosine);
