@@ -13,12 +13,11 @@ namespace pendula {
 /// load. The bobs accelerate by ẇ_i = Σ_{j≤i} l_j (Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b), so that q̈ belongs to the momentum
 /// û_a·(R − l Σ_{j≥i} m_j b_j), b the accelerations that q̈ = 0 would give.
 template <class Space>
-class ChainForwardDynamics : public ForwardDynamics<Space> {
+class ChainForwardDynamics : public ForwardDynamics {
   using Link = typename Space::Link;
   using Rates = std::array<double, Space::dof>;
   using Cartesian = typename Link::template Cartesian<double>;
   using Trig = typename Link::template Trig<double>;
-  using Vector = Coordinates<Space, Eigen::Dynamic>;
 
  public:
   explicit ChainForwardDynamics(const Chain<Space>& chain)
@@ -26,7 +25,7 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     chain_.torque(0, torque_);
   }
 
-  void acceleration(double time, const Vector& q, const Vector& v, Vector& acceleration) override {
+  void acceleration(double time, const double* q, const double* v, double* acceleration) override {
     if (chain_.driven()) chain_.torque(time, torque_);
     Cartesian b{}, below{};
     for (int i = 0; i < chain_.links(); ++i) {
@@ -61,13 +60,13 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
   Motion& motion(int i) { return motions_[static_cast<std::size_t>(i)]; }
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * chain_.links() + i; }
 
-  Rates rates_of(int i, const Vector& values) const {
+  Rates rates_of(int i, const double* values) const {
     Rates rates;
     for (std::size_t a = 0; a < rates.size(); ++a) rates[a] = values[entry(i, a)];
     return rates;
   }
 
-  Trig trig_of(int i, const Vector& q) const {
+  Trig trig_of(int i, const double* q) const {
     Trig trig;
     Link::trig(rates_of(i, q), trig);
     return trig;
