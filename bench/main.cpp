@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <iostream>
+#include <pendula/library.hpp>
 #include <pendula/version.hpp>
 #include <race.hpp>
 #include <steps.hpp>
@@ -34,7 +35,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
   benchmark::AddCustomContext("compiler", BENCH_COMPILER);
-  benchmark::AddCustomContext("flags", BENCH_FLAGS);
+  benchmark::AddCustomContext(
+      "flags", BENCH_FLAGS + (" with the library for " + std::string(pendula::library().instruction_set)));
   bench::register_unit();
   bench::register_few_links();
   bench::register_chain_costs();

@@ -24,8 +24,3 @@ install(FILES "${PROJECT_BINARY_DIR}/pendulaConfig.cmake" "${PROJECT_BINARY_DIR}
               "${PROJECT_SOURCE_DIR}/cmake/PendulaKernels.cmake" "${PROJECT_SOURCE_DIR}/cmake/PendulaPython.cmake"
               "${PROJECT_SOURCE_DIR}/cmake/PendulaXsimd.cmake" "${PROJECT_SOURCE_DIR}/cmake/check_requirements.py"
         DESTINATION "${package_dir}")
-
-if(PENDULA_NATIVE)
-  install(CODE "message(STATUS \"pendula: this library is for processors like this machine's; \
-configure with -DPENDULA_NATIVE=OFF for one that runs elsewhere\")")
-endif()

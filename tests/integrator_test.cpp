@@ -1,6 +1,6 @@
 // The run-time factory, the explicit methods, the simulation loop, and how failures are told.
 
-#include <pendula/chain_integrator.hpp>
+#include <pendula/gauss/chain_forward_dynamics.hpp>
 #include <pendula/gauss/chain_solver.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 
@@ -79,10 +79,10 @@ TEST(ExplicitMethods, MeetGaussLegendre) {
 }
 
 template <class Space>
-void expect_the_same_accelerations(const Chain<Space>& chain, ForwardDynamics<Space>& dense, const State<Space>& at) {
+void expect_the_same_accelerations(const Chain<Space>& chain, ForwardDynamics& dense, const State<Space>& at) {
   Eigen::VectorXd expected(at.q.size()), got(at.q.size());
-  dense.acceleration(0.3, at.q, at.v, expected);
-  make_chain_forward_dynamics(chain)->acceleration(0.3, at.q, at.v, got);
+  dense.acceleration(0.3, at.q.data(), at.v.data(), expected.data());
+  ChainForwardDynamics<Space>(chain).acceleration(0.3, at.q.data(), at.v.data(), got.data());
   EXPECT_LT((got - expected).norm(), 1e-13 * expected.norm());  // measured 5e-15
 }
 
@@ -121,6 +121,16 @@ TEST(ExplicitMethods, RefuseASingularStart) {
   const auto integrator = make_integrator(equal_chain<Spatial>(1), options);
   const auto hanging = State<Spatial>::from_angles(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
   EXPECT_EQ(integrator->start(hanging).status, Status::singular_mass_matrix);
+}
+
+TEST(Failure, OfAStateOfAnotherChainIsTold) {
+  const auto integrator = make_integrator(equal_chain<Planar>(3), RunOptions());
+  try {
+    integrator->start(swinging(4));
+    FAIL() << "expected std::invalid_argument";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "state: angles: expected 3 numbers for this chain, got 4");
+  }
 }
 
 TEST(Failure, AtThePoleNamesTheLink) {

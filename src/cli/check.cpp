@@ -7,7 +7,7 @@
 #include <memory>
 #include <pendula/integrator.hpp>
 #include <pendula/invariants.hpp>
-#include <pendula/kernel_registry.hpp>
+#include <pendula/library.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -170,7 +170,7 @@ struct Tally {
 template <class Space>
 void check_space(const CheckOptions& options, Tally& tally) {
   if (options.space && *options.space != Space::name) return;
-  for (const KernelEntry<Space>& entry : kernel_registry<Space>()) {
+  for (const KernelEntry& entry : library_of<Space>().kernels) {
     if (options.links && *options.links != entry.info.links) continue;
     constexpr unsigned seed = 1;
     for (const KernelCheck::Line& line : entry.check(seed).lines) {

@@ -7,7 +7,9 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <pendula/library.hpp>
 #include <pendula/version.hpp>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -19,6 +21,15 @@
 
 namespace pendula::cli {
 namespace {
+
+/// Name of the instruction set that the library computes with. Throws io::InputError where PENDULA_ARCH is wrong.
+std::string instruction_set() {
+  try {
+    return std::string(library().instruction_set);
+  } catch (const std::invalid_argument& error) {
+    throw io::InputError(error.what());
+  }
+}
 
 /// The command line: what can be asked for, and what was.
 struct CommandLine {
@@ -48,9 +59,13 @@ CommandLine::CommandLine() {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), links);
     return error == std::errc() && end == text.data() + text.size() && links >= 1;
   });
-  app.set_version_flag("--version", "pendula " + std::string(version), "Print the version and end");
+  app.set_version_flag(
+      "--version", [] { return "pendula " + std::string(version) + " (" + instruction_set() + ")"; },
+      "Print the version and the instruction set in use, and end");
   app.set_help_flag("-h,--help", "Print this help and end");
-  app.footer("Exit status: 0 done, 1 the computation failed (rows already computed are kept), 2 the input was wrong.");
+  app.footer(
+      "Exit status: 0 done, 1 the computation failed (rows already computed are kept), 2 the input was wrong.\n"
+      "PENDULA_ARCH in the environment asks for a lesser instruction set than the best that the processor has.");
 
   simulate = app.add_subcommand("simulate", "Run a scenario; write its trajectory, print a summary");
   simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file; - is standard input")
@@ -113,6 +128,7 @@ std::string complaint(const CommandLine& line, const std::string& what) {
 }
 
 ExitStatus dispatch(const CommandLine& line) {
+  instruction_set();  // whether it is wrong, before anything else is
   if (*line.simulate) return simulate(line.simulate_options);
   if (*line.check) return check(line.check_options);
   if (*line.kernels) return kernels();

@@ -5,26 +5,23 @@
 #include <pendula/forward_dynamics.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 #include <pendula/gauss/gauss_integrator.hpp>
-#include <pendula/integrator.hpp>
-#include <string>
+#include <pendula/options.hpp>
+#include <pendula/plain_integrator.hpp>
 
 namespace pendula {
 
 /// Every method over one generated kernel; the number of stages stays a run-time number, so that a build does not hold
 /// stages × forms × kernels specialisations. Throws std::invalid_argument for stages without a tableau.
 template <class Kernel>
-std::unique_ptr<Integrator<SpaceOf<Kernel>>> make_dense_integrator(const Chain<SpaceOf<Kernel>>& chain,
-                                                                   const RunOptions& options) {
-  using Space = SpaceOf<Kernel>;
-  const std::string kernel{Kernel::name};
+std::unique_ptr<PlainIntegrator> make_dense_integrator(const Chain<SpaceOf<Kernel>>& chain, const RunOptions& options) {
   if (options.method != Method::gauss) {
-    return make_explicit_integrator<Space>(std::make_unique<DenseForwardDynamics<Kernel>>(chain), options, kernel);
+    return make_explicit_integrator(std::make_unique<DenseForwardDynamics<Kernel>>(chain), chain.links(),
+                                    SpaceOf<Kernel>::dof, options, Kernel::name);
   }
-  const Description description{"dense", "", kernel};
   if (options.form == Form::velocity) {
-    return std::make_unique<GaussIntegrator<DenseVelocityNewton<Kernel>>>(chain, options.stages, description);
+    return std::make_unique<GaussIntegrator<DenseVelocityNewton<Kernel>>>(chain, options.stages, "dense", Kernel::name);
   }
-  return std::make_unique<GaussIntegrator<DenseMomentumNewton<Kernel>>>(chain, options.stages, description);
+  return std::make_unique<GaussIntegrator<DenseMomentumNewton<Kernel>>>(chain, options.stages, "dense", Kernel::name);
 }
 
 }  // namespace pendula

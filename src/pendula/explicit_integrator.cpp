@@ -9,6 +9,7 @@
 #include <pendula/explicit_integrator.hpp>
 #include <pendula/gauss/compensated.hpp>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -19,46 +20,41 @@ namespace odeint = boost::numeric::odeint;
 
 using Vector = std::vector<double>;  // (q, q̇)
 
-/// rate = d/dt (q, q̇) = (q̇, q̈) at x and time. Behind one type, so that odeint is compiled once for both spaces.
+/// rate = d/dt (q, q̇) = (q̇, q̈) at x and time.
 using RightHandSide = std::function<void(const Vector& x, Vector& rate, double time)>;
 
-template <class Space>
-RightHandSide right_hand_side_of(ForwardDynamics<Space>& dynamics, Eigen::Index coordinates) {
-  using Workspace = Coordinates<Space, Eigen::Dynamic>;
-  return [&dynamics, q = Workspace(coordinates), v = Workspace(coordinates), acceleration = Workspace(coordinates)](
-             const Vector& x, Vector& rate, double time) mutable {
-    const Eigen::Index k = q.size();
-    q = Eigen::Map<const Workspace>(x.data(), k);
-    v = Eigen::Map<const Workspace>(x.data() + k, k);
-    dynamics.acceleration(time, q, v, acceleration);
-    Eigen::Map<Workspace>(rate.data(), k) = v;
-    Eigen::Map<Workspace>(rate.data() + k, k) = acceleration;
+RightHandSide right_hand_side_of(ForwardDynamics& dynamics, std::size_t coordinates) {
+  const auto k = static_cast<std::ptrdiff_t>(coordinates);
+  return [&dynamics, k](const Vector& x, Vector& rate, double time) {
+    std::copy(x.begin() + k, x.end(), rate.begin());
+    dynamics.acceleration(time, x.data(), x.data() + k, rate.data() + k);
   };
 }
 
 /// What fixed and adaptive steps share.
-template <class Space>
-class ExplicitIntegrator : public Integrator<Space> {
+class ExplicitIntegrator : public PlainIntegrator {
  public:
-  ExplicitIntegrator(std::unique_ptr<ForwardDynamics<Space>> dynamics, std::string kernel)
-      : dynamics_(std::move(dynamics)), kernel_(std::move(kernel)) {}
+  ExplicitIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int links, int dof, std::string_view kernel)
+      : x_(2 * static_cast<std::size_t>(links * dof)),
+        dynamics_(std::move(dynamics)),
+        links_(links),
+        kernel_(kernel),
+        right_hand_side_(right_hand_side_of(*dynamics_, x_.size() / 2)) {}
 
-  Outcome start(const State<Space>& state) override {
-    time_.assign(state.time);
+  Outcome start(double time, const double* q, const double* v) override {
+    time_.assign(time);
     statistics_ = {};
-    x_.resize(static_cast<std::size_t>(2 * state.q.size()));
-    Eigen::Map<Eigen::VectorXd>(x_.data(), state.q.size()) = state.q;
-    Eigen::Map<Eigen::VectorXd>(x_.data() + state.q.size(), state.q.size()) = state.v;
-    right_hand_side_ = right_hand_side_of(*dynamics_, state.q.size());
+    const std::size_t k = x_.size() / 2;
+    std::copy_n(v, k, std::copy_n(q, k, x_.begin()));
     return require_finite_rate();
   }
 
   double time() const override { return time_.value; }
 
-  State<Space> state() const override {
-    const auto k = static_cast<Eigen::Index>(x_.size() / 2);
-    return {time(), Eigen::Map<const Eigen::VectorXd>(x_.data(), k),
-            Eigen::Map<const Eigen::VectorXd>(x_.data() + k, k)};
+  void read_state(double* q, double* v) const override {
+    const auto k = static_cast<std::ptrdiff_t>(x_.size() / 2);
+    std::copy(x_.begin(), x_.begin() + k, q);
+    std::copy(x_.begin() + k, x_.end(), v);
   }
 
   const Statistics& statistics() const override { return statistics_; }
@@ -94,32 +90,28 @@ class ExplicitIntegrator : public Integrator<Space> {
     return {Status::singular_mass_matrix, time(), 0, 0, 0, non_finite_link(rate)};
   }
 
-  static int non_finite_link(const Vector& x) {
+  int non_finite_link(const Vector& x) const {
     const auto at = std::find_if(x.begin(), x.end(), [](double value) { return !std::isfinite(value); });
-    const auto links = static_cast<std::ptrdiff_t>(x.size()) / (2 * Space::dof);
-    return at == x.end() ? -1 : static_cast<int>((at - x.begin()) % links);
+    return at == x.end() ? -1 : static_cast<int>((at - x.begin()) % links_);
   }
 
-  std::unique_ptr<ForwardDynamics<Space>> dynamics_;
+  std::unique_ptr<ForwardDynamics> dynamics_;
+  int links_;
   std::string kernel_;
   RightHandSide right_hand_side_;
   Compensated<double> time_{};
 };
 
-template <class Space>
-class FixedStepIntegrator : public ExplicitIntegrator<Space> {
-  using Base = ExplicitIntegrator<Space>;
-
+class FixedStepIntegrator : public ExplicitIntegrator {
  public:
-  using Base::Base;
+  using ExplicitIntegrator::ExplicitIntegrator;
 
   Outcome step(double h) override {
-    Vector& x = this->x_;
-    next_.resize(x.size());
-    stepper_.do_step(std::ref(this->right_hand_side()), x, this->time(), next_, h);
-    if (!Base::is_finite(next_)) return this->failure(Status::not_finite, h, next_);
-    x.swap(next_);
-    return this->accept(h);
+    next_.resize(x_.size());
+    stepper_.do_step(std::ref(right_hand_side()), x_, time(), next_, h);
+    if (!is_finite(next_)) return failure(Status::not_finite, h, next_);
+    x_.swap(next_);
+    return accept(h);
   }
 
  private:
@@ -128,20 +120,19 @@ class FixedStepIntegrator : public ExplicitIntegrator<Space> {
 };
 
 /// Embedded pair with odeint's step control; h is only an upper bound.
-template <class Space, class Stepper>
-class AdaptiveIntegrator : public ExplicitIntegrator<Space> {
-  using Base = ExplicitIntegrator<Space>;
-
+template <class Stepper>
+class AdaptiveIntegrator : public ExplicitIntegrator {
  public:
-  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics<Space>> dynamics, double tolerance, std::string kernel)
-      : Base(std::move(dynamics), std::move(kernel)),
+  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int links, int dof, std::string_view kernel,
+                     double tolerance)
+      : ExplicitIntegrator(std::move(dynamics), links, dof, kernel),
         tolerance_(tolerance),
         stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
 
-  Outcome start(const State<Space>& state) override {
+  Outcome start(double time, const double* q, const double* v) override {
     stepper_ = odeint::make_controlled<Stepper>(tolerance_, tolerance_);
     proposed_ = 0;
-    return Base::start(state);
+    return ExplicitIntegrator::start(time, q, v);
   }
 
   Outcome step(double h) override {
@@ -149,22 +140,22 @@ class AdaptiveIntegrator : public ExplicitIntegrator<Space> {
     double tried = proposed_ == 0 ? std::min(h, first_step) : std::min(h, proposed_);
     for (int attempt = 0; attempt < max_attempts && tried > smallest_step(); ++attempt) {
       const double size = tried;
-      double time = this->time();
-      next_ = this->x_;
-      const bool accepted = stepper_.try_step(std::ref(this->right_hand_side()), next_, time, tried) == odeint::success;
-      if (!Base::is_finite(next_) || !std::isfinite(tried)) return this->failure(Status::not_finite, size, next_);
+      double at = time();
+      next_ = x_;
+      const bool accepted = stepper_.try_step(std::ref(right_hand_side()), next_, at, tried) == odeint::success;
+      if (!is_finite(next_) || !std::isfinite(tried)) return failure(Status::not_finite, size, next_);
       if (accepted) {
-        this->x_.swap(next_);
+        x_.swap(next_);
         if (!cut || tried < size) proposed_ = tried;
-        return this->accept(size);
+        return accept(size);
       }
-      ++this->statistics_.rejected_steps;
+      ++statistics_.rejected_steps;
     }
-    return this->failure(Status::not_converged, tried, this->x_);
+    return failure(Status::not_converged, tried, x_);
   }
 
  private:
-  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(this->time())); }
+  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
 
   static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
   static constexpr int max_attempts = 100;
@@ -177,30 +168,24 @@ class AdaptiveIntegrator : public ExplicitIntegrator<Space> {
 
 }  // namespace
 
-template <class Space>
-std::unique_ptr<Integrator<Space>> make_explicit_integrator(std::unique_ptr<ForwardDynamics<Space>> dynamics,
-                                                            const RunOptions& options, std::string kernel) {
+std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<ForwardDynamics> dynamics, int links, int dof,
+                                                          const RunOptions& options, std::string_view kernel) {
+  using Dopri5 = AdaptiveIntegrator<odeint::runge_kutta_dopri5<Vector>>;
+  using Fehlberg78 = AdaptiveIntegrator<odeint::runge_kutta_fehlberg78<Vector>>;
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
     throw std::invalid_argument("tolerance: expected a positive number, got " + std::to_string(options.tolerance));
   }
   switch (options.method) {
     case Method::rk4:
-      return std::make_unique<FixedStepIntegrator<Space>>(std::move(dynamics), std::move(kernel));
+      return std::make_unique<FixedStepIntegrator>(std::move(dynamics), links, dof, kernel);
     case Method::dopri5:
-      return std::make_unique<AdaptiveIntegrator<Space, odeint::runge_kutta_dopri5<Vector>>>(
-          std::move(dynamics), options.tolerance, std::move(kernel));
+      return std::make_unique<Dopri5>(std::move(dynamics), links, dof, kernel, options.tolerance);
     case Method::fehlberg78:
-      return std::make_unique<AdaptiveIntegrator<Space, odeint::runge_kutta_fehlberg78<Vector>>>(
-          std::move(dynamics), options.tolerance, std::move(kernel));
+      return std::make_unique<Fehlberg78>(std::move(dynamics), links, dof, kernel, options.tolerance);
     case Method::gauss:
       break;
   }
   throw std::invalid_argument("method: expected an explicit one");
 }
-
-template std::unique_ptr<Integrator<Planar>> make_explicit_integrator(std::unique_ptr<ForwardDynamics<Planar>>,
-                                                                      const RunOptions&, std::string);
-template std::unique_ptr<Integrator<Spatial>> make_explicit_integrator(std::unique_ptr<ForwardDynamics<Spatial>>,
-                                                                       const RunOptions&, std::string);
 
 }  // namespace pendula

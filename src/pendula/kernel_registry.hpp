@@ -1,17 +1,27 @@
 #pragma once
 
+#include <array>
 #include <memory>
-#include <pendula/kernel_check.hpp>
 #include <pendula/options.hpp>
-#include <span>
+#include <pendula/plain_chain.hpp>
+#include <pendula/plain_integrator.hpp>
 #include <string_view>
 
 namespace pendula {
 
-template <class Space, int N>
-class Chain;
-template <class Space>
-class Integrator;
+/// What a generated kernel's self-test measured.
+struct KernelCheck {
+  /// One statement about the kernel, the largest relative error found in it, and what that may be.
+  struct Line {
+    std::string_view what;
+    double error = 0;
+    double limit = 0;
+
+    bool ok() const { return error <= limit; }  // false for NaN
+  };
+
+  std::array<Line, 7> lines;
+};
 
 /// A fixed-n kernel of this build.
 struct KernelInfo {
@@ -21,15 +31,10 @@ struct KernelInfo {
 };
 
 /// A fixed-n kernel, and what was compiled from it.
-template <class Space>
 struct KernelEntry {
   KernelInfo info;
-  std::unique_ptr<Integrator<Space>> (*make)(const Chain<Space, -1>&, const RunOptions&);
+  std::unique_ptr<PlainIntegrator> (*make)(const PlainChain&, const RunOptions&);
   KernelCheck (*check)(unsigned seed);
 };
-
-/// The kernels of one space, by number of links; the table is generated with the build.
-template <class Space>
-std::span<const KernelEntry<Space>> kernel_registry();
 
 }  // namespace pendula

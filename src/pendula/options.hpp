@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ostream>
+#include <string_view>
 
 namespace pendula {
 
@@ -50,16 +51,20 @@ inline std::ostream& operator<<(std::ostream& out, Solver solver) {
   return out;
 }
 
-inline std::ostream& operator<<(std::ostream& out, Iteration iteration) {
+inline constexpr std::string_view name_of(Iteration iteration) {
   switch (iteration) {
     case Iteration::automatic:
-      return out << "auto";
+      return "auto";
     case Iteration::newton:
-      return out << "newton";
+      return "newton";
     case Iteration::fixed_point:
-      return out << "fixed-point";
+      return "fixed-point";
   }
-  return out;
+  return "";
+}
+
+inline std::ostream& operator<<(std::ostream& out, Iteration iteration) {
+  return out << name_of(iteration);
 }
 
 /// What a run is asked to do.

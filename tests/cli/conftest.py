@@ -98,9 +98,17 @@ def settings(*overrides: str) -> list[str]:
 def pendula(tmp_path: Path) -> Callable[..., Result]:
     """Calls the program in a folder of its own."""
 
-    def call(*arguments: str | Path) -> Result:
+    def call(*arguments: str | Path, **environment: str) -> Result:
         command: Sequence[str] = [program(), *map(str, arguments)]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(
+            command,
+            cwd=tmp_path,
+            env=os.environ | environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
         return Result(done.returncode, done.stdout, done.stderr)
 
     return call

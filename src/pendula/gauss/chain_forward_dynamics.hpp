@@ -14,12 +14,11 @@ namespace pendula {
 ///   ξ̈_i = b_i − b_{i−1} − δ_{i1} g up,  b_i = (F_i − F_{i+1})/m_i,  F_i = T_i ξ_i + (torque_i × ξ_i − λ_i ξ̇_i)/l_i²,
 /// and T keeps the lengths: ξ_i·ξ̈_i = −|ξ̇_i|².
 template <class Space>
-class ChainForwardDynamics : public ForwardDynamics<Space> {
+class ChainForwardDynamics : public ForwardDynamics {
   using Link = typename Space::Link;
   using Rates = std::array<double, Space::dof>;
   using Cartesian = typename Link::template Cartesian<double>;
   using Trig = typename Link::template Trig<double>;
-  using Vector = Coordinates<Space, Eigen::Dynamic>;
 
  public:
   explicit ChainForwardDynamics(const Chain<Space>& chain)
@@ -27,7 +26,7 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     chain_.torque(0, torque_);
   }
 
-  void acceleration(double time, const Vector& q, const Vector& v, Vector& acceleration) override {
+  void acceleration(double time, const double* q, const double* v, double* acceleration) override {
     if (chain_.driven()) chain_.torque(time, torque_);
     for (int i = 0; i < chain_.links(); ++i) place(i, rates_of(i, q), rates_of(i, v));
     eliminate();
@@ -58,12 +57,13 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
   Motion& motion(int i) { return motions_[static_cast<std::size_t>(i)]; }
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * chain_.links() + i; }
 
-  Rates rates_of(int i, const Vector& values) const {
+  Rates rates_of(int i, const double* values) const {
     Rates rates;
     for (std::size_t a = 0; a < rates.size(); ++a) rates[a] = values[entry(i, a)];
     return rates;
   }
 
+<<<<<<< HEAD
   void place(int i, const Rates& q, const Rates& v) {
     Motion& here = motion(i);
     Link::trig(q, here.trig);
@@ -109,6 +109,12 @@ class ChainForwardDynamics : public ForwardDynamics<Space> {
     Rates a;
     Link::rates(trig, 1 / determinant, difference(direction_acceleration, turning(trig, v)), a);
     for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
+=======
+  Trig trig_of(int i, const double* q) const {
+    Trig trig;
+    Link::trig(rates_of(i, q), trig);
+    return trig;
+>>>>>>> abi
   }
 
   // Σ_ab û_ab v_a v_b, each pair of different coordinates counted twice.

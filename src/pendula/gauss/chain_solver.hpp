@@ -163,12 +163,13 @@ class ChainSolver {
   // Slow contraction costs more than Newton; far from round-off, so that rounding is not taken for it.
   bool diverges(const Correction& correction) const {
     if (!std::isfinite(correction.relative)) return true;
-    const bool far = correction.relative > far_from_roundoff;
+    const bool far = correction.relative > far_from_roundoff();
     return far && ((count_ > 3 && correction.relative > 0.7 * last_.relative) || count_ > 20);
   }
 
-  static inline const double far_from_roundoff =
-      67 * std::sqrt(static_cast<double>(std::numeric_limits<Real>::epsilon()));  // 1e-6 in double
+  static double far_from_roundoff() {  // 1e-6 in double
+    return 67 * std::sqrt(static_cast<double>(std::numeric_limits<Real>::epsilon()));
+  }
 
   ChainStages<Space, S, N, Real, Arch> stages_;
   ChainNewton<Space, S, N, Real, Arch> newton_;

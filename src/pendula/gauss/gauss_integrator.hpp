@@ -1,38 +1,47 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <pendula/gauss/stepper.hpp>
-#include <pendula/integrator.hpp>
-#include <sstream>
-#include <utility>
+#include <pendula/plain_integrator.hpp>
+#include <string_view>
 
 namespace pendula {
 
 /// A Gauss–Legendre stepper behind the run-time interface: one virtual call a step.
 template <class StageSolver>
-class GaussIntegrator : public Integrator<typename StageSolver::Space> {
-  using Space = typename StageSolver::Space;
+class GaussIntegrator : public PlainIntegrator {
+  using Chain = typename StageSolver::Chain;
+  using State = typename StageSolver::State;
 
  public:
-  /// `description` without the iteration, which the solver itself tells.
+  /// `solver` and `kernel` are what describe() says, literals.
   template <class... SolverOptions>
-  GaussIntegrator(const Chain<Space>& chain, int stages, Description description,
+  GaussIntegrator(const Chain& chain, int stages, std::string_view solver, std::string_view kernel,
                   const SolverOptions&... solver_options)
-      : stepper_(chain, stages, {}, solver_options...), description_(std::move(description)) {}
+      : stepper_(chain, stages, {}, solver_options...),
+        coordinates_(StageSolver::Space::dof * chain.links()),
+        solver_(solver),
+        kernel_(kernel) {}
 
-  Outcome start(const State<Space>& state) override { return stepper_.start(state); }
+  Outcome start(double time, const double* q, const double* v) override {
+    using Numbers = Eigen::Map<const Eigen::VectorXd>;
+    return stepper_.start(State{time, Numbers(q, coordinates_), Numbers(v, coordinates_)});
+  }
   Outcome step(double h) override { return stepper_.step(h); }
   double time() const override { return stepper_.time(); }
-  State<Space> state() const override { return stepper_.state(); }
-  const Statistics& statistics() const override { return stepper_.statistics(); }
-  Description describe() const override {
-    std::ostringstream iteration;
-    iteration << stepper_.solver().iteration();
-    return {description_.solver, iteration.str(), description_.kernel};
+  void read_state(double* q, double* v) const override {
+    using Numbers = Eigen::Map<Eigen::VectorXd>;
+    const State state = stepper_.state();
+    Numbers(q, coordinates_) = state.q;
+    Numbers(v, coordinates_) = state.v;
   }
+  const Statistics& statistics() const override { return stepper_.statistics(); }
+  Description describe() const override { return {solver_, name_of(stepper_.solver().iteration()), kernel_}; }
 
  private:
   GaussStepper<StageSolver> stepper_;
-  Description description_;
+  Eigen::Index coordinates_;
+  std::string_view solver_, kernel_;
 };
 
 }  // namespace pendula

@@ -33,7 +33,9 @@ void LinearSystem<Size>::solve() {
   solution = lu_.solve(right);
 }
 
-// Compiled once in the library: it is a good part of the compile time of every kernel otherwise.
+#ifdef PENDULA_LIBRARY
+// Compiled once in a copy of the library: it is a good part of the compile time of every kernel otherwise.
 extern template class LinearSystem<Eigen::Dynamic>;
+#endif
 
 }  // namespace pendula

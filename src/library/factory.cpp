@@ -1,8 +1,13 @@
-#include <pendula/chain_integrator.hpp>
+#include "library/factory.hpp"
+
 #include <pendula/explicit_integrator.hpp>
+#include <pendula/gauss/chain_forward_dynamics.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/integrator.hpp>
+#include <stdexcept>
 #include <string>
+
+#include "library/chain_integrator.hpp"
 
 namespace pendula {
 namespace {
@@ -11,7 +16,7 @@ template <class Space>
 std::string no_kernel_message(int links) {
   const std::string wanted = std::string(Space::name) + ":" + std::to_string(links);
   std::string built;
-  for (const KernelEntry<Space>& entry : kernel_registry<Space>()) {
+  for (const KernelEntry& entry : library_of<Space>().kernels) {
     built += (built.empty() ? "" : ", ") + std::string(entry.info.name);
   }
   return "no kernel for a " + std::string(Space::name) + " chain of " + std::to_string(links) +
@@ -20,23 +25,24 @@ std::string no_kernel_message(int links) {
 }
 
 template <class Space>
-const KernelEntry<Space>* find_kernel(int links) {
-  for (const KernelEntry<Space>& entry : kernel_registry<Space>()) {
+const KernelEntry* find_kernel(int links) {
+  for (const KernelEntry& entry : library_of<Space>().kernels) {
     if (entry.info.links == links) return &entry;
   }
   return nullptr;
 }
 
 template <class Space>
-const KernelEntry<Space>& require_kernel(int links) {
-  if (const KernelEntry<Space>* kernel = find_kernel<Space>(links)) return *kernel;
+const KernelEntry& require_kernel(int links) {
+  if (const KernelEntry* kernel = find_kernel<Space>(links)) return *kernel;
   throw NoKernel(no_kernel_message<Space>(links));
 }
 
 template <class Space>
-std::unique_ptr<Integrator<Space>> make_explicit(const Chain<Space>& chain, const RunOptions& options) {
-  if (const KernelEntry<Space>* kernel = find_kernel<Space>(chain.links())) return kernel->make(chain, options);
-  return make_explicit_integrator<Space>(make_chain_forward_dynamics(chain), options, "");
+std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
+  if (const KernelEntry* kernel = find_kernel<Space>(chain.links)) return kernel->make(chain, options);
+  return make_explicit_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain_of<Space>(chain)), chain.links,
+                                  Space::dof, options, "");
 }
 
 // In momentum form the chain solver is the faster one, on one spatial link with one stage as fast as the dense one,
@@ -55,22 +61,15 @@ void require_newton(Iteration iteration) {
 }  // namespace
 
 template <class Space>
-std::unique_ptr<Integrator<Space>> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
-  if (options.method != Method::gauss) return make_explicit(chain, options);
+std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options) {
+  if (options.method != Method::gauss) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
-  if (solver_for(options) == Solver::chain) return make_chain_integrator(chain, options);
+  if (solver_for(options) == Solver::chain) return make_chain_integrator(chain_of<Space>(chain), options);
   require_newton(options.iteration);
-  return require_kernel<Space>(chain.links()).make(chain, options);
+  return require_kernel<Space>(chain.links).make(chain, options);
 }
 
-template std::unique_ptr<Integrator<Planar>> make_integrator(const Chain<Planar>&, const RunOptions&);
-template std::unique_ptr<Integrator<Spatial>> make_integrator(const Chain<Spatial>&, const RunOptions&);
-
-std::vector<KernelInfo> built_in_kernels() {
-  std::vector<KernelInfo> kernels;
-  for (const auto& entry : kernel_registry<Planar>()) kernels.push_back(entry.info);
-  for (const auto& entry : kernel_registry<Spatial>()) kernels.push_back(entry.info);
-  return kernels;
-}
+template std::unique_ptr<PlainIntegrator> make_plain_integrator<Planar>(const PlainChain&, const RunOptions&);
+template std::unique_ptr<PlainIntegrator> make_plain_integrator<Spatial>(const PlainChain&, const RunOptions&);
 
 }  // namespace pendula

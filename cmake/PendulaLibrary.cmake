@@ -1,0 +1,140 @@
+# The compiled library: all of src/library, once for each instruction set, in one static library; which copy runs is
+# decided when the program does (src/pendula/library.cpp).
+#
+# Code compiled for AVX-512 must not be what a linker takes for some inline function that other code uses, too: a machine
+# without AVX-512 would die there. Nor may a program's copy of such a function, compiled with other flags, be what the
+# library uses: how Eigen allocates depends on them. So each copy is sealed: its objects are linked into one, whose
+# symbols are all made local but `pendula_library_<instruction set>`. What passes through that is in library.hpp.
+include_guard(GLOBAL)
+
+# Stages of the chain integrators, those of one translation unit in one item.
+set(_pendula_chain_stages "1 2 3 4" "5 6" "7 8")
+# What these are compiled with beside the flags of their copy.
+set(_pendula_chain_options "")
+
+# Flags of each copy: no instructions but those that src/pendula/library.cpp asks the processor for, whatever
+# CMAKE_CXX_FLAGS allows. Without SSE3 there is nothing above it.
+set(_pendula_flags_sse2 -march=x86-64 -mno-sse3)
+set(_pendula_flags_avx2 ${_pendula_flags_sse2} -mavx2 -mfma)
+set(_pendula_flags_avx512 ${_pendula_flags_avx2} -mavx512f -mavx512cd -mavx512dq -mavx512bw -mavx512vl)
+set(_pendula_flags_baseline "")
+
+# Instruction sets that this compiler can make code for, from the least to the best.
+function(_pendula_possible_archs out_archs)
+  include(CheckCXXSourceCompiles)
+  check_cxx_source_compiles("#ifndef __x86_64__\n#error\n#endif\nint main() {}" PENDULA_X86_64)
+  check_cxx_source_compiles("#ifndef __ELF__\n#error\n#endif\nint main() {}" PENDULA_ELF)
+  if(PENDULA_X86_64 AND NOT PENDULA_CHECKED)
+    set(${out_archs} sse2 avx2 avx512 PARENT_SCOPE)
+  else()
+    set(${out_archs} baseline PARENT_SCOPE)
+  endif()
+endfunction()
+
+_pendula_possible_archs(_pendula_archs)
+set(PENDULA_ARCHS "${_pendula_archs}" CACHE STRING "Instruction sets to compile the library for, of ${_pendula_archs}")
+foreach(arch IN LISTS PENDULA_ARCHS)
+  if(NOT arch IN_LIST _pendula_archs)
+    message(FATAL_ERROR "PENDULA_ARCHS: expected some of ${_pendula_archs}, got \"${arch}\"")
+  endif()
+endforeach()
+set(_pendula_chosen "")  # each once, from the least to the best
+foreach(arch IN LISTS _pendula_archs)
+  if(arch IN_LIST PENDULA_ARCHS)
+    list(APPEND _pendula_chosen ${arch})
+  endif()
+endforeach()
+if(_pendula_chosen STREQUAL "")
+  message(FATAL_ERROR "PENDULA_ARCHS: expected some of ${_pendula_archs}, got none")
+endif()
+set(PENDULA_ARCHS "${_pendula_chosen}")
+
+# Whether copies can be sealed here: by GNU ld, by way of the compiler, which knows what it has to be told. They have to
+# be where there are several, or how Eigen allocates depends on flags.
+function(_pendula_check_seal)
+  if(NOT PENDULA_ELF AND NOT PENDULA_X86_64)
+    return()
+  endif()
+  execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -fuse-ld=bfd -Wl,--help OUTPUT_VARIABLE help ERROR_VARIABLE error)
+  if(NOT help MATCHES "--force-group-allocation" OR NOT CMAKE_OBJCOPY OR NOT CMAKE_OBJDUMP)
+    message(FATAL_ERROR "pendula: GNU ld (2.29 or later), objcopy and objdump are needed (Debian: binutils); got\n"
+                        "${CMAKE_CXX_COMPILER} -fuse-ld=bfd -Wl,--help: ${error}\n"
+                        "objcopy: ${CMAKE_OBJCOPY}, objdump: ${CMAKE_OBJDUMP}")
+  endif()
+endfunction()
+
+# Translation units of the chain integrators. Sets OUT_SOURCES.
+function(pendula_chain_sources out_sources)
+  set(sources "")
+  foreach(space IN ITEMS Planar Spatial)
+    foreach(stages IN LISTS _pendula_chain_stages)
+      string(TOLOWER "${space}_${stages}" name)
+      string(REPLACE " " "_" name "${name}")
+      set(instances "")
+      separate_arguments(numbers NATIVE_COMMAND "${stages}")
+      foreach(s IN LISTS numbers)
+        string(APPEND instances "template std::unique_ptr<PlainIntegrator> make_chain_stages<${space}, ${s}>("
+                                "const Chain<${space}>&, const RunOptions&);\n")
+      endforeach()
+      set(source "${PROJECT_BINARY_DIR}/kernels/chain_${name}.cpp")
+      configure_file("${PROJECT_SOURCE_DIR}/cmake/chain_stages.cpp.in" "${source}" @ONLY)
+      set_source_files_properties("${source}" PROPERTIES COMPILE_OPTIONS "${_pendula_chain_options}")
+      list(APPEND sources "${source}")
+    endforeach()
+  endforeach()
+  set(${out_sources} "${sources}" PARENT_SCOPE)
+endfunction()
+
+# Compiles SOURCES once for each instruction set and adds the copies to TARGET.
+function(pendula_add_copies target)
+  set(declarations "")
+  set(pointers "")
+  foreach(arch IN LISTS PENDULA_ARCHS)
+    _pendula_compile_copy(pendula_${arch} ${arch} ${ARGN})
+    _pendula_seal(${target} pendula_${arch} pendula_library_${arch})
+    string(APPEND declarations "extern const pendula::Library pendula_library_${arch};\n")
+    list(APPEND pointers "&pendula_library_${arch}")
+  endforeach()
+  list(JOIN pointers ", " pointers)
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/library_copies.hpp.in" "${PROJECT_BINARY_DIR}/kernels/library_copies.hpp"
+                 @ONLY)
+  target_include_directories(${target} PRIVATE "${PROJECT_BINARY_DIR}/kernels")
+endfunction()
+
+function(_pendula_compile_copy copy arch)
+  add_library(${copy} OBJECT ${ARGN})
+  pendula_own_target(${copy})
+  # Sealing needs machine code, and would not make symbols local that a program must have once.
+  target_compile_options(${copy} PRIVATE ${_pendula_flags_${arch}} -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+  target_compile_definitions(${copy} PRIVATE PENDULA_LIBRARY=pendula_library_${arch} PENDULA_INSTRUCTION_SET="${arch}")
+  target_include_directories(${copy} PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
+  target_link_libraries(${copy} PRIVATE pendula_kernels pendula::xsimd)
+  set_target_properties(${copy} PROPERTIES POSITION_INDEPENDENT_CODE ON INTERPROCEDURAL_OPTIMIZATION OFF)
+  list(GET PENDULA_ARCHS 0 first)
+  if(NOT arch STREQUAL first)
+    set_target_properties(${copy} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)  # the sources are in there once
+  endif()
+endfunction()
+
+function(_pendula_seal target copy symbol)
+  if(NOT PENDULA_ELF)
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${copy}>)
+    return()
+  endif()
+  set(sealed "${CMAKE_CURRENT_BINARY_DIR}/$<CONFIG>/${copy}.o")
+  add_custom_command(
+    OUTPUT "${sealed}"
+    COMMAND "${CMAKE_COMMAND}" -E make_directory "${CMAKE_CURRENT_BINARY_DIR}/$<CONFIG>"
+    COMMAND "${CMAKE_CXX_COMPILER}" -r -nostdlib -fuse-ld=bfd -Wl,--force-group-allocation -o "${sealed}.open"
+            $<TARGET_OBJECTS:${copy}>
+    COMMAND "${CMAKE_COMMAND}" -D "OBJECT=${sealed}.open" -D "OBJDUMP=${CMAKE_OBJDUMP}" -D "COPY=${copy}"
+            -P "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
+    COMMAND "${CMAKE_OBJCOPY}" --keep-global-symbol=${symbol} "${sealed}.open" "${sealed}"
+    COMMAND "${CMAKE_COMMAND}" -E rm "${sealed}.open"
+    DEPENDS $<TARGET_OBJECTS:${copy}> "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
+    COMMENT "Sealing ${copy}.o" COMMAND_EXPAND_LISTS VERBATIM)
+  set_source_files_properties("${sealed}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
+  target_sources(${target} PRIVATE "${sealed}")
+endfunction()
+
+_pendula_check_seal()

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/gauss/gauss_integrator.hpp>
+
+#include "library/chain_integrator.hpp"
+
+namespace pendula {
+
+template <class Space, int S>
+std::unique_ptr<PlainIntegrator> make_chain_stages(const Chain<Space>& chain, const RunOptions& options) {
+  return std::make_unique<GaussIntegrator<ChainSolver<Space, S>>>(chain, S, "chain", "", options.iteration);
+}
+
+}  // namespace pendula

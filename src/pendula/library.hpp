@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <pendula/kernel_registry.hpp>
+#include <pendula/options.hpp>
+#include <pendula/plain_chain.hpp>
+#include <pendula/plain_integrator.hpp>
+#include <span>
+#include <string_view>
+
+namespace pendula {
+
+/// What the compiled library offers for chains of one space.
+struct SpaceLibrary {
+  /// As make_integrator, of integrator.hpp.
+  std::unique_ptr<PlainIntegrator> (*make_integrator)(const PlainChain&, const RunOptions&);
+  /// The fixed-n kernels of this build, by number of links.
+  std::span<const KernelEntry> kernels;
+};
+
+/// The compiled library for one instruction set. There are several in one file, each compiled for itself; all that
+/// passes between them and a program is what is in here: numbers, pointers to them, classes of nothing but virtual
+/// functions. So it does not matter how either was compiled. (How Eigen's vectors lie in memory and who may free them
+/// depends on flags such as -mavx.)
+struct Library {
+  std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" where there is one only
+  SpaceLibrary planar, spatial;
+};
+
+/// The library for the best instruction set that this processor has, or for the lesser one that the environment
+/// variable PENDULA_ARCH asks for, which is read once. Throws std::invalid_argument where PENDULA_ARCH names none of
+/// this build, or one that the processor lacks; std::runtime_error where the processor has none of this build.
+const Library& library();
+
+/// Its part for one space.
+template <class Space>
+const SpaceLibrary& library_of() {
+  return Space::dof == 1 ? library().planar : library().spatial;
+}
+
+}  // namespace pendula

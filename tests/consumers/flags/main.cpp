@@ -1,0 +1,118 @@
+// Everything that crosses between a program and the compiled library does so once, in both directions, and comes back
+// right and can be freed.
+#include <iostream>
+#include <memory>
+#include <pendula/explicit_integrator.hpp>
+#include <pendula/kernels/planar_3.hpp>
+#include <pendula/pendula.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+using namespace pendula;
+
+namespace {
+
+constexpr double step = 2e-3, duration = 0.1;
+
+template <class Space>
+Chain<Space> loaded_chain() {
+  ChainParameters<Space> parameters;
+  parameters.masses = Eigen::Vector3d(1.0, 0.5, 2.0);
+  parameters.lengths = Eigen::Vector3d(1.0, 2.0, 0.5);
+  parameters.damping = Eigen::Vector3d(0.1, 0.2, 0.3);
+  parameters.torque = Torque<Space, Eigen::Dynamic>::Constant(Space::torque_components, 3, 0.25);
+  Drive<Space> drive;
+  drive.link = 1;
+  drive.amplitude.setConstant(0.5);
+  drive.frequency = 3;
+  parameters.drives.assign(5, drive);
+  return Chain<Space>(parameters);
+}
+
+template <class Space>
+State<Space> start() {
+  if constexpr (Space::dof == 1) {
+    return State<Space>::from_angles(Eigen::Vector3d(1.0, 0.8, 0.6), Eigen::Vector3d(0.1, 0.2, 0.3));
+  } else {
+    return State<Space>::from_angles(Eigen::Vector3d(1.0, 0.8, 0.6), Eigen::Vector3d(0.1, 0.2, 0.3));
+  }
+}
+
+// States go both ways in every row, and are kept and freed here.
+template <class Space>
+State<Space> end_of_run(Integrator<Space>& integrator) {
+  std::vector<State<Space>> rows;
+  const auto result = simulate(integrator, start<Space>(), {step, duration, 1},
+                               [&](const State<Space>& state) { rows.push_back(state); });
+  if (!result.outcome) throw std::runtime_error(message(result.outcome));
+  return rows.back();
+}
+
+template <class Space>
+State<Space> by_library(const RunOptions& options) {
+  return end_of_run(*make_integrator(loaded_chain<Space>(), options));
+}
+
+// The same compiled here.
+State<Planar> by_stepper(const Chain<Planar>& chain) {
+  GaussStepper<ChainSolver<Planar, 2>> stepper(chain, 2);
+  Outcome outcome = stepper.start(start<Planar>());
+  while (outcome && stepper.time() < duration - step / 2) outcome = stepper.step(step);
+  if (!outcome) throw std::runtime_error(message(outcome));
+  return stepper.state();
+}
+
+template <class Space>
+bool same(const std::string& what, const State<Space>& a, const State<Space>& b) {
+  const double difference = (a.q - b.q).cwiseAbs().maxCoeff() + (a.v - b.v).cwiseAbs().maxCoeff();
+  const bool good = difference < 1e-13;  // measured 2e-15
+  std::cout << what << " differ by " << difference << (good ? "" : ": WRONG") << '\n';
+  return good;
+}
+
+template <class Error, class Action>
+bool throws(const std::string& what, Action action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    const bool good = std::string(error.what()).find(what) != std::string::npos;
+    std::cout << error.what() << (good ? "" : ": WRONG") << '\n';
+    return good;
+  }
+  std::cout << "nothing was thrown: " << what << '\n';
+  return false;
+}
+
+}  // namespace
+
+int main() {
+  std::cout << "library for " << library().instruction_set << ", heap aligned to " << EIGEN_DEFAULT_ALIGN_BYTES << '\n';
+  const RunOptions chain{.solver = Solver::chain}, dense{.solver = Solver::dense}, rk4{.method = Method::rk4};
+  const auto planar = loaded_chain<Planar>();
+
+  bool good = same("here and there", by_library<Planar>(chain), by_stepper(planar));
+  good = same("in the plane", by_library<Planar>(chain), by_library<Planar>(dense)) && good;
+  good = same("in space", by_library<Spatial>(chain), by_library<Spatial>(dense)) && good;
+  // The method from there, the accelerations from here.
+  auto accelerations = std::make_unique<DenseForwardDynamics<kernels::Planar3>>(planar);
+  Integrator<Planar> ours(make_explicit_integrator(std::move(accelerations), 3, 1, rk4, ""), 3);
+  good = same("explicit ones", by_library<Planar>(rk4), end_of_run(ours)) && good;
+
+  for (const KernelInfo& kernel : built_in_kernels()) std::cout << kernel.name << ' ';
+  std::cout << make_integrator(planar, dense)->describe().kernel << '\n';
+  good = throws<NoKernel>("planar_3",
+                          [&] {
+                            const Chain<Planar> long_chain(
+                                {.masses = Eigen::VectorXd::Ones(77), .lengths = Eigen::VectorXd::Ones(77)});
+                            make_integrator(long_chain, dense);
+                          }) &&
+         good;
+  good = throws<std::invalid_argument>("expected 1 to 8", [&] { make_integrator(planar, {.stages = 99}); }) && good;
+  good = throws<std::invalid_argument>(
+             "expected 3 numbers",
+             [&] { make_integrator(planar, chain)->start(State<Planar>::from_angles(Eigen::VectorXd::Ones(4))); }) &&
+         good;
+  return good ? 0 : 1;
+}
