@@ -17,7 +17,7 @@ from pendula_codegen.kernel import DenseKernel
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.models import find_model
-from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, VECTORS, gauss
+from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
 
 PACKAGE = Path(__file__).parent
 WIDTH = 120
@@ -142,7 +142,7 @@ def render_tableaux() -> str:
             None,
             "--output gauss_tableaux.hpp",
         ),
-        tableaux=[gauss(stages) for stages in range(1, MAX_STAGES + 1)],
+        tableaux=[*map(gauss, range(1, MAX_STAGES + 1)), *map(radau, RADAU_STAGES)],
         vectors=VECTORS,
         matrices=MATRICES,
         digits=DIGITS,

@@ -1,4 +1,4 @@
-"""Gauss–Legendre tableaux, s = 1..8, in high precision and rounded once (paper eq. 45–51 for s = 2)."""
+"""Tableaux in high precision and rounded once: Gauss–Legendre, s = 1..8 (paper eq. 45–51 for s = 2); Radau IIA, s = 2, 3."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from mpmath import mp, mpf, polyroots, taylor, workdps
 
 DIGITS = 60
 MAX_STAGES = 8
+RADAU_STAGES = (2, 3)
 VECTORS = ("c", "c_low", "b", "b_low")
 MATRICES = ("a", "a_low", "m", "m_low", "a_squared", "extrapolation")
 
@@ -22,8 +23,9 @@ def _product(values) -> mpf:
 
 @dataclass(frozen=True)
 class Tableau:
-    """Gauss–Legendre collocation with `stages` stages; matrices are lists of rows of mpf."""
+    """Collocation with `stages` stages; matrices are lists of rows of mpf."""
 
+    family: str  # "Gauss" | "Radau"
     stages: int
     c: list[mpf]
     b: list[mpf]
@@ -47,12 +49,14 @@ class Tableau:
 
     @cached_property
     def m(self) -> list[list[float]]:
-        """a_ij / b_j in double precision with m_ii = ½ and m_ij + m_ji = 1 exactly.
+        """a_ij / b_j in double precision; of Gauss methods with m_ii = ½ and m_ij + m_ji = 1 exactly.
 
         The larger of the two is rounded; 1 minus it is then exact (Sterbenz), because it lies in [½, 2].
         This is a_ij b_i + a_ji b_j = b_i b_j, which makes the method symplectic, without any rounding.
         """
         s = range(self.stages)
+        if self.family == "Radau":
+            return [[float(self.a[i][j] / self.b[j]) for j in s] for i in s]
         m = [[0.5] * self.stages for _ in s]
         with workdps(DIGITS):
             for i in s:
@@ -77,8 +81,11 @@ class Tableau:
 
     @cached_property
     def m_low(self) -> list[list[mpf]]:
-        """What m lacks of a_ij / b_j; antisymmetric, as m_ij + m_ji = 1 holds before and after rounding."""
+        """What m lacks of a_ij / b_j; of Gauss methods antisymmetric, as m_ij + m_ji = 1 holds before and after."""
         s = range(self.stages)
+        if self.family == "Radau":
+            with workdps(DIGITS):
+                return [[_lost(self.a[i][j] / self.b[j], self.m[i][j]) for j in s] for i in s]
         low = [[mpf(0)] * self.stages for _ in s]
         with workdps(DIGITS):
             for i in s:
@@ -86,6 +93,10 @@ class Tableau:
                     low[i][j] = _lost(self.a[i][j] / self.b[j], self.m[i][j])
                     low[j][i] = -low[i][j]
         return low
+
+    @property
+    def order(self) -> int:
+        return 2 * self.stages - (self.family == "Radau")
 
     @property
     def text(self) -> dict[str, list]:
@@ -111,15 +122,24 @@ def _literal(x: mpf | float) -> str:
 def gauss(stages: int) -> Tableau:
     """The Gauss–Legendre method with `stages` stages, to DIGITS digits."""
     with workdps(DIGITS):
-        return _gauss(stages)
+        return _collocation("Gauss", stages, lambda x: mp.legendre(stages, 2 * x - 1))
 
 
-def _gauss(stages: int) -> Tableau:
-    coefficients = taylor(lambda x: mp.legendre(stages, 2 * x - 1), 0, stages)[::-1]
+def radau(stages: int) -> Tableau:
+    """The Radau IIA method with `stages` stages, to DIGITS digits: c_s = 1 (Hairer, Wanner, IV.5)."""
+    with workdps(DIGITS):
+        return _collocation(
+            "Radau", stages, lambda x: mp.legendre(stages, 2 * x - 1) - mp.legendre(stages - 1, 2 * x - 1)
+        )
+
+
+def _collocation(family: str, stages: int, polynomial) -> Tableau:
+    """The method whose nodes are the zeros of a polynomial."""
+    coefficients = taylor(polynomial, 0, stages)[::-1]
     c = sorted(mp.re(root) for root in polyroots(coefficients, maxsteps=500, extraprec=4 * DIGITS))
     powers = range(1, stages + 1)
     vandermonde = mp.matrix([[node ** (k - 1) for node in c] for k in powers])
     # Collocation integrates every polynomial of degree < s exactly: Σ_j a_ij c_j^(k−1) = c_i^k / k.
     a = [list(mp.lu_solve(vandermonde, mp.matrix([node**k / k for k in powers]))) for node in c]
     b = list(mp.lu_solve(vandermonde, mp.matrix([mpf(1) / k for k in powers])))
-    return Tableau(stages, c, b, a)
+    return Tableau(family, stages, c, b, a)

@@ -15,6 +15,7 @@
 #include <variant>
 
 #include "cli/commands.hpp"
+#include "cli/doubts.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
 #include "cli/warnings.hpp"
@@ -72,8 +73,10 @@ class Run {
 
   /// Never throws for a run that fails: the summary says so.
   io::Summary run() {
+    warn_of_stiffness(scenario_, warnings_);
     const io::Ending ending = integrate();
     const io::Ending written = close();
+    if (ending.ok()) doubt();
     return summary(ending.ok() ? written : ending);
   }
 
@@ -104,12 +107,23 @@ class Run {
   /// Throws io::Ending rather than take a row that is not finite; the energy is not wherever anything else is not.
   void take(const State<Space>& state) {
     const Points<Space, Eigen::Dynamic> bobs = bob_positions(scenario_.chain, state);
-    const double energy = pendula::energy(scenario_.chain, state);
-    if (!std::isfinite(energy)) {
+    const Energies<double> energies = pendula::energies(scenario_.chain, state);
+    if (!std::isfinite(energies.total())) {
       throw io::Ending{"not_finite", "at t = " + io::shortest(state.time) + ": the energy is not a finite number", {}};
     }
-    record_.add(state, bobs, energy);
-    if (file_) file_->write(state, bobs, energy);
+    record_.add(state, bobs, energies, integrator_->statistics().load_work);
+    if (file_) file_->write(state, bobs, energies.total());
+  }
+
+  // What the run itself gives to doubt, and a second one with coarser steps.
+  void doubt() {
+    const Statistics& statistics = integrator_->statistics();
+    warn_of_energy(scenario_, record_.balance(), warnings_);
+    warn_of_defect(scenario_, statistics.largest_defect, warnings_);
+    if (!is_doubtful(scenario_, statistics)) return;
+    const InterruptGuard guard;
+    warn_of_step(
+        scenario_, record_.last(), [&] { return guard.interrupted(); }, warnings_);
   }
 
   io::Ending close() {

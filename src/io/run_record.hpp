@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <pendula/chain.hpp>
@@ -22,6 +23,25 @@ struct EnergyError {
   }
 };
 
+/// How far the energy is from what the start had and loads brought, over the rows; relative to all that the chain had.
+struct EnergyBalance {
+  double scale = 0;            ///< Σ M_i |g| l_i and the kinetic energy at the start  [J]
+  double most = 0, least = 0;  ///< relative, above and below
+
+  void add(const Energies<double>& energies, double work) {
+    if (rows_++ == 0) initial_ = energies.total() - work;
+    const double whole = scale + std::abs(work);
+    const double off = energies.total() - initial_ - work;
+    if (off == 0 || !(whole > 0)) return;
+    most = std::max(most, off / whole);
+    least = std::min(least, off / whole);
+  }
+
+ private:
+  double initial_ = 0;
+  std::int64_t rows_ = 0;
+};
+
 /// A row of the table that summaries show.
 struct TableRow {
   double time = 0;
@@ -37,9 +57,13 @@ class RunRecord {
   RunRecord(const Chain<Space>& chain, double duration, int table_rows = 11)
       : scale_(energy_scale(chain)), interval_(duration / (table_rows - 1)) {}
 
-  /// bobs  positions, (dimension x n)
-  void add(const State<Space>& state, const Points<Space, Eigen::Dynamic>& bobs, double energy) {
+  /// bobs  positions, (dimension x n); work: what loads have brought since the first row  [J]
+  void add(const State<Space>& state, const Points<Space, Eigen::Dynamic>& bobs, const Energies<double>& energies,
+           double work) {
+    const double energy = energies.total();
+    if (rows_ == 0) balance_.scale = scale_ + energies.kinetic;
     if (rows_++ == 0) error_ = {energy, scale_ > 0 ? scale_ : std::abs(energy), 0};
+    balance_.add(energies, work);
     const double error = error_.of(energy);
     if (!std::isnan(error_.largest) && !(error <= error_.largest)) error_.largest = error;
     energy_ = energy;
@@ -54,7 +78,8 @@ class RunRecord {
 
   std::int64_t rows() const { return rows_; }
   const EnergyError& energy_error() const { return error_; }
-  double energy() const { return energy_; }           ///< of the last row
+  double energy() const { return energy_; }  ///< of the last row
+  const EnergyBalance& balance() const { return balance_; }
   const State<Space>& last() const { return last_; }  ///< state of the last row
 
   /// The thinned table; it ends in the last row.
@@ -70,6 +95,7 @@ class RunRecord {
   double place_ = -1;
   std::int64_t rows_ = 0;
   EnergyError error_;
+  EnergyBalance balance_;
   double energy_ = std::nan("");
   State<Space> last_;
   TableRow last_row_;

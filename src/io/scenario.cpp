@@ -65,7 +65,7 @@ constexpr std::array<std::string_view, 28> all_keys = {"chain.space",
 
 constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
-constexpr std::array<std::string_view, 4> method_names = {"gauss", "rk4", "dopri5", "fehlberg78"};
+constexpr std::array<std::string_view, 5> method_names = {"gauss", "radau", "rk4", "dopri5", "fehlberg78"};
 constexpr std::array<std::string_view, 2> form_names = {"momentum", "velocity"};
 constexpr std::array<std::string_view, 3> solver_names = {"auto", "chain", "dense"};
 constexpr std::array<std::string_view, 3> iteration_names = {"auto", "newton", "fixed-point"};
@@ -299,7 +299,8 @@ void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
 RunOptions read_run(const Section& run) {
   RunOptions options;
   options.method = choice(run, "method", options.method, method_names);
-  if (const auto stages = run.find("stages")) options.stages = static_cast<int>(stages->integer(1, 8));
+  if (const auto stages = run.find("stages"))
+    options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer(1, 8));
   options.form = choice(run, "form", options.form, form_names);
   options.solver = choice(run, "solver", options.solver, solver_names);
   options.iteration = choice(run, "iteration", options.iteration, iteration_names);
@@ -326,7 +327,7 @@ std::vector<std::string> unused_keys(const Section& run, Method method) {
     warnings.push_back(entry->place() + ": has no effect with method " +
                        std::string(method_names[static_cast<std::size_t>(method)]));
   };
-  for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, method == Method::gauss);
+  for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, !is_explicit(method));
   check("step", !is_adaptive(method));
   check("tolerance", is_adaptive(method));
   return warnings;

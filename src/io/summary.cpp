@@ -22,8 +22,8 @@ std::string name_of(Value value) {
   return text.str();
 }
 
-bool is_gauss(const Summary& summary) {
-  return summary.run.method == Method::gauss;
+bool has_stages(const Summary& summary) {
+  return !is_explicit(summary.run.method);
 }
 
 /// null for an empty name.
@@ -123,8 +123,9 @@ std::string settings(const Summary& summary) {
                         std::string(unit.mass) + ", length " + rounded(model.length) + std::string(unit.length) +
                         ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
   std::string method = name_of(summary.run.method);
-  if (is_gauss(summary)) {
-    method += ", " + plural(summary.run.stages, "stage") + " (order " + std::to_string(2 * summary.run.stages) + "), " +
+  if (has_stages(summary)) {
+    method += ", " + plural(summary.run.stages, "stage") + " (order " +
+              std::to_string(2 * summary.run.stages - (summary.run.method == Method::radau ? 1 : 0)) + "), " +
               name_of(summary.run.form) + " form";
   }
   text += line("method", method);
@@ -172,7 +173,7 @@ std::string statistics(const Summary& summary) {
   };
   std::string text = line("steps", std::to_string(counts.steps));
   text += line("rejected steps", std::to_string(counts.rejected_steps));
-  if (is_gauss(summary)) {
+  if (has_stages(summary)) {
     text += line("iterations", std::to_string(counts.newton_iterations),
                  rounded(a_step(static_cast<double>(counts.newton_iterations)), 4) + " a step");
   }
@@ -215,7 +216,7 @@ Ending ending_of(const Outcome& outcome) {
 }
 
 std::string to_json(const Summary& summary) {
-  const bool gauss = is_gauss(summary);
+  const bool staged = has_stages(summary);
   const bool adaptive = is_adaptive(summary.run.method);
   const Json json{{"pendula", version},
                   {"scenario", summary.model.scenario},
@@ -224,8 +225,8 @@ std::string to_json(const Summary& summary) {
                   {"units", summary.model.natural ? "natural" : "SI"},
                   {"natural_units", to_json(summary.model.natural)},
                   {"method", name_of(summary.run.method)},
-                  {"stages", where(gauss, summary.run.stages)},
-                  {"form", where(gauss, name_of(summary.run.form))},
+                  {"stages", where(staged, summary.run.stages)},
+                  {"form", where(staged, name_of(summary.run.form))},
                   {"solver", or_null(summary.description.solver)},
                   {"iteration", or_null(summary.description.iteration)},
                   {"kernel", or_null(summary.description.kernel)},

@@ -62,7 +62,7 @@ void require_newton(Iteration iteration) {
 
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options) {
-  if (options.method != Method::gauss) return make_explicit<Space>(chain, options);
+  if (is_explicit(options.method)) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
   if (solver_for(options) == Solver::chain) return make_chain_integrator(chain_of<Space>(chain), options);
   require_newton(options.iteration);

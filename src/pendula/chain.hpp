@@ -63,6 +63,9 @@ class Chain {
   /// Whether anything but gravity acts: damping, torque or a drive.
   bool loaded() const { return loaded_; }
 
+  /// Whether damping acts.
+  bool damped() const { return (damping().array() != 0).any(); }
+
   /// Constant torque without the drives, (torque_components x n)  [N m].
   const Torque<Space, N>& constant_torque() const { return parameters_.torque; }
 

@@ -14,14 +14,17 @@ namespace pendula {
 /// stages × forms × kernels specialisations. Throws std::invalid_argument for stages without a tableau.
 template <class Kernel>
 std::unique_ptr<PlainIntegrator> make_dense_integrator(const Chain<SpaceOf<Kernel>>& chain, const RunOptions& options) {
-  if (options.method != Method::gauss) {
+  if (is_explicit(options.method)) {
     return make_explicit_integrator(std::make_unique<DenseForwardDynamics<Kernel>>(chain), chain.links(),
                                     SpaceOf<Kernel>::dof, options, Kernel::name);
   }
+  const Family family = family_of(options.method);
   if (options.form == Form::velocity) {
-    return std::make_unique<GaussIntegrator<DenseVelocityNewton<Kernel>>>(chain, options.stages, "dense", Kernel::name);
+    return std::make_unique<GaussIntegrator<DenseVelocityNewton<Kernel>>>(chain, options.stages, "dense", Kernel::name,
+                                                                          family);
   }
-  return std::make_unique<GaussIntegrator<DenseMomentumNewton<Kernel>>>(chain, options.stages, "dense", Kernel::name);
+  return std::make_unique<GaussIntegrator<DenseMomentumNewton<Kernel>>>(chain, options.stages, "dense", Kernel::name,
+                                                                        family);
 }
 
 }  // namespace pendula

@@ -106,15 +106,30 @@ class FixedStepIntegrator : public ExplicitIntegrator {
  public:
   using ExplicitIntegrator::ExplicitIntegrator;
 
+  // A step that ends nowhere is taken in ever smaller parts.
   Outcome step(double h) override {
-    next_.resize(x_.size());
-    stepper_.do_step(std::ref(right_hand_side()), x_, time(), next_, h);
-    if (!is_finite(next_)) return failure(Status::not_finite, h, next_);
-    x_.swap(next_);
-    return accept(h);
+    for (int parts = 1; parts <= most_parts; parts *= 2) {
+      if (try_in(parts, h)) {
+        x_.swap(next_);
+        return accept(h);
+      }
+      ++statistics_.rejected_steps;
+    }
+    --statistics_.rejected_steps;
+    return failure(Status::not_finite, h / most_parts, next_);
   }
 
  private:
+  static constexpr int most_parts = 1024;
+
+  bool try_in(int parts, double h) {
+    next_ = x_;
+    for (int part = 0; part < parts && is_finite(next_); ++part) {
+      stepper_.do_step(std::ref(right_hand_side()), next_, time() + part * (h / parts), h / parts);
+    }
+    return is_finite(next_);
+  }
+
   odeint::runge_kutta4<Vector> stepper_;
   Vector next_;
 };
@@ -143,15 +158,17 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
       double at = time();
       next_ = x_;
       const bool accepted = stepper_.try_step(std::ref(right_hand_side()), next_, at, tried) == odeint::success;
-      if (!is_finite(next_) || !std::isfinite(tried)) return failure(Status::not_finite, size, next_);
-      if (accepted) {
+      if (!is_finite(next_) || !std::isfinite(tried)) {
+        stepper_ = odeint::make_controlled<Stepper>(tolerance_, tolerance_);  // it may keep a rate that is not finite
+        tried = size / 8;
+      } else if (accepted) {
         x_.swap(next_);
         if (!cut || tried < size) proposed_ = tried;
         return accept(size);
       }
       ++statistics_.rejected_steps;
     }
-    return failure(Status::not_converged, tried, x_);
+    return failure(Status::tolerance_not_met, tried, next_);
   }
 
  private:
@@ -183,6 +200,7 @@ std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<Forwar
     case Method::fehlberg78:
       return std::make_unique<Fehlberg78>(std::move(dynamics), links, dof, kernel, options.tolerance);
     case Method::gauss:
+    case Method::radau:
       break;
   }
   throw std::invalid_argument("method: expected an explicit one");

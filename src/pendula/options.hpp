@@ -5,8 +5,9 @@
 
 namespace pendula {
 
-/// How time is advanced: implicit Gauss–Legendre, or an explicit method for comparison (paper §3.2).
-enum class Method { gauss, rk4, dopri5, fehlberg78 };
+/// How time is advanced: implicit Gauss–Legendre, Radau IIA where damping is stiff, or an explicit method for
+/// comparison (paper §3.2).
+enum class Method { gauss, radau, rk4, dopri5, fehlberg78 };
 
 /// Which form of the equations Gauss–Legendre solves: (q, p) is symplectic, (q, q̇) is the paper's.
 enum class Form { momentum, velocity };
@@ -17,6 +18,10 @@ enum class Solver { automatic, chain, dense };
 /// How the stage equations are iterated.
 enum class Iteration { automatic, newton, fixed_point };
 
+constexpr bool is_explicit(Method method) {
+  return method != Method::gauss && method != Method::radau;
+}
+
 constexpr bool is_adaptive(Method method) {
   return method == Method::dopri5 || method == Method::fehlberg78;
 }
@@ -25,6 +30,8 @@ inline std::ostream& operator<<(std::ostream& out, Method method) {
   switch (method) {
     case Method::gauss:
       return out << "gauss";
+    case Method::radau:
+      return out << "radau";
     case Method::rk4:
       return out << "rk4";
     case Method::dopri5:
@@ -70,7 +77,7 @@ inline std::ostream& operator<<(std::ostream& out, Iteration iteration) {
 /// What a run is asked to do.
 struct RunOptions {
   Method method = Method::gauss;
-  int stages = 2;                              ///< gauss: 1..8, order 2·stages
+  int stages = 2;                              ///< gauss: 1..8, order 2·stages; radau: 2, 3, order 2·stages − 1
   Form form = Form::momentum;                  ///< gauss
   Solver solver = Solver::automatic;           ///< gauss
   Iteration iteration = Iteration::automatic;  ///< gauss

@@ -11,7 +11,9 @@ namespace pendula {
 enum class Status {
   ok,
   not_converged,         ///< the stage equations were not solved to round-off
-  wrong_root,            ///< they were, but not by the motion: energy came from nowhere
+  wrong_root,            ///< they were, but not by the motion: energy came from nowhere, or went there
+  unresolved,            ///< they were, but by steps too coarse for the motion
+  tolerance_not_met,     ///< an explicit method shrank its step to nothing
   not_finite,            ///< a value became infinite or NaN
   singular_mass_matrix,  ///< the coordinates of a link fail: in (θ, φ), sin θ = 0
 };
@@ -24,6 +26,10 @@ inline std::ostream& operator<<(std::ostream& out, Status status) {
       return out << "not converged";
     case Status::wrong_root:
       return out << "wrong root";
+    case Status::unresolved:
+      return out << "unresolved";
+    case Status::tolerance_not_met:
+      return out << "tolerance not met";
     case Status::not_finite:
       return out << "not finite";
     case Status::singular_mass_matrix:
@@ -58,8 +64,15 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
           << "); a smaller step may help";
       break;
     case Status::wrong_root:
-      out << "the stage equations have a solution that is not the motion, with energy from nowhere (step "
+      out << "the stage equations have a solution that is not the motion, its energy does not balance (step "
           << outcome.step << " s, " << outcome.iterations << " iterations); a smaller step may help";
+      break;
+    case Status::unresolved:
+      out << "the motion changes faster than the step follows (step " << outcome.step << " s); a smaller step may help";
+      break;
+    case Status::tolerance_not_met:
+      out << "the error of a step stays above the tolerance, or a value infinite" << where(" at link ")
+          << ", down to steps of " << outcome.step << " s";
       break;
     case Status::not_finite:
       out << "a value became infinite or NaN" << where(" at link ") << " (step " << outcome.step << " s, iteration "
@@ -86,6 +99,8 @@ struct Statistics {
   std::int64_t steps = 0;              ///< accepted steps
   std::int64_t rejected_steps = 0;     ///< attempts that were not accepted
   std::int64_t newton_iterations = 0;  ///< Newton or fixed-point iterations, all attempts
+  double load_work = 0;                ///< energy that torque and damping brought  [J]; NaN where nobody counts
+  double largest_defect = 0;           ///< of a step that was accepted: GaussStepper::step
 };
 
 }  // namespace pendula

@@ -63,7 +63,6 @@ class ChainForwardDynamics : public ForwardDynamics {
     return rates;
   }
 
-<<<<<<< HEAD
   void place(int i, const Rates& q, const Rates& v) {
     Motion& here = motion(i);
     Link::trig(q, here.trig);
@@ -102,19 +101,13 @@ class ChainForwardDynamics : public ForwardDynamics {
   }
 
   // û̈ = Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b.
-  void set_coordinates(int i, const Rates& v, const Cartesian& direction_acceleration, Vector& acceleration) {
+  void set_coordinates(int i, const Rates& v, const Cartesian& direction_acceleration, double* acceleration) {
     const Trig& trig = motion(i).trig;
     double determinant;
     Link::metric_determinant(trig, determinant);
     Rates a;
     Link::rates(trig, 1 / determinant, difference(direction_acceleration, turning(trig, v)), a);
     for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
-=======
-  Trig trig_of(int i, const double* q) const {
-    Trig trig;
-    Link::trig(rates_of(i, q), trig);
-    return trig;
->>>>>>> abi
   }
 
   // Σ_ab û_ab v_a v_b, each pair of different coordinates counted twice.

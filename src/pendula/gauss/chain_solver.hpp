@@ -98,12 +98,13 @@ class ChainSolver {
   using Chain = pendula::Chain<Space, N>;
   using State = pendula::State<Space, N, Real>;
 
-  /// Throws std::invalid_argument unless `stages` is S.
-  ChainSolver(const Chain& chain, int stages, Iteration iteration = Iteration::automatic)
-      : stages_(chain),
+  /// Throws std::invalid_argument unless `stages` is S, and the method has so many.
+  ChainSolver(const Chain& chain, int stages, Iteration iteration = Iteration::automatic, Family family = Family::gauss)
+      : family_(family),
+        stages_(chain, family),
         newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
         choice_(iteration, newton_cost<Space>(S, chain.links()), S) {
-    gauss_tableau<S>(stages);
+    tableau_of<S>(family, stages);
   }
 
   Status start(const State& state) {
@@ -140,6 +141,12 @@ class ChainSolver {
   int singular_link() const { return -1; }
   static constexpr double largest_turn = 3;
   double turn() const { return stages_.turn(); }
+  double defect() { return stages_.defect(); }
+  double predictor_gain() const { return stages_.predictor_gain(); }
+  bool loaded() const { return stages_.loaded(); }
+  bool damped() const { return stages_.chain().damped(); }
+  bool dissipates() const { return family_ == Family::radau; }
+  static constexpr int stages() { return S; }
   double work() const { return static_cast<double>(stages_.work()); }
   bool continues() const { return choice_.active() == Iteration::fixed_point || newton_.positive(); }
   double energy_defect() {
@@ -171,6 +178,7 @@ class ChainSolver {
     return 67 * std::sqrt(static_cast<double>(std::numeric_limits<Real>::epsilon()));
   }
 
+  Family family_;
   ChainStages<Space, S, N, Real, Arch> stages_;
   ChainNewton<Space, S, N, Real, Arch> newton_;
   ChainFixedPoint<Space, S, N, Real, Arch> fixed_point_;

@@ -35,9 +35,11 @@ class ChainStages {
   using Vector = std::array<L, D>;  ///< one vector at all stages
   using Numbers = std::array<Real, D>;
 
-  explicit ChainStages(const Chain<Space, N>& chain)
+  explicit ChainStages(const Chain<Space, N>& chain, Family family = Family::gauss)
       : chain_(chain),
         constants_(chain),
+        columns_(family),
+        restoring_interval_(family == Family::gauss ? 16 : 1),
         state_(constants_),
         anchors_(chain.links()),
         stages_(chain.links()),
@@ -132,6 +134,7 @@ class ChainStages {
   void start(const State<Space, N, Real>& state) {
     forget();
     steps_ = 0;
+    fastest_ = 0;
     for (int i = 0; i < links(); ++i) {
       std::array<Real, Space::dof> q, v;
       for (std::size_t a = 0; a < q.size(); ++a) {
@@ -149,6 +152,7 @@ class ChainStages {
     const bool other = Real(h) != columns_.h();
     columns_.prepare(Real(h), Real(alike ? last_h_ : 0));
     if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
+    is_predicted_ = alike;
     if (alike) {
       predict();
     } else {
@@ -189,6 +193,27 @@ class ChainStages {
     return static_cast<double>(end.total() - start.total() - brought) / scale_of(start, brought);
   }
 
+  /// How far, at the start of the step, the polynomial through the stages' rates is off, of bobs, relative to the
+  /// fastest that there was.
+  double defect() {
+    using std::sqrt;
+    Numbers bob{}, missed{}, last{};
+    Real furthest(0);
+    state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+      for (std::size_t k = 0; k < D; ++k) {
+        const Real* U = stages_[i] + k * Z;
+        const Real& z = state_.free(i)[k];
+        bob[k] += rate[k];
+        missed[k] += z + columns_.at_start(U) - rate[k];
+        last[k] += z + (columns_.h() == 0 ? Real(0) : Real(U[S - 1] / columns_.hb(S - 1)));
+      }
+      furthest = std::max(furthest, dot(missed, missed));
+      fastest_ = std::max({fastest_, static_cast<double>(dot(bob, bob)), static_cast<double>(dot(last, last))});
+    });
+    return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / fastest_) : 0;
+  }
+  double predictor_gain() const { return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1; }
+
   /// Energy that torque and damping bring in the step  [J].
   Real work() const {
     Real work(0);
@@ -208,7 +233,7 @@ class ChainStages {
     if (turn_ > far_turn) follow_stages();
     move();
     ++steps_;
-    if (steps_ % restoring_interval == 0) {
+    if (steps_ % restoring_interval_ == 0) {
       for (int i = 0; i < links(); ++i) state_.restore_length(i, constants_[i].length);
     }
     for (int i = 0; i < links(); ++i) anchors_[i].follow(state_.direction(i, constants_[i].inverse_length));
@@ -251,7 +276,6 @@ class ChainStages {
  private:
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
-  static constexpr std::int64_t restoring_interval = 16;  // steps
   // Radians in a step, from which on angles are followed from stage to stage.
   static constexpr double far_turn = 0.5;
 
@@ -403,12 +427,14 @@ class ChainStages {
   Chain<Space, N> chain_;
   ChainLinks<Space, N, Real> constants_;
   detail::StageColumns<S, Real> columns_;
+  std::int64_t restoring_interval_;  // steps: Gauss methods keep lengths but for rounding
   RodState<Space, N, Real> state_;
   detail::PerLink<AngleAnchor<Space, Real>, N> anchors_, saved_anchors_{anchors_};
   detail::LinkArray<per_link, N, Real> stages_;
   detail::LinkArray<Space::torque_components * Z, N, Real> torque_;
-  Real fastest_fall_;  // g/l of the shortest link
-  bool torque_is_set_ = false;
+  Real fastest_fall_;   // g/l of the shortest link
+  double fastest_ = 0;  // bob, squared  [m²/s²]
+  bool torque_is_set_ = false, is_predicted_ = false;
   double step_ = 0;  // of the stages
   double turn_ = 0;
   double last_h_ = 0;  // of the step that the stages belong to; 0: they belong to none

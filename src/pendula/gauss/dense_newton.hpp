@@ -66,6 +66,11 @@ class DenseStages {
   static constexpr Iteration iteration() { return Iteration::newton; }
   static constexpr int worst_link() { return -1; }
   static constexpr bool continues() { return true; }
+  bool loaded() const { return chain_.loaded(); }
+  bool damped() const { return chain_.damped(); }
+  bool dissipates() const { return family_ == Family::radau; }
+  int stages() const { return coefficients_.stages(); }
+  double predictor_gain() const { return last_h_ == 0 ? 1 : coefficients_.predictor_gain(); }
   static constexpr double largest_turn = 1;  // near a pole φ moves faster than anything is resolved
 
   /// Link whose coordinates fail at the last evaluated stages, −1 where none does.
@@ -75,18 +80,17 @@ class DenseStages {
   const Vector& stage(int i) const { return unknown_[i]; }
 
  protected:
-  DenseStages(const Chain& chain, int s)
-      : chain_(chain),
+  DenseStages(const Chain& chain, int s, Family family)
+      : family_(family),
+        chain_(chain),
         parameters_(kernel_parameters<Kernel>(chain)),
-        coefficients_(gauss_tableau<S>(s)),
+        coefficients_(tableau_of<S>(family, s)),
         system_(s),
         torque_(s),
         unknown_(s),
         last_unknown_(s) {
     for (int i = 0; i < s; ++i) chain_.torque(0, torque_[i]);
   }
-
-  int stages() const { return coefficients_.stages(); }
 
   void prepare_step(double time, double h) {
     coefficients_.prepare(h, last_h_);
@@ -138,6 +142,22 @@ class DenseStages {
     return (end.total() - start.total() - brought) / (scale > 0 ? scale : 1);
   }
 
+  /// How far the polynomial through the stages' velocities is off at the start of the step, where it is v: of bobs,
+  /// relative to the fastest so far.
+  double defect_at(const Vector& q, const Vector& v, const PerStage<Vector, S>& velocities) {
+    Vector missed = -v;
+    for (int i = 0; i < stages(); ++i) missed += coefficients_.lagrange(i, 0) * velocities[i];
+    double furthest = 0;
+    const auto squared_speed = [&](const Vector& rates, double& largest) {
+      for_each_bob(chain_, at(q, rates),
+                   [&](int, const auto&, const auto& w) { largest = std::max(largest, w.squaredNorm()); });
+    };
+    squared_speed(missed, furthest);
+    squared_speed(v, fastest_);
+    squared_speed(velocities[stages() - 1], fastest_);
+    return furthest > 0 ? std::sqrt(furthest / fastest_) : 0;
+  }
+
   /// Energy that torque and damping bring in the step  [J].
   double work_at(const PerStage<Vector, S>& positions, const PerStage<Vector, S>& velocities) const {
     double work = 0;
@@ -178,6 +198,7 @@ class DenseStages {
     return i % Kernel::links;
   }
 
+  Family family_;
   Chain chain_;
   Parameters parameters_;
   StepCoefficients<S> coefficients_;
@@ -185,6 +206,7 @@ class DenseStages {
   PerStage<KernelTorque, S> torque_;
   PerStage<Vector, S> unknown_, last_unknown_;
   double last_h_ = 0;
+  double fastest_ = 0;  // bob since the start of the run, squared  [m²/s²]
   int singular_link_ = -1;
 };
 
@@ -199,17 +221,19 @@ template <class Kernel, int S = Eigen::Dynamic>
 class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
   using Base = detail::DenseStages<Kernel, S>;
   using Base::chain_, Base::parameters_, Base::coefficients_, Base::system_, Base::torque_, Base::unknown_;
-  using Base::stages, Base::singular_link_;
+  using Base::singular_link_;
 
  public:
+  using Base::stages;
   using typename Base::Chain, typename Base::Matrix, typename Base::Space, typename Base::State, typename Base::Vector;
 
   /// Throws std::invalid_argument if the chain has another number of links, or there is no tableau with `s` stages.
-  DenseMomentumNewton(const Chain& chain, int s)
-      : Base(chain, s), position_(s), momentum_(s), force_(s), p_D_q_(s), p_D_v_(s), f_D_q_(s), f_D_v_(s) {}
+  DenseMomentumNewton(const Chain& chain, int s, Family family = Family::gauss)
+      : Base(chain, s, family), position_(s), momentum_(s), force_(s), p_D_q_(s), p_D_v_(s), f_D_q_(s), f_D_v_(s) {}
 
   Status start(const State& state) {
     this->forget();
+    this->fastest_ = 0;
     singular_link_ = -1;
     const Vector q = state.q;
     velocity_ = state.v;
@@ -245,6 +269,12 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
     Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v_start);
     Kernel::velocity_from_momentum(parameters_, q, p, v);
     return Base::energy_defect(q_.value, v_start, q, v, work());
+  }
+
+  double defect() {
+    Vector v;
+    Kernel::velocity_from_momentum(parameters_, q_.value, p_.value, v);
+    return this->defect_at(q_.value, v, unknown_);
   }
 
   double work() const { return this->work_at(position_, unknown_); }
@@ -339,17 +369,19 @@ template <class Kernel, int S = Eigen::Dynamic>
 class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
   using Base = detail::DenseStages<Kernel, S>;
   using Base::chain_, Base::parameters_, Base::coefficients_, Base::system_, Base::torque_, Base::unknown_;
-  using Base::stages, Base::singular_link_;
+  using Base::singular_link_;
 
  public:
+  using Base::stages;
   using typename Base::Chain, typename Base::Matrix, typename Base::Space, typename Base::State, typename Base::Vector;
 
   /// Throws std::invalid_argument if the chain has another number of links, or there is no tableau with `s` stages.
-  DenseVelocityNewton(const Chain& chain, int s)
-      : Base(chain, s), position_(s), velocity_(s), residual_(s), E_D_q_(s), E_D_v_(s), E_D_a_(s) {}
+  DenseVelocityNewton(const Chain& chain, int s, Family family = Family::gauss)
+      : Base(chain, s, family), position_(s), velocity_(s), residual_(s), E_D_q_(s), E_D_v_(s), E_D_a_(s) {}
 
   Status start(const State& state) {
     this->forget();
+    this->fastest_ = 0;
     singular_link_ = -1;
     q_.assign(Vector(state.q));
     v_.assign(Vector(state.v));
@@ -381,6 +413,8 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
     const auto [moved, pushed] = increments();
     return Base::energy_defect(q_.value, v_.value, q_.value + moved, v_.value + pushed, work());
   }
+
+  double defect() { return this->defect_at(q_.value, v_.value, velocity_); }
 
   double work() const { return this->work_at(position_, velocity_); }
   double turn() const { return this->turn_of(velocity_); }

@@ -2,10 +2,17 @@
 
 #include <Eigen/Core>
 #include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/tableau.hpp>
+#include <pendula/options.hpp>
 #include <pendula/plain_integrator.hpp>
 #include <string_view>
 
 namespace pendula {
+
+/// The tableau family of an implicit method.
+constexpr Family family_of(Method method) {
+  return method == Method::radau ? Family::radau : Family::gauss;
+}
 
 /// A Gauss–Legendre stepper behind the run-time interface: one virtual call a step.
 template <class StageSolver>

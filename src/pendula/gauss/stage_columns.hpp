@@ -14,7 +14,7 @@ class StageColumns {
   static constexpr std::size_t stages = S, Z = L::size;
 
  public:
-  StageColumns() : coefficients_(gauss_tableau<S, Real>(S)) {
+  explicit StageColumns(Family family = Family::gauss) : coefficients_(tableau_of<S, Real>(family, S)) {
     for (int i = 0; i < S; ++i) {
       for (int j = 0; j < S; ++j) m_[j][i] = coefficients_.m(i, j);
     }
@@ -53,6 +53,14 @@ class StageColumns {
     return product(m_, stored);
   }
 
+  /// The polynomial through stage values that hold the factor h b, at the start of their step.
+  Real at_start(const Real* x) const {
+    Real sum = start_[0] * x[0];
+    for (std::size_t j = 1; j < stages; ++j) sum += start_[j] * x[j];
+    return sum;
+  }
+  Real predictor_gain() const { return coefficients_.predictor_gain(); }
+
   /// The polynomial through the last step's stage values, at this step's stages.
   L extrapolated(const Real* last) const { return product(extrapolation_, last); }
 
@@ -84,6 +92,7 @@ class StageColumns {
       hc_[i] = exact.value;
       hc_low_[i] = exact.low + h_ * coefficients_.c_low(i);
       hb_[i] = coefficients_.hb(i);
+      start_[i] = h_ == 0 ? Real(0) : Real(coefficients_.lagrange(i, Real(0)) / hb_[i]);
     }
   }
 
@@ -106,7 +115,7 @@ class StageColumns {
   alignas(pack_alignment) Real hb_[Z] = {};
   alignas(pack_alignment) Real hc_[Z] = {};
   alignas(pack_alignment) Real hc_low_[Z] = {};
-  Real half_[stages] = {};
+  Real half_[stages] = {}, start_[stages] = {};
 };
 
 }  // namespace pendula::detail

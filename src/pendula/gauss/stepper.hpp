@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <pendula/gauss/compensated.hpp>
@@ -36,6 +37,10 @@ struct StepperOptions {
 ///   double energy_defect();                of the end of the step against its start and the work of loads, relative to
 ///                                          all energy that the chain has
 ///   double work() const;                   what torque and damping bring in the step  [J]
+///   double defect();                       how far, at the start of the step, the polynomial through its stage
+///                                          velocities is off: of the bobs, relative to the fastest so far
+///   double predictor_gain() const;         how much larger the error of a prediction is than such a defect
+///   bool loaded(), damped(), dissipates(), int stages() const;
 ///   void accept();                         moves the state to the end of the step
 ///   void save(); void restore();           keep a state and go back to it; neither allocates
 ///   State state(double time) const;        the state as users read it
@@ -80,43 +85,59 @@ class GaussStepper {
  private:
   static double epsilon() { return static_cast<double>(std::numeric_limits<typename StageSolver::Real>::epsilon()); }
 
+  // The defect of a step: from where on it is looked for, and where the step is not accepted. One stage says of the
+  // velocity no more than its mean.
+  static constexpr double noticed_defect = 1e-4;
+  double accepted_defect() const { return solver_.stages() == 1 ? 0.3 : 0.1; }
+
   // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
   // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
-  static constexpr double largest_defect = 0.02;
+  static constexpr double largest_energy_defect = 0.02;
 
   /// One step of exactly h; on failure the state is what it was.
-  Outcome attempt(double h) {
+  Outcome attempt(double h, bool is_last_resort = false) {
     solver_.prepare(time(), h);
     at_roundoff_.restart();
     Correction correction;
-    bool far = false;
+    double first = 0;
     for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
       correction = solver_.correct();
       ++statistics_.newton_iterations;
       if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
-      if (iteration == 1) far = correction.relative > trusted_prediction;
+      if (iteration == 1) first = correction.relative;
       if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
-      if (!is_motion(far)) return failure(Status::wrong_root, h, iteration, correction);
+      const Status status = status_of_solution(first, is_last_resort);
+      if (status != Status::ok) return failure(status, h, iteration, correction);
       return accept(h, iteration, correction);
     }
     return failure(Status::not_converged, h, options_.max_iterations, correction);
   }
 
-  // Whether the stages are the solution that continues from a step of no length.
-  bool is_motion(bool far) {
+  // Whether the stages are the solution that continues from a step of no length, and follow the motion. Methods that
+  // damp what they do not resolve are asked for no more than that energy does not grow.
+  Status status_of_solution(double first, bool is_last_resort) {
     const double turn = solver_.turn();
-    if (!solver_.continues() || !(turn < StageSolver::largest_turn)) return false;
-    return (!far && turn < trusted_turn) || std::abs(solver_.energy_defect()) < largest_defect;
+    if (!solver_.continues() || !(turn < StageSolver::largest_turn)) return Status::wrong_root;
+    if (first > trusted_prediction || turn > trusted_turn) {
+      const double energy = solver_.energy_defect();
+      if (!(energy < largest_energy_defect)) return Status::wrong_root;
+      if (!(energy > -largest_energy_defect) && !solver_.damped()) return Status::wrong_root;
+    }
+    defect_ = 0;
+    if (solver_.dissipates() || first < noticed_defect * solver_.predictor_gain()) return Status::ok;
+    defect_ = solver_.defect();
+    return defect_ < accepted_defect() || is_last_resort ? Status::ok : Status::unresolved;
   }
 
   // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
   Outcome step_in_parts(double h) {
     const Compensated<double> start = time_;
+    const double work = statistics_.load_work;
     solver_.save();
     double done = 0, part = 0.5;
     while (done < 1) {
-      const Outcome outcome = attempt(h * part);
+      const Outcome outcome = attempt(h * part, part <= smallest_part);
       if (outcome) {
         done += part;
         const bool fits = std::fmod(done, 2 * part) == 0 && part < 0.5;
@@ -126,6 +147,7 @@ class GaussStepper {
       } else {
         solver_.restore();
         time_ = start;
+        statistics_.load_work = work;
         return outcome;
       }
     }
@@ -136,6 +158,8 @@ class GaussStepper {
 
   Outcome accept(double h, int iterations, const Correction& correction) {
     if (solver_.singular_link() >= 0) return failure(Status::singular_mass_matrix, h, iterations, correction);
+    if (solver_.loaded()) statistics_.load_work += solver_.work();
+    statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
     solver_.accept();
     time_.add(h);
     return {Status::ok, time(), h, iterations, correction.relative, -1};
@@ -146,7 +170,9 @@ class GaussStepper {
     ++statistics_.rejected_steps;
     const int singular = solver_.singular_link();
     if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
-    const int link = correction.link >= 0 || status == Status::wrong_root ? correction.link : solver_.worst_link();
+    const int link = correction.link >= 0 || status == Status::wrong_root || status == Status::unresolved
+                         ? correction.link
+                         : solver_.worst_link();
     return {status, time(), h, iterations, correction.relative, link};
   }
 
@@ -154,6 +180,7 @@ class GaussStepper {
   StepperOptions options_;
   RoundoffStop at_roundoff_;
   Compensated<double> time_{};
+  double defect_ = 0;  // of the last solution
   Statistics statistics_;
 };
 

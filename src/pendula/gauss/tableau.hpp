@@ -6,6 +6,7 @@
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace pendula {
 
@@ -21,7 +22,13 @@ template <int S, class Real = double>
 using StageMatrix = Eigen::Matrix<Real, S, S, Eigen::ColMajor, S == Eigen::Dynamic ? max_stages : S,
                                   S == Eigen::Dynamic ? max_stages : S>;
 
-/// The Gauss–Legendre method of s stages and order 2s; s = 2 is paper eq. (48)–(51). To the last bit of a Real of up to
+/// The methods that the stepper knows.
+enum class Family {
+  gauss,  ///< Gauss–Legendre, order 2s: symplectic and symmetric; s = 2 is paper eq. (48)–(51)
+  radau,  ///< Radau IIA, order 2s − 1: damps at once what it does not resolve; 2 or 3 stages
+};
+
+/// The coefficients of a method. To the last bit of a Real of up to
 /// 106 bits, but for a_squared and extrapolation, where the bits of double are enough.
 template <int S = Eigen::Dynamic, class Real = double>
 struct Tableau {
@@ -31,6 +38,8 @@ struct Tableau {
   StageMatrix<S, Real> m;              ///< a_ij / b_j, m_ii = ½ and m_ij + m_ji = 1 exactly: what makes it symplectic
   StageMatrix<S, Real> a_squared;      ///< A², for the velocity form
   StageMatrix<S, Real> extrapolation;  ///< ℓ_j(1 + c_i): the last step's stage polynomial at this step's stages
+
+  Family family = Family::gauss;
 
   int stages() const { return static_cast<int>(c.size()); }
 };
@@ -62,11 +71,11 @@ void round_symplectic(const StageMatrix<S, Real>& low, StageMatrix<S, Real>& m) 
   }
 }
 
-template <int From, int S, class Real>
-Tableau<S, Real> make_tableau() {
-  using Generated = kernels::GaussTableau<From>;
-  constexpr auto size = static_cast<std::size_t>(From);
+template <class Generated, int S, class Real>
+Tableau<S, Real> make_tableau(Family family) {
+  constexpr auto size = static_cast<std::size_t>(Generated::stages);
   Tableau<S, Real> tableau;
+  tableau.family = family;
   StageVector<S, Real> c, b_low;
   StageMatrix<S, Real> a_low, m_low;
   copy<size, S>(Generated::c, c);
@@ -83,7 +92,11 @@ Tableau<S, Real> make_tableau() {
   tableau.c_low += c - tableau.c;
   tableau.b += b_low;
   tableau.a += a_low;
-  round_symplectic<S>(m_low, tableau.m);
+  if (family == Family::gauss) {
+    round_symplectic<S>(m_low, tableau.m);
+  } else {
+    tableau.m += m_low;
+  }
   return tableau;
 }
 
@@ -102,14 +115,30 @@ Tableau<S, Real> gauss_tableau(int stages) {
   require_stages(stages);
   if constexpr (S != Eigen::Dynamic) {
     if (stages != S) throw std::invalid_argument("stages: this solver is compiled for " + std::to_string(S));
-    return detail::make_tableau<S, S, Real>();
+    return detail::make_tableau<kernels::GaussTableau<S>, S, Real>(Family::gauss);
   } else {
-    static constexpr std::array<Tableau<S, Real> (*)(), max_stages> make = {
-        &detail::make_tableau<1, S, Real>, &detail::make_tableau<2, S, Real>, &detail::make_tableau<3, S, Real>,
-        &detail::make_tableau<4, S, Real>, &detail::make_tableau<5, S, Real>, &detail::make_tableau<6, S, Real>,
-        &detail::make_tableau<7, S, Real>, &detail::make_tableau<8, S, Real>};
-    return make[static_cast<std::size_t>(stages - 1)]();
+    return [&]<int... less_one>(std::integer_sequence<int, less_one...>) {
+      static constexpr std::array make{&detail::make_tableau<kernels::GaussTableau<less_one + 1>, S, Real>...};
+      return make[static_cast<std::size_t>(stages - 1)](Family::gauss);
+    }
+    (std::make_integer_sequence<int, max_stages>());
   }
+}
+
+/// The tableau of a method; where S is fixed, `stages` must equal it. Throws std::invalid_argument.
+template <int S = Eigen::Dynamic, class Real = double>
+Tableau<S, Real> tableau_of(Family family, int stages) {
+  if (family == Family::gauss) return gauss_tableau<S, Real>(stages);
+  if (stages == 2 || stages == 3) {
+    if constexpr (S == Eigen::Dynamic || S == 2) {
+      if (stages == 2) return detail::make_tableau<kernels::RadauTableau<2>, S, Real>(family);
+    }
+    if constexpr (S == Eigen::Dynamic || S == 3) {
+      if (stages == 3) return detail::make_tableau<kernels::RadauTableau<3>, S, Real>(family);
+    }
+    throw std::invalid_argument("stages: this solver is compiled for " + std::to_string(S));
+  }
+  throw std::invalid_argument("stages: expected 2 or 3 for radau, got " + std::to_string(stages));
 }
 
 /// The tableau with the step size folded in, and the predictor for the ratio of this step to the last.
@@ -143,6 +172,14 @@ class StepCoefficients {
   Real h2a2(int i, int j) const { return h2a2_(i, j); }
   Real extrapolation(int i, int j) const { return extrapolation_(i, j); }
 
+  /// How much larger the error of the stage polynomial is at the last stage of the next step than at its own start.
+  Real predictor_gain() const {
+    Real gain(1);
+    const Real end = 1 + tableau_.c[stages() - 1];
+    for (int j = 0; j < stages(); ++j) gain *= (end - tableau_.c[j]) / tableau_.c[j];
+    return gain;
+  }
+
   /// ℓ_j(x) on the nodes c: the polynomial through stage values, x in steps from the start of theirs.
   Real lagrange(int j, Real x) const {
     Real value(1);
@@ -162,20 +199,26 @@ class StepCoefficients {
   }
 
   // Weights that do not sum to h exactly would make every step drift by an ulp of h. The inner ones are rounded to
-  // multiples of ulp(h), so that what they leave of h is exact, and its halves, the two equal outer ones, are too.
+  // multiples of ulp(h), so that what they leave of h is exact, and its halves, the two equal outer ones, are too; of
+  // Radau, whose weights are all different, the last one takes it.
   void make_sum_exact() {
     const Eigen::Index s = hb_.size();
     if (s == 1) {
       hb_[0] = h_;
       return;
     }
+    const bool symmetric = tableau_.family == Family::gauss;
     Real rest = h_;
-    for (Eigen::Index j = 1; j + 1 < s; ++j) {
+    for (Eigen::Index j = symmetric ? 1 : 0; j + 1 < s; ++j) {
       const Real sum = h_ + hb_[j];
       hb_[j] = sum - h_;
       rest -= hb_[j];
     }
-    hb_[0] = hb_[s - 1] = rest / 2;
+    if (!symmetric) {
+      hb_[s - 1] = rest;
+    } else {
+      hb_[0] = hb_[s - 1] = rest / 2;
+    }
   }
 
   // ℓ_j(1 + ratio·c_i) on the nodes c.
