@@ -85,8 +85,10 @@ function(pendula_chain_sources out_sources)
   set(${out_sources} "${sources}" PARENT_SCOPE)
 endfunction()
 
-# Compiles SOURCES once for each instruction set and adds the copies to TARGET.
+# Compiles SOURCES once for each instruction set and adds the copies to TARGET, which chooses among them on any processor.
 function(pendula_add_copies target)
+  list(GET _pendula_archs 0 least)
+  target_compile_options(${target} PRIVATE ${_pendula_flags_${least}})
   set(declarations "")
   set(pointers "")
   foreach(arch IN LISTS PENDULA_ARCHS)
@@ -135,6 +137,7 @@ function(_pendula_seal target copy symbol)
     COMMENT "Sealing ${copy}.o" COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties("${sealed}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
   target_sources(${target} PRIVATE "${sealed}")
+  add_dependencies(${target} ${copy})
 endfunction()
 
 _pendula_check_seal()
