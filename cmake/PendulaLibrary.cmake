@@ -12,8 +12,8 @@ set(_pendula_chain_stages "1 2 3 4" "5 6" "7 8")
 # What these are compiled with beside the flags of their copy.
 set(_pendula_chain_options "")
 
-# Flags of each copy: no instructions but those that src/pendula/library.cpp asks the processor for, whatever
-# CMAKE_CXX_FLAGS allows. Without SSE3 there is nothing above it.
+# Flags of each copy: no vector instructions but those that src/pendula/library.cpp asks the processor for, whatever
+# CMAKE_CXX_FLAGS say before, -march=native or -mavx. Without SSE3 there is nothing above it.
 set(_pendula_flags_sse2 -march=x86-64 -mno-sse3)
 set(_pendula_flags_avx2 ${_pendula_flags_sse2} -mavx2 -mfma)
 set(_pendula_flags_avx512 ${_pendula_flags_avx2} -mavx512f -mavx512cd -mavx512dq -mavx512bw -mavx512vl)
@@ -85,8 +85,10 @@ function(pendula_chain_sources out_sources)
   set(${out_sources} "${sources}" PARENT_SCOPE)
 endfunction()
 
-# Compiles SOURCES once for each instruction set and adds the copies to TARGET.
+# Compiles SOURCES once for each instruction set and adds the copies to TARGET, which chooses among them on any processor.
 function(pendula_add_copies target)
+  list(GET _pendula_archs 0 least)
+  target_compile_options(${target} PRIVATE ${_pendula_flags_${least}})
   set(declarations "")
   set(pointers "")
   foreach(arch IN LISTS PENDULA_ARCHS)
@@ -135,6 +137,7 @@ function(_pendula_seal target copy symbol)
     COMMENT "Sealing ${copy}.o" COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties("${sealed}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
   target_sources(${target} PRIVATE "${sealed}")
+  add_dependencies(${target} ${copy})
 endfunction()
 
 _pendula_check_seal()

@@ -11,9 +11,12 @@ endif()
 list(APPEND files ${chains})
 list(JOIN files "\n" lines)
 file(WRITE "${BUILD}/lint.txt" "${lines}\n")
-# The compilation database is the compiler's: clang-tidy need not know each of its warnings.
+# The compilation database is the compiler's: clang-tidy need not know each of its warnings, nor g++'s symbols.
+file(READ "${BUILD}/compile_commands.json" database)
+string(REPLACE " -fno-gnu-unique" "" database "${database}")
+file(WRITE "${BUILD}/lint/compile_commands.json" "${database}")
 execute_process(
-  COMMAND xargs -P ${jobs} -n 1 -a "${BUILD}/lint.txt" "${CLANG_TIDY}" --quiet -p "${BUILD}"
+  COMMAND xargs -P ${jobs} -n 1 -a "${BUILD}/lint.txt" "${CLANG_TIDY}" --quiet -p "${BUILD}/lint"
           --extra-arg=-Wno-unknown-warning-option
   RESULT_VARIABLE result OUTPUT_VARIABLE complaints ERROR_VARIABLE notes)
 if(NOT result EQUAL 0)

@@ -22,7 +22,7 @@ int main() {
   const Eigen::Vector2d expected(-1.0407657832461712, -1.7073476624693271);
   const double distance = (bob - expected).norm();
   std::cout << "last bob off by " << distance << '\n';
-  return distance < 1e-12  // measured MEASURE
+  return distance < 1e-12  // measured 1.7e-15
                  && potential_energy_of_hanging_chain<pendula::kernels::Planar3>() == -6 &&
                  potential_energy_of_hanging_chain<pendula::kernels::Planar5>() == -15
              ? 0
