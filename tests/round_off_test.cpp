@@ -34,12 +34,14 @@ double published_run(double q_phi, double q_theta, double p_phi, double p_theta,
   const Eigen::Vector2d rates((p[0] - c * p[1]) / (2 - c * c), (2 * p[1] - c * p[0]) / (2 - c * c));
   const auto start = State<Planar>::from_angles(theta, rates);
   const auto integrator = make_integrator(chain, along_chain(stages, Iteration::fixed_point));
-  const double before = energy(chain, start);
+  const long double before = energy(chain, start.cast<long double>());
   constexpr double h = 1.0 / 128;
   double worst = 0;
   const RunResult result =
-      simulate(*integrator, start, {h, h * static_cast<double>(steps), 64},
-               [&](const auto& state) { worst = std::max(worst, std::abs((energy(chain, state) - before) / before)); });
+      simulate(*integrator, start, {h, h * static_cast<double>(steps), 64}, [&](const auto& state) {
+        const long double change = energy(chain, state.template cast<long double>()) - before;
+        worst = std::max(worst, static_cast<double>(std::abs(change / before)));
+      });
   EXPECT_TRUE(result.outcome) << result.outcome;
   return worst;
 }

@@ -247,7 +247,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
        "you mean spatial?)"},
       {"\"spatial\"", "3", "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got 3"},
       {"\"gauss\"", "\"euler\"",
-       "file.toml:24: run.method: expected \"gauss\" or \"rk4\" or \"dopri5\" or \"fehlberg78\", "
+       "file.toml:24: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or \"fehlberg78\", "
        "got \"euler\""},
       {"\"SI\"", "\"imperial\"", "file.toml:9: chain.units: expected \"SI\" or \"natural\", got \"imperial\""},
       // wrong lengths
@@ -480,7 +480,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step=1e-", "--set run.step=1e-: expected a TOML value after '=', got \"1e-\""},
       {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
-       "--set run.method=eulr: run.method: expected \"gauss\" or \"rk4\" or \"dopri5\" or "
+       "--set run.method=eulr: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or "
        "\"fehlberg78\", got \"eulr\""},
       {"run=3", "--set run=3: run: expected a table, got 3"},
       {"chain.masses.first=3",

@@ -192,7 +192,7 @@ TEST(Summary, NaturalUnitsAreTold) {
 template <class Space>
 void add(RunRecord<Space>& record, const Chain<Space>& chain, State<Space> state, double time, double energy) {
   state.time = time;
-  record.add(state, bob_positions(chain, state), energy);
+  record.add(state, bob_positions(chain, state), Energies<double>{0, energy}, 0);
 }
 
 TEST(RunRecord, EnergyErrorsAreRelativeToTheScaleOfTheChain) {

@@ -54,8 +54,8 @@ void warn_of_energy(const io::Scenario<Space>& scenario, const io::EnergyBalance
 
 template <class Space>
 void warn_of_defect(const io::Scenario<Space>& scenario, double defect, Warnings& warnings) {
-  const double trusted = scenario.run.stages == 1 ? 0.1 : 0.02;
-  if (defect <= trusted) return;
+  static constexpr double trusted = 0.02;
+  if (defect <= trusted || scenario.run.stages == 1) return;
   warnings.add("a step missed the velocity by " + io::rounded(defect, 2) + " of the fastest; " +
                smaller_step_advice(scenario.run));
 }
@@ -63,7 +63,7 @@ void warn_of_defect(const io::Scenario<Space>& scenario, double defect, Warnings
 /// Whether a second run is worth its time: none that was wrong had followed the motion so closely.
 template <class Space>
 bool is_doubtful(const io::Scenario<Space>& scenario, const Statistics& statistics) {
-  return scenario.run.method != Method::gauss || statistics.largest_defect > 1e-4;
+  return scenario.run.method != Method::gauss || statistics.largest_defect > 2e-5;
 }
 
 /// Distance of two states: of bobs relative to the length of the chain, and of their velocities to the fastest.

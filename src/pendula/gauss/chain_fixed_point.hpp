@@ -82,10 +82,11 @@ class ChainFixedPoint {
     const L hb = stages.columns().hb();
     L change(Real(0)), scale(Real(0)), all(Real(0));
     L tau = stages.kept_row(0).offset;
-    Vector rod = stages.kept_rod(0), bond_before;
+    Vector rod = stages.kept_rod(0), here, bond_before;
     bond_before.fill(L(Real(0)));
     const int last = stages.links() - 1;
     for (int i = 0; i <= last; ++i) {
+      here = rod;
       Vector pull = scaled(tau, rod);
       stages.set_multiplier(i, tau);
       if (i < last) {
@@ -96,23 +97,23 @@ class ChainFixedPoint {
       }
       const Vector bond = scaled(L(stages.constants(i).inverse_mass.value), pull);
       const Vector freed = stages.kept_freed(i), old = stages.increments(i);
-      const L inverse_length(stages.constants(i).inverse_length);
-      Vector U;
-      L changed(Real(0));
+      const L inverse_square(stages.constants(i).inverse_square);
+      Vector U, difference_to_old, advance;
       for (std::size_t k = 0; k < D; ++k) {
         U[k] = hb * (freed[k] + (bond[k] - bond_before[k]));
-        const L advance = fma(hb, L(stages.rods().free(i)[k]), U[k]);
-        changed = max(changed, abs(U[k] - old[k]) * inverse_length);
-        scale = max(scale, abs(advance) * inverse_length);
+        advance[k] = fma(hb, L(stages.rods().free(i)[k]), U[k]);
+        difference_to_old[k] = U[k] - old[k];
         all = all + U[k];
       }
+      const L changed = largest_across(here, difference_to_old) * inverse_square;
+      scale = max(scale, largest_across(here, advance) * inverse_square);
       change = max(change, changed);
       visit(i, changed);
       stages.set_increments(i, U);
       bond_before = bond;
     }
     stages.set_turn(static_cast<double>(over_stages(scale, [](const Real& x, const Real& y) { return Real(x + y); })));
-    return {relative(change, max(scale, abs(stages.falling())), all), -1};
+    return {relative(change, scale, all), -1};
   }
 
   // What is not a number reaches the sum of all, though not always the largest change.

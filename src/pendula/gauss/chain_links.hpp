@@ -146,6 +146,18 @@ std::array<Real, D> difference(const std::array<Real, D>& a, const std::array<Re
   return components<D>([&](std::size_t k) { return a[k] - b[k]; });
 }
 
+/// The largest component of a × b: how far b goes across a, exactly zero where both lie along one axis.
+template <class Real, std::size_t D>
+Real largest_across(const std::array<Real, D>& a, const std::array<Real, D>& b) {
+  using std::abs, std::max;
+  Real largest = abs(a[0] * b[1] - a[1] * b[0]);
+  if constexpr (D == 3) {
+    largest = max(largest, abs(a[1] * b[2] - a[2] * b[1]));
+    largest = max(largest, abs(a[2] * b[0] - a[0] * b[2]));
+  }
+  return largest;
+}
+
 /// What the sweeps along a chain need to know of one link.
 template <class Real>
 struct LinkConstants {

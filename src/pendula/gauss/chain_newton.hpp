@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <pendula/gauss/block.hpp>
 #include <pendula/gauss/chain_stages.hpp>
@@ -354,35 +355,35 @@ class ChainNewton {
 
   // Number by number, not in lanes: what a link waits for is short then.
   PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
-    using std::abs;
     const auto& columns = stages.columns();
     Real dw[vectors] = {};
     Real largest(0);
     L scale(Real(0));
     int at = -1;
     for (int i = 0; i < stages.links(); ++i) {
-      const Real& inverse_length = stages.constants(i).inverse_length;
+      const L inverse_square(stages.constants(i).inverse_square);
       alignas(pack_alignment) Real dV[D][Lanes] = {};
       stage_changes(gains_[i], dw, dV);
-      Vector U = stages.increments(i);
+      Vector U = stages.increments(i), dU;
       for (std::size_t d = 0; d < D; ++d) {
-        for (std::size_t k = 0; k < s; ++k) {
-          dw[d * s + k] += dV[d][k];
-          const Real change = abs(columns.hb(k) * dV[d][k]) * inverse_length;
-          if (!(change <= largest)) {  // also where it is not a number
-            largest = change;
-            at = i;
-          }
-        }
-        U[d] = fma(columns.hb(), L::load(dV[d]), U[d]);
+        for (std::size_t k = 0; k < s; ++k) dw[d * s + k] += dV[d][k];
+        dU[d] = columns.hb() * L::load(dV[d]);
+        U[d] = U[d] + dU[d];
       }
       stages.set_increments(i, U);
-      for (const L& advance : stages.advance(i)) scale = max(scale, abs(advance) * L(inverse_length));
+      PerStage change;
+      change = largest_across(stages.kept_rod(i), dU) * inverse_square;
+      for (std::size_t k = 0; k < s; ++k) {
+        if (change[k] <= largest) continue;  // not where it is not a number
+        largest = change[k];
+        at = i;
+      }
+      if (!std::isfinite(static_cast<double>(dV[0][0]))) return {std::numeric_limits<double>::quiet_NaN(), i};
+      scale = max(scale, largest_across(stages.kept_rod(i), stages.advance(i)) * inverse_square);
     }
-    PerStage turns, scales;
+    PerStage turns;
     turns = scale;
-    scales = max(scale, abs(stages.falling()));
-    const Real fastest = *std::max_element(scales.values, scales.values + s);
+    const Real fastest = *std::max_element(turns.values, turns.values + s);
     stages.set_turn(static_cast<double>(std::accumulate(turns.values, turns.values + s, Real(0))));
     return {static_cast<double>(largest > 0 ? Real(largest / fastest) : largest), at};
   }

@@ -43,8 +43,7 @@ class ChainStages {
         state_(constants_),
         anchors_(chain.links()),
         stages_(chain.links()),
-        torque_(chain.loaded() ? chain.links() : 0),
-        fastest_fall_(Real(std::abs(chain.gravity()) / chain.lengths().minCoeff())) {}
+        torque_(chain.loaded() ? chain.links() : 0) {}
 
   int links() const { return constants_.links(); }
   const Chain<Space, N>& chain() const { return chain_; }
@@ -172,10 +171,6 @@ class ChainStages {
                        });
     last_h_ = 0;
   }
-
-  /// How fast links would turn that fell freely for a step, times h b: below it, velocities are rounding of weight and
-  /// tension, which cancel.
-  L falling() const { return columns_.hb() * L(columns_.h() * fastest_fall_); }
 
   /// The most that a link turns in the step, as the iterations on the stages find it  [rad].
   double turn() const { return turn_; }

@@ -87,8 +87,7 @@ class GaussStepper {
 
   // The defect of a step: from where on it is looked for, and where the step is not accepted. One stage says of the
   // velocity no more than its mean.
-  static constexpr double noticed_defect = 1e-4;
-  double accepted_defect() const { return solver_.stages() == 1 ? 0.3 : 0.1; }
+  static constexpr double noticed_defect = 1e-6, accepted_defect = 0.02;
 
   // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
   // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
@@ -127,7 +126,7 @@ class GaussStepper {
     defect_ = 0;
     if (solver_.dissipates() || first < noticed_defect * solver_.predictor_gain()) return Status::ok;
     defect_ = solver_.defect();
-    return defect_ < accepted_defect() || is_last_resort ? Status::ok : Status::unresolved;
+    return defect_ < accepted_defect || solver_.stages() == 1 || is_last_resort ? Status::ok : Status::unresolved;
   }
 
   // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
