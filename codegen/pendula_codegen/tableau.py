@@ -1,4 +1,4 @@
-"""Tableaux in high precision and rounded once: Gauss–Legendre, s = 1..8 (paper eq. 45–51 for s = 2); Radau IIA, s = 2, 3."""
+"""Tableaux in high precision and rounded once: Gauss–Legendre (paper eq. 45–51 for s = 2) and Radau IIA."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Tableau:
 
     @cached_property
     def m_low(self) -> list[list[mpf]]:
-        """What m lacks of a_ij / b_j; of Gauss methods antisymmetric, as m_ij + m_ji = 1 holds before and after."""
+        """What m lacks of a_ij / b_j; antisymmetric of Gauss methods, as m_ij + m_ji = 1."""
         s = range(self.stages)
         if self.family == "Radau":
             with workdps(DIGITS):

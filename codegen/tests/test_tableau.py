@@ -5,7 +5,7 @@ import re
 import pytest
 from mpmath import mpf, sqrt, workdps
 
-from pendula_codegen.tableau import DIGITS, MAX_STAGES, gauss
+from pendula_codegen.tableau import DIGITS, MAX_STAGES, RADAU_STAGES, gauss, radau
 
 STAGES = range(1, MAX_STAGES + 1)
 TINY = mpf(10) ** (10 - DIGITS)  # measured 4e-57 for the extrapolation, 2e-60 elsewhere
@@ -93,3 +93,31 @@ def test_header_holds_the_rounded_numbers(s, fresh_headers):
     matrices = [t.a, t.a_low, t.m, t.m_low, t.a_squared, t.extrapolation]
     expected = [*t.c, *t.c_low, *t.b, *t.b_low, *(x for matrix in matrices for row in matrix for x in row)]
     assert numbers == [float(x) for x in expected]
+
+
+@pytest.mark.parametrize("stages", RADAU_STAGES)
+def test_radau_integrates_its_order_and_ends_in_a_stage(stages):
+    """B(2s − 1) and C(s) (Hairer, Wanner IV.5), and b the last row of a: stiffly accurate."""
+    with workdps(DIGITS):
+        method = radau(stages)
+        bound = mpf(10) ** (8 - DIGITS)
+        assert abs(method.c[-1] - 1) < bound
+        assert all(abs(x - y) < bound for x, y in zip(method.a[-1], method.b, strict=True))
+        for k in range(1, 2 * stages):
+            assert (
+                abs(sum(b * c ** (k - 1) for b, c in zip(method.b, method.c, strict=True)) - mpf(1) / k)
+                < bound
+            )
+        for k in range(1, stages + 1):
+            for row, node in zip(method.a, method.c, strict=True):
+                assert (
+                    abs(sum(x * c ** (k - 1) for x, c in zip(row, method.c, strict=True)) - node**k / k)
+                    < bound
+                )
+
+
+def test_radau_of_three_stages_is_the_published_one():
+    """c = (4 ∓ √6)/10, 1."""
+    with workdps(DIGITS):
+        c = [(4 - mpf(6) ** 0.5) / 10, (4 + mpf(6) ** 0.5) / 10, mpf(1)]
+        assert all(abs(x - y) < mpf(10) ** (8 - DIGITS) for x, y in zip(radau(3).c, c, strict=True))
