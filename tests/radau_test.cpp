@@ -52,8 +52,8 @@ TEST_P(Radau, FollowsDampingFarFasterThanAStep) {
   const auto start = State<Planar>::from_angles(Eigen::VectorXd::Ones(1), Eigen::VectorXd::Constant(1, 20));
   const State<Planar> end = final_state(chain, start, radau(stages, solver), 1e-3, 1);
   const double creeping = -0.001 * 9.81 * 0.05 * std::sin(end.q[0]) / 1000;
-  EXPECT_NEAR(end.v[0], creeping, 1e-3 * std::abs(creeping));          // measured MEASURE
-  EXPECT_NEAR(end.q[0], 1 + 20 * 2.5e-9 + creeping, 1e-10);            // measured MEASURE
+  EXPECT_NEAR(end.v[0], creeping, 1e-3 * std::abs(creeping));  // measured MEASURE
+  EXPECT_NEAR(end.q[0], 1 + 20 * 2.5e-9 + creeping, 1e-10);    // measured MEASURE
 }
 
 TEST(Radau, HasTwoOrThreeStages) {
