@@ -108,6 +108,11 @@ function(_pendula_compile_copy copy arch)
   pendula_own_target(${copy})
   # Sealing needs machine code, and would not make symbols local that a program must have once.
   target_compile_options(${copy} PRIVATE ${_pendula_flags_${arch}} -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+  list(GET _pendula_archs 0 least)
+  if(NOT arch STREQUAL least)
+    # Without optimisation, Eigen's empty constants would be initialised when a program starts (check_runs_nothing.cmake).
+    target_compile_options(${copy} PRIVATE $<$<NOT:$<CONFIG:Release,RelWithDebInfo,MinSizeRel>>:-O1>)
+  endif()
   target_compile_definitions(${copy} PRIVATE PENDULA_LIBRARY=pendula_library_${arch} PENDULA_INSTRUCTION_SET="${arch}")
   target_include_directories(${copy} PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
   target_link_libraries(${copy} PRIVATE pendula_kernels pendula::xsimd)

@@ -1,5 +1,6 @@
 #include "library/factory.hpp"
 
+#include <pendula/chain_numbers.hpp>
 #include <pendula/explicit_integrator.hpp>
 #include <pendula/gauss/chain_forward_dynamics.hpp>
 #include <pendula/gauss/tableau.hpp>

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <memory>
+#include <pendula/chain.hpp>
+#include <pendula/dense_forward_dynamics.hpp>
 #include <pendula/explicit_integrator.hpp>
-#include <pendula/forward_dynamics.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 #include <pendula/gauss/gauss_integrator.hpp>
 #include <pendula/options.hpp>

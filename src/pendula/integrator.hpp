@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <pendula/chain.hpp>
+#include <pendula/chain_numbers.hpp>
 #include <pendula/library.hpp>
 #include <pendula/options.hpp>
 #include <pendula/outcome.hpp>
