@@ -46,7 +46,7 @@ TEST_P(PoleOrder, IsTwiceTheStages) {
   const std::vector<double> counts = stages < 3    ? std::vector<double>{64, 96, 128, 192, 256}
                                      : stages < 5  ? std::vector<double>{24, 32, 40, 48, 64}
                                      : stages == 5 ? std::vector<double>{16, 18, 20, 24, 28}
-                                                   : std::vector<double>{14, 16, 18, 20, 22};
+                                                   : std::vector<double>{10, 11, 12, 13, 14, 16};
   ErrorLadder ladder;
   for (double count : counts) {
     ladder.steps.push_back(1 / count);

@@ -60,6 +60,14 @@ void warn_of_defect(const io::Scenario<Space>& scenario, double defect, Warnings
                smaller_step_advice(scenario.run));
 }
 
+/// Near a pole φ moves faster than steps follow, even in parts.
+inline void warn_of_pole(const Description& description, const Statistics& statistics, bool spatial,
+                         Warnings& warnings) {
+  if (description.solver != "dense" || !spatial || statistics.rejected_steps == 0) return;
+  warnings.add("the dense solver came near a pole of (theta, phi) and took " +
+               std::to_string(statistics.rejected_steps) + " steps in parts; run.solver = \"chain\" knows no pole");
+}
+
 /// Whether a second run is worth its time: none that was wrong had followed the motion so closely.
 template <class Space>
 bool is_doubtful(const io::Scenario<Space>& scenario, const Statistics& statistics) {

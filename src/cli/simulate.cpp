@@ -120,6 +120,7 @@ class Run {
     const Statistics& statistics = integrator_->statistics();
     warn_of_energy(scenario_, record_.balance(), warnings_);
     warn_of_defect(scenario_, statistics.largest_defect, warnings_);
+    warn_of_pole(integrator_->describe(), statistics, Space::dof == 2, warnings_);
     if (!is_doubtful(scenario_, statistics)) return;
     const InterruptGuard guard;
     warn_of_step(

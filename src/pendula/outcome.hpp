@@ -12,7 +12,6 @@ enum class Status {
   ok,
   not_converged,         ///< the stage equations were not solved to round-off
   wrong_root,            ///< they were, but not by the motion: energy came from nowhere, or went there
-  unresolved,            ///< they were, but by steps too coarse for the motion
   tolerance_not_met,     ///< an explicit method shrank its step to nothing
   not_finite,            ///< a value became infinite or NaN
   singular_mass_matrix,  ///< the coordinates of a link fail: in (θ, φ), sin θ = 0
@@ -26,8 +25,6 @@ inline std::ostream& operator<<(std::ostream& out, Status status) {
       return out << "not converged";
     case Status::wrong_root:
       return out << "wrong root";
-    case Status::unresolved:
-      return out << "unresolved";
     case Status::tolerance_not_met:
       return out << "tolerance not met";
     case Status::not_finite:
@@ -66,9 +63,6 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
     case Status::wrong_root:
       out << "the stage equations have a solution that is not the motion, its energy does not balance (step "
           << outcome.step << " s, " << outcome.iterations << " iterations); a smaller step may help";
-      break;
-    case Status::unresolved:
-      out << "the motion changes faster than the step follows (step " << outcome.step << " s); a smaller step may help";
       break;
     case Status::tolerance_not_met:
       out << "the error of a step stays above the tolerance, or a value infinite" << where(" at link ")

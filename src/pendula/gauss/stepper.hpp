@@ -85,9 +85,9 @@ class GaussStepper {
  private:
   static double epsilon() { return static_cast<double>(std::numeric_limits<typename StageSolver::Real>::epsilon()); }
 
-  // The defect of a step: from where on it is looked for, and where the step is not accepted. One stage says of the
-  // velocity no more than its mean.
-  static constexpr double noticed_defect = 1e-6, accepted_defect = 0.02;
+  // From where on the defect of a step is looked for. It is told, not acted on: steps of different sizes would cost
+  // what symplectic ones are taken for, and long chains move well in modes far slower than their fastest.
+  static constexpr double noticed_defect = 1e-6;
 
   // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
   // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
@@ -95,7 +95,7 @@ class GaussStepper {
   static constexpr double largest_energy_defect = 0.02;
 
   /// One step of exactly h; on failure the state is what it was.
-  Outcome attempt(double h, bool is_last_resort = false) {
+  Outcome attempt(double h) {
     solver_.prepare(time(), h);
     at_roundoff_.restart();
     Correction correction;
@@ -106,16 +106,16 @@ class GaussStepper {
       if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
       if (iteration == 1) first = correction.relative;
       if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
-      const Status status = status_of_solution(first, is_last_resort);
+      const Status status = status_of_solution(first);
       if (status != Status::ok) return failure(status, h, iteration, correction);
       return accept(h, iteration, correction);
     }
     return failure(Status::not_converged, h, options_.max_iterations, correction);
   }
 
-  // Whether the stages are the solution that continues from a step of no length, and follow the motion. Methods that
+  // Whether the stages are the solution that continues from a step of no length. Methods that
   // damp what they do not resolve are asked for no more than that energy does not grow.
-  Status status_of_solution(double first, bool is_last_resort) {
+  Status status_of_solution(double first) {
     const double turn = solver_.turn();
     if (!solver_.continues() || !(turn < StageSolver::largest_turn)) return Status::wrong_root;
     if (first > trusted_prediction || turn > trusted_turn) {
@@ -126,7 +126,7 @@ class GaussStepper {
     defect_ = 0;
     if (solver_.dissipates() || first < noticed_defect * solver_.predictor_gain()) return Status::ok;
     defect_ = solver_.defect();
-    return defect_ < accepted_defect || solver_.stages() == 1 || is_last_resort ? Status::ok : Status::unresolved;
+    return Status::ok;
   }
 
   // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
@@ -136,7 +136,7 @@ class GaussStepper {
     solver_.save();
     double done = 0, part = 0.5;
     while (done < 1) {
-      const Outcome outcome = attempt(h * part, part <= smallest_part);
+      const Outcome outcome = attempt(h * part);
       if (outcome) {
         done += part;
         const bool fits = std::fmod(done, 2 * part) == 0 && part < 0.5;
@@ -169,9 +169,7 @@ class GaussStepper {
     ++statistics_.rejected_steps;
     const int singular = solver_.singular_link();
     if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
-    const int link = correction.link >= 0 || status == Status::wrong_root || status == Status::unresolved
-                         ? correction.link
-                         : solver_.worst_link();
+    const int link = correction.link >= 0 || status == Status::wrong_root ? correction.link : solver_.worst_link();
     return {status, time(), h, iterations, correction.relative, link};
   }
 
