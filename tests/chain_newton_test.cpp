@@ -95,7 +95,8 @@ TYPED_TEST(ChainStageEquations, AreThoseOfTheDenseSolverToTheOrderOfTheMethod) {
       return distance(this->along_chain(stages, Iteration::automatic, steps, h), this->dense(stages, steps, h));
     };
     const int steps = stages == 1 ? 40 : stages == 2 ? 20 : 8;
-    EXPECT_NEAR(std::log2(difference(steps) / difference(2 * steps)), 2 * stages, 0.2) << stages;  // measured within 0.097
+    EXPECT_NEAR(std::log2(difference(steps) / difference(2 * steps)), 2 * stages, 0.2)
+        << stages;  // measured within 0.097
   }
 }
 

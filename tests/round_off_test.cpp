@@ -164,7 +164,8 @@ TEST_P(LongChain, KeepsItsEnergy) {
   const Chain<Planar> chain = metre_of_links(n);
   const auto start = State<Planar>::from_angles(Eigen::VectorXd::LinSpaced(n, 0.1, 0.6));
   const State<Planar> end = final_state(chain, start, along_chain(2), 0.25 / n, 0.05);
-  EXPECT_LT(std::abs(energy(chain, end) - energy(chain, start)), 1e-10 * energy_scale(chain));  // measured 1.8e-13 of 1000 links
+  EXPECT_LT(std::abs(energy(chain, end) - energy(chain, start)),
+            1e-10 * energy_scale(chain));  // measured 1.8e-13 of 1000 links
   EXPECT_GT(distance(start, end), 1e-3);
 }
 
