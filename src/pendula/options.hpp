@@ -58,7 +58,7 @@ inline std::ostream& operator<<(std::ostream& out, Solver solver) {
   return out;
 }
 
-inline constexpr std::string_view name_of(Iteration iteration) {
+constexpr std::string_view name_of(Iteration iteration) {
   switch (iteration) {
     case Iteration::automatic:
       return "auto";
