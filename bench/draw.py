@@ -1,4 +1,4 @@
-"""Draws the work-precision and scaling pictures from the kept figures.
+"""Draws the work-precision, scaling and drift pictures from the kept figures.
 
 usage: python bench/draw.py FIGURES_FOLDER IMAGES_FOLDER
 
@@ -17,6 +17,7 @@ mpl.use("svg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
+BENCH = Path(__file__).parent
 INK = "#7d8590"
 STYLE = {
     "svg.hashsalt": "pendula",
@@ -154,6 +155,22 @@ def draw_scaling(benchmarks: dict, folder: Path) -> bool:
     return True
 
 
+def draw_drift(before: dict, now: dict, folder: Path) -> None:
+    """Energy error along runs in space, of the solver in angles that was and of the one that is."""
+    names = [name for name in now if name != "steps"]
+    figure, panels = plt.subplots(1, len(names), figsize=(9.6, 3.2), sharey=True, layout="constrained")
+    for axes, name in zip(panels, names, strict=True):
+        for label, runs, color in (("angles", before, "#e5484d"), ("rods", now, "#1f9d55")):
+            errors = runs[name]
+            steps = [runs["steps"] * (part + 1) / len(errors) for part in range(len(errors))]
+            axes.loglog(steps, errors, color=color, label=label)
+        axes.set(xlabel="steps", title=name)
+        axes.grid(True)
+    panels[0].set_ylabel("|ΔH| / Σ M g l, largest in 1 % of the run")
+    panels[0].legend()
+    save(figure, folder / "drift.svg")
+
+
 def save(figure: plt.Figure, file: Path) -> None:
     """Writes an SVG that is the same for the same figures."""
     figure.savefig(file, transparent=True, metadata={"Date": None})
@@ -162,11 +179,16 @@ def save(figure: plt.Figure, file: Path) -> None:
 
 
 def main() -> None:
-    """Reads races.json and benchmarks.json, writes the pictures."""
+    """Reads races.json, benchmarks.json and drift.json, writes the pictures."""
     figures, images = map(Path, sys.argv[1:])
     mpl.rcParams.update(STYLE)
     draw_work_precision(json.loads((figures / "races.json").read_text(encoding="utf-8")), images)
     kept = json.loads((figures / "benchmarks.json").read_text(encoding="utf-8"))
+    drifts = [
+        json.loads((folder / file).read_text(encoding="utf-8"))
+        for folder, file in ((BENCH, "drift_in_angles.json"), (figures, "drift.json"))
+    ]
+    draw_drift(*drifts, images)
     if not draw_scaling(kept["benchmarks"], images):
         print("no chain solver was measured: scaling.svg is left as it is")
 

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <cmath>
-#include <limits>
 #include <pendula/gauss/chain_stages.hpp>
+#include <pendula/gauss/stage_change.hpp>
 #include <pendula/gauss/stepper.hpp>
 
 namespace pendula {
@@ -24,23 +23,17 @@ class ChainFixedPoint {
 
   /// The link where one more iteration changes most.
   int worst_link(Stages& stages) {
-    int worst = -1;
-    Real largest(0);
+    detail::WorstLink<Real> worst;
     sweep_inward(stages);
-    sweep_outward(stages, [&](int i, const L& change) {
-      const Real here = over_stages(change, [](const Real& x, const Real& y) { return x >= y ? x : y; });
-      if (here <= largest || (worst >= 0 && !std::isfinite(static_cast<double>(largest)))) return;
-      largest = here;
-      worst = i;
-    });
-    return worst;
+    sweep_outward(stages, [&](int i, const L& change) { worst.see(i, detail::StageChange<S, L>::largest_of(change)); });
+    return worst.link();
   }
 
  private:
   using L = typename Stages::L;
   using Vector = typename Stages::Vector;
   using Placed = typename Stages::Placed;
-  static constexpr std::size_t D = Stages::D, Z = Stages::Z;
+  static constexpr std::size_t D = Stages::D;
 
   // From the tip to the pivot: X and Z of every link, and the elimination of the multipliers.
   PENDULA_IN_REGISTERS void sweep_inward(Stages& stages) {
@@ -80,7 +73,7 @@ class ChainFixedPoint {
   template <class Visit>
   PENDULA_IN_REGISTERS Correction sweep_outward(Stages& stages, Visit visit) {
     const L hb = stages.columns().hb();
-    L change(Real(0)), scale(Real(0)), all(Real(0));
+    detail::StageChange<S, L> change;
     L tau = stages.kept_row(0).offset;
     Vector rod = stages.kept_rod(0), here, bond_before;
     bond_before.fill(L(Real(0)));
@@ -97,43 +90,18 @@ class ChainFixedPoint {
       }
       const Vector bond = scaled(L(stages.constants(i).inverse_mass.value), pull);
       const Vector freed = stages.kept_freed(i), old = stages.increments(i);
-      const L inverse_square(stages.constants(i).inverse_square);
       Vector U, difference_to_old, advance;
       for (std::size_t k = 0; k < D; ++k) {
         U[k] = hb * (freed[k] + (bond[k] - bond_before[k]));
         advance[k] = fma(hb, L(stages.rods().free(i)[k]), U[k]);
         difference_to_old[k] = U[k] - old[k];
-        all = all + U[k];
       }
-      const L changed = largest_across(here, difference_to_old) * inverse_square;
-      scale = max(scale, largest_across(here, advance) * inverse_square);
-      change = max(change, changed);
-      visit(i, changed);
+      visit(i, change.add(here, difference_to_old, advance, stages.constants(i).inverse_square));
       stages.set_increments(i, U);
       bond_before = bond;
     }
-    stages.set_turn(static_cast<double>(over_stages(scale, [](const Real& x, const Real& y) { return Real(x + y); })));
-    return {relative(change, scale, all), -1};
-  }
-
-  // What is not a number reaches the sum of all, though not always the largest change.
-  static double relative(const L& change, const L& scale, const L& all) {
-    const auto plus = [](const Real& x, const Real& y) { return Real(x + y); };
-    const auto larger = [](const Real& x, const Real& y) { return x > y ? x : y; };
-    if (!std::isfinite(static_cast<double>(over_stages(all, plus)))) return std::numeric_limits<double>::quiet_NaN();
-    const Real largest_change = over_stages(change, larger);
-    return largest_change > 0 ? static_cast<double>(largest_change / over_stages(scale, larger)) : 0;
-  }
-
-  // Of all stages in halves: what is done first does not wait for all the others.
-  template <class Combine>
-  static Real over_stages(const L& lanes, Combine combine) {
-    alignas(pack_alignment) Real values[Z];
-    lanes.store(values);
-    for (std::size_t count = S; count > 1; count = (count + 1) / 2) {
-      for (std::size_t k = 0; k < count / 2; ++k) values[k] = combine(values[k], values[k + (count + 1) / 2]);
-    }
-    return values[0];
+    stages.set_turn(change.turn());
+    return {change.relative(), -1};
   }
 };
 

@@ -39,7 +39,8 @@ class ChainForwardDynamics : public ForwardDynamics {
       if (!last) bond = difference(bond, scaled(next, motion(i + 1).rod));
       bond = scaled(constants_[i].inverse_mass.value, bond);
       const Cartesian rod_acceleration = sum(motion(i).free, difference(bond, before));
-      set_coordinates(i, rates_of(i, v), scaled(constants_[i].inverse_length, rod_acceleration), acceleration);
+      const Rates a = of_coordinates(i, rates_of(i, v), scaled(constants_[i].inverse_length, rod_acceleration));
+      for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
       before = bond;
       tension = next;
     }
@@ -101,13 +102,13 @@ class ChainForwardDynamics : public ForwardDynamics {
   }
 
   // û̈ = Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b.
-  void set_coordinates(int i, const Rates& v, const Cartesian& direction_acceleration, double* acceleration) {
+  Rates of_coordinates(int i, const Rates& v, const Cartesian& direction_acceleration) {
     const Trig& trig = motion(i).trig;
     double determinant;
     Link::metric_determinant(trig, determinant);
     Rates a;
     Link::rates(trig, 1 / determinant, difference(direction_acceleration, turning(trig, v)), a);
-    for (std::size_t k = 0; k < a.size(); ++k) acceleration[entry(i, k)] = a[k];
+    return a;
   }
 
   // Σ_ab û_ab v_a v_b, each pair of different coordinates counted twice.

@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <pendula/gauss/block.hpp>
 #include <pendula/gauss/chain_stages.hpp>
+#include <pendula/gauss/stage_change.hpp>
 #include <pendula/gauss/stepper.hpp>
 
 namespace pendula {
@@ -21,7 +20,8 @@ namespace pendula {
 ///   W_b[k,j] = H_kj V(k)·t_b(j),  F_b[k,j] = H_kj t_b(k)·V(j)
 ///   Z = T − X̂ E⁻¹ W,  v₀ = −X̂ E⁻¹ (X·V)                                  changes of V that keep X·V = 0: v₀ + Z α
 ///   L = Tᵀ + F E₂⁻¹ X̂ᵀ                                                    what of q no multiplier changes
-///   N = τ H − H τ − (λ/l²) H + H (torque/l² ×) H                           ∂q/∂V at fixed τ and G
+///   N = τ H − H τ − (λ/l²) H + H (torque/l² ×) H − (M g/l) H²              ∂q/∂V at fixed τ and G
+/// where the last term is that of steps which do not resolve the chain's swinging.
 /// Multipliers follow from E₂ τ = X̂·(G − H f(τ = 0)). Inward, with δG_{i+1} = P δw_i + g from the link below and
 /// B = P + m I:
 ///   S = L (B − N) Z,  K = −S⁻¹ L B,  k = −S⁻¹ L ((B − N) v₀ + g − q),  P ← B + B Z K,  g ← g + B (v₀ + Z k),
@@ -40,7 +40,17 @@ class ChainNewton {
     set_coefficients(stages.columns());
     run_out(stages);
     inward(stages);
-    return outward(stages);
+    return outward(stages, [](int, const L&) {});
+  }
+
+  /// The link where one more iteration changes most.
+  int worst_link(Stages& stages) {
+    detail::WorstLink<Real> worst;
+    set_coefficients(stages.columns());
+    run_out(stages);
+    inward(stages);
+    outward(stages, [&](int i, const L& change) { worst.see(i, detail::StageChange<S, L>::largest_of(change)); });
+    return worst.link();
   }
 
   /// The multipliers that belong to the increments as they are.
@@ -110,6 +120,11 @@ class ChainNewton {
     for (std::size_t k = 0; k < s; ++k) {
       inverse_hb_.values[k] = h_ == 0 ? Real(0) : Real(1 / columns.hb(k));
       for (std::size_t j = 0; j < s; ++j) ha_[k].values[j] = columns.ha(k, j);
+    }
+    for (std::size_t k = 0; k < s; ++k) {
+      L row(Real(0));
+      for (std::size_t j = 0; j < s; ++j) row = fma(L(ha_[k][j]), ha_[j].lanes(), row);
+      ha_squared_[k] = row;
     }
   }
 
@@ -297,10 +312,12 @@ class ChainNewton {
   // own ← BZ − N Z.
   void subtract_own(const Stages& stages, int i, const Terms& terms, const Tangents& Z, const Tangents& BZ,
                     Tangents& own) const {
-    const Real& drag = stages.constants(i).drag;
+    const Real drag = stages.constants(i).drag, hanging = stages.hanging(i);
     for (std::size_t k = 0; k < s; ++k) {
       Real minus[s];
-      for (std::size_t j = 0; j < s; ++j) minus[j] = ha_[k][j] * (terms.tau[j] + drag - terms.tau[k]);
+      for (std::size_t j = 0; j < s; ++j) {
+        minus[j] = ha_[k][j] * (terms.tau[j] + drag - terms.tau[k]) + hanging * ha_squared_[k][j];
+      }
       for (std::size_t d = 0; d < D; ++d) {
         own.set_row(d * s + k, row_of_product<s>(minus, Z, d * s, BZ.row(d * s + k)));
       }
@@ -353,15 +370,14 @@ class ChainNewton {
     return L::load(block[row]);
   }
 
-  // Number by number, not in lanes: what a link waits for is short then.
-  PENDULA_IN_REGISTERS Correction outward(Stages& stages) {
+  // From the pivot to the tip: the changes of all stages; visit(i, what they turn rod i). Number by number, not in
+  // lanes: what a link waits for is short then.
+  template <class Visit>
+  PENDULA_IN_REGISTERS Correction outward(Stages& stages, Visit visit) {
     const auto& columns = stages.columns();
     Real dw[vectors] = {};
-    Real largest(0);
-    L scale(Real(0));
-    int at = -1;
+    detail::StageChange<S, L> change;
     for (int i = 0; i < stages.links(); ++i) {
-      const L inverse_square(stages.constants(i).inverse_square);
       alignas(pack_alignment) Real dV[D][Lanes] = {};
       stage_changes(gains_[i], dw, dV);
       Vector U = stages.increments(i), dU;
@@ -371,21 +387,10 @@ class ChainNewton {
         U[d] = U[d] + dU[d];
       }
       stages.set_increments(i, U);
-      PerStage change;
-      change = largest_across(stages.kept_rod(i), dU) * inverse_square;
-      for (std::size_t k = 0; k < s; ++k) {
-        if (change[k] <= largest) continue;  // not where it is not a number
-        largest = change[k];
-        at = i;
-      }
-      if (!std::isfinite(static_cast<double>(dV[0][0]))) return {std::numeric_limits<double>::quiet_NaN(), i};
-      scale = max(scale, largest_across(stages.kept_rod(i), stages.advance(i)) * inverse_square);
+      visit(i, change.add(stages.kept_rod(i), dU, stages.advance(i), stages.constants(i).inverse_square));
     }
-    PerStage turns;
-    turns = scale;
-    const Real fastest = *std::max_element(turns.values, turns.values + s);
-    stages.set_turn(static_cast<double>(std::accumulate(turns.values, turns.values + s, Real(0))));
-    return {static_cast<double>(largest > 0 ? Real(largest / fastest) : largest), at};
+    stages.set_turn(change.turn());
+    return {change.relative(), -1};
   }
 
   static void stage_changes(const Gain& gain, const Real* dw, Real (&dV)[D][Lanes]) {
@@ -407,7 +412,7 @@ class ChainNewton {
   }
 
   detail::PerLink<Gain, N> gains_;
-  PerStage ha_[s]{}, unit_[s]{};  // of k: h a_kj, δ_kj
+  PerStage ha_[s]{}, ha_squared_[s]{}, unit_[s]{};  // of k: h a_kj, Σ_i h a_ki h a_ij, δ_kj
   PerStage inverse_hb_{};         // 1/(h b), of a step of no length zero
   Real h_{0};                     // that all of them are for
   bool is_set_ = false, positive_ = true;

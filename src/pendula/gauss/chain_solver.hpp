@@ -14,16 +14,13 @@
 namespace pendula {
 
 /// Cost of one Newton iteration on a chain in fixed-point iterations, by space and stages, as measured on ten links
-/// (g++ 12; the mean of AVX2 and AVX-512, which are up to a third apart). It grows with the cube of the blocks that
-/// Newton eliminates. On few links the fixed point waits for its own divisions, and with four stages or more Newton
-/// costs fewer of its iterations: three quarters as many on two links. With fewer stages Newton waits as much.
+/// (g++ 12; the mean of AVX2 and AVX-512, which are up to a half apart). It grows with the cube of the blocks that
+/// Newton eliminates, and hardly with the links.
 template <class Space>
-constexpr double newton_cost(int stages, int links) {
-  constexpr std::array<double, 8> planar{2.1, 2.6, 4.6, 5.4, 8.4, 9.0, 14.3, 14.7};
-  constexpr std::array<double, 8> spatial{2.3, 3.9, 6.9, 9.8, 12.8, 14.9, 22.9, 24.3};
-  const double waiting = stages <= 3 ? 0.0 : 0.8;  // in links
-  const double of_ten = links * (10 + waiting) / (10 * (links + waiting));
-  return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)] * of_ten;
+constexpr double newton_cost(int stages) {
+  constexpr std::array<double, 8> planar{2.1, 4.8, 9.0, 10.5, 15.5, 18.0, 23.0, 30.0};
+  constexpr std::array<double, 8> spatial{4.3, 8.2, 13.5, 22.0, 20.5, 30.0, 40.5, 58.0};
+  return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)];
 }
 
 /// Chooses between the two iterations by what they take: iterations a step, counted while the run goes, times the cost
@@ -31,10 +28,11 @@ constexpr double newton_cost(int stages, int links) {
 /// on a clock: the same run makes the same choices.
 class IterationChoice {
  public:
-  IterationChoice(Iteration wanted, double newton_cost, int stages) : wanted_(wanted), cost_{newton_cost, 1.0} {
-    const Iteration likely = stages <= 2 ? Iteration::newton : Iteration::fixed_point;
-    preferred_ = active_ = wanted == Iteration::automatic ? likely : wanted;
-  }
+  IterationChoice(Iteration wanted, double newton_cost)
+      : wanted_(wanted),
+        preferred_(wanted == Iteration::automatic ? Iteration::fixed_point : wanted),
+        active_(preferred_),
+        cost_{newton_cost, 1.0} {}
 
   Iteration active() const { return active_; }
   Iteration preferred() const { return preferred_; }
@@ -43,7 +41,9 @@ class IterationChoice {
   void begin_step() {
     active_ = preferred_;
     iterations_ = {};
-    if (is_automatic() && ++steps_ % trial_interval == trial_step) active_ = other(preferred_);
+    if (is_automatic() && ++steps_ % trial_interval == trial_step && may_win(other(preferred_))) {
+      active_ = other(preferred_);
+    }
   }
 
   void count_iteration() { ++iterations_[index(active_)]; }
@@ -60,8 +60,7 @@ class IterationChoice {
       preferred_ = Iteration::newton;
       spent_[index(Iteration::fixed_point)] = forbidden;
     } else {
-      const double after = active_ == Iteration::newton ? last_evaluation : 0;
-      spent_[index(active_)] = cost_[index(active_)] * (iterations_[index(active_)] + after);
+      spent_[index(active_)] = cost_of(active_, iterations_[index(active_)]);
     }
     gave_up_ = false;
     const Iteration rival = other(preferred_);
@@ -73,6 +72,13 @@ class IterationChoice {
   static Iteration other(Iteration iteration) {
     return iteration == Iteration::newton ? Iteration::fixed_point : Iteration::newton;
   }
+
+  double cost_of(Iteration iteration, int iterations) const {
+    return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
+  }
+
+  // A trial is for nothing where two iterations, of which no step takes fewer, cost more than steps do.
+  bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
 
   static constexpr int trial_interval = 64, trial_step = 8;
   static constexpr double last_evaluation = 0.3;  // of forces after the last Newton iteration, in iterations
@@ -103,7 +109,7 @@ class ChainSolver {
       : family_(family),
         stages_(chain, family),
         newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
-        choice_(iteration, newton_cost<Space>(S, chain.links()), S) {
+        choice_(iteration, newton_cost<Space>(S)) {
     tableau_of<S>(family, stages);
   }
 
@@ -135,8 +141,10 @@ class ChainSolver {
     return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
   }
 
-  /// The fixed point takes no note of where it changes what; one more iteration tells.
-  int worst_link() { return choice_.active() == Iteration::newton ? last_.link : fixed_point_.worst_link(stages_); }
+  /// Iterations take no note of where they change what; one more tells.
+  int worst_link() {
+    return choice_.active() == Iteration::newton ? newton_.worst_link(stages_) : fixed_point_.worst_link(stages_);
+  }
 
   int singular_link() const { return -1; }
   static constexpr double largest_turn = 3;

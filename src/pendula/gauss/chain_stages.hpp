@@ -26,6 +26,12 @@ namespace pendula {
 ///
 /// Stages are held as increments U = h b (ξ̇ − z) and W = h b (ż + δ_{i1} g up), so that what is large enters exactly:
 ///   X = ξ + h c z + m U,  Z = z − δ_{i1} h c g up + m W,  m_ij = a_ij/b_j.
+///
+/// Multipliers grow through a step as tension does, and where they grow too far the stage equations fold: with two
+/// stages at h ω = √12, ω what the chain swings with. Of a step so long, M g/l ξ joins τ ξ̇: that is of H the term
+/// Σ M g/l (|ξ|² − l²)/2, which is zero on the motion, and of a chain at rest nothing is left for τ. Then any swinging
+/// goes through any step, as it does in angles.
+///
 /// All stages of one number are a Lanes<S, Real>, everything is done for all of them at once.
 template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
 class ChainStages {
@@ -81,6 +87,7 @@ class ChainStages {
       placed.pull[k] = tau * fma(hb, z, L::load(U));
     }
     if (loaded()) add_loads(i, placed);
+    if (hangs_) add_hanging(i, placed);
     return placed;
   }
 
@@ -93,9 +100,10 @@ class ChainStages {
   /// Σ_j h a_kj f(j) of what acts on a rod but its multiplier, rods at the stages being X.
   Vector impulse_without_multiplier(int i, const Vector& X) const {
     Vector impulse = zero();
-    if (loaded()) {
+    if (loaded() || hangs_) {
       Placed placed{X, {}, impulse};
-      add_loads(i, placed);
+      if (loaded()) add_loads(i, placed);
+      if (hangs_) add_hanging(i, placed);
       for (std::size_t k = 0; k < D; ++k) impulse[k] = -columns_.integral(placed.pull[k]);
     }
     impulse[D - 1] = impulse[D - 1] - columns_.hc() * L(constants_[i].weight);
@@ -108,6 +116,10 @@ class ChainStages {
     if (i == 0) freed[D - 1] = freed[D - 1] - columns_.hc() * L(Real(chain_.gravity()));
     return freed;
   }
+
+  /// What the rod pulls beside its multiplier, over its length: of a step that does not resolve how fast the chain can
+  /// swing, the tension of a chain at rest; otherwise nothing.
+  Real hanging(int i) const { return hangs_ ? constants_[i].hanging : Real(0); }
 
   /// Torque on link i, times h b / l².
   auto torque(int i) const {
@@ -151,6 +163,7 @@ class ChainStages {
     const bool other = Real(h) != columns_.h();
     columns_.prepare(Real(h), Real(alike ? last_h_ : 0));
     if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
+    hangs_ = columns_.h() * columns_.h() * constants_.fastest_swing() > unresolved_swing;
     is_predicted_ = alike;
     if (alike) {
       predict();
@@ -271,6 +284,9 @@ class ChainStages {
  private:
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
+  // (h ω)² from which on a step does not resolve the chain's swinging.
+  static constexpr double unresolved_swing = 4;
+
   // Radians in a step, from which on angles are followed from stage to stage.
   static constexpr double far_turn = 0.5;
 
@@ -302,6 +318,11 @@ class ChainStages {
     for (std::size_t k = 0; k < D; ++k) {
       placed.pull[k] = placed.pull[k] + (drag * advanced[k] - turning[k]);
     }
+  }
+
+  void add_hanging(int i, Placed& placed) const {
+    const L tension = columns_.hb() * L(constants_[i].hanging);
+    for (std::size_t k = 0; k < D; ++k) placed.pull[k] = fma(tension, placed.rod[k], placed.pull[k]);
   }
 
   void set_torques(double time) {
@@ -362,6 +383,7 @@ class ChainStages {
     const Vector advanced = advance(i);
     for (std::size_t k = 0; k < D; ++k) placed.pull[k] = tau * advanced[k];
     if (loaded()) add_loads(i, placed);
+    if (hangs_) add_hanging(i, placed);
     return totals(placed.pull);
   }
 
@@ -429,7 +451,7 @@ class ChainStages {
   detail::LinkArray<Space::torque_components * Z, N, Real> torque_;
   Real fastest_fall_;   // g/l of the shortest link
   double fastest_ = 0;  // bob, squared  [m²/s²]
-  bool torque_is_set_ = false, is_predicted_ = false;
+  bool torque_is_set_ = false, is_predicted_ = false, hangs_ = false;
   double step_ = 0;  // of the stages
   double turn_ = 0;
   double last_h_ = 0;  // of the step that the stages belong to; 0: they belong to none

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <pendula/gauss/chain_links.hpp>
+#include <pendula/gauss/lanes.hpp>
+#include <pendula/gauss/stepper.hpp>
+
+namespace pendula::detail {
+
+/// What one iteration changes the stages of a chain by, gathered link by link; S stages in the lanes of an L.
+template <int S, class L>
+class StageChange {
+  using Real = pendula::ScalarOf<L>;
+
+ public:
+  /// A rod whose increments change by dU; they advance it by h b ξ̇. Returns what it turns by the change.
+  template <std::size_t D>
+  L add(const std::array<L, D>& rod, const std::array<L, D>& dU, const std::array<L, D>& advance,
+        const Real& inverse_square) {
+    const L scale(inverse_square);
+    const L turned = largest_across(rod, dU) * scale;
+    largest_ = max(largest_, turned);
+    scale_ = max(scale_, largest_across(rod, advance) * scale);
+    for (const L& component : dU) all_ = all_ + component;
+    return turned;
+  }
+
+  /// Relative to the fastest turn; NaN if any change is no number: that reaches their sum, though not always the
+  /// largest.
+  double relative() const {
+    if (!std::isfinite(static_cast<double>(over_stages(all_, plus)))) return std::numeric_limits<double>::quiet_NaN();
+    const Real change = largest_of(largest_);
+    return change > 0 ? static_cast<double>(change / largest_of(scale_)) : 0;
+  }
+
+  /// The most that a rod turns in the step  [rad].
+  double turn() const { return static_cast<double>(over_stages(scale_, plus)); }
+
+  /// The largest of all stages; NaN if the last one is.
+  static Real largest_of(const L& lanes) {
+    return over_stages(lanes, [](const Real& x, const Real& y) { return x > y ? x : y; });
+  }
+
+ private:
+  static Real plus(const Real& x, const Real& y) { return x + y; }
+
+  // Of all stages in halves: what is done first does not wait for all the others.
+  template <class Combine>
+  static Real over_stages(const L& lanes, Combine combine) {
+    alignas(pack_alignment) Real values[L::size];
+    lanes.store(values);
+    for (std::size_t count = S; count > 1; count = (count + 1) / 2) {
+      for (std::size_t k = 0; k < count / 2; ++k) values[k] = combine(values[k], values[k + (count + 1) / 2]);
+    }
+    return values[0];
+  }
+
+  L largest_{Real(0)}, scale_{Real(0)}, all_{Real(0)};  // turns of one change, of the step; all changes
+};
+
+/// The link whose change is the largest, or the first whose change is no number.
+template <class Real>
+class WorstLink {
+ public:
+  void see(int link, const Real& change) {
+    if (change <= largest_ || (link_ >= 0 && !std::isfinite(static_cast<double>(largest_)))) return;
+    largest_ = change;
+    link_ = link;
+  }
+  int link() const { return link_; }
+
+ private:
+  Real largest_{0};
+  int link_ = -1;
+};
+
+}  // namespace pendula::detail
