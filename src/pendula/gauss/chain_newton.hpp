@@ -413,8 +413,8 @@ class ChainNewton {
 
   detail::PerLink<Gain, N> gains_;
   PerStage ha_[s]{}, ha_squared_[s]{}, unit_[s]{};  // of k: h a_kj, Σ_i h a_ki h a_ij, δ_kj
-  PerStage inverse_hb_{};         // 1/(h b), of a step of no length zero
-  Real h_{0};                     // that all of them are for
+  PerStage inverse_hb_{};                           // 1/(h b), of a step of no length zero
+  Real h_{0};                                       // that all of them are for
   bool is_set_ = false, positive_ = true;
 };
 
