@@ -86,13 +86,16 @@ double distance(const Chain<Space>& chain, const State<Space>& a, const State<Sp
   return position + (velocity == 0 ? 0 : velocity / speed);
 }
 
-/// Runs again with steps twice as long, or a tolerance a hundred times as large: where that ends elsewhere, the steps
-/// or the chaos of the motion decide where.
+/// Runs again with longer steps, or a tolerance a hundred times as large: where that ends elsewhere, the steps or the
+/// chaos of the motion decide where. Steps of twice the length, where some were taken in parts, would be taken in the
+/// same parts again.
 template <class Space, class Stop>
-void warn_of_step(const io::Scenario<Space>& scenario, const State<Space>& end, Stop stop, Warnings& warnings) {
+void warn_of_step(const io::Scenario<Space>& scenario, const State<Space>& end, const Statistics& statistics, Stop stop,
+                  Warnings& warnings) {
   static constexpr double trusted = 0.01;
+  const bool in_parts = statistics.rejected_steps > 0;
   RunOptions coarser = scenario.run;
-  coarser.step *= 2;
+  coarser.step *= in_parts ? 3 : 2;
   coarser.tolerance *= 100;
   const auto integrator = make_integrator(scenario.chain, coarser);
   const double step = is_adaptive(coarser.method) ? std::numeric_limits<double>::infinity() : coarser.step;
@@ -103,7 +106,9 @@ void warn_of_step(const io::Scenario<Space>& scenario, const State<Space>& end, 
   if (result.stopped) return;
   const double off = result.outcome ? distance(scenario.chain, end, other) : std::numeric_limits<double>::infinity();
   if (off <= trusted) return;
-  const std::string what = is_adaptive(coarser.method) ? "with a hundred times the tolerance" : "with twice the step";
+  const std::string what = is_adaptive(coarser.method) ? "with a hundred times the tolerance"
+                           : in_parts                  ? "with three times the step"
+                                                       : "with twice the step";
   warnings.add(what + " the motion ends " +
                (std::isfinite(off) ? "elsewhere, by " + io::rounded(off, 2) + " of its size" : "before its time") +
                ": the last state cannot be trusted; " + smaller_step_advice(scenario.run));

@@ -124,7 +124,7 @@ class Run {
     if (!is_doubtful(scenario_, statistics)) return;
     const InterruptGuard guard;
     warn_of_step(
-        scenario_, record_.last(), [&] { return guard.interrupted(); }, warnings_);
+        scenario_, record_.last(), statistics, [&] { return guard.interrupted(); }, warnings_);
   }
 
   io::Ending close() {

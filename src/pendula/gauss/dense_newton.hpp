@@ -71,7 +71,7 @@ class DenseStages {
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return coefficients_.stages(); }
   double predictor_gain() const { return last_h_ == 0 ? 1 : coefficients_.predictor_gain(); }
-  static constexpr double largest_turn = Space::dof == 1 ? 3 : 0.25;  // near a pole φ moves faster than all else
+  static constexpr double largest_turn = Space::dof == 1 ? 3 : 0.12;  // near a pole φ moves faster than all else
 
   /// Link whose coordinates fail at the last evaluated stages, −1 where none does.
   int singular_link() const { return singular_link_; }
