@@ -166,7 +166,7 @@ def draw_drift(before: dict, now: dict, folder: Path) -> None:
             axes.loglog(steps, errors, color=color, label=label)
         axes.set(xlabel="steps", title=name)
         axes.grid(True)
-    panels[0].set_ylabel("|ΔH| / Σ M g l, largest in 1 % of the run")
+    panels[0].set_ylabel("|ΔH| / Σ M g l")
     panels[0].legend()
     save(figure, folder / "drift.svg")
 

@@ -27,7 +27,7 @@ from pendula_codegen.printing import Body, print_body
 from pendula_codegen.program import Assignment, Program, shortest_program
 from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 
-ORDER_NAMES = {1: "first", 2: "second", 3: "third"}
+ORDER_NAMES = {1: "first", 2: "second"}
 
 
 @dataclass(frozen=True)
@@ -96,16 +96,14 @@ class LinkKernel:
             )
             for order, name in ORDER_NAMES.items()
         ]
-        return [*first, *others, *self._motion(), *self._loads(), self._newton_terms()]
+        return [*first, *others, *self._motion(), self._torque_load()]
 
     def _motion(self) -> list[LinkFunction]:
-        """Entry points between coordinates and Cartesian vectors, and the force of a momentum and a load."""
-        v, p, u_dot = self._rates, self._leaves("p"), self._leaves("u_dot")
-        momentum, load = self._leaves("momentum"), self._leaves("load")
+        """Entry points between coordinates and Cartesian vectors."""
+        v, u_dot = self._leaves("v"), self._leaves("u_dot")
         inverse = Leaf(self.inverse, "inverse_determinant", "inverse_determinant")
         dual = (("Trig<Real>", "trig"), ("Real", "inverse_determinant"))
         trig = (("Trig<Real>", "trig"),)
-        force = [self._force(a, v, momentum, load) for a in range(self.model.dof)]
         return [
             LinkFunction(
                 "velocity",
@@ -123,14 +121,6 @@ class LinkKernel:
                 (("determinant", self._determinant),),
             ),
             LinkFunction(
-                "tangent_momentum",
-                "Tangent vector sum of p_a u^a, u^a the dual basis; inverse_determinant is of the metric.",
-                (*dual, ("Coordinates<Real>", "p")),
-                (("Cartesian<Real>", "tangent"),),
-                tuple(_entries("tangent", self._sum(p, self._dual))),
-                (*p, inverse),
-            ),
-            LinkFunction(
                 "rates",
                 "Rates v_a = u^a·u_dot of the coordinates from the rate of the direction.",
                 (*dual, ("Cartesian<Real>", "u_dot")),
@@ -138,102 +128,23 @@ class LinkKernel:
                 tuple((f"v[{a}]", _dot(self._dual[a], u_dot)) for a in range(self.model.dof)),
                 (*u_dot, inverse),
             ),
-            LinkFunction(
-                "force",
-                "Generalised force y_a·momentum + u_a·load with y_a = sum of v_b u_ab.",
-                (
-                    *trig,
-                    ("Coordinates<Real>", "v"),
-                    ("Cartesian<Real>", "momentum"),
-                    ("Cartesian<Real>", "load"),
-                ),
-                (("Coordinates<Real>", "f"),),
-                tuple((f"f[{a}]", force[a]) for a in range(self.model.dof)),
-                (*v, *momentum, *load),
-            ),
         ]
 
-    def _loads(self) -> list[LinkFunction]:
-        """Loads on a link as vectors: the generalised force of a load along q_a is u_a·load."""
+    def _torque_load(self) -> LinkFunction:
+        """A torque as a vector: its generalised force along q_a is u_a·load."""
         model = self.model
-        u, u_dot, torque = self._leaves("u"), self._leaves("u_dot"), self._leaves("torque", len(model.torque))
-        direction, rate = (Matrix([leaf.symbol for leaf in leaves]) for leaves in (u, u_dot))
+        u, torque = self._leaves("u"), self._leaves("torque", len(model.torque))
+        direction = Matrix([leaf.symbol for leaf in u])
         axes = [Matrix([int(j == k) for j in range(model.dimension)]) for k in range(model.dimension)]
         turn = dict(zip(model.torque, [leaf.symbol for leaf in torque], strict=True))
         turning = Matrix([model.generalized_torque(direction, axis).subs(turn) for axis in axes])
-        moment, damping = (
-            Leaf(Symbol("size"), "moment", "moment"),
-            Leaf(Symbol("factor"), "damping", "damping"),
-        )
-        braking = -Matrix([model.dissipation(rate).diff(r) for r in rate]).subs(model.damping, damping.symbol)
-        out = (("Cartesian<Real>", "load"),)
-        return [
-            LinkFunction(
-                "weight_load",
-                "Load of gravity; moment is M g l of the link.",
-                (("Real", "moment"),),
-                out,
-                tuple(_entries("load", -moment.symbol * model.up)),
-                (moment,),
-            ),
-            LinkFunction(
-                "torque_load",
-                "Load of a torque on a link of direction u.",
-                (("Torque<Real>", "torque"), ("Cartesian<Real>", "u")),
-                out,
-                tuple(_entries("load", turning)),
-                (*torque, *u),
-            ),
-            LinkFunction(
-                "drag_load",
-                "Load of damping on a link whose direction changes at the rate u_dot.",
-                (("Real", "damping"), ("Cartesian<Real>", "u_dot")),
-                out,
-                tuple(_entries("load", braking)),
-                (damping, *u_dot),
-            ),
-        ]
-
-    def _newton_terms(self) -> LinkFunction:
-        """What one link puts into Newton's matrix, all of it in one pass."""
-        v, momentum, load = self._rates, self._leaves("momentum"), self._leaves("load")
-        y = [
-            self._sum(v, [self.derivative((a, b)) for b in range(self.model.dof)])
-            for a in range(self.model.dof)
-        ]
-        outputs = [entry for a, u_a in enumerate(self._first) for entry in _entries(f"u_a[{a}]", u_a)]
-        outputs += [entry for a, y_a in enumerate(y) for entry in _entries(f"y[{a}]", y_a)]
-        for a, u_a in enumerate(self._first):
-            outputs += [
-                (f"p[{a}]", _dot(u_a, momentum)),
-                (f"f[{a}]", self._force(a, v, momentum, load)),
-            ]
-        for k, (a, b) in enumerate(self.indices(2)):
-            bent = self._sum(v, [self.derivative((a, b, c)) for c in range(self.model.dof)])
-            second = self.derivative((a, b))
-            outputs += [
-                (f"p_D_q[{k}]", _dot(second, momentum)),
-                (f"f_D_q[{k}]", _dot(bent, momentum) + _dot(second, load)),
-            ]
         return LinkFunction(
-            "newton_terms",
-            "u_a and y_a; p_a = u_a·momentum and f_a of force, and derivatives at fixed momentum, load, v.",
-            (
-                ("Trig<Real>", "trig"),
-                ("Coordinates<Real>", "v"),
-                ("Cartesian<Real>", "momentum"),
-                ("Cartesian<Real>", "load"),
-            ),
-            (
-                ("First<Real>", "u_a"),
-                ("First<Real>", "y"),
-                ("Coordinates<Real>", "p"),
-                ("Coordinates<Real>", "f"),
-                ("Symmetric<Real>", "p_D_q"),
-                ("Symmetric<Real>", "f_D_q"),
-            ),
-            tuple(outputs),
-            (*v, *momentum, *load),
+            "torque_load",
+            "Load of a torque on a link of direction u.",
+            (("Torque<Real>", "torque"), ("Cartesian<Real>", "u")),
+            (("Cartesian<Real>", "load"),),
+            tuple(_entries("load", turning)),
+            (*torque, *u),
         )
 
     inverse = Symbol("inverse")
@@ -272,22 +183,14 @@ class LinkKernel:
         return simplify(value * self._determinant) * self.inverse
 
     def _leaves(self, name: str, count: int | None = None) -> tuple[Leaf, ...]:
-        """Components of the vector argument `name`, Cartesian, or one a coordinate for rates and momenta."""
+        """Components of the vector argument `name`, Cartesian, or one a coordinate for rates."""
         if count is None:
-            count = self.model.dof if name in ("v", "p") else self.model.dimension
+            count = self.model.dof if name == "v" else self.model.dimension
         return tuple(Leaf(Symbol(f"{name}_{k}"), f"{name}[{k}]", name) for k in range(count))
-
-    @property
-    def _rates(self) -> tuple[Leaf, ...]:
-        return self._leaves("v")
 
     def _sum(self, factors: Sequence[Leaf], vectors: Sequence[Matrix]) -> Matrix:
         terms = (factor.symbol * vector for factor, vector in zip(factors, vectors, strict=True))
         return sum(terms, zeros(self.model.dimension, 1))
-
-    def _force(self, a: int, v: Sequence[Leaf], momentum: Sequence[Leaf], load: Sequence[Leaf]) -> Expr:
-        y_a = self._sum(v, [self.derivative((a, b)) for b in range(self.model.dof)])
-        return _dot(y_a, momentum) + _dot(self._first[a], load)
 
     def angles(self) -> list[str]:
         """C++ for the coordinates of a direction u."""

@@ -59,12 +59,13 @@ class ChainFixedPoint {
                              const L& beyond, const L& before) {
     const Real* free = stages.rods().free(i);
     const Vector freed = stages.freed(i, W);
-    L product(stages.rods().product(i));  // X·Z, of which ξ·z is exact
+    L product(stages.rods().product(i)), moving(Real(0));  // X·Z = ξ·z, which is exact, + (X − ξ)·z + X·(Z − z)
     for (std::size_t k = 0; k < D; ++k) {
-      product = fma(here.rod[k], freed[k], fma(here.moved[k], L(free[k]), product));
+      moving = fma(here.moved[k], L(free[k]), moving);
+      product = fma(here.rod[k], freed[k], product);
     }
     const L square = L(stages.constants(i).inverse_masses) * dot(here.rod, here.rod);
-    const MultiplierRow<L> next = row.next(square, beyond, before, -product);
+    const MultiplierRow<L> next = row.next(square, beyond, before, -(product + moving));
     stages.keep(i, here.rod, freed, next);
     return next;
   }

@@ -81,8 +81,7 @@ class ChainStages {
     for (std::size_t k = 0; k < D; ++k) {
       const Real* U = stages_[i] + k * Z;
       const L z(free[k]);
-      const L rest = fma(hc_low, z, columns_.integral(U) + L(along_low[k]));
-      placed.moved[k] = fma(hc, z, rest);
+      placed.moved[k] = fma(hc, z, columns_.integral(U, fma(hc_low, z, L(along_low[k]))));
       placed.rod[k] = L(along[k]) + placed.moved[k];
       placed.pull[k] = tau * fma(hb, z, L::load(U));
     }
@@ -112,7 +111,7 @@ class ChainStages {
 
   /// Z − z, from W.
   Vector freed(int i, const Vector& W) const {
-    Vector freed = components<D>([&](std::size_t k) { return columns_.integral(W[k]) + L(state_.free_low(i)[k]); });
+    Vector freed = components<D>([&](std::size_t k) { return columns_.integral(W[k], L(state_.free_low(i)[k])); });
     if (i == 0) freed[D - 1] = freed[D - 1] - columns_.hc() * L(Real(chain_.gravity()));
     return freed;
   }

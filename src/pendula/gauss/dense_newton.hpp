@@ -71,7 +71,7 @@ class DenseStages {
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return coefficients_.stages(); }
   double predictor_gain() const { return last_h_ == 0 ? 1 : coefficients_.predictor_gain(); }
-  static constexpr double largest_turn = Space::dof == 1 ? 3 : 0.12;  // near a pole φ moves faster than all else
+  static constexpr double largest_turn = Space::dof == 1 ? 3 : 0.25;  // near a pole φ moves faster than all else
 
   /// Link whose coordinates fail at the last evaluated stages, −1 where none does.
   int singular_link() const { return singular_link_; }
@@ -183,11 +183,23 @@ class DenseStages {
     }
   }
 
-  /// The most that a coordinate changes in the step  [rad].
-  double turn_of(const PerStage<Vector, S>& velocities) const {
+  /// The most that a coordinate changes in the step, φ near a pole twice: it does not go on like that there  [rad].
+  double turn_of(const PerStage<Vector, S>& positions, const PerStage<Vector, S>& velocities) const {
     double turn = 0;
-    for (int i = 0; i < stages(); ++i) turn += std::abs(coefficients_.hb(i)) * velocities[i].cwiseAbs().maxCoeff();
+    for (int i = 0; i < stages(); ++i) {
+      turn += std::abs(coefficients_.hb(i)) * fastest_coordinate(positions[i], velocities[i]);
+    }
     return turn;
+  }
+  static double fastest_coordinate(const Vector& q, const Vector& v) {
+    if constexpr (Space::dof == 1) {
+      return v.cwiseAbs().maxCoeff();
+    } else {
+      const auto theta = q.template head<Kernel::links>().array();
+      const auto twice = 1 + theta.cos().square();
+      return std::max(v.template head<Kernel::links>().cwiseAbs().maxCoeff(),
+                      (twice * v.template tail<Kernel::links>().array().abs()).maxCoeff());
+    }
   }
 
   static pendula::State<Space, Kernel::links> at(const Vector& q, const Vector& v) { return {0, q, v}; }
@@ -278,7 +290,7 @@ class DenseMomentumNewton : public detail::DenseStages<Kernel, S> {
   }
 
   double work() const { return this->work_at(position_, unknown_); }
-  double turn() const { return this->turn_of(unknown_); }
+  double turn() const { return this->turn_of(position_, unknown_); }
 
   void accept() {
     const auto [moved, pushed] = increments();
@@ -417,7 +429,7 @@ class DenseVelocityNewton : public detail::DenseStages<Kernel, S> {
   double defect() { return this->defect_at(q_.value, v_.value, velocity_); }
 
   double work() const { return this->work_at(position_, velocity_); }
-  double turn() const { return this->turn_of(velocity_); }
+  double turn() const { return this->turn_of(position_, velocity_); }
 
   void accept() {
     const auto [moved, pushed] = increments();

@@ -50,7 +50,7 @@ class RodState {
   const Real* along_low(int i) const { return along_low_[i]; }  ///< what it lost to rounding
   const Real* free(int i) const { return free_[i]; }            ///< z_i  [m/s]
   const Real* free_low(int i) const { return free_low_[i]; }
-  const Real& product(int i) const { return product_[i]; }  ///< ξ_i·z_i, of the last gauge
+  const Real& product(int i) const { return product_[i]; }  ///< ξ_i·z_i without their low parts, of the last gauge
 
   Vector direction(int i, const Real& inverse_length) const {
     return components<D>([&](std::size_t k) { return along_[i][k] * inverse_length; });
@@ -123,7 +123,7 @@ class RodState {
     }
   }
 
-  /// Moves rods [begin, end) by h z and what their stages add to ξ and z; of a whole block, `block` rods are moved.
+  /// Moves a block of rods from `begin` on by h z, z without its low part, and what their stages add to ξ and z.
   void advance(int begin, const Real& h, const Real* moved, const Real* pushed) {
     Real* __restrict rod = along_[begin], * __restrict rod_low = along_low_[begin];
     Real* __restrict free = free_[begin], * __restrict free_low = free_low_[begin];
@@ -131,7 +131,7 @@ class RodState {
     for (std::size_t k = 0; k < block_size; ++k) {
       const Twofold<Real> coasted = exact_product(h, free[k]);
       const Twofold<Real> near = exact_sum(rod[k], coasted.value);
-      const Real rest = near.low + (rod_low[k] + (coasted.low + h * free_low[k]));
+      const Real rest = near.low + (rod_low[k] + coasted.low);
       const Twofold<Real> added = exact_sum(rest, moved[k]);
       const Twofold<Real> there = exact_sum(near.value, added.value);
       rod[k] = there.value;
@@ -237,7 +237,7 @@ class RodState {
       gauge.change[k] = gained[k] + shift.value;
       const Twofold<Real> product = exact_product(along[k], z.value);
       gauge.product[k] = product.value;
-      gauge.product_low[k] = product.low + (along[k] * z.low + along_low[k] * z.value);
+      gauge.product_low[k] = product.low;
     }
   }
 

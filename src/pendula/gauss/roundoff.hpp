@@ -53,7 +53,7 @@ class RoundoffStop {
     if (count_ < 3) return false;
     if (pair == 0) return true;
     const double rate = pair / pair_before;
-    if (rate < 1 && pair * rate <= negligible()) return true;
+    if (rate < 1 && pair * rate <= lost_in_rounding()) return true;
     if (count_ == 3) first_ = best_ = pair_before;
     const bool stalled = has_stalled(last_[0] / last_[2], 2.0 / std::max(1, count_ - 3));
     best_ = std::min(best_, pair);
@@ -82,16 +82,20 @@ class RoundoffStop {
     return safety * constant_ * correction * correction <= negligible();
   }
 
-  // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding.
+  // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding; of
+  // those that are as small as a last bit, half the way on a scale of powers will do.
   bool has_stalled(double rate, double exponent) const {
-    const bool suspicious = last_[0] <= small_ && rate >= 0.5;
-    return suspicious && rate >= (1 + std::pow(best_ / first_, exponent)) / 2;
+    if (last_[0] > small_) return false;
+    const double average = std::pow(best_ / first_, exponent);
+    return rate >= std::max(0.5, (1 + average) / 2) || (last_[0] <= epsilon_ && rate >= std::sqrt(average));
   }
 
   static constexpr double double_epsilon = std::numeric_limits<double>::epsilon();
 
   double coarser() const { return epsilon_ / double_epsilon; }  // than double
   double negligible() const { return 1e-20 * coarser(); }
+  // What the next correction of a fixed point may be, a thousandth of a last bit.
+  double lost_in_rounding() const { return 1e-19 * coarser(); }
   // Corrections below may be rounding alone and say nothing of C.
   double noise() const { return 1e-12 * coarser(); }
 

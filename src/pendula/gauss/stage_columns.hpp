@@ -45,12 +45,12 @@ class StageColumns {
   L hc() const { return L::load(hc_); }          ///< h c
   L hc_low() const { return L::load(hc_low_); }  ///< what hc lost to rounding
 
-  /// Σ_j m_ij x_j for all i, with x already times h b_j.
-  L integral(const Real* x) const { return product(m_, x); }
-  L integral(const L& x) const {
+  /// Σ_j m_ij x_j for all i, with x already times h b_j, added to `start`.
+  L integral(const Real* x, const L& start) const { return product(m_, x, start); }
+  L integral(const L& x, const L& start = L(Real(0))) const {
     alignas(pack_alignment) Real stored[Z];
     x.store(stored);
-    return product(m_, stored);
+    return product(m_, stored, start);
   }
 
   /// The polynomial through stage values that hold the factor h b, at the start of their step.
@@ -75,8 +75,8 @@ class StageColumns {
   }
 
  private:
-  static L product(const Real (&columns)[stages][Z], const Real* x) {
-    L even = L(x[0]) * L::load(columns[0]);
+  static L product(const Real (&columns)[stages][Z], const Real* x, const L& start = L(Real(0))) {
+    L even = fma(L(x[0]), L::load(columns[0]), start);
     if constexpr (S == 1) return even;
     L odd = L(x[S > 1]) * L::load(columns[S > 1]);
     for (std::size_t j = 2; j < S; j += 2) {
