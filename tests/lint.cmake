@@ -11,9 +11,13 @@ endif()
 list(APPEND files ${chains})
 list(JOIN files "\n" lines)
 file(WRITE "${BUILD}/lint.txt" "${lines}\n")
-# The compilation database is the compiler's: clang-tidy need not know each of its warnings, nor g++'s symbols.
+# The compilation database is the compiler's: clang-tidy need not know each of its warnings, nor g++'s symbols, and
+# cannot read another compiler's precompiled headers.
 file(READ "${BUILD}/compile_commands.json" database)
 string(REPLACE " -fno-gnu-unique" "" database "${database}")
+string(REGEX REPLACE " -Winvalid-pch -include [^ ]+" "" database "${database}")
+string(REGEX REPLACE " -Winvalid-pch (-Xclang )?-include-pch -Xclang [^ ]+ -Xclang -include -Xclang [^ ]+" "" database
+       "${database}")
 file(WRITE "${BUILD}/lint/compile_commands.json" "${database}")
 execute_process(
   COMMAND xargs -P ${jobs} -n 1 -a "${BUILD}/lint.txt" "${CLANG_TIDY}" --quiet -p "${BUILD}/lint"
