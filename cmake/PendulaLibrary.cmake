@@ -121,8 +121,9 @@ function(_pendula_compile_copy copy arch)
 endfunction()
 
 function(_pendula_seal target copy symbol)
+  set(objects "$<FILTER:$<TARGET_OBJECTS:${copy}>,EXCLUDE,cmake_pch>")  # CMake counts precompiled headers among them
   if(NOT PENDULA_ELF)
-    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${copy}>)
+    target_sources(${target} PRIVATE ${objects})
     return()
   endif()
   set(sealed "${CMAKE_CURRENT_BINARY_DIR}/$<CONFIG>/${copy}.o")
@@ -130,12 +131,12 @@ function(_pendula_seal target copy symbol)
     OUTPUT "${sealed}"
     COMMAND "${CMAKE_COMMAND}" -E make_directory "${CMAKE_CURRENT_BINARY_DIR}/$<CONFIG>"
     COMMAND "${CMAKE_CXX_COMPILER}" -r -nostdlib -fuse-ld=bfd -Wl,--force-group-allocation -o "${sealed}.open"
-            $<TARGET_OBJECTS:${copy}>
+            ${objects}
     COMMAND "${CMAKE_COMMAND}" -D "OBJECT=${sealed}.open" -D "OBJDUMP=${CMAKE_OBJDUMP}" -D "COPY=${copy}"
             -P "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
     COMMAND "${CMAKE_OBJCOPY}" --keep-global-symbol=${symbol} "${sealed}.open" "${sealed}"
     COMMAND "${CMAKE_COMMAND}" -E rm "${sealed}.open"
-    DEPENDS $<TARGET_OBJECTS:${copy}> "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
+    DEPENDS ${objects} "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
     COMMENT "Sealing ${copy}.o" COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties("${sealed}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
   target_sources(${target} PRIVATE "${sealed}")
