@@ -195,10 +195,12 @@ class DenseStages {
     if constexpr (Space::dof == 1) {
       return v.cwiseAbs().maxCoeff();
     } else {
-      const auto theta = q.template head<Kernel::links>().array();
-      const auto twice = 1 + theta.cos().square();
-      return std::max(v.template head<Kernel::links>().cwiseAbs().maxCoeff(),
-                      (twice * v.template tail<Kernel::links>().array().abs()).maxCoeff());
+      double fastest = v.template head<Kernel::links>().cwiseAbs().maxCoeff();
+      for (int i = 0; i < Kernel::links; ++i) {
+        const double phi_dot = std::abs(v[Kernel::links + i]);
+        fastest = std::max(fastest, std::abs(std::sin(q[i])) < 0.25 ? 2 * phi_dot : phi_dot);
+      }
+      return fastest;
     }
   }
 

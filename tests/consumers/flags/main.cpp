@@ -92,7 +92,7 @@ int main() {
   std::cout << "library for " << library().instruction_set << ", heap aligned to " << EIGEN_DEFAULT_ALIGN_BYTES << '\n';
   const RunOptions chain{.solver = Solver::chain}, dense{.solver = Solver::dense}, rk4{.method = Method::rk4};
   // Two discretisations of one motion: with so many stages, both are the motion.
-  const RunOptions exact_chain{.solver = Solver::chain, .stages = 6}, exact_dense{.solver = Solver::dense, .stages = 6};
+  const RunOptions exact_chain{.stages = 6, .solver = Solver::chain}, exact_dense{.stages = 6, .solver = Solver::dense};
   const auto planar = loaded_chain<Planar>();
 
   bool good = same("here and there", by_library<Planar>(chain), by_stepper(planar));
