@@ -15,11 +15,7 @@ namespace pendula::test {
 namespace {
 
 // Sanitizers take minutes to compile eight stages.
-#ifdef PENDULA_FEW_KERNELS
-constexpr int many_stages = 3;
-#else
 constexpr int many_stages = 8;
-#endif
 
 template <class Space, int S, class Real>
 State<Space, Eigen::Dynamic, Real> end_state(const Chain<Space>& chain, const State<Space>& start, Iteration iteration,
@@ -78,8 +74,6 @@ TYPED_TEST(NumberType, EndsWhereAWiderOneDoesInThePlane) {
   }
 }
 
-#ifndef PENDULA_FEW_KERNELS
-
 // An order that double is too short to show. The coefficients must have all the bits of a long double, too.
 TEST(LongDouble, ShowsTheOrderOfEightStages) {
   if (std::numeric_limits<long double>::digits < 64) GTEST_SKIP() << "long double is double here";
@@ -101,8 +95,6 @@ TEST(LongDouble, KeepsEnergyToItsOwnLastBits) {
   const auto ulps = static_cast<double>(change / energy_scale(chain) / std::numeric_limits<long double>::epsilon());
   EXPECT_LT(std::abs(ulps), 2);  // measured 0.27
 }
-
-#endif
 
 }  // namespace
 }  // namespace pendula::test
