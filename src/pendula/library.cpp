@@ -51,11 +51,11 @@ const Library& asked_for(std::string_view name) {
 }  // namespace
 
 const Library& library() {
-  static const Library& chosen = []() -> const Library& {
+  static const Library* const chosen = [] {
     const char* wanted = std::getenv("PENDULA_ARCH");
-    return wanted == nullptr || *wanted == '\0' ? best() : asked_for(wanted);
+    return wanted == nullptr || *wanted == '\0' ? &best() : &asked_for(wanted);
   }();
-  return chosen;
+  return *chosen;
 }
 
 }  // namespace pendula
