@@ -9,6 +9,7 @@ include_guard(GLOBAL)
 
 # Stages of the chain integrators, those of one translation unit in one item.
 set(_pendula_chain_stages "1 2 3 4" "5 6" "7 8")
+
 # Flags of each copy: no vector instructions but those that src/pendula/library.cpp asks the processor for, whatever
 # CMAKE_CXX_FLAGS say before, -march=native or -mavx. Without SSE3 there is nothing above it.
 set(_pendula_flags_sse2 -march=x86-64 -mno-sse3)
@@ -116,7 +117,7 @@ function(_pendula_compile_copy copy arch)
   target_compile_definitions(${copy} PRIVATE PENDULA_LIBRARY=pendula_library_${arch} PENDULA_INSTRUCTION_SET="${arch}")
   target_include_directories(${copy} PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
   target_link_libraries(${copy} PRIVATE pendula_kernels pendula::xsimd)
-  target_precompile_headers(${copy} PRIVATE <Eigen/Dense> <xsimd/xsimd.hpp>)  # a fifth of the time to compile it all
+  target_precompile_headers(${copy} PRIVATE <Eigen/Dense> <xsimd/xsimd.hpp>)
   set_target_properties(${copy} PROPERTIES POSITION_INDEPENDENT_CODE ON INTERPROCEDURAL_OPTIMIZATION OFF)
   list(GET PENDULA_ARCHS 0 first)
   if(NOT arch STREQUAL first)

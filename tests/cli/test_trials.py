@@ -58,7 +58,9 @@ def test_newton_may_meet_a_pole_where_the_motion_does_not(trial):
     assert error(run, "dense_silent_momentum_s2") < 1e-6  # measured 1e-7
 
 
-@pytest.mark.parametrize("name", ["ok_with_nan", "dense_1326", "dense_silent_momentum_s2", "stiff"])
+@pytest.mark.parametrize(
+    "name", ["ok_with_nan", "dense_1326", "dense_silent_momentum_s2", "stiff", "same_parts"]
+)
 def test_right_or_said(trial, name):
     run = trial(name)
     assert said(run) or error(run, name) < 1e-6

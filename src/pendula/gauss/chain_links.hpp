@@ -167,7 +167,7 @@ struct LinkConstants {
   Real inverse_masses{0};                     ///< 1/m_i + 1/m_{i−1}, of the bobs at both ends of the rod; 1/m_0 = 0
   Real drag{0};                               ///< λ/l²
   Real weight{0};                             ///< M g, M the mass that the rod carries
-  Real hanging{0};                            ///< M g/l, its tension over its length where the chain hangs at rest
+  Real hanging{0};                            ///< M |g|/l, its tension over its length where the chain hangs at rest
 };
 
 /// The constants of a chain link by link.
@@ -188,10 +188,10 @@ class ChainLinks {
       link.inverse_masses = link.inverse_mass.value + (i == 0 ? Real(0) : Real(1 / Real(chain.masses()[i - 1])));
       link.drag = Real(chain.damping()[i]) * link.inverse_square;
       link.weight = (carried += link.mass) * Real(chain.gravity());
-      link.hanging = link.weight * link.inverse_length;
       using std::abs, std::max;
+      link.hanging = abs(link.weight) * link.inverse_length;
       const Real of_neighbours = link.inverse_masses - (i + 1 < links() ? Real(0) : link.inverse_mass.value);
-      fastest_swing_ = max(fastest_swing_, Real((link.inverse_masses + of_neighbours) * abs(link.hanging)));
+      fastest_swing_ = max(fastest_swing_, Real((link.inverse_masses + of_neighbours) * link.hanging));
     }
   }
 

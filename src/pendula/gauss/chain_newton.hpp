@@ -20,7 +20,7 @@ namespace pendula {
 ///   W_b[k,j] = H_kj V(k)·t_b(j),  F_b[k,j] = H_kj t_b(k)·V(j)
 ///   Z = T − X̂ E⁻¹ W,  v₀ = −X̂ E⁻¹ (X·V)                                  changes of V that keep X·V = 0: v₀ + Z α
 ///   L = Tᵀ + F E₂⁻¹ X̂ᵀ                                                    what of q no multiplier changes
-///   N = τ H − H τ − (λ/l²) H + H (torque/l² ×) H − (M g/l) H²              ∂q/∂V at fixed τ and G
+///   N = τ H − H τ − (λ/l²) H + H (torque/l² ×) H − (M |g|/l) H²             ∂q/∂V at fixed τ and G
 /// where the last term is that of steps which do not resolve the chain's swinging.
 /// Multipliers follow from E₂ τ = X̂·(G − H f(τ = 0)). Inward, with δG_{i+1} = P δw_i + g from the link below and
 /// B = P + m I:

@@ -77,7 +77,8 @@ class IterationChoice {
     return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
   }
 
-  // A trial is for nothing where two iterations, of which no step takes fewer, cost more than steps do.
+  // A trial is for nothing where two iterations cost more than steps do: a step that needs but one of Newton's takes
+  // hardly more of the other.
   bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
 
   static constexpr int trial_interval = 64, trial_step = 8;

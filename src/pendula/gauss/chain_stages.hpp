@@ -28,9 +28,9 @@ namespace pendula {
 ///   X = ξ + h c z + m U,  Z = z − δ_{i1} h c g up + m W,  m_ij = a_ij/b_j.
 ///
 /// Multipliers grow through a step as tension does, and where they grow too far the stage equations fold: with two
-/// stages at h ω = √12, ω what the chain swings with. Of a step so long, M g/l ξ joins τ ξ̇: that is of H the term
-/// Σ M g/l (|ξ|² − l²)/2, which is zero on the motion, and of a chain at rest nothing is left for τ. Then any swinging
-/// goes through any step, as it does in angles.
+/// stages at h ω = √12, ω what the chain swings with. Of a step so long, M |g|/l ξ joins τ ξ̇: that is of H the term
+/// Σ M |g|/l (|ξ|² − l²)/2, which is zero on the motion, and of a chain at rest nothing is left for τ. Then any
+/// swinging goes through any step, as it does in angles.
 ///
 /// All stages of one number are a Lanes<S, Real>, everything is done for all of them at once.
 template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>

@@ -38,7 +38,7 @@ class StageChange {
   /// The most that a rod turns in the step  [rad].
   double turn() const { return static_cast<double>(over_stages(scale_, plus)); }
 
-  /// The largest of all stages; NaN if the last one is.
+  /// The largest of all stages.
   static Real largest_of(const L& lanes) {
     return over_stages(lanes, [](const Real& x, const Real& y) { return x > y ? x : y; });
   }
