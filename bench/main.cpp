@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 #include <iostream>
-#include <pendula/library.hpp>
+#include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
 #include <race.hpp>
 #include <steps.hpp>

@@ -1,5 +1,5 @@
 # The compiled library: all of src/library, once for each instruction set, in one static library; which copy runs is
-# decided when the program does (src/pendula/library.cpp).
+# decided when the program does (src/pendula/run/library.cpp).
 #
 # Code compiled for AVX-512 must not be what a linker takes for some inline function that other code uses, too: a machine
 # without AVX-512 would die there. Nor may a program's copy of such a function, compiled with other flags, be what the
@@ -10,7 +10,7 @@ include_guard(GLOBAL)
 # Stages of the chain integrators, those of one translation unit in one item.
 set(_pendula_chain_stages "1 2 3 4" "5 6" "7 8")
 
-# Flags of each copy: no vector instructions but those that src/pendula/library.cpp asks the processor for, whatever
+# Flags of each copy: no vector instructions but those that src/pendula/run/library.cpp asks the processor for, whatever
 # CMAKE_CXX_FLAGS say before, -march=native or -mavx. Without SSE3 there is nothing above it.
 set(_pendula_flags_sse2 -march=x86-64 -mno-sse3)
 set(_pendula_flags_avx2 ${_pendula_flags_sse2} -mavx2 -mfma)

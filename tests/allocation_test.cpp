@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <new>
-#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/chain/chain_solver.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"

@@ -1,7 +1,7 @@
 // The stage equations along a chain: Newton and the fixed point find one solution, Newton is exact, and chain and dense
 // solver are two discretisations of one motion, equal to the order of the method; with all loads.
 
-#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/chain/chain_solver.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 
 #include "support/kernels.hpp"

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <pendula/chain.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/state.hpp>
 
 namespace pendula {
 namespace {

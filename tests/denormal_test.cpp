@@ -7,7 +7,7 @@
 #include <xmmintrin.h>
 
 #include <array>
-#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/chain/chain_solver.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"

@@ -1,8 +1,8 @@
 // The run-time factory, the explicit methods, the simulation loop, and how failures are told.
 
-#include <pendula/dense_forward_dynamics.hpp>
-#include <pendula/gauss/chain_forward_dynamics.hpp>
-#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/chain/chain_forward_dynamics.hpp>
+#include <pendula/chain/chain_solver.hpp>
+#include <pendula/explicit/dense_forward_dynamics.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 
 #include "support/kernels.hpp"

@@ -1,6 +1,6 @@
 // What the generated kernels say agrees with itself, with the O(n) invariants, and in every number type.
 
-#include <pendula/invariants.hpp>
+#include <pendula/chain/invariants.hpp>
 #include <unsupported/Eigen/AutoDiff>
 #include <xsimd/xsimd.hpp>
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <pendula/gauss/lanes.hpp>
-#include <pendula/gauss/sincos.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/sincos.hpp>
 #include <random>
 
 namespace pendula::test {

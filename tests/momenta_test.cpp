@@ -1,4 +1,4 @@
-#include <pendula/momenta.hpp>
+#include <pendula/chain/momenta.hpp>
 
 #include <algorithm>
 #include <cmath>

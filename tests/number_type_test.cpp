@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/chain/chain_solver.hpp>
+#include <pendula/chain/invariants.hpp>
 #include <pendula/gauss/stepper.hpp>
-#include <pendula/invariants.hpp>
 
 #include "support/random_chain.hpp"
 

@@ -1,6 +1,6 @@
 // Spatial chains at and through the pole, where (θ, φ) fail: what the user reads there, what is conserved.
 
-#include <pendula/heading.hpp>
+#include <pendula/chain/heading.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"

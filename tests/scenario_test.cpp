@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
-#include <pendula/invariants.hpp>
-#include <pendula/momenta.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/chain/momenta.hpp>
 #include <string>
 #include <vector>
 

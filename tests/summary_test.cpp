@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <pendula/invariants.hpp>
+#include <pendula/chain/invariants.hpp>
 #include <set>
 #include <string>
 

@@ -5,9 +5,9 @@
 #include <iostream>
 #include <limits>
 #include <memory>
-#include <pendula/integrator.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/library.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/library.hpp>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <pendula/integrator.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/simulation.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/simulation.hpp>
 #include <string>
 
 #include "cli/warnings.hpp"

@@ -1,6 +1,6 @@
 #include <iomanip>
 #include <iostream>
-#include <pendula/integrator.hpp>
+#include <pendula/run/integrator.hpp>
 
 #include "cli/commands.hpp"
 

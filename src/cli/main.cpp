@@ -7,7 +7,7 @@
 #include <exception>
 #include <iostream>
 #include <new>
-#include <pendula/library.hpp>
+#include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
 #include <stdexcept>
 #include <string>

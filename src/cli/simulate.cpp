@@ -6,9 +6,9 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <pendula/integrator.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/simulation.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/simulation.hpp>
 #include <stdexcept>
 #include <string>
 #include <system_error>

@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <optional>
-#include <pendula/chain.hpp>
+#include <pendula/chain/chain.hpp>
 #include <string_view>
 
 namespace pendula::io {

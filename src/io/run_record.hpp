@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <pendula/chain.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/chain/state.hpp>
 #include <vector>
 
 namespace pendula::io {

@@ -9,7 +9,7 @@
 #include <iostream>
 #include <limits>
 #include <numbers>
-#include <pendula/momenta.hpp>
+#include <pendula/chain/momenta.hpp>
 #include <stdexcept>
 #include <utility>
 

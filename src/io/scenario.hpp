@@ -5,9 +5,9 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <pendula/chain.hpp>
-#include <pendula/options.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/system/options.hpp>
 #include <span>
 #include <string>
 #include <string_view>

@@ -3,12 +3,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
-#include <pendula/chain.hpp>
-#include <pendula/integrator.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/options.hpp>
-#include <pendula/outcome.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
 #include <string>
 #include <vector>
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <pendula/space.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/space.hpp>
+#include <pendula/chain/state.hpp>
 #include <string>
 
 #include "io/line_file.hpp"

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <pendula/chain.hpp>
-#include <pendula/options.hpp>
-#include <pendula/plain_integrator.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 
 namespace pendula {
 

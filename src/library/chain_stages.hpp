@@ -1,6 +1,6 @@
 #pragma once
 
-#include <pendula/gauss/chain_solver.hpp>
+#include <pendula/chain/chain_solver.hpp>
 #include <pendula/gauss/gauss_integrator.hpp>
 
 #include "library/chain_integrator.hpp"

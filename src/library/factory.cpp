@@ -1,10 +1,10 @@
 #include "library/factory.hpp"
 
-#include <pendula/chain_numbers.hpp>
-#include <pendula/explicit_integrator.hpp>
-#include <pendula/gauss/chain_forward_dynamics.hpp>
+#include <pendula/chain/chain_forward_dynamics.hpp>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/explicit/explicit_integrator.hpp>
 #include <pendula/gauss/tableau.hpp>
-#include <pendula/integrator.hpp>
+#include <pendula/run/integrator.hpp>
 #include <stdexcept>
 #include <string>
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <pendula/options.hpp>
-#include <pendula/plain_chain.hpp>
-#include <pendula/plain_integrator.hpp>
+#include <pendula/chain/plain_chain.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 
 namespace pendula {
 

@@ -1,4 +1,4 @@
-#include <pendula/gauss/linear_system.hpp>
+#include <pendula/numeric/linear_system.hpp>
 
 namespace pendula {
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <pendula/chain.hpp>
-#include <pendula/kernel_traits.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/kernel_traits.hpp>
+#include <pendula/chain/state.hpp>
 #include <random>
 
 namespace pendula::test {

@@ -4,16 +4,16 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <pendula/chain.hpp>
-#include <pendula/gauss/compensated.hpp>
-#include <pendula/gauss/linear_system.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/chain/kernel_traits.hpp>
+#include <pendula/chain/state.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/gauss/tableau.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/kernel_traits.hpp>
-#include <pendula/outcome.hpp>
-#include <pendula/state.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/linear_system.hpp>
+#include <pendula/system/outcome.hpp>
 #include <type_traits>
 #include <vector>
 

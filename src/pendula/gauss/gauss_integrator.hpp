@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/gauss/tableau.hpp>
-#include <pendula/options.hpp>
-#include <pendula/plain_integrator.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 #include <string_view>
 
 namespace pendula {

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <array>
-#include <pendula/gauss/compensated.hpp>
-#include <pendula/gauss/lanes.hpp>
 #include <pendula/gauss/tableau.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/lanes.hpp>
 
 namespace pendula::detail {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <pendula/gauss/compensated.hpp>
 #include <pendula/gauss/roundoff.hpp>
-#include <pendula/options.hpp>
-#include <pendula/outcome.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
 
 namespace pendula {
 

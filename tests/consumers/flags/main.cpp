@@ -2,8 +2,8 @@
 // right and can be freed.
 #include <iostream>
 #include <memory>
-#include <pendula/dense_forward_dynamics.hpp>
-#include <pendula/explicit_integrator.hpp>
+#include <pendula/explicit/dense_forward_dynamics.hpp>
+#include <pendula/explicit/explicit_integrator.hpp>
 #include <pendula/kernels/planar_3.hpp>
 #include <pendula/pendula.hpp>
 #include <stdexcept>

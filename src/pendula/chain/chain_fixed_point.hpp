@@ -1,7 +1,7 @@
 #pragma once
 
-#include <pendula/gauss/chain_stages.hpp>
-#include <pendula/gauss/stage_change.hpp>
+#include <pendula/chain/chain_stages.hpp>
+#include <pendula/chain/stage_change.hpp>
 #include <pendula/gauss/stepper.hpp>
 
 namespace pendula {

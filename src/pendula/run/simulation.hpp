@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <pendula/integrator.hpp>
-#include <pendula/outcome.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/system/outcome.hpp>
 #include <stdexcept>
 #include <string>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <pendula/chain.hpp>
-#include <pendula/space.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/space.hpp>
 #include <stdexcept>
 #include <string>
 #include <type_traits>

@@ -4,10 +4,10 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
-#include <pendula/chain.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/space.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/chain/space.hpp>
+#include <pendula/chain/state.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>

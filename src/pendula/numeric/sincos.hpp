@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <pendula/gauss/lanes.hpp>
+#include <pendula/numeric/lanes.hpp>
 #include <tuple>
 #include <xsimd/xsimd.hpp>
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <pendula/gauss/block.hpp>
-#include <pendula/gauss/chain_stages.hpp>
-#include <pendula/gauss/stage_change.hpp>
+#include <pendula/chain/chain_stages.hpp>
+#include <pendula/chain/stage_change.hpp>
 #include <pendula/gauss/stepper.hpp>
+#include <pendula/numeric/block.hpp>
 
 namespace pendula {
 

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cstdlib>
-#include <pendula/library.hpp>
+#include <pendula/run/library.hpp>
 #include <stdexcept>
 #include <string>
 

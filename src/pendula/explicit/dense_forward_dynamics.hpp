@@ -1,9 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <pendula/chain.hpp>
-#include <pendula/forward_dynamics.hpp>
-#include <pendula/kernel_traits.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/kernel_traits.hpp>
+#include <pendula/explicit/forward_dynamics.hpp>
 
 namespace pendula {
 

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <memory>
-#include <pendula/kernel_registry.hpp>
-#include <pendula/options.hpp>
-#include <pendula/plain_chain.hpp>
-#include <pendula/plain_integrator.hpp>
+#include <pendula/chain/plain_chain.hpp>
+#include <pendula/system/kernel_registry.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 #include <span>
 #include <string_view>
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <pendula/space.hpp>
+#include <pendula/chain/space.hpp>
 #include <type_traits>
 
 namespace pendula {

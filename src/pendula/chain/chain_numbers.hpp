@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <pendula/chain.hpp>
-#include <pendula/plain_chain.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/plain_chain.hpp>
 #include <span>
 #include <utility>
 #include <vector>

@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <pendula/chain.hpp>
-#include <pendula/gauss/chain_links.hpp>
-#include <pendula/gauss/lanes.hpp>
-#include <pendula/gauss/multipliers.hpp>
-#include <pendula/gauss/rod_state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/heading.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/chain/multipliers.hpp>
+#include <pendula/chain/rod_state.hpp>
+#include <pendula/chain/state.hpp>
 #include <pendula/gauss/stage_columns.hpp>
-#include <pendula/heading.hpp>
-#include <pendula/invariants.hpp>
-#include <pendula/state.hpp>
+#include <pendula/numeric/lanes.hpp>
 #include <xsimd/xsimd.hpp>
 
 namespace pendula {

@@ -1,13 +1,13 @@
 #pragma once
 
 #include <memory>
-#include <pendula/chain.hpp>
-#include <pendula/dense_forward_dynamics.hpp>
-#include <pendula/explicit_integrator.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/explicit/dense_forward_dynamics.hpp>
+#include <pendula/explicit/explicit_integrator.hpp>
 #include <pendula/gauss/dense_newton.hpp>
 #include <pendula/gauss/gauss_integrator.hpp>
-#include <pendula/options.hpp>
-#include <pendula/plain_integrator.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 
 namespace pendula {
 

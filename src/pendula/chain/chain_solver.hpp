@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <pendula/gauss/chain_fixed_point.hpp>
-#include <pendula/gauss/chain_newton.hpp>
-#include <pendula/gauss/chain_stages.hpp>
+#include <pendula/chain/chain_fixed_point.hpp>
+#include <pendula/chain/chain_newton.hpp>
+#include <pendula/chain/chain_stages.hpp>
 #include <pendula/gauss/roundoff.hpp>
-#include <pendula/options.hpp>
-#include <pendula/outcome.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
 
 namespace pendula {
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <pendula/forward_dynamics.hpp>
-#include <pendula/options.hpp>
-#include <pendula/plain_integrator.hpp>
+#include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 #include <string_view>
 
 namespace pendula {

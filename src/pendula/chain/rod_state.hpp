@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <pendula/gauss/chain_links.hpp>
-#include <pendula/gauss/compensated.hpp>
-#include <pendula/gauss/multipliers.hpp>
-#include <pendula/heading.hpp>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/heading.hpp>
+#include <pendula/chain/multipliers.hpp>
+#include <pendula/numeric/compensated.hpp>
 #include <type_traits>
 
 namespace pendula {

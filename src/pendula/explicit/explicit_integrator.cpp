@@ -6,8 +6,8 @@
 #include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
 #include <cmath>
 #include <functional>
-#include <pendula/explicit_integrator.hpp>
-#include <pendula/gauss/compensated.hpp>
+#include <pendula/explicit/explicit_integrator.hpp>
+#include <pendula/numeric/compensated.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>

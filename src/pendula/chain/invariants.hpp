@@ -3,9 +3,9 @@
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
-#include <pendula/chain.hpp>
-#include <pendula/space.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/space.hpp>
+#include <pendula/chain/state.hpp>
 
 namespace pendula {
 

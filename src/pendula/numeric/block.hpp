@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <pendula/gauss/lanes.hpp>
+#include <pendula/numeric/lanes.hpp>
 
 namespace pendula {
 

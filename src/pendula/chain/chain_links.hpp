@@ -7,9 +7,9 @@
 #include <limits>
 #include <memory>
 #include <new>
-#include <pendula/chain.hpp>
-#include <pendula/gauss/compensated.hpp>
-#include <pendula/gauss/lanes.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/lanes.hpp>
 #include <type_traits>
 #include <utility>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <pendula/space.hpp>
+#include <pendula/chain/space.hpp>
 #include <stdexcept>
 #include <string>
 

@@ -1,14 +1,14 @@
 #pragma once
 
 #include <memory>
-#include <pendula/chain.hpp>
-#include <pendula/chain_numbers.hpp>
-#include <pendula/library.hpp>
-#include <pendula/options.hpp>
-#include <pendula/outcome.hpp>
-#include <pendula/plain_chain.hpp>
-#include <pendula/plain_integrator.hpp>
-#include <pendula/state.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/chain/plain_chain.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
+#include <pendula/system/plain_integrator.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <pendula/space.hpp>
+#include <pendula/chain/space.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>

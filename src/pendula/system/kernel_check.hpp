@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <initializer_list>
 #include <limits>
-#include <pendula/kernel_registry.hpp>
+#include <pendula/system/kernel_registry.hpp>
 #include <random>
 #include <tuple>
 #include <utility>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <pendula/outcome.hpp>
+#include <pendula/system/outcome.hpp>
 #include <string_view>
 
 namespace pendula {

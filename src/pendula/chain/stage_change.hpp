@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <pendula/gauss/chain_links.hpp>
-#include <pendula/gauss/lanes.hpp>
+#include <pendula/chain/chain_links.hpp>
 #include <pendula/gauss/stepper.hpp>
+#include <pendula/numeric/lanes.hpp>
 
 namespace pendula::detail {
 

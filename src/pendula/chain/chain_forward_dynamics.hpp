@@ -1,9 +1,9 @@
 #pragma once
 
-#include <pendula/forward_dynamics.hpp>
-#include <pendula/gauss/chain_links.hpp>
-#include <pendula/gauss/multipliers.hpp>
-#include <pendula/heading.hpp>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/heading.hpp>
+#include <pendula/chain/multipliers.hpp>
+#include <pendula/explicit/forward_dynamics.hpp>
 #include <vector>
 
 namespace pendula {
