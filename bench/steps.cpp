@@ -92,7 +92,7 @@ class Stepping {
   int links_;
   double step_;
   pendula::State<Space> start_;
-  std::unique_ptr<pendula::Integrator<Space>> integrator_;
+  std::unique_ptr<pendula::Integrator> integrator_;
 };
 
 template <class Space>

@@ -11,7 +11,8 @@ int main() {
   parameters.masses = parameters.lengths = Eigen::Vector2d(1, 1);
   const Chain<Planar> chain(parameters);
 
-  GaussStepper<DenseMomentumNewton<kernels::Planar2, 2>> stepper(chain, 2);
+  using Kernel = kernels::Planar2;
+  GaussStepper<LagrangianSolver<Kernel>> stepper(system_of<Kernel>(chain), 2);
   Outcome outcome = stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(std::numbers::pi / 2)));
   for (int step = 0; outcome && step < 20000; ++step) outcome = stepper.step(5e-4);
   if (!outcome) {

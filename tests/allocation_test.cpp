@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <new>
 #include <pendula/chain/chain_solver.hpp>
+#include <pendula/gauss/stepper.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"

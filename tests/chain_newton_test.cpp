@@ -1,8 +1,10 @@
 // The stage equations along a chain: Newton and the fixed point find one solution, Newton is exact, and chain and dense
 // solver are two discretisations of one motion, equal to the order of the method; with all loads.
 
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/chain_solver.hpp>
-#include <pendula/gauss/dense_newton.hpp>
+#include <pendula/gauss/lagrangian_solver.hpp>
+#include <pendula/gauss/stepper.hpp>
 
 #include "support/kernels.hpp"
 #include "support/run.hpp"
@@ -50,7 +52,7 @@ class ChainStageEquations : public ::testing::Test {
   }
 
   State<Space> dense(int stages, int steps, double h) {
-    return run(GaussStepper<DenseMomentumNewton<Kernel>>(chain, stages), steps, h);
+    return run(GaussStepper<LagrangianSolver<Kernel>>(system_of<Kernel>(chain), stages), steps, h);
   }
 
   Random random{7};

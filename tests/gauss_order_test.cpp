@@ -46,16 +46,16 @@ INSTANTIATE_TEST_SUITE_P(Stages, Order,
                                   std::to_string(std::get<0>(test.param));
                          });
 
-constexpr double plateau = 5e-15;  // errors of the finest steps settle at 4e-16 to 3e-15
+constexpr double plateau = 1e-14;  // errors of the finest steps settle at 4e-16 to 3e-15, which is part of those below
 
 TEST_P(Order, IsTwiceTheStagesInThePlane) {
   const ErrorLadder rungs = ladder(equal_chain<Planar>(2), planar_start(), stages(), form());
-  EXPECT_NEAR(rungs.slope(plateau), 2 * stages(), 0.2);  // measured within 0.15 (3 stages, velocity form), most 0.005
+  EXPECT_NEAR(rungs.slope(plateau), 2 * stages(), 0.2);  // measured within 0.16 (velocity form), most 0.005
 }
 
 TEST_P(Order, IsTwiceTheStagesInSpace) {
   const ErrorLadder rungs = ladder(equal_chain<Spatial>(2), spatial_start(), stages(), form());
-  EXPECT_NEAR(rungs.slope(plateau), 2 * stages(), 0.2);  // measured within 0.15 (3 stages, velocity form), most 0.005
+  EXPECT_NEAR(rungs.slope(plateau), 2 * stages(), 0.2);  // measured within 0.16 (velocity form), most 0.005
 }
 
 TEST_P(Order, TimeReversalReturnsToTheStart) {
@@ -69,7 +69,7 @@ TEST_P(Order, TimeReversalReturnsToTheStart) {
 
 /// (q, p) after one step from (q, p), for a planar double pendulum.
 Eigen::Vector4d step_map(const Chain<Planar>& chain, const Eigen::Vector4d& qp, int stages, Form form) {
-  const auto parameters = kernel_parameters<kernels::Planar2>(chain);
+  const auto parameters = system_of<kernels::Planar2>(chain).parameters(0);
   Eigen::Vector2d q = qp.head<2>(), v, p;
   Eigen::Vector2d momentum = qp.tail<2>();
   kernels::Planar2::velocity_from_momentum(parameters, q, momentum, v);

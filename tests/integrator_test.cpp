@@ -1,9 +1,12 @@
 // The run-time factory, the explicit methods, the simulation loop, and how failures are told.
 
 #include <pendula/chain/chain_forward_dynamics.hpp>
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/chain_solver.hpp>
-#include <pendula/explicit/dense_forward_dynamics.hpp>
-#include <pendula/gauss/dense_newton.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
+#include <pendula/gauss/lagrangian_solver.hpp>
+#include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/velocity_newton.hpp>
 
 #include "support/kernels.hpp"
 #include "support/run.hpp"
@@ -35,7 +38,7 @@ TEST(Factory, RefusesStagesWithoutATableau) {
 TEST(Factory, SaysWhatRuns) {
   const Description description = make_integrator(equal_chain<Spatial>(2), gauss(3))->describe();
   EXPECT_EQ(description.solver, "dense");
-  EXPECT_EQ(description.iteration, "newton");
+  EXPECT_EQ(description.iteration, "fixed-point");
   EXPECT_EQ(description.kernel, "spatial_2");
 }
 
@@ -54,7 +57,7 @@ TEST(Factory, ChoosesTheChainSolverForAnyNumberOfLinks) {
 
 TEST(Factory, FixedSizeSteppersAgreeWithIt) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
-  GaussStepper<DenseMomentumNewton<kernels::Planar2, 3>> stepper(chain, 3);
+  GaussStepper<LagrangianSolver<kernels::Planar2, 4>> stepper(system_of<kernels::Planar2>(chain), 3);
   const auto integrator = make_integrator(chain, gauss(3));
   ASSERT_TRUE(stepper.start(swinging(2)));
   ASSERT_TRUE(integrator->start(swinging(2)));
@@ -90,10 +93,10 @@ void expect_the_same_accelerations(const Chain<Space>& chain, ForwardDynamics& d
 TEST(ExplicitMethods, HaveTheSameAccelerationsWithoutAKernel) {
   Random random(3);
   const Chain<Planar> planar = random_chain<Planar>(random, 4, true);
-  DenseForwardDynamics<kernels::Planar4> planar_dense(planar);
+  SystemForwardDynamics<kernels::Planar4> planar_dense(system_of<kernels::Planar4>(planar));
   expect_the_same_accelerations(planar, planar_dense, random_state<Planar>(random, 4));
   const Chain<Spatial> spatial = random_chain<Spatial>(random, 3, true);
-  DenseForwardDynamics<kernels::Spatial3> spatial_dense(spatial);
+  SystemForwardDynamics<kernels::Spatial3> spatial_dense(system_of<kernels::Spatial3>(spatial));
   expect_the_same_accelerations(spatial, spatial_dense, random_state<Spatial>(random, 3));
   RunOptions options;
   options.method = Method::rk4;
@@ -130,7 +133,7 @@ TEST(Failure, OfAStateOfAnotherChainIsTold) {
     integrator->start(swinging(4));
     FAIL() << "expected std::invalid_argument";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "state: angles: expected 3 numbers for this chain, got 4");
+    EXPECT_STREQ(error.what(), "state: coordinates: expected 3 numbers for this chain, got 4");
   }
 }
 
@@ -139,7 +142,7 @@ TEST(Failure, AtThePoleNamesTheLink) {
   const auto start = State<Spatial>::from_angles(Eigen::Vector3d(1, 0, 1), Eigen::Vector3d::Zero());
   const Outcome outcome = integrator->start(start);
   EXPECT_EQ(outcome.status, Status::singular_mass_matrix);
-  EXPECT_EQ(outcome.link, 1);
+  EXPECT_EQ(outcome.part, 1);
   EXPECT_EQ(
       message(outcome),
       "at t = 0 s: the mass matrix in (theta, phi) is singular: sin(theta) = 0 at link 2, where phi has no meaning");
@@ -148,7 +151,8 @@ TEST(Failure, AtThePoleNamesTheLink) {
 // A tenth of a second takes four iterations, its halves take three.
 TEST(Failure, OfAStepIsMendedByHalves) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
-  GaussStepper<DenseMomentumNewton<kernels::Planar2, 4>> stepper(chain, 4, {.max_iterations = 3});
+  GaussStepper<LagrangianSolver<kernels::Planar2>> stepper(system_of<kernels::Planar2>(chain), 4, {.max_iterations = 3},
+                                                           Iteration::newton);
   ASSERT_TRUE(stepper.start(swinging(2)));
   const Outcome outcome = stepper.step(0.1);
   ASSERT_TRUE(outcome) << outcome;
@@ -160,9 +164,9 @@ TEST(Failure, OfAStepIsMendedByHalves) {
   EXPECT_LT(std::abs(change), 1e-12 * energy_scale(chain));  // measured 6.4e-14; of the whole step at once, 1.1e-11
 }
 
-template <class StageSolver>
-void expect_an_untouched_state_where_no_part_converges() {
-  GaussStepper<StageSolver> stepper(equal_chain<Planar>(4), 2, {.max_iterations = 1});
+template <class Solver, class Model>
+void expect_an_untouched_state_where_no_part_converges(const Model& model) {
+  GaussStepper<Solver> stepper(model, 2, {.max_iterations = 1});
   ASSERT_TRUE(stepper.start(swinging(4)));
   const Outcome outcome = stepper.step(0.01);
   EXPECT_EQ(outcome.status, Status::not_converged) << outcome;
@@ -170,7 +174,7 @@ void expect_an_untouched_state_where_no_part_converges() {
   EXPECT_EQ(outcome.time, 0);
   EXPECT_EQ(outcome.iterations, 1);
   EXPECT_GT(outcome.residual, 0);
-  EXPECT_GE(outcome.link, 0);
+  EXPECT_GE(outcome.part, 0);
   EXPECT_EQ(stepper.time(), 0);
   EXPECT_EQ(distance(stepper.state(), swinging(4)), 0);
   EXPECT_EQ(stepper.statistics().steps, 0);
@@ -178,9 +182,10 @@ void expect_an_untouched_state_where_no_part_converges() {
 }
 
 TEST(Failure, LeavesTheStateAndSaysHowFarItCame) {
-  expect_an_untouched_state_where_no_part_converges<DenseMomentumNewton<kernels::Planar4>>();
-  expect_an_untouched_state_where_no_part_converges<DenseVelocityNewton<kernels::Planar4>>();
-  expect_an_untouched_state_where_no_part_converges<ChainSolver<Planar, 2>>();
+  const auto system = system_of<kernels::Planar4>(equal_chain<Planar>(4));
+  expect_an_untouched_state_where_no_part_converges<LagrangianSolver<kernels::Planar4>>(system);
+  expect_an_untouched_state_where_no_part_converges<VelocityNewton<kernels::Planar4>>(system);
+  expect_an_untouched_state_where_no_part_converges<ChainSolver<Planar, 2>>(equal_chain<Planar>(4));
 }
 
 /// The largest energy that a double pendulum has in 50 s of steps far too large, in units of what it could have.

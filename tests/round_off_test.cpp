@@ -31,8 +31,8 @@ double published_run(double q_phi, double q_theta, double p_phi, double p_theta,
   constexpr double h = 1.0 / 128;
   double worst = 0;
   const RunResult result =
-      simulate(*integrator, start, {h, h * static_cast<double>(steps), 64}, [&](const auto& state) {
-        const long double change = energy(chain, state.template cast<long double>()) - before;
+      simulate(*integrator, start, {h, h * static_cast<double>(steps), 64}, [&](const State<Planar>& state) {
+        const long double change = energy(chain, state.cast<long double>()) - before;
         worst = std::max(worst, static_cast<double>(std::abs(change / before)));
       });
   EXPECT_TRUE(result.outcome) << result.outcome;

@@ -209,7 +209,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
        "got "
        "the unknown key \"output\""},
       {"[output]", "[outputs]",
-       "file.toml:32: outputs: expected one of chain, start, run, output, got the unknown key "
+       "file.toml:32: outputs: expected one of chain, system, start, run, output, got the unknown key "
        "\"outputs\" (did you mean output?)"},
       {"[[chain.drive]]", "[chain.drive]", "file.toml:11: chain.drive: expected [[chain.drive]] tables, got a table"},
       // unknown keys, with the one that may be meant
@@ -471,7 +471,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
        "--set run.stpe=1: run.stpe: expected one of method, stages, form, solver, iteration, step, "
        "tolerance, duration, got the unknown key \"stpe\" (did you mean step?)"},
       {"step=1",
-       "--set step=1: step: expected one of chain, start, run, output, got the unknown key \"step\" (did you "
+       "--set step=1: step: expected one of chain, system, start, run, output, got the unknown key \"step\" (did you "
        "mean run.step?)"},
       {"run.step", "--set run.step: expected KEY=VALUE such as run.step=1e-4, got \"run.step\""},
       {"=1", "--set =1: expected KEY=VALUE such as run.step=1e-4, got \"=1\""},

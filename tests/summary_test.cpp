@@ -6,8 +6,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <pendula/chain/invariants.hpp>
+#include <pendula/run/chain_subject.hpp>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "io/run_record.hpp"
 
@@ -53,6 +55,7 @@ Summary summary_of_a_run() {
   summary.wall_seconds = 0.25;
   summary.energy_error = {-1.5, 100, 1e-12};
   summary.energy_final = -1.25;
+  summary.shown = {"x_2", "y_2", "z_2"};
   summary.final = snapshot(chain, spatial_state());
   summary.rows = 201;
   return summary;
@@ -190,15 +193,26 @@ TEST(Summary, NaturalUnitsAreTold) {
 // The record of the rows.
 
 template <class Space>
-void add(RunRecord<Space>& record, const Chain<Space>& chain, State<Space> state, double time, double energy) {
+void add(RunRecord& record, const Chain<Space>& chain, State<Space> state, double time, double energy) {
+  const ChainSubject<Space> subject(chain);
   state.time = time;
-  record.add(state, bob_positions(chain, state), Energies<double>{0, energy}, 0);
+  Observation seen = subject.observe(state);
+  seen.kinetic = 0;
+  seen.energy = energy;
+  std::vector<double> row;
+  subject.append_row(state, seen, row);
+  record.add(state, seen, row, 0);
+}
+
+template <class Space>
+RunRecord record_of(const Chain<Space>& chain, double duration) {
+  return RunRecord(ChainSubject<Space>(chain), duration);
 }
 
 TEST(RunRecord, EnergyErrorsAreRelativeToTheScaleOfTheChain) {
   const Chain<Planar> chain = planar_chain(10);
   const State<Planar> state = State<Planar>::from_angles(Eigen::Vector2d(0.1, 0.2));
-  RunRecord<Planar> record(chain, 1);
+  RunRecord record = record_of(chain, 1);
   for (const double energy : {5.0, 5.5, 4.0, 5.25}) add(record, chain, state, 0, energy);
   const double scale = 10 * (3 * 0.5 + 2 * 1.5);  // Σ M_i g l_i
   EXPECT_EQ(record.energy_error().initial, 5);
@@ -210,10 +224,10 @@ TEST(RunRecord, EnergyErrorsAreRelativeToTheScaleOfTheChain) {
 TEST(RunRecord, EnergyErrorsWithoutGravityAreRelativeToTheEnergy) {
   const Chain<Planar> chain = planar_chain(0);
   const State<Planar> state = State<Planar>::from_angles(Eigen::Vector2d(0.1, 0.2));
-  RunRecord<Planar> moving(chain, 1);
+  RunRecord moving = record_of(chain, 1);
   for (const double energy : {-5.0, -5.5}) add(moving, chain, state, 0, energy);
   EXPECT_DOUBLE_EQ(moving.energy_error().largest, 0.1);
-  RunRecord<Planar> at_rest(chain, 1);
+  RunRecord at_rest = record_of(chain, 1);
   for (const double energy : {0.0, 0.0}) add(at_rest, chain, state, 0, energy);
   EXPECT_EQ(at_rest.energy_error().largest, 0);
   for (const double energy : {1.0, 0.0}) add(at_rest, chain, state, 0, energy);
@@ -223,14 +237,14 @@ TEST(RunRecord, EnergyErrorsWithoutGravityAreRelativeToTheEnergy) {
 TEST(RunRecord, AnEnergyThatIsNotFiniteIsNotHidden) {
   const Chain<Planar> chain = planar_chain(10);
   const State<Planar> state = State<Planar>::from_angles(Eigen::Vector2d(0.1, 0.2));
-  RunRecord<Planar> record(chain, 1);
+  RunRecord record = record_of(chain, 1);
   for (const double energy : {5.0, std::numeric_limits<double>::quiet_NaN(), 5.0}) add(record, chain, state, 0, energy);
   EXPECT_TRUE(std::isnan(record.energy_error().largest));
 }
 
 TEST(RunRecord, TheTableIsThinAndEndsInTheLastRow) {
   const Chain<Spatial> chain = spatial_chain();
-  RunRecord<Spatial> record(chain, 10);
+  RunRecord record = record_of(chain, 10);
   for (int i = 0; i <= 1000; ++i) add(record, chain, spatial_state(), 0.01 * i, 0);
   const std::vector<TableRow> table = record.table();
   ASSERT_EQ(table.size(), 11u);
@@ -241,7 +255,7 @@ TEST(RunRecord, TheTableIsThinAndEndsInTheLastRow) {
 
 TEST(RunRecord, ARunWithoutDurationHasOneTableRow) {
   const Chain<Spatial> chain = spatial_chain();
-  RunRecord<Spatial> record(chain, 0);
+  RunRecord record = record_of(chain, 0);
   EXPECT_TRUE(record.table().empty());
   add(record, chain, spatial_state(), 0, 0);
   EXPECT_EQ(record.table().size(), 1u);

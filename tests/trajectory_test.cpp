@@ -8,6 +8,8 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <pendula/chain/state.hpp>
+#include <pendula/run/chain_subject.hpp>
 #include <random>
 #include <sstream>
 #include <string>
@@ -61,10 +63,24 @@ State<Spatial> spatial_state() {
 }
 
 template <class Space>
+ChainSubject<Space> subject_of(int links) {
+  ChainParameters<Space> parameters;
+  parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(links);
+  return ChainSubject<Space>(Chain<Space>(parameters));
+}
+
+template <class Space>
 std::string header(int links) {
   std::string text;
-  append_header<Space>(text, links);
+  append_header(text, subject_of<Space>(links).columns());
   return text;
+}
+
+/// A row of two links in space that ends in `energy`.
+std::vector<double> row_of(double energy) {
+  std::vector<double> row(15, 1.0 / 3);
+  row.push_back(energy);
+  return row;
 }
 
 TEST(Trajectory, HeaderNamesEveryColumn) {
@@ -75,21 +91,19 @@ TEST(Trajectory, HeaderNamesEveryColumn) {
 }
 
 TEST(Trajectory, RowsFollowTheHeader) {
-  Points<Spatial, Eigen::Dynamic> bobs(3, 2);
-  bobs << 9, 12, 10, 13, 11, 14;
+  const Observation seen{Eigen::VectorXd::LinSpaced(6, 9, 14), 0, 15};
+  std::vector<double> row;
+  subject_of<Spatial>(2).append_row(spatial_state(), seen, row);
   std::string text;
-  append_row<Spatial>(text, spatial_state(), bobs, 15);
+  append_row(text, row);
   EXPECT_EQ(text, "0.10000000000000001,1,3,5,7,2,4,6,8,9,10,11,12,13,14,15\n");
 }
 
 TEST(Trajectory, EveryDoubleIsReadBackAsItIs) {
   const std::vector<double> values = {1.0 / 3, -1e-300, 4.9e-324, 1.7976931348623157e308, -0.0, 2.0 / 7 * 1e17};
   for (const double value : values) {
-    State<Planar> state;
-    state.time = value;
-    state.q = state.v = Eigen::VectorXd::Constant(1, value);
     std::string text;
-    append_row<Planar>(text, state, Points<Planar, Eigen::Dynamic>::Constant(2, 1, value), value);
+    append_row(text, std::vector<double>(6, value));
     const std::vector<double> read = numbers_of(text);
     ASSERT_EQ(read.size(), 6u);
     for (const double number : read) {
@@ -101,9 +115,8 @@ TEST(Trajectory, EveryDoubleIsReadBackAsItIs) {
 
 TEST(Trajectory, FileHoldsHeaderAndRows) {
   const ScratchFile scratch;
-  TrajectoryFile<Spatial> file(scratch.path(), 2);
-  const Points<Spatial, Eigen::Dynamic> bobs = Points<Spatial, Eigen::Dynamic>::Zero(3, 2);
-  for (int i = 0; i < 3; ++i) file.write(spatial_state(), bobs, i);
+  TrajectoryFile file(scratch.path(), subject_of<Spatial>(2).columns());
+  for (int i = 0; i < 3; ++i) file.write(row_of(i));
   file.close();
   EXPECT_EQ(file.rows(), 3);
   const std::vector<std::string> lines = scratch.lines();
@@ -114,9 +127,8 @@ TEST(Trajectory, FileHoldsHeaderAndRows) {
 
 TEST(Trajectory, ManyRowsGoThroughManyBlocks) {
   const ScratchFile scratch;
-  TrajectoryFile<Spatial> file(scratch.path(), 2);
-  const Points<Spatial, Eigen::Dynamic> bobs = Points<Spatial, Eigen::Dynamic>::Constant(3, 2, 1.0 / 3);
-  for (int i = 0; i < 5000; ++i) file.write(spatial_state(), bobs, i);
+  TrajectoryFile file(scratch.path(), subject_of<Spatial>(2).columns());
+  for (int i = 0; i < 5000; ++i) file.write(row_of(i));
   file.close();
   const std::vector<std::string> lines = scratch.lines();
   ASSERT_EQ(lines.size(), 5001u);
@@ -126,8 +138,8 @@ TEST(Trajectory, ManyRowsGoThroughManyBlocks) {
 TEST(Trajectory, RowsSurviveAnExceptionThatEndsTheRun) {
   const ScratchFile scratch;
   try {
-    TrajectoryFile<Spatial> file(scratch.path(), 2);
-    file.write(spatial_state(), Points<Spatial, Eigen::Dynamic>::Zero(3, 2), 0);
+    TrajectoryFile file(scratch.path(), subject_of<Spatial>(2).columns());
+    file.write(row_of(0));
     throw std::runtime_error("a run that fails");
   } catch (const std::runtime_error&) {
     EXPECT_EQ(scratch.lines().size(), 2u);
@@ -136,7 +148,7 @@ TEST(Trajectory, RowsSurviveAnExceptionThatEndsTheRun) {
 
 TEST(Trajectory, AFileThatCannotBeOpenedIsAnInputError) {
   try {
-    TrajectoryFile<Planar>("no/such/folder/out.csv", 1);
+    TrajectoryFile("no/such/folder/out.csv", subject_of<Planar>(1).columns());
     FAIL() << "no error";
   } catch (const InputError& error) {
     EXPECT_STREQ(error.what(),
@@ -146,12 +158,9 @@ TEST(Trajectory, AFileThatCannotBeOpenedIsAnInputError) {
 
 #ifdef __linux__
 TEST(Trajectory, AFullDiskIsAnOutputError) {
-  const Points<Planar, Eigen::Dynamic> bobs = Points<Planar, Eigen::Dynamic>::Zero(2, 1);
-  State<Planar> state;
-  state.q = state.v = Eigen::VectorXd::Zero(1);
   const auto fill = [&](int rows) {
-    TrajectoryFile<Planar> file("/dev/full", 1);
-    for (int i = 0; i < rows; ++i) file.write(state, bobs, 0);
+    TrajectoryFile file("/dev/full", subject_of<Planar>(1).columns());
+    for (int i = 0; i < rows; ++i) file.write(std::vector<double>(6, 0.0));
     file.close();
   };
   EXPECT_THROW(fill(0), OutputError);       // seen when closing

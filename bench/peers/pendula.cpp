@@ -32,7 +32,7 @@ class PendulaRun : public Run {
   int steps_;
   double step_, last_step_;
   pendula::State<Planar> start_;
-  std::unique_ptr<pendula::Integrator<Planar>> integrator_;
+  std::unique_ptr<pendula::Integrator> integrator_;
   pendula::Outcome outcome_;
 };
 

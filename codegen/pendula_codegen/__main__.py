@@ -8,11 +8,15 @@ from pathlib import Path
 
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.models import MODELS
+from pendula_codegen.links import LINKS
+from pendula_codegen.model import read_model
+from pendula_codegen.models import find_model
 from pendula_codegen.render import (
+    Header,
     kernel_name,
     render_kernel,
     render_link,
+    render_model,
     render_tableaux,
     write_atomically,
 )
@@ -41,13 +45,20 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     kernel = commands.add_parser("kernel", help="the dense kernel of a chain with a fixed number of links")
-    kernel.add_argument("--space", required=True, help=f"model: {', '.join(MODELS)}")
+    kernel.add_argument("--space", required=True, help=f"model: {', '.join(LINKS)}")
     kernel.add_argument("--links", required=True, type=int, help="number of links, from 1")
     kernel.set_defaults(run=_run_kernel)
 
     link = commands.add_parser("link", help="direction of one link and its derivatives")
-    link.add_argument("--space", required=True, help=f"model: {', '.join(MODELS)}")
+    link.add_argument("--space", required=True, help=f"model: {', '.join(LINKS)}")
     link.set_defaults(run=_run_link)
+
+    model = commands.add_parser("model", help="the kernel of a model file")
+    model.add_argument(
+        "--model", required=True, help="a file that defines define(model, links), or a built-in model's name"
+    )
+    model.add_argument("--links", type=int, help="number of links, from 1, where the model has links")
+    model.set_defaults(run=_run_model)
 
     tableaux = commands.add_parser("tableaux", help="Gauss–Legendre coefficients")
     tableaux.set_defaults(run=_run_tableaux)
@@ -59,24 +70,29 @@ def _parser() -> argparse.ArgumentParser:
     counts.set_defaults(run=_run_counts)
     counts.add_argument("--output", required=True, type=Path, help="a .json file")
 
-    for command in (kernel, link, tableaux, refresh):
+    for command in (kernel, link, model, tableaux, refresh):
         command.add_argument(
             "--output", required=True, type=Path, help="a .hpp file, or a folder to put it in"
         )
     return parser
 
 
-def _write(output: Path, name: str, text: str) -> None:
-    write_atomically(output if output.suffix == ".hpp" else output / name, text)
+def _write(output: Path, name: str, header: Header) -> None:
+    write_atomically(output if output.suffix == ".hpp" else output / name, header.text)
 
 
 def _run_kernel(options: argparse.Namespace) -> None:
-    text = render_kernel(options.space, options.links)
-    _write(options.output, f"{kernel_name(options.space, options.links)}.hpp", text)
+    header = render_kernel(options.space, options.links)
+    _write(options.output, f"{kernel_name(options.space, options.links)}.hpp", header)
 
 
 def _run_link(options: argparse.Namespace) -> None:
     _write(options.output, f"{options.space}_link.hpp", render_link(options.space))
+
+
+def _run_model(options: argparse.Namespace) -> None:
+    model = read_model(find_model(options.model), options.links)
+    _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name))
 
 
 def _run_tableaux(options: argparse.Namespace) -> None:
@@ -84,16 +100,16 @@ def _run_tableaux(options: argparse.Namespace) -> None:
 
 
 def _run_refresh(options: argparse.Namespace) -> None:
-    for name, text in committed_headers().items():
-        write_atomically(options.output / name, text)
+    for name, header in committed_headers().items():
+        write_atomically(options.output / name, header.text)
 
 
 def _run_counts(options: argparse.Namespace) -> None:
     write_atomically(options.output, as_json(count_table(committed_headers())))
 
 
-def committed_headers() -> dict[str, str]:
-    """File name and text of every header that the repository keeps under generated/."""
+def committed_headers() -> dict[str, Header]:
+    """File name and header of everything header that the repository keeps under generated/."""
     kernels = {
         f"{kernel_name(space, links)}.hpp": render_kernel(space, links)
         for space, numbers in COMMITTED.items()

@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, cached_property
 
-from sympy import Add, Expr, Matrix, Rational, Symbol, cos, expand, sin, trigsimp
+from sympy import Add, Expr, Matrix, Rational, Symbol, expand, trigsimp
 
 from pendula_codegen.errors import GenerationError
+from pendula_codegen.link_model import LinkModel
 from pendula_codegen.mechanics import LagrangianSystem, require_declared
-from pendula_codegen.model import LinkModel
+from pendula_codegen.simplify import shortest_by_pythagoras
 
 
 def on_link(symbol: Symbol, link: int, suffix: str = "") -> Symbol:
@@ -57,20 +58,6 @@ def link_terms(model: LinkModel) -> LinkTerms:
         height=first.dot(model.up),
         loads=tuple(shortest_by_pythagoras(load, angles) for load in _loads(model, first, rate)),
     )
-
-
-def shortest_by_pythagoras(expression: Expr, angles: list[Symbol]) -> Expr:
-    """The expanded form with the fewest terms that sin² + cos² = 1 of each angle gives."""
-    shortest = expand(expression)
-    while True:
-        forms = [shortest]
-        for angle in angles:
-            for kept, replaced in ((sin(angle), cos(angle)), (cos(angle), sin(angle))):
-                forms.append(expand(shortest.subs(replaced**2, 1 - kept**2)))
-        best = min(forms, key=lambda form: len(Add.make_args(form)))
-        if best is shortest:
-            return shortest
-        shortest = best
 
 
 def _loads(model: LinkModel, direction: Matrix, rate: Matrix) -> list[Expr]:

@@ -1,33 +1,26 @@
-"""Operation counts of generated kernels, read back from what their documentation comments say."""
+"""Operation counts of generated kernels, as a table that is kept."""
 
 from __future__ import annotations
 
 import json
-import re
+from collections.abc import Mapping
+from dataclasses import asdict
 
-_COUNTS = re.compile(
-    r"/// (?:(\d+) temporar(?:y|ies), )?(\d+) operations?(?:, (\d+) sin/cos)?\.\n"
-    r"  template <class Real>\n  static void (\w+)\("
-)
+from pendula_codegen.render import Header
+
+Table = dict[str, dict[str, dict[str, int]]]
 
 
-def count_table(headers: dict[str, str]) -> dict[str, dict[str, dict[str, int]]]:
-    """Header -> function -> counts, for all generated functions that state them."""
+def count_table(headers: Mapping[str, Header]) -> Table:
+    """Header -> function -> counts, for all generated functions."""
     return {
-        header: {
-            name: {
-                "temporaries": int(temporaries or 0),
-                "operations": int(operations),
-                "trig": int(trig or 0),
-            }
-            for temporaries, operations, trig, name in _COUNTS.findall(text)
-        }
-        for header, text in sorted(headers.items())
-        if _COUNTS.search(text)
+        name: {function: asdict(counts) for function, counts in header.counts.items()}
+        for name, header in sorted(headers.items())
+        if header.counts
     }
 
 
-def as_json(table: dict[str, dict[str, dict[str, int]]]) -> str:
+def as_json(table: Table) -> str:
     """One line a function, so that a change shows what became longer."""
     blocks = [
         f"  {json.dumps(header)}: {{\n"

@@ -1,4 +1,4 @@
-"""C++ for A x = b with the symmetric mass matrix: L D Lᵀ with numbers, never with symbols."""
+"""C++ for M x = b with the symmetric mass matrix: L D Lᵀ with numbers, never with symbols."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ UNROLLED = 10
 
 
 def solve_lines(size: int) -> list[str]:
-    """Body of solve_symmetric(A, b): reads A's lower triangle, may overwrite it, leaves x in b."""
+    """Body of solve_symmetric(M, b): reads M's lower triangle, may overwrite it, leaves x in b."""
     return _unrolled(size) if size <= UNROLLED else _looped()
 
 
 def _unrolled(size: int) -> list[str]:
     rows = range(size)
-    lines = [f"Real a_{i}_{j} = A({i}, {j});" for i in rows for j in range(i + 1)]
+    lines = [f"Real a_{i}_{j} = M({i}, {j});" for i in rows for j in range(i + 1)]
     lines += [f"Real x_{i} = b[{i}];" for i in rows]
     for k in rows:
         lines.append(f"const Real inverse_{k} = Real(1.0) / a_{k}_{k};")
@@ -32,15 +32,15 @@ def _looped() -> list[str]:
     return [
         "Vector<Real> inverse_pivot;",
         "for (int k = 0; k < coordinates; ++k) {",
-        "  inverse_pivot[k] = Real(1.0) / A(k, k);",
+        "  inverse_pivot[k] = Real(1.0) / M(k, k);",
         "  for (int i = k + 1; i < coordinates; ++i) {",
-        "    const Real factor = A(i, k) * inverse_pivot[k];",
+        "    const Real factor = M(i, k) * inverse_pivot[k];",
         "    b[i] = b[i] - factor * b[k];",
-        "    for (int j = k + 1; j <= i; ++j) A(i, j) = A(i, j) - factor * A(j, k);",
+        "    for (int j = k + 1; j <= i; ++j) M(i, j) = M(i, j) - factor * M(j, k);",
         "  }",
         "}",
         "for (int k = coordinates - 1; k >= 0; --k) {",
-        "  for (int i = k + 1; i < coordinates; ++i) b[k] = b[k] - A(i, k) * b[i];",
+        "  for (int i = k + 1; i < coordinates; ++i) b[k] = b[k] - M(i, k) * b[i];",
         "  b[k] = b[k] * inverse_pivot[k];",
         "}",
     ]

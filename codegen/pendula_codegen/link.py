@@ -22,8 +22,9 @@ from sympy import (
     zeros,
 )
 
-from pendula_codegen.model import LinkModel
-from pendula_codegen.printing import Body, print_body
+from pendula_codegen.backends.cpp import Body, array_entry, print_body
+from pendula_codegen.link_model import LinkModel
+from pendula_codegen.places import Place
 from pendula_codegen.program import Assignment, Program, shortest_program
 from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 
@@ -79,7 +80,7 @@ class LinkKernel:
                 "Direction û(q), a unit vector.",
                 trig,
                 (("Cartesian<Real>", "u"),),
-                tuple(_entries("u", self.model.direction)),
+                tuple(_entries("u", (), self.model.direction)),
             )
         ]
         others = [
@@ -91,7 +92,7 @@ class LinkKernel:
                 tuple(
                     entry
                     for k, index in enumerate(self.indices(order))
-                    for entry in _entries(f"u_{'abc'[:order]}[{k}]", self.derivative(index))
+                    for entry in _entries(f"u_{'abc'[:order]}", (k,), self.derivative(index))
                 ),
             )
             for order, name in ORDER_NAMES.items()
@@ -101,7 +102,7 @@ class LinkKernel:
     def _motion(self) -> list[LinkFunction]:
         """Entry points between coordinates and Cartesian vectors."""
         v, u_dot = self._leaves("v"), self._leaves("u_dot")
-        inverse = Leaf(self.inverse, "inverse_determinant", "inverse_determinant")
+        inverse = Leaf(self.inverse, Place("inverse_determinant"), "inverse_determinant")
         dual = (("Trig<Real>", "trig"), ("Real", "inverse_determinant"))
         trig = (("Trig<Real>", "trig"),)
         return [
@@ -110,7 +111,7 @@ class LinkKernel:
                 "Rate of the direction, sum of v_a u_a.",
                 (*trig, ("Coordinates<Real>", "v")),
                 (("Cartesian<Real>", "u_dot"),),
-                tuple(_entries("u_dot", self._sum(v, self._first))),
+                tuple(_entries("u_dot", (), self._sum(v, self._first))),
                 v,
             ),
             LinkFunction(
@@ -118,14 +119,14 @@ class LinkKernel:
                 "Determinant of the metric u_a·u_b, zero where the coordinates fail.",
                 trig,
                 (("Real", "determinant"),),
-                (("determinant", self._determinant),),
+                ((Place("determinant"), self._determinant),),
             ),
             LinkFunction(
                 "rates",
                 "Rates v_a = u^a·u_dot of the coordinates from the rate of the direction.",
                 (*dual, ("Cartesian<Real>", "u_dot")),
                 (("Coordinates<Real>", "v"),),
-                tuple((f"v[{a}]", _dot(self._dual[a], u_dot)) for a in range(self.model.dof)),
+                tuple((Place("v", index=(a,)), _dot(self._dual[a], u_dot)) for a in range(self.model.dof)),
                 (*u_dot, inverse),
             ),
         ]
@@ -143,7 +144,7 @@ class LinkKernel:
             "Load of a torque on a link of direction u.",
             (("Torque<Real>", "torque"), ("Cartesian<Real>", "u")),
             (("Cartesian<Real>", "load"),),
-            tuple(_entries("load", turning)),
+            tuple(_entries("load", (), turning)),
             (*torque, *u),
         )
 
@@ -186,7 +187,10 @@ class LinkKernel:
         """Components of the vector argument `name`, Cartesian, or one a coordinate for rates."""
         if count is None:
             count = self.model.dof if name == "v" else self.model.dimension
-        return tuple(Leaf(Symbol(f"{name}_{k}"), f"{name}[{k}]", name) for k in range(count))
+        return tuple(
+            Leaf(Symbol(f"{name}_{k}"), Place(name, index=(k,)), "input" if name == "torque" else name)
+            for k in range(count)
+        )
 
     def _sum(self, factors: Sequence[Leaf], vectors: Sequence[Matrix]) -> Matrix:
         terms = (factor.symbol * vector for factor, vector in zip(factors, vectors, strict=True))
@@ -212,7 +216,7 @@ class LinkKernel:
         return shortest_program([function.assignments], [self._vocabulary(function)])
 
     def _render(self, function: LinkFunction) -> RenderedLinkFunction:
-        body = print_body(self.program(function))
+        body = print_body(self.program(function), entry=array_entry)
         read = [
             f"const {kind}& {name if name in body.sources else f'/*{name}*/'}"
             for kind, name in function.inputs
@@ -225,7 +229,10 @@ class LinkKernel:
         )
 
     def _vocabulary(self, function: LinkFunction) -> Vocabulary:
-        angles = [Angle(q, f"trig.sin_{q}", f"trig.cos_{q}", "trig") for q in self.model.coordinates]
+        angles = [
+            Angle(q, given=(Place("trig", f"sin_{q}"), Place("trig", f"cos_{q}")))
+            for q in self.model.coordinates
+        ]
         return Vocabulary(function.leaves, angles, {}, Form(pair_angles=False, expanded=frozenset()))
 
 
@@ -233,5 +240,6 @@ def _dot(vector: Matrix, leaves: Sequence[Leaf]) -> Expr:
     return sum((component * leaf.symbol for component, leaf in zip(vector, leaves, strict=True)), Integer(0))
 
 
-def _entries(name: str, value: Matrix) -> list[tuple[str, Expr]]:
-    return [(f"{name}[{k}]", value[k]) for k in range(value.rows)]
+def _entries(name: str, before: tuple[int, ...], value: Matrix) -> list[Assignment]:
+    """The components of a vector, or of the one that stands at `before` among several."""
+    return [(Place(name, index=(*before, k)), value[k]) for k in range(value.rows)]

@@ -1,6 +1,7 @@
-"""Analytical mechanics of any Lagrangian L(q, v): momenta, gradient, Hessian, Euler–Lagrange equations.
+"""Analytical mechanics of any Lagrangian L(q, v, t): momenta, gradient, Hessian, Euler–Lagrange equations.
 
-Nothing here knows about chains; chain.py builds a chain's Lagrangian and hands it over as a LagrangianSystem.
+Nothing here knows about chains; chain.py builds a chain's Lagrangian and hands it over as a LagrangianSystem, as
+model.py does for everything else.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pendula_codegen.errors import GenerationError
 
 @dataclass(frozen=True)
 class LagrangianSystem:
-    """A mechanical system: L(q, v) and the generalised forces Q(q, v, inputs) beside it.
+    """A mechanical system: L(q, v, t) and the generalised forces Q(q, v, t, inputs) beside it.
 
     name            how messages call it
     coordinates     q
@@ -24,6 +25,7 @@ class LagrangianSystem:
     inputs          further symbols that only the forces may hold (torques, damping)
     lagrangian      L, J
     forces          Q_k, generalised forces that L does not give, N m
+    time            t, where L or the forces hold it
     """
 
     name: str
@@ -33,12 +35,19 @@ class LagrangianSystem:
     inputs: tuple[Symbol, ...]
     lagrangian: Expr
     forces: tuple[Expr, ...]
+    time: Symbol | None = None
 
     def __post_init__(self) -> None:
-        declared = (*self.coordinates, *self.velocities, *self.parameters)
+        clock = () if self.time is None else (self.time,)
+        declared = (*self.coordinates, *self.velocities, *self.parameters, *clock)
         require_declared(self.lagrangian, declared, f"the Lagrangian of model '{self.name}'")
         for force in self.forces:
             require_declared(force, (*declared, *self.inputs), f"a load of model '{self.name}'")
+
+
+def time_slope(system: LagrangianSystem, expression: Expr) -> Expr:
+    """∂expression/∂t."""
+    return Integer(0) if system.time is None else gradient(expression, (system.time,))[0]
 
 
 def require_declared(expression: Expr, declared: Iterable[Symbol], what: str) -> None:
@@ -86,14 +95,16 @@ def momenta(system: LagrangianSystem) -> list[Expr]:
 
 def euler_lagrange(system: LagrangianSystem, accelerations: Sequence[Symbol]) -> list[Expr]:
     """d/dt ∂L/∂v_k − ∂L/∂q_k for each k, dv/dt = accelerations (paper eq. 10); loads are not subtracted."""
-    p_D_q = jacobian(momenta(system), system.coordinates)
-    p_D_v = jacobian(momenta(system), system.velocities)
+    p = momenta(system)
+    p_D_q = jacobian(p, system.coordinates)
+    p_D_v = jacobian(p, system.velocities)
     L_q = gradient(system.lagrangian, system.coordinates)
     return [
         Add(
             *(slope * v for slope, v in zip(row_q, system.velocities, strict=True)),
             *(inertia * a for inertia, a in zip(row_v, accelerations, strict=True)),
+            time_slope(system, momentum),
             -force,
         )
-        for row_q, row_v, force in zip(p_D_q, p_D_v, L_q, strict=True)
+        for momentum, row_q, row_v, force in zip(p, p_D_q, p_D_v, L_q, strict=True)
     ]

@@ -1,45 +1,386 @@
-"""What a link model is: the vocabulary in which the files under models/ are written."""
+"""What a model file may say: `define(model, links)` is given a Model and tells it a mechanical system.
+
+    def define(model, links):
+        x = model.coordinate("x", "m")
+        m = model.parameter("m", "kg", default=1.0, positive=True)
+        model.lagrangian = m * model.rate(x)**2 / 2
+
+Everything that is wrong raises GenerationError with the file and the line of the model that said it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import keyword
+import random
+import re
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from numbers import Real
+from pathlib import Path
 
-from sympy import Expr, Matrix, Symbol
+import mpmath
+from sympy import Add, Expr, Integer, Symbol, expand, lambdify, sympify
+
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.mechanics import LagrangianSystem, gradient, jacobian, momenta
+from pendula_codegen.simplify import shortest
+
+MAX_LINKS = 64  # a slip of the keyboard should not be derived for ever
+
+_KEYWORDS = (
+    "alignas alignof and asm auto bitand bitor bool break case catch char class compl concept const consteval "
+    "constexpr constinit continue decltype default delete do double dynamic_cast else enum explicit export extern "
+    "false float for friend goto if inline int long mutable namespace new noexcept not nullptr operator or private "
+    "protected public register reinterpret_cast requires return short signed sizeof static static_assert static_cast "
+    "struct switch template this throw true try typedef typeid typename union unsigned using virtual void volatile "
+    "wchar_t while xor"
+)
+CPP_KEYWORDS = frozenset(_KEYWORDS.split())
+# What the columns of a file and the members of a kernel are called anyhow.
+TAKEN = frozenset({"t", "time", "energy", "links", "name", "inputs", "points", "coordinates"})
 
 
-@dataclass(frozen=True, eq=False)  # a model is what it is by identity, so that results can be kept for it
-class LinkModel:
-    """One link of a chain: its coordinates, parameters, direction and loads, and nothing derived from them.
+@dataclass(frozen=True)
+class Coordinate:
+    symbol: Symbol
+    unit: str
 
-    coordinates         angles of one link (dof symbols), absolute, rad
-    direction           unit vector along the rod as a function of the coordinates, (dimension x 1)
-    angles              the inverse of direction: unit vector -> coordinates
-    up                  unit vector against gravity, (dimension x 1)
-    mass, length, damping   parameters of one link: kg, m, N m s
-    gravity             parameter of the chain: m/s²
-    torque              components of the torque on one link, N m
-    generalized_torque  (û, ∂û/∂q_a) -> the torque's generalised force along q_a, N m
-    dissipation         û̇ -> Rayleigh's dissipation function of one link, W
-    """
+    @property
+    def is_angle(self) -> bool:
+        return self.unit == "rad"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """symbols: one, or one a link; default None where the scenario has to say it."""
 
     name: str
-    coordinates: tuple[Symbol, ...]
-    direction: Matrix
-    angles: Callable[[Matrix], tuple[Expr, ...]]
-    up: Matrix
-    mass: Symbol
-    length: Symbol
-    gravity: Symbol
-    damping: Symbol
-    torque: tuple[Symbol, ...]
-    generalized_torque: Callable[[Matrix, Matrix], Expr]
-    dissipation: Callable[[Matrix], Expr]
+    unit: str
+    symbols: tuple[Symbol, ...]
+    default: float | None
+    positive: bool
+    per_link: bool
+
+
+@dataclass(frozen=True)
+class Input:
+    symbol: Symbol
+    unit: str
+
+
+@dataclass(frozen=True)
+class Point:
+    name: str
+    components: tuple[Expr, ...]
+
+
+@dataclass
+class _Said:
+    """An expression, and the line of the model that said it."""
+
+    value: Expr
+    where: str
+
+
+@dataclass
+class Model:
+    """A mechanical system as its file tells it; see `define` in the documentation."""
+
+    name: str
+    links: int
+    file: str
+    coordinates: list[Coordinate] = field(default_factory=list)
+    parameters: list[Parameter] = field(default_factory=list)
+    inputs: list[Input] = field(default_factory=list)
+    points: list[Point] = field(default_factory=list)
+    _forces: list[tuple[Symbol, _Said]] = field(default_factory=list)
+    _lagrangian: _Said | None = None
+    _dissipation: _Said | None = None
+    _names: dict[str, str] = field(default_factory=dict)  # name -> what it is
+
+    def __setattr__(self, name: str, value: object) -> None:
+        known = name in type(self).__dataclass_fields__ or isinstance(
+            getattr(type(self), name, None), property
+        )
+        if not known:
+            raise GenerationError(
+                f"{self._line()}: model.{name}: expected lagrangian or dissipation, which can be set"
+            )
+        object.__setattr__(self, name, value)
+
+    # --- what a model file calls
+
+    def coordinate(self, name: str, unit: str) -> Symbol:
+        """A coordinate. Of the unit "rad" it is an angle; anything else is not."""
+        symbol = self._declare(name, "a coordinate")
+        self._declare(f"{name}_dot", f"the rate of {name}")
+        self.coordinates.append(Coordinate(symbol, self._text(unit, "a unit")))
+        return symbol
+
+    def rate(self, of: Expr) -> Expr:
+        """dq/dt of a coordinate, a symbol; of an expression in coordinates and time, its derivative."""
+        value = self._expression(of, "rate")
+        for coordinate in self.coordinates:
+            if value == coordinate.symbol:
+                return _rate_symbol(coordinate.symbol)
+        slopes = [(c.symbol, _rate_symbol(c.symbol)) for c in self.coordinates]
+        return Add(*(value.diff(q) * v for q, v in slopes), value.diff(self.time))
+
+    def parameter(
+        self,
+        name: str,
+        unit: str,
+        *,
+        default: float | None = None,
+        positive: bool = False,
+        per_link: bool = False,
+    ) -> Symbol | list[Symbol]:
+        """A number that the scenario or a program gives; with per_link a list of one a link, name_1, name_2, …"""
+        self._declare(name, "a parameter")
+        if default is not None and not isinstance(default, Real):
+            self._fail(f"parameter {name}: default: expected a number, got {default!r}")
+        if positive and default is not None and not default > 0:
+            self._fail(f"parameter {name}: default: expected a number > 0, got {default!r}")
+        names = [f"{name}_{i + 1}" for i in range(self.links)] if per_link else [name]
+        symbols = tuple(Symbol(each, real=True, positive=positive or None) for each in names)
+        for each in names if per_link else ():
+            self._declare(each, f"an element of {name}")
+        value = None if default is None else float(default)
+        self.parameters.append(
+            Parameter(name, self._text(unit, "a unit"), symbols, value, positive, per_link)
+        )
+        return list(symbols) if per_link else symbols[0]
+
+    def input(self, name: str, unit: str) -> Symbol:
+        """A number that the scenario or a program gives at every time; it may stand in forces only."""
+        symbol = self._declare(name, "an input")
+        self.inputs.append(Input(symbol, self._text(unit, "a unit")))
+        return symbol
 
     @property
-    def dof(self) -> int:
-        return len(self.coordinates)
+    def time(self) -> Symbol:
+        """t, s. It may stand in the Lagrangian, too."""
+        return Symbol("t", real=True)
 
     @property
-    def dimension(self) -> int:
-        return self.direction.rows
+    def lagrangian(self) -> Expr | None:
+        return None if self._lagrangian is None else self._lagrangian.value
+
+    @lagrangian.setter
+    def lagrangian(self, value: Expr) -> None:
+        self._lagrangian = self._said(value, "lagrangian")
+
+    @property
+    def dissipation(self) -> Expr:
+        """Rayleigh's function: −∂/∂v of it are forces."""
+        return Integer(0) if self._dissipation is None else self._dissipation.value
+
+    @dissipation.setter
+    def dissipation(self, value: Expr) -> None:
+        self._dissipation = self._said(value, "dissipation")
+
+    def force(self, coordinate: Symbol, value: Expr) -> None:
+        """A generalised force along a coordinate, beside what L gives; several add up."""
+        if coordinate not in [c.symbol for c in self.coordinates]:
+            self._fail(f"force: expected a coordinate of the model first, got {coordinate}")
+        self._forces.append((coordinate, self._said(value, "force")))
+
+    def point(self, name: str, components: Sequence[Expr]) -> None:
+        """A point for files and pictures: 2 or 3 components, m."""
+        if isinstance(components, str) or not isinstance(components, Iterable):
+            self._fail(f"point {name}: expected 2 or 3 components, got {components!r}")
+        values = tuple(self._expression(value, f"point {name}") for value in components)
+        if len(values) not in (2, 3):
+            self._fail(f"point {name}: expected 2 or 3 components, got {len(values)}")
+        self._name(name)
+        for axis in "xyz"[: len(values)]:
+            self._declare(f"{name}_{axis}", f"a component of the point {name}")
+        self._check(Add(*values), f"point {name}", (*self._positions(), self.time))
+        self.points.append(Point(name, values))
+
+    # --- what the generator asks
+
+    @cached_property
+    def system(self) -> LagrangianSystem:
+        """The model as mechanics.py takes it, checked. Raises GenerationError."""
+        if not self.coordinates:
+            raise GenerationError(f"{self.file}: expected a coordinate: model.coordinate(name, unit)")
+        if self._lagrangian is None:
+            raise GenerationError(f"{self.file}: expected model.lagrangian to be set")
+        self._check_lagrangian(self._lagrangian)
+        angles = [c.symbol for c in self.coordinates if c.is_angle]
+        system = LagrangianSystem(
+            name=self.name,
+            coordinates=tuple(c.symbol for c in self.coordinates),
+            velocities=self._rates(),
+            parameters=tuple(symbol for p in self.parameters for symbol in p.symbols),
+            inputs=tuple(i.symbol for i in self.inputs),
+            lagrangian=shortest(self._lagrangian.value, angles),
+            forces=tuple(self._force_along(c.symbol, angles) for c in self.coordinates),
+            time=self.time,
+        )
+        self._check_kinetic(system, self._lagrangian.where)
+        return system
+
+    def _force_along(self, q: Symbol, angles: Sequence[Symbol]) -> Expr:
+        known = (*self._positions(), *self._rates(), self.time)
+        inputs = tuple(i.symbol for i in self.inputs)
+        given = [said for along, said in self._forces if along == q]
+        for said in given:
+            self._check(said.value, "force", (*known, *inputs), said.where)
+        total = Add(*(said.value for said in given))
+        if self._dissipation is not None:
+            self._check(self._dissipation.value, "dissipation", known, self._dissipation.where)
+            total -= gradient(expand(self._dissipation.value), [_rate_symbol(q)])[0]
+        return shortest(total, angles)
+
+    def _check_lagrangian(self, said: _Said) -> None:
+        inputs = {i.symbol for i in self.inputs} & said.value.free_symbols
+        if inputs:
+            name = min(symbol.name for symbol in inputs)
+            raise GenerationError(
+                f"{said.where}: lagrangian: the input {name} may stand in forces only: model.force(q, {name})"
+            )
+        self._check(said.value, "lagrangian", (*self._positions(), *self._rates(), self.time), said.where)
+
+    def _check_kinetic(self, system: LagrangianSystem, where: str) -> None:
+        rates = set(system.velocities)
+        mass = [[expand(entry) for entry in row] for row in jacobian(momenta(system), system.velocities)]
+        for q, row in zip(system.coordinates, mass, strict=True):
+            if all(entry == 0 for entry in row):
+                raise GenerationError(
+                    f"{where}: lagrangian: the coordinate {q} has no kinetic energy: its rate {q}_dot does not "
+                    "stand in it with the power 2"
+                )
+            if any(entry.free_symbols & rates for entry in row):
+                raise GenerationError(
+                    f"{where}: lagrangian: expected powers of the rates up to 2, got others of {q}_dot"
+                )
+        if _is_singular(mass):
+            raise GenerationError(f"{where}: lagrangian: its mass matrix is singular everywhere")
+
+    # --- names, lines and messages
+
+    def _positions(self) -> tuple[Symbol, ...]:
+        return (*(c.symbol for c in self.coordinates), *(s for p in self.parameters for s in p.symbols))
+
+    def _rates(self) -> tuple[Symbol, ...]:
+        return tuple(_rate_symbol(c.symbol) for c in self.coordinates)
+
+    def _said(self, value: object, what: str) -> _Said:
+        return _Said(self._expression(value, what), self._line())
+
+    def _expression(self, value: object, what: str) -> Expr:
+        if isinstance(value, (Real, Expr)) and not isinstance(value, bool):
+            return sympify(value)
+        self._fail(f"{what}: expected a SymPy expression, got {type(value).__name__} {value!r}")
+
+    def _check(self, value: Expr, what: str, known: Iterable[Symbol], where: str | None = None) -> None:
+        names = {symbol.name for symbol in known}
+        strangers = sorted(s.name for s in value.free_symbols if s.name not in names or s not in set(known))
+        if strangers:
+            hint = self._names.get(strangers[0])
+            why = f", which is {hint}" if hint else ", which the model does not declare"
+            raise GenerationError(f"{where or self._line()}: {what} holds the symbol '{strangers[0]}'{why}")
+
+    def _declare(self, name: str, what: str) -> Symbol:
+        self._name(name)
+        if name in TAKEN:
+            self._fail(f"expected another name than '{name}', which means something already")
+        if name in self._names:
+            self._fail(f"expected a new name, got '{name}', which is {self._names[name]} already")
+        self._names[name] = what
+        return Symbol(name, real=True)
+
+    def _name(self, name: object) -> None:
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
+            self._fail(f"expected a name of letters, digits and underscores, got {name!r}")
+        if name in CPP_KEYWORDS or (keyword.iskeyword(name) and name != "lambda"):
+            self._fail(f"expected a name that no programming language uses, got '{name}'")
+
+    def _text(self, value: object, what: str) -> str:
+        if not isinstance(value, str) or not value.isprintable() or '"' in value or "\\" in value:
+            self._fail(f"expected {what}, got {value!r}")
+        return value
+
+    def _fail(self, what: str) -> None:
+        raise GenerationError(f"{self._line()}: {what}")
+
+    def _line(self) -> str:
+        """The line of the model file that is being carried out."""
+        frame = sys._getframe()
+        while frame is not None:
+            if frame.f_code.co_filename == self.file:
+                return f"{self.file}:{frame.f_lineno}"
+            frame = frame.f_back
+        return self.file
+
+
+def _rate_symbol(q: Symbol) -> Symbol:
+    return Symbol(f"{q.name}_dot", real=True)
+
+
+def _is_singular(mass: list[list[Expr]]) -> bool:
+    """Whether a matrix is singular wherever one looks: at a few places, none of which is special."""
+    symbols = sorted({s for row in mass for entry in row for s in entry.free_symbols}, key=lambda s: s.name)
+    evaluate = lambdify(symbols, mass, "mpmath")
+    draw = random.Random(1)
+    for _ in range(3):
+        numbers = mpmath.matrix(evaluate(*(mpmath.mpf(draw.uniform(0.5, 2)) for _ in symbols)))
+        diagonal = mpmath.fprod(numbers[k, k] for k in range(len(mass)))
+        if abs(mpmath.det(numbers)) > 1e-12 * abs(diagonal):
+            return False
+    return True
+
+
+def read_model(file: Path, links: int | None = None) -> Model:
+    """What the model file defines; `links` is 1 where it has none. Raises GenerationError."""
+    if links is not None and not 1 <= links <= MAX_LINKS:
+        raise GenerationError(f"{file}: links: expected 1 to {MAX_LINKS}, got {links}")
+    define = _define_of(file)
+    name = file.stem if links is None else f"{file.stem}_{links}"
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise GenerationError(
+            f"{file}: expected a file name of letters, digits and underscores, ending in .py"
+        )
+    model = Model(name, links or 1, str(file))
+    try:
+        define(model, links or 1)
+    except GenerationError:
+        raise
+    except Exception as error:
+        raise GenerationError(_said_by(error, file)) from error
+    model.system  # noqa: B018  the checks of the whole
+    return model
+
+
+def _define_of(file: Path) -> Callable[[Model, int], None]:
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "no text in UTF-8"
+        raise GenerationError(f"{file}: expected a model file, got: {reason}") from error
+    names: dict[str, object] = {"__name__": file.stem, "__file__": str(file)}
+    try:
+        exec(compile(text, str(file), "exec"), names)
+    except SyntaxError as error:
+        raise GenerationError(f"{file}:{error.lineno}: {error.msg}") from error
+    except Exception as error:
+        raise GenerationError(_said_by(error, file)) from error
+    define = names.get("define")
+    if not callable(define):
+        raise GenerationError(f"{file}: expected a function define(model, links), got none")
+    return define
+
+
+def _said_by(error: Exception, file: Path) -> str:
+    """An exception of the model file, with the line of the file that it came through last."""
+    lines = [
+        entry.lineno for entry in traceback.extract_tb(error.__traceback__) if entry.filename == str(file)
+    ]
+    where = f"{file}:{lines[-1]}" if lines else str(file)
+    text = " ".join(str(error).split())
+    return f"{where}: {type(error).__name__}{': ' + text if text else ''}"

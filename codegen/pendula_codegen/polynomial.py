@@ -1,7 +1,8 @@
-"""Sparse polynomials with rational coefficients in named atoms: the canonical form between SymPy and C++.
+"""Sparse polynomials with rational coefficients in named atoms: the canonical form between SymPy and a backend.
 
 SymPy derives; what it hands over is expanded here, because a polynomial has one form only: terms that cancel
 are gone, and the factoring of straight_line.py does not depend on how SymPy happened to write an expression.
+What is no polynomial (a root, an exponential, a quotient) is an atom whose argument is one.
 """
 
 from __future__ import annotations
@@ -9,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 
-from sympy import Expr, cos, sin
+from sympy import Expr, Function, acos, asin, atan, cos, cosh, exp, log, sin, sinh, tan, tanh
 
 from pendula_codegen.errors import GenerationError
 
 Number = int | Fraction
 Monomial = tuple[int, ...]  # atom numbers, ascending, with multiplicity
 Polynomial = dict[Monomial, Number]
+Call = str | tuple[str, Fraction]  # name of a function of one argument; ("pow", exponent)
 _TRIG = (sin, cos)
+_FUNCTIONS: tuple[type[Function], ...] = (acos, asin, atan, cosh, exp, log, sinh, tan, tanh)
 ONE: Polynomial = {(): 1}
 
 
@@ -51,11 +54,21 @@ def multiply(left: Polynomial, right: Polynomial) -> Polynomial:
     return product
 
 
-class Expander:
-    """Turns SymPy expressions into polynomials; `atom` says what a symbol, a sine or a cosine becomes."""
+def constant(polynomial: Polynomial) -> Number | None:
+    """The number that a polynomial is; None where it holds an atom."""
+    return None if any(polynomial) else polynomial.get((), 0)
 
-    def __init__(self, atom: Callable[[Expr], Polynomial]):
+
+class Expander:
+    """Turns SymPy expressions into polynomials.
+
+    atom   what a symbol, or a sine or cosine, becomes
+    call   what a function of a polynomial becomes
+    """
+
+    def __init__(self, atom: Callable[[Expr], Polynomial], call: Callable[[Call, Polynomial], Polynomial]):
         self._atom = atom
+        self._call = call
         self._known: dict[Expr, Polynomial] = {}
 
     def expand(self, expression: Expr) -> Polynomial:
@@ -64,7 +77,14 @@ class Expander:
         return self._known[expression]
 
     def _expand(self, expression: Expr) -> Polynomial:
-        if expression.is_Symbol or isinstance(expression, _TRIG):
+        if expression.is_Symbol:
+            return self._atom(expression)
+        if expression.is_Rational:
+            value = quotient(int(expression.p), int(expression.q))
+            return {(): value} if value else {}
+        if expression.is_number:
+            return _rounded(expression)
+        if isinstance(expression, _TRIG):
             return self._atom(expression)
         if expression.is_Mul:
             return self._product(expression.args)
@@ -73,15 +93,43 @@ class Expander:
             for term in expression.args:
                 add_into(total, self.expand(term))
             return total
-        if expression.is_Rational:
-            value = quotient(int(expression.p), int(expression.q))
-            return {(): value} if value else {}
-        if expression.is_Pow and expression.exp.is_Integer and expression.exp > 0:
-            return self._product([expression.base] * int(expression.exp))
-        raise GenerationError(f"a kernel has only + − * / sin cos: it cannot evaluate {expression}")
+        if expression.is_Pow:
+            return self._power(expression.base, expression.exp)
+        if isinstance(expression, _FUNCTIONS):
+            return self._call(type(expression).__name__, self.expand(expression.args[0]))
+        raise GenerationError(
+            f"a kernel cannot evaluate {expression}: it has + − * / powers roots exp log and the functions "
+            "sin cos tan asin acos atan sinh cosh tanh"
+        )
 
     def _product(self, factors: Iterable[Expr]) -> Polynomial:
         product = ONE
         for factor in factors:
             product = multiply(product, self.expand(factor))
         return product
+
+    def _power(self, base: Expr, exponent: Expr) -> Polynomial:
+        if not exponent.is_Rational:
+            return self._call("exp", multiply(self.expand(exponent), self._call("log", self.expand(base))))
+        root = self.expand(base)
+        if exponent.q != 1:
+            root = self._call(_root(int(exponent.q)), root)
+        if exponent.p < 0:
+            root = self._call("inverse", root)
+        product = ONE
+        for _ in range(abs(int(exponent.p))):
+            product = multiply(product, root)
+        return product
+
+
+def _root(degree: int) -> Call:
+    return {2: "sqrt", 3: "cbrt"}.get(degree, ("pow", Fraction(1, degree)))
+
+
+def _rounded(expression: Expr) -> Polynomial:
+    """A number that is no fraction, such as π or √2, rounded to double."""
+    value = complex(expression)
+    if value.imag or value.real != value.real or abs(value.real) == float("inf"):
+        raise GenerationError(f"a kernel cannot evaluate {expression}: it is no finite real number")
+    exact = Fraction(value.real)
+    return {(): quotient(exact.numerator, exact.denominator)} if exact else {}

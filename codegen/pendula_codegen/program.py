@@ -7,20 +7,21 @@ from dataclasses import dataclass
 
 from sympy import Expr
 
+from pendula_codegen.places import Place
 from pendula_codegen.polynomial import Polynomial, ordered
 from pendula_codegen.straight_line import Graph, Term, factor, share
 from pendula_codegen.vocabulary import ORDERS, Atom, Order, Vocabulary
 
 SIN_COS = 10  # operations that one sine or cosine counts for in a comparison of candidates
 
-Assignment = tuple[str, Expr]  # C++ left-hand side, value
+Assignment = tuple[Place, Expr]  # where the value goes
 
 
 @dataclass(frozen=True)
 class Program:
     """Straight-line code for `targets`; node k < len(atoms) of the graph is atoms[k]."""
 
-    targets: tuple[str, ...]
+    targets: tuple[Place, ...]
     atoms: tuple[Atom, ...]
     graph: Graph
     outputs: tuple[Term, ...]
@@ -29,19 +30,23 @@ class Program:
 
     @property
     def trig(self) -> int:
-        """How many sines and cosines are read."""
-        return sum(1 for node in self.order if node < len(self.atoms) and self.atoms[node].is_trig)
+        """How many sines, cosines, roots and the like are read."""
+        return sum(1 for node in self.order if node < len(self.atoms) and self.atoms[node].is_call)
 
     @property
     def cost(self) -> int:
         return self.operations + SIN_COS * self.trig
+
+    def needed_by(self, count: int) -> int:
+        """How many nodes, of the order, the first `count` outputs need: they come first in it."""
+        return len(self.graph.order(node for _, node in self.outputs[:count]))
 
 
 @dataclass(frozen=True)
 class Problem:
     """Assignments as polynomials in the atoms of one vocabulary: all that a program needs but an order."""
 
-    targets: tuple[str, ...]
+    targets: tuple[Place, ...]
     vocabulary: Vocabulary
     values: tuple[Polynomial, ...]
     definitions: dict[int, Polynomial]

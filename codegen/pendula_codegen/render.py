@@ -4,37 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
 import jinja2
+from sympy import expand
 
 from pendula_codegen import __version__
+from pendula_codegen.backends import cpp
+from pendula_codegen.backends.cpp import Counts, RenderedFunction
 from pendula_codegen.chain import Chain
+from pendula_codegen.chain_kernel import ChainKernel
+from pendula_codegen.entry_points import SystemKernel
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.kernel import DenseKernel
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
-from pendula_codegen.models import find_model
+from pendula_codegen.links import find_link
+from pendula_codegen.model import Model
+from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
 
 PACKAGE = Path(__file__).parent
-WIDTH = 120
-
-
-def signature(name: str, arguments: list[str]) -> str:
-    """First lines of a static member function, broken at arguments to the width of the project's style."""
-    head = f"  static void {name}("
-    lines = [head]
-    for k, argument in enumerate(arguments):
-        piece = argument + (") {" if k == len(arguments) - 1 else ",")
-        if len(lines[-1]) + 1 + len(piece) > WIDTH:
-            lines.append(" " * len(head) + piece)
-        else:
-            lines[-1] += piece if lines[-1].endswith("(") else f" {piece}"
-    return "\n".join(lines)
-
 
 ENVIRONMENT = jinja2.Environment(
     loader=jinja2.FileSystemLoader(PACKAGE / "templates"),
@@ -43,9 +37,15 @@ ENVIRONMENT = jinja2.Environment(
     lstrip_blocks=True,
     keep_trailing_newline=True,
 )
+ENVIRONMENT.globals.update(signature=cpp.signature, solve_lines=solve_lines, unrolled=UNROLLED)
 
 
-ENVIRONMENT.globals.update(signature=signature, solve_lines=solve_lines, unrolled=UNROLLED)
+@dataclass(frozen=True)
+class Header:
+    """A generated header, and what its functions cost."""
+
+    text: str
+    counts: Mapping[str, Counts] = field(default_factory=dict)
 
 
 # Sources that only one kind of header is made from; __main__ and counts write none.
@@ -53,11 +53,13 @@ OWN_SOURCES = {
     "kernel": {
         "blocks.py",
         "chain.py",
-        "kernel.py",
+        "chain_kernel.py",
         "linear_solve.py",
         "mechanics.py",
+        "simplify.py",
         "templates/kernel.hpp.j2",
     },
+    "model": {"model.py", "model_kernel.py"},
     "link": {"link.py", "templates/link.hpp.j2"},
     "tableaux": {"tableau.py", "templates/gauss_tableaux.hpp.j2"},
     "none": {"__main__.py", "counts.py"},
@@ -72,7 +74,9 @@ def inputs_hash(kind: str, model: str | None) -> str:
         name = path.relative_to(PACKAGE).as_posix()
         if path.suffix not in (".py", ".j2") or name in foreign:
             continue
-        if path.parent.name == "models" and path.stem not in ("__init__", model):
+        if path.parent.name == "models" or (
+            path.parent.name == "links" and path.stem not in ("__init__", model)
+        ):
             continue
         digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
@@ -92,35 +96,217 @@ def kernel_name(space: str, links: int) -> str:
     return f"{space}_{links}"
 
 
-def render_kernel(space: str, links: int) -> str:
-    """The text of <space>_<links>.hpp; raises GenerationError on an unknown space or links < 1."""
-    chain = Chain(find_model(space), links)
-    return render_dense(DenseKernel(chain))
+def struct_name(name: str) -> str:
+    """planar_2 as Planar2."""
+    return "".join(part[:1].upper() + part[1:] for part in name.split("_"))
 
 
-def render_dense(kernel: DenseKernel) -> str:
-    space, links = kernel.chain.model.name, kernel.chain.links
-    name = kernel_name(space, links)
-    plural = "" if links == 1 else "s"
-    return ENVIRONMENT.get_template("kernel.hpp.j2").render(
+def render_kernel(space: str, links: int) -> Header:
+    """<space>_<links>.hpp; raises GenerationError on an unknown space or links < 1."""
+    return render_chain(ChainKernel(Chain(find_link(space), links)))
+
+
+def render_chain(kernel: ChainKernel) -> Header:
+    chain, model, n = kernel.chain, kernel.chain.model, kernel.chain.links
+    name = kernel_name(model.name, n)
+    plural = "" if n == 1 else "s"
+    angles = chain.coordinates
+    components = [""] if len(model.torque) == 1 else [f"_{axis}" for axis in "xyz"]
+    number = len(angles)
+    return _render(
+        kernel,
+        name=name,
+        model=model.name,
         banner=banner(
-            f"Kernel of the {space} chain with {links} link{plural}.",
+            f"Kernel of the {model.name} chain with {n} link{plural}.",
             "kernel",
-            space,
-            f"--space {space} --links {links} --output {name}.hpp",
+            model.name,
+            f"--space {model.name} --links {n} --output {name}.hpp",
         ),
-        guard_name=name,
-        struct=f"{space.capitalize()}{links}",
-        chain=kernel.chain,
-        functions=kernel.render(),
-        documented=documented,
+        about=[
+            f"Pure functions of the {model.name} chain with {n} link{plural}.",
+            "",
+            "Arguments of all functions (SI units):",
+            "  chain    masses m_i (kg), lengths l_i (m), damping λ_i (N m s), gravity g (m/s²)",
+            f"  q, v, a  angles (rad), rates (rad/s), accelerations (rad/s²), ({number}): "
+            + ", ".join(q.name for q in angles),
+            f"  p        momenta conjugate to q, ({number}) (N m s)",
+            f"  torque   torque on each link at the time in question, ({len(model.torque)} x {n}) (N m)",
+        ],
+        numbers=[
+            ("int", "links", n),
+            ("int", "dof", model.dof),
+            ("int", "dimension", model.dimension),
+            ("int", "coordinates", number),
+            ("int", "torque_components", len(model.torque)),
+        ],
+        coordinates=[(q.name, "rad", True) for q in angles],
+        parameters=[
+            ("masses", "kg", n, None, True, True),
+            ("lengths", "m", n, None, True, True),
+            ("damping", "N m s", n, 0.0, False, True),
+            ("gravity", "m/s^2", 1, 9.81, False, False),
+        ],
+        inputs=[(f"torque_{i}{axis}", "N m") for i in chain.numbers for axis in components],
+        points=[(f"bob_{i}", model.dimension) for i in chain.numbers],
+        types=[
+            ("LinkVector", "Eigen::Matrix<Real, links, 1>"),
+            ("LinkMatrix", "Eigen::Matrix<Real, links, links>"),
+            ("Points", "Eigen::Matrix<Real, dimension, links>"),
+            ("Inputs", "Eigen::Matrix<Real, torque_components, links>"),
+            ("Torque", "Inputs<Real>"),
+        ],
+        fields=["LinkVector<Real> masses, lengths, damping;", "Real gravity;"],
+        has_hamiltonian=True,
     )
 
 
-def render_link(space: str) -> str:
-    """The text of <space>_link.hpp."""
-    kernel = LinkKernel(find_model(space))
-    return ENVIRONMENT.get_template("link.hpp.j2").render(
+def render_model(model: Model, source: str) -> Header:
+    """The header of a model; `source` is how the banner names its file."""
+    kernel = ModelKernel(model)
+    scalars = [p for p in model.parameters if not p.per_link]
+    arrays = [p for p in model.parameters if p.per_link]
+    inputs, points = len(model.inputs), sum(len(p.components) for p in model.points)
+    names = [c.symbol.name for c in model.coordinates]
+    fields = [f"Eigen::Matrix<Real, links, 1> {p.name};  ///< {p.unit}" for p in arrays]
+    fields += [f"Real {p.name};  ///< {p.unit}" for p in scalars]
+    if _holds_time(model):
+        fields.append("Real time;  ///< s")
+    return _render(
+        kernel,
+        name=model.name,
+        model=Path(source).stem,
+        banner=banner(
+            f"Kernel of the system {model.name}.",
+            "model",
+            None,
+            f"--model {source} --links {model.links} --output {model.name}.hpp",
+        ),
+        about=[
+            f"Pure functions of the system {model.name}.",
+            "",
+            "Arguments of all functions:",
+            "  parameters  what the model declares, by name" + ("; time, s" if _holds_time(model) else ""),
+            f"  q, v, a     coordinates, rates, accelerations, ({len(names)}): {', '.join(names)}",
+            f"  p           momenta conjugate to q, ({len(names)})",
+            f"  inputs      at the time in question, ({inputs})",
+        ],
+        numbers=[
+            ("int", "links", model.links),
+            ("int", "coordinates", len(names)),
+            ("int", "point_components", points),
+        ],
+        coordinates=[(c.symbol.name, c.unit, c.is_angle) for c in model.coordinates],
+        parameters=[
+            (p.name, p.unit, len(p.symbols), p.default, p.positive, p.per_link) for p in [*arrays, *scalars]
+        ],
+        inputs=[(i.symbol.name, i.unit) for i in model.inputs],
+        points=[(p.name, len(p.components)) for p in model.points],
+        types=[
+            ("Points", "Eigen::Matrix<Real, point_components, 1>"),
+            ("Inputs", f"Eigen::Matrix<Real, {inputs}, 1>"),
+        ],
+        fields=fields,
+        has_hamiltonian=False,
+    )
+
+
+def _holds_time(model: Model) -> bool:
+    system = model.system
+    held = [system.lagrangian, *system.forces, *(c for p in model.points for c in p.components)]
+    return any(expression.has(model.time) for expression in held)
+
+
+def _constant_masses(kernel: SystemKernel) -> bool:
+    """Whether no entry on the diagonal of the mass matrix depends on the coordinates."""
+    changing = {*kernel.system.coordinates}
+    diagonal = (expand(kernel.mass[k, k]) for k in range(kernel.mass.rows))
+    return not any(entry.free_symbols & changing for entry in diagonal)
+
+
+def _render(kernel: SystemKernel, **words) -> Header:
+    functions = [cpp.render_function(kernel, function) for function in kernel.functions()]
+    text = ENVIRONMENT.get_template("kernel.hpp.j2").render(
+        banner=words["banner"],
+        about=words["about"],
+        struct=struct_name(words["name"]),
+        name=words["name"],
+        model=words["model"],
+        numbers=[*words["numbers"], ("bool", "constant_masses", cpp.literal(_constant_masses(kernel)))],
+        lists=_lists(words),
+        types=words["types"],
+        fields=words["fields"],
+        assignments=_assignments(words["parameters"]),
+        casts=_casts(words["parameters"], words["fields"]),
+        functions=functions,
+        using_of=_using,
+        size=len(kernel.system.coordinates),
+        has_hamiltonian=words["has_hamiltonian"],
+    )
+    return Header(text, {function.name: function.counts for function in functions})
+
+
+def _lists(words: dict) -> list[str]:
+    """What the kernel says of its coordinates, parameters, inputs and points."""
+    coordinates, parameters = words["coordinates"], words["parameters"]
+    inputs, points = words["inputs"], words["points"]
+    return cpp.constants(
+        [
+            ("std::string_view", "coordinate_names", [c[0] for c in coordinates]),
+            ("std::string_view", "coordinate_units", [c[1] for c in coordinates]),
+            ("bool", "coordinate_is_angle", [c[2] for c in coordinates]),
+            ("std::string_view", "parameter_names", [p[0] for p in parameters]),
+            ("std::string_view", "parameter_units", [p[1] for p in parameters]),
+            ("int", "parameter_sizes", [p[2] for p in parameters]),
+            ("double", "parameter_defaults", [p[3] for p in parameters]),
+            ("bool", "parameter_is_positive", [p[4] for p in parameters]),
+            ("bool", "parameter_is_per_link", [p[5] for p in parameters]),
+            ("std::string_view", "input_names", [i[0] for i in inputs]),
+            ("std::string_view", "input_units", [i[1] for i in inputs]),
+            ("std::string_view", "point_names", [p[0] for p in points]),
+            ("int", "point_sizes", [p[1] for p in points]),
+        ]
+    )
+
+
+def _assignments(parameters: list[tuple]) -> list[str]:
+    """Statements that read parameters one after the other."""
+    lines, at = [], 0
+    for name, _, size, _, _, per_link in parameters:
+        if not per_link:
+            lines.append(f"to.{name} = Real(from[{at}]);")
+        else:
+            lines.append(f"for (int i = 0; i < {size}; ++i) to.{name}[i] = Real(from[{at} + i]);")
+        at += size
+    return lines
+
+
+def _casts(parameters: list[tuple], fields: list[str]) -> list[str]:
+    """Statements that convert parameters one after the other."""
+    lines = [
+        f"for (int i = 0; i < {size}; ++i) to.{name}[i] = To(from.{name}[i]);"
+        if per_link
+        else f"to.{name} = To(from.{name});"
+        for name, _, size, _, _, per_link in parameters
+    ]
+    holds_time = any(line.startswith("Real time;") for line in fields)
+    return [*lines, "to.time = To(from.time);"] if holds_time else lines
+
+
+_MATH = re.compile(r"\b(sin|cos|tan|asin|acos|atan|sinh|cosh|tanh|exp|log|sqrt|cbrt|pow)\(")
+
+
+def _using(function: RenderedFunction) -> list[str]:
+    """Declarations by which the functions of the standard library are found beside those of Real's namespace."""
+    used = sorted({name for line in function.lines for name in _MATH.findall(line)})
+    return [f"using {', '.join(f'std::{name}' for name in used)};"] if used else []
+
+
+def render_link(space: str) -> Header:
+    """<space>_link.hpp."""
+    kernel = LinkKernel(find_link(space))
+    functions = kernel.render()
+    text = ENVIRONMENT.get_template("link.hpp.j2").render(
         banner=banner(
             f"One link of the {space} chain.", "link", space, f"--space {space} --output {space}_link.hpp"
         ),
@@ -129,37 +315,27 @@ def render_link(space: str) -> str:
         names=kernel.index_names(),
         trig=kernel.trig_names(),
         angles=kernel.angles(),
-        functions=kernel.render(),
+        functions=functions,
     )
+    return Header(text, {function.name: function.body.counts for function in functions})
 
 
-def render_tableaux() -> str:
-    """The text of gauss_tableaux.hpp."""
-    return ENVIRONMENT.get_template("gauss_tableaux.hpp.j2").render(
-        banner=banner(
-            f"Gauss–Legendre methods with 1 to {MAX_STAGES} stages.",
-            "tableaux",
-            None,
-            "--output gauss_tableaux.hpp",
-        ),
-        tableaux=[*map(gauss, range(1, MAX_STAGES + 1)), *map(radau, RADAU_STAGES)],
-        vectors=VECTORS,
-        matrices=MATRICES,
-        digits=DIGITS,
+def render_tableaux() -> Header:
+    """gauss_tableaux.hpp."""
+    return Header(
+        ENVIRONMENT.get_template("gauss_tableaux.hpp.j2").render(
+            banner=banner(
+                f"Gauss–Legendre methods with 1 to {MAX_STAGES} stages.",
+                "tableaux",
+                None,
+                "--output gauss_tableaux.hpp",
+            ),
+            tableaux=[*map(gauss, range(1, MAX_STAGES + 1)), *map(radau, RADAU_STAGES)],
+            vectors=VECTORS,
+            matrices=MATRICES,
+            digits=DIGITS,
+        )
     )
-
-
-def documented(function) -> list[str]:
-    """Doc comment of a rendered function: equation, arguments with shapes and units, counts."""
-    lines = [function.function.title, ""]
-    rows = []
-    for output in function.function.outputs:
-        meaning, unit = output.meaning.split("|")
-        rows.append((output.name, f"out, {meaning}", unit))
-    width = max(len(row[0]) for row in rows) + 2
-    column = max(len(row[1]) for row in rows) + 2
-    lines += [f"{name:<{width}}{meaning:<{column}}{unit}" for name, meaning, unit in rows]
-    return [*lines, str(function.body.counts)]
 
 
 def write_atomically(path: Path, text: str) -> None:

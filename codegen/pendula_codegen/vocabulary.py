@@ -8,47 +8,57 @@ from dataclasses import dataclass, replace
 from sympy import Add, Expr, Integer, Symbol, cos, sin
 
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.polynomial import Expander, Polynomial, ordered
+from pendula_codegen.places import Place
+from pendula_codegen.polynomial import Call, Expander, Polynomial, constant, ordered, quotient
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A value that a function reads, the C++ that fetches it, and the argument it comes from."""
+    """A value that a function reads, and where it stands.
+
+    kind   parameter, input, q, v, a or p: see ORDERS
+    """
 
     symbol: Symbol
-    code: str
-    source: str
+    place: Place
+    kind: str
 
 
 @dataclass(frozen=True)
 class Angle:
-    """A coordinate, of which only sine and cosine are read, once each; `sine`, `cosine` are C++."""
+    """A coordinate whose sine and cosine are computed once each.
+
+    place   where the angle stands, or
+    given   where its sine and cosine do, computed already
+    """
 
     symbol: Symbol
-    sine: str
-    cosine: str
-    source: str
+    place: Place | None = None
+    given: tuple[Place, Place] | None = None
 
 
 @dataclass(frozen=True)
 class Atom:
-    """One atom: fetched by `code`, or computed from its `definition`. `kind`: see ORDERS."""
+    """One atom: read from a place, or a function of what stands there, or computed from a definition or an argument.
+
+    kind         see ORDERS
+    function     what is computed of the place, or of the argument
+    definition   what the atom stands for
+    argument     of the function, in other atoms
+    """
 
     name: str
     kind: str
-    code: str = ""
-    source: str = ""
+    place: Place | None = None
+    function: Call = ""
     definition: Expr | None = None
+    argument: Polynomial | None = None
     position: int = 0  # among all atoms, as the arguments have them
 
     @property
-    def is_trig(self) -> bool:
-        return self.kind == "trig"
-
-    @property
-    def is_computed(self) -> bool:
-        """Whether fetching it calls a function, so that it is a value and no reference."""
-        return "(" in self.code and self.is_trig
+    def is_call(self) -> bool:
+        """Whether computing it takes a sine, a root or the like."""
+        return bool(self.function) or self.kind == "trig"
 
 
 @dataclass(frozen=True)
@@ -74,10 +84,10 @@ class Order:
 # What an equation gains from an order depends on its structure; these won somewhere when more were tried on
 # planar 2–8 and spatial 2–5. The first is tried with every form, the others with the best form of the first.
 ORDERS = (
-    Order(("definition", "chain", "torque", "v", "a", "p", "trig", "pair")),
-    Order(("definition", "chain", "torque", "v", "a", "p", "trig", "pair"), last_link_first=True),
-    Order(("pair", "trig", "v", "a", "p", "definition", "chain", "torque")),
-    Order(("trig", "pair", "v", "a", "p", "chain", "definition", "torque"), last_link_first=True),
+    Order(("definition", "parameter", "input", "v", "a", "p", "trig", "pair")),
+    Order(("definition", "parameter", "input", "v", "a", "p", "trig", "pair"), last_link_first=True),
+    Order(("pair", "trig", "v", "a", "p", "definition", "parameter", "input")),
+    Order(("trig", "pair", "v", "a", "p", "parameter", "definition", "input"), last_link_first=True),
 )
 
 
@@ -93,16 +103,15 @@ class Vocabulary:
         self._angles = {angle.symbol: k for k, angle in enumerate(angles)}
         self._numbers: dict[Expr, int] = {}
         self._pairs: dict[tuple[type, Symbol, Symbol], int] = {}
-        self._expander = Expander(self._atom)
+        self._calls: dict[tuple, int] = {}
+        self._expander = Expander(self._atom, self._call)
         for symbol, definition in definitions.items():
             if symbol not in form.expanded:
                 self._add(symbol, Atom(symbol.name, "definition", definition=definition))
         for leaf in leaves:
-            self._add(leaf.symbol, Atom(leaf.symbol.name, leaf.source, leaf.code, leaf.source))
+            self._add(leaf.symbol, Atom(leaf.symbol.name, leaf.kind, leaf.place))
         for angle in angles:
-            for function, code in ((sin, angle.sine), (cos, angle.cosine)):
-                name = f"{function.__name__}_{angle.symbol.name}"
-                self._add(function(angle.symbol), Atom(name, "trig", code, angle.source))
+            self._add_angle(angle)
         if form.pair_angles:
             self._add_pairs(list(self._angles))
 
@@ -111,14 +120,20 @@ class Vocabulary:
         self.atoms.append(replace(atom, position=len(self.atoms)))
         return self._numbers[expression]
 
+    def _add_angle(self, angle: Angle) -> None:
+        for k, function in enumerate((sin, cos)):
+            name = f"{function.__name__}_{angle.symbol.name}"
+            if angle.given:
+                self._add(function(angle.symbol), Atom(name, "trig", angle.given[k]))
+            else:
+                self._add(function(angle.symbol), Atom(name, "trig", angle.place, function.__name__))
+
     def _add_pairs(self, angles: list[Symbol]) -> None:
-        """Atoms for sin and cos of the difference of two angles of the same kind: cos_theta_1_2."""
+        """Atoms for sin and cos of the difference of two angles: cos_theta_1_2."""
         for k, first in enumerate(angles):
             for second in angles[k + 1 :]:
-                kind, i = first.name.rsplit("_", 1)
-                other, j = second.name.rsplit("_", 1)
-                for function in (sin, cos) if kind == other else ():
-                    name = f"{function.__name__}_{kind}_{i}_{j}"
+                for function in (sin, cos):
+                    name = f"{function.__name__}_{_both(first.name, second.name)}"
                     definition = _of_sum(function, [(1, first), (-1, second)])
                     number = self._add(Symbol(name), Atom(name, "pair", definition=definition))
                     self._pairs[(function, first, second)] = number
@@ -133,11 +148,14 @@ class Vocabulary:
         waiting = list(polynomials)
         while waiting:
             for atom in sorted({atom for monomial in waiting.pop() for atom in monomial}):
-                definition = self.atoms[atom].definition
-                if definition is not None and atom not in found:
-                    found[atom] = self.polynomial(definition)
-                    waiting.append(found[atom])
+                held = self._held_by(self.atoms[atom])
+                if held is not None and atom not in found:
+                    found[atom] = held
+                    waiting.append(held)
         return found
+
+    def _held_by(self, atom: Atom) -> Polynomial | None:
+        return self.polynomial(atom.definition) if atom.definition is not None else atom.argument
 
     def ranking(self, order: Order) -> list[int]:
         """All atoms, those to be pulled out first in front."""
@@ -157,10 +175,10 @@ class Vocabulary:
         return self._trig(type(expression), expression.args[0])
 
     def _trig(self, function: type, angle: Expr) -> Polynomial:
-        """sin or cos of an integer combination of angles."""
+        """sin or cos, of an integer combination of angles by those of the angles."""
         parts = [term.as_coeff_Mul() for term in Add.make_args(angle)]
         if any(symbol not in self._angles or not isinstance(c, Integer) for c, symbol in parts):
-            raise GenerationError(f"a kernel cannot evaluate {function(angle)}")
+            return self._call(function.__name__, self.polynomial(angle))
         parts.sort(key=lambda part: self._angles[part[1]])
         terms = [(int(c), symbol) for c, symbol in parts]
         if [abs(c) for c, _ in terms] == [1, 1] and terms[0][0] == -terms[1][0]:
@@ -168,6 +186,28 @@ class Vocabulary:
             if number is not None:
                 return {(number,): terms[0][0] if function is sin else 1}
         return self.polynomial(_of_sum(function, terms))
+
+    def _call(self, function: Call, argument: Polynomial) -> Polynomial:
+        """A function of a polynomial, as an atom; equal ones are one atom."""
+        number = constant(argument)
+        if number is not None and function == "inverse" and number:
+            return {(): quotient(1, number)}
+        key = (function, tuple(ordered(argument).items()))
+        if key not in self._calls:
+            word = function if isinstance(function, str) else function[0]
+            name = f"{word}_{sum(1 for known, _ in self._calls if known == function) + 1}"
+            self._calls[key] = len(self.atoms)
+            self.atoms.append(
+                Atom(name, "call", function=function, argument=ordered(argument), position=len(self.atoms))
+            )
+        return {(self._calls[key],): 1}
+
+
+def _both(first: str, second: str) -> str:
+    """theta_1 and theta_2 as theta_1_2; names of no such pattern side by side."""
+    kind, _, i = first.rpartition("_")
+    other, _, j = second.rpartition("_")
+    return f"{kind}_{i}_{j}" if kind and kind == other else f"{first}_{second}"
 
 
 def _of_sum(function: type, terms: list[tuple[int, Symbol]]) -> Expr:

@@ -6,13 +6,13 @@ from sympy import Expr, Matrix
 
 from pendula_codegen.blocks import Blocks, collect_blocks
 from pendula_codegen.chain import Chain
+from pendula_codegen.links import LINKS
 from pendula_codegen.mechanics import euler_lagrange
-from pendula_codegen.models import MODELS
 
 
 @cache
 def chain(space: str, links: int) -> Chain:
-    return Chain(MODELS[space], links)
+    return Chain(LINKS[space], links)
 
 
 def written_out(chain: Chain, expression: Expr | Matrix) -> Expr | Matrix:

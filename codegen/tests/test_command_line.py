@@ -12,7 +12,7 @@ from sympy import Symbol
 
 from conftest import REPOSITORY
 from pendula_codegen.__main__ import main
-from pendula_codegen.models import MODELS
+from pendula_codegen.links import LINKS
 
 
 def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess:
@@ -80,9 +80,9 @@ def test_exit_status_of_the_process(tmp_path):
 
 
 def test_symbol_that_the_model_does_not_declare(tmp_path, capsys, monkeypatch):
-    planar = MODELS["planar"]
+    planar = LINKS["planar"]
     heavy = replace(planar, up=planar.up * Symbol("k"))
-    monkeypatch.setitem(MODELS, "planar", heavy)
+    monkeypatch.setitem(LINKS, "planar", heavy)
     assert main(["kernel", "--space", "planar", "--links", "2", "--output", str(tmp_path)]) == 2
     message = "the Lagrangian of model 'planar' holds the symbol 'k', which the model does not declare"
     assert capsys.readouterr().err == f"pendula_codegen: error: {message}\n"

@@ -43,5 +43,5 @@ def test_solves_with_the_lower_triangle_alone(size):
     x = [draw.uniform(-1, 1) for _ in range(size)]
     b = [sum(a * value for a, value in zip(row, x, strict=True)) for row in A]
     lower = [[A[i][j] if j <= i else float("nan") for j in range(size)] for i in range(size)]
-    exec(as_python(solve_lines(size)), {"A": lower, "b": b, "coordinates": size})
+    exec(as_python(solve_lines(size)), {"M": lower, "b": b, "coordinates": size})
     assert max(abs(p - q) for p, q in zip(b, x, strict=True)) < 1e-14  # measured 9e-16

@@ -8,17 +8,17 @@ from sympy import Matrix, Rational, Symbol, cos, simplify, sin
 from pendula_codegen.blocks import collect_blocks
 from pendula_codegen.chain import Chain
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.models import MODELS, find_model
+from pendula_codegen.links import LINKS, find_link
 
-PLANAR, SPATIAL = MODELS["planar"], MODELS["spatial"]
+PLANAR, SPATIAL = LINKS["planar"], LINKS["spatial"]
 
 
-@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+@pytest.mark.parametrize("model", LINKS.values(), ids=LINKS)
 def test_direction_is_a_unit_vector(model):
     assert simplify(model.direction.dot(model.direction)) == 1
 
 
-@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+@pytest.mark.parametrize("model", LINKS.values(), ids=LINKS)
 def test_angles_are_the_inverse_of_the_direction(model):
     at = dict(zip(model.coordinates, (Rational(13, 10), Rational(-21, 10)), strict=False))
     angles = Matrix(model.angles(model.direction.subs(at)))
@@ -40,7 +40,7 @@ def test_undeclared_symbol_in_the_dissipation():
 
 def test_unknown_model():
     with pytest.raises(GenerationError, match=r"^unknown model 'cubic': expected one of planar, spatial$"):
-        find_model("cubic")
+        find_link("cubic")
 
 
 @pytest.mark.parametrize("links", [0, -3])

@@ -27,13 +27,25 @@ struct SimulateOptions {
 ExitStatus simulate(const SimulateOptions& options);
 
 struct CheckOptions {
+  std::optional<std::string> model;  ///< a model file, a built-in model, or a scenario with [system]
   std::optional<std::string> space;
   std::optional<int> links;
 };
 
-/// The self-test of this build: kernels, order, energy; a table to standard output. Throws io::InputError where no
-/// kernel is chosen.
+/// The self-test of this build, or of one model: kernels, order, energy; a table to standard output. Throws
+/// io::InputError where no kernel is chosen.
 ExitStatus check(const CheckOptions& options);
+
+struct BuildOptions {
+  std::string model;         ///< a model file, or a built-in model
+  std::optional<int> links;  ///< where the model has some
+};
+
+/// Makes the kernel of a model, or finds it made; says where it is on standard output. Throws io::InputError.
+ExitStatus build(const BuildOptions& options);
+
+/// Writes NAME.py, a model to start from. Throws io::InputError where that cannot be.
+ExitStatus new_model(const std::string& name);
 
 /// Lists the fixed-n kernels of this build on standard output.
 ExitStatus kernels();

@@ -1,6 +1,7 @@
 #include <iomanip>
 #include <iostream>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/library.hpp>
 
 #include "cli/commands.hpp"
 
@@ -11,6 +12,9 @@ ExitStatus kernels() {
             << "links\n";
   for (const KernelInfo& kernel : built_in_kernels()) {
     std::cout << std::setw(14) << kernel.name << std::setw(9) << kernel.space << kernel.links << '\n';
+  }
+  for (const SystemEntry* entry : library().systems) {
+    std::cout << std::setw(14) << entry->info.name << std::setw(9) << "-" << entry->info.links << '\n';
   }
   return done;
 }

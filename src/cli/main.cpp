@@ -40,8 +40,12 @@ struct CommandLine {
   CLI::App* simulate;
   CLI::App* check;
   CLI::App* kernels;
+  CLI::App* build;
+  CLI::App* new_model;
   SimulateOptions simulate_options;
   CheckOptions check_options;
+  BuildOptions build_options;
+  std::string model_name;
 };
 
 /// A check of an option's text: what is expected where `accept` says no.
@@ -88,14 +92,29 @@ CommandLine::CommandLine() {
   simulate->add_flag("--quiet", simulate_options.quiet, "Print errors only (and the JSON object, where asked for)");
   simulate->footer("Example: pendula simulate double.toml --set run.step=1e-4 -o out.csv");
 
-  check = app.add_subcommand("check", "Test the kernels and methods of this build on themselves");
+  check = app.add_subcommand("check", "Test the kernels and methods of this build, or a model, on themselves");
+  check
+      ->add_option("MODEL", check_options.model,
+                   "A model file (.py), a built-in model, or a scenario (.toml) that names one; else this build")
+      ->check(not_empty);
   check->add_option("--space", check_options.space, "Only kernels of this space")
       ->check(CLI::IsMember({"planar", "spatial"}));
   check->add_option("--links", check_options.links, "Only kernels of this many links")
       ->type_name("N")
       ->check(one_or_more);
 
-  kernels = app.add_subcommand("kernels", "List the fixed-n kernels of this build");
+  kernels = app.add_subcommand("kernels", "List the kernels of this build");
+
+  build = app.add_subcommand("build", "Derive and compile the kernel of a model, and keep it");
+  build->add_option("MODEL", build_options.model, "A model file (.py), or a built-in model")
+      ->required()
+      ->check(not_empty);
+  build->add_option("--links", build_options.links, "Number of links, where the model has some")
+      ->type_name("N")
+      ->check(one_or_more);
+
+  new_model = app.add_subcommand("new-model", "Write a model file to start from");
+  new_model->add_option("NAME", model_name, "Its name: letters, digits, underscores")->required();
 }
 
 /// What an unknown word may have been meant for: an option of `app`, or a command.
@@ -132,7 +151,9 @@ ExitStatus dispatch(const CommandLine& line) {
   if (*line.simulate) return simulate(line.simulate_options);
   if (*line.check) return check(line.check_options);
   if (*line.kernels) return kernels();
-  std::cerr << complaint(line, "expected a command: simulate, check or kernels");
+  if (*line.build) return build(line.build_options);
+  if (*line.new_model) return new_model(line.model_name);
+  std::cerr << complaint(line, "expected a command: simulate, check, kernels, build or new-model");
   return wrong_input;
 }
 

@@ -16,4 +16,10 @@ class InputError : public std::runtime_error {
       : std::runtime_error(where + ": " + key + ": expected " + expected + ", got " + got) {}
 };
 
+/// The same of the model that a scenario or a command line names; whoever knows the place adds it.
+class ModelError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 }  // namespace pendula::io

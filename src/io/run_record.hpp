@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <pendula/chain/chain.hpp>
-#include <pendula/chain/invariants.hpp>
-#include <pendula/chain/state.hpp>
+#include <optional>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <utility>
 #include <vector>
 
 namespace pendula::io {
@@ -23,82 +24,95 @@ struct EnergyError {
   }
 };
 
-/// How far the energy is from what the start had and loads brought, over the rows; relative to all that the chain had.
+/// How far the energy is from what the start had and loads brought, over the rows; relative to all that there was.
 struct EnergyBalance {
-  double scale = 0;            ///< Σ M_i |g| l_i and the kinetic energy at the start  [J]
   double most = 0, least = 0;  ///< relative, above and below
-
-  void add(const Energies<double>& energies, double work) {
-    if (rows_++ == 0) initial_ = energies.total() - work;
-    const double whole = scale + std::abs(work);
-    const double off = energies.total() - initial_ - work;
-    if (off == 0 || !(whole > 0)) return;
-    most = std::max(most, off / whole);
-    least = std::min(least, off / whole);
-  }
-
- private:
-  double initial_ = 0;
-  std::int64_t rows_ = 0;
 };
 
 /// A row of the table that summaries show.
 struct TableRow {
   double time = 0;
-  Eigen::VectorXd bob;      ///< the last one
-  double energy_error = 0;  ///< relative
+  std::vector<double> shown;  ///< Subject::shown_columns
+  double energy_error = 0;    ///< relative
 };
 
 /// What is kept of the rows of a run besides the file: energy errors, a thinned table, the last state.
-template <class Space>
+///
+/// What energies are compared with may be known when the run ends only: errors are kept in joules.
 class RunRecord {
  public:
   /// The table has about `table_rows` rows, evenly over `duration`.
-  RunRecord(const Chain<Space>& chain, double duration, int table_rows = 11)
-      : scale_(energy_scale(chain)), interval_(duration / (table_rows - 1)) {}
+  RunRecord(const Subject& subject, double duration, int table_rows = 11)
+      : scale_(subject.energy_scale()), shown_(subject.shown_columns()), interval_(duration / (table_rows - 1)) {}
 
-  /// bobs  positions, (dimension x n); work: what loads have brought since the first row  [J]
-  void add(const State<Space>& state, const Points<Space, Eigen::Dynamic>& bobs, const Energies<double>& energies,
-           double work) {
-    const double energy = energies.total();
-    if (rows_ == 0) balance_.scale = scale_ + energies.kinetic;
-    if (rows_++ == 0) error_ = {energy, scale_ > 0 ? scale_ : std::abs(energy), 0};
-    balance_.add(energies, work);
-    const double error = error_.of(energy);
-    if (!std::isnan(error_.largest) && !(error <= error_.largest)) error_.largest = error;
-    energy_ = energy;
-    last_ = state;
-    last_row_ = {state.time, bobs.col(bobs.cols() - 1), error};
+  /// row  the numbers of the trajectory; work: what loads have brought since the first row  [J]
+  void add(const Motion& motion, const Observation& seen, const std::vector<double>& row, double work) {
+    if (rows_++ == 0) start(seen, work);
+    follow(seen, work);
+    last_ = motion;
+    const auto first = row.begin() + static_cast<std::ptrdiff_t>(shown_.first);
+    last_row_ = {motion.time, {first, first + static_cast<std::ptrdiff_t>(shown_.second)}, seen.energy - initial_};
     // The slack lets a row in that comes at its time but for rounding.
-    const double place = interval_ > 0 ? std::floor(state.time / interval_ + 1e-6) : 0;
+    const double place = interval_ > 0 ? std::floor(motion.time / interval_ + 1e-6) : 0;
     if (place <= place_) return;
     place_ = place;
     table_.push_back(last_row_);
   }
 
   std::int64_t rows() const { return rows_; }
-  const EnergyError& energy_error() const { return error_; }
-  double energy() const { return energy_; }  ///< of the last row
-  const EnergyBalance& balance() const { return balance_; }
-  const State<Space>& last() const { return last_; }  ///< state of the last row
+  EnergyError energy_error() const {
+    EnergyError error{initial_, compared_with(), 0};
+    error.largest = std::isnan(largest_) ? largest_ : error.of(initial_ + largest_);
+    return error;
+  }
+  double energy() const { return energy_; }     ///< of the last row
+  const Motion& last() const { return last_; }  ///< state of the last row
+
+  EnergyBalance balance() const {
+    if (!(whole_ > 0)) return {};
+    return {most_ / whole_, least_ / whole_};
+  }
 
   /// The thinned table; it ends in the last row.
   std::vector<TableRow> table() const {
     std::vector<TableRow> table = table_;
     if (!table.empty() && table.back().time != last_row_.time) table.push_back(last_row_);
+    const EnergyError error{initial_, compared_with(), 0};
+    for (TableRow& row : table) row.energy_error = error.of(initial_ + row.energy_error);
     return table;
   }
 
  private:
-  double scale_;
+  void start(const Observation& seen, double work) {
+    initial_ = seen.energy;
+    brought_before_ = work;
+  }
+
+  void follow(const Observation& seen, double work) {
+    energy_ = seen.energy;
+    const double error = std::abs(energy_ - initial_);
+    if (!std::isnan(largest_) && !(error <= largest_)) largest_ = error;
+    largest_sum_ = std::max(largest_sum_, std::abs(seen.kinetic) + std::abs(seen.potential()));
+    const double brought = work - brought_before_, off = energy_ - initial_ - brought;
+    // All that there was: what gravity can give, or else what was seen to move.
+    const double moved = scale_ ? *scale_ + (rows_ == 1 ? seen.kinetic : 0) : seen.kinetic;
+    whole_ = std::max(whole_, moved + std::abs(brought));
+    most_ = std::max(most_, off);
+    least_ = std::min(least_, off);
+  }
+
+  double compared_with() const { return !scale_ ? largest_sum_ : *scale_ > 0 ? *scale_ : std::abs(initial_); }
+
+  std::optional<double> scale_;
+  std::pair<std::size_t, std::size_t> shown_;
   double interval_;
   double place_ = -1;
   std::int64_t rows_ = 0;
-  EnergyError error_;
-  EnergyBalance balance_;
-  double energy_ = std::nan("");
-  State<Space> last_;
-  TableRow last_row_;
+  double initial_ = std::nan(""), energy_ = std::nan(""), brought_before_ = 0;
+  double largest_ = 0, largest_sum_ = 0;  // error; |T| + |U|  [J]
+  double whole_ = 0, most_ = 0, least_ = 0;
+  Motion last_;
+  TableRow last_row_;  // here and in the table, energy errors are in joules
   std::vector<TableRow> table_;
 };
 

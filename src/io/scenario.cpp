@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "io/number.hpp"
+#include "io/system_reader.hpp"
 #include "io/toml_reader.hpp"
 
 namespace pendula::io {
@@ -21,7 +22,7 @@ namespace {
 
 using Names = std::span<const std::string_view>;
 
-constexpr std::array<std::string_view, 4> section_names = {"chain", "start", "run", "output"};
+constexpr std::array<std::string_view, 5> section_names = {"chain", "system", "start", "run", "output"};
 constexpr std::array<std::string_view, 9> chain_keys = {"space",   "links",  "masses", "lengths", "gravity",
                                                         "damping", "torque", "units",  "drive"};
 constexpr std::array<std::string_view, 4> drive_keys = {"link", "amplitude", "frequency", "phase"};
@@ -34,7 +35,7 @@ constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "fo
 constexpr std::array<std::string_view, 1> output_keys = {"every"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 28> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 36> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -47,6 +48,14 @@ constexpr std::array<std::string_view, 28> all_keys = {"chain.space",
                                                        "chain.drive.amplitude",
                                                        "chain.drive.frequency",
                                                        "chain.drive.phase",
+                                                       "system.model",
+                                                       "system.links",
+                                                       "system.parameters",
+                                                       "system.drive",
+                                                       "system.drive.input",
+                                                       "system.drive.constant",
+                                                       "system.drive.amplitude",
+                                                       "system.drive.frequency",
                                                        "start.theta",
                                                        "start.phi",
                                                        "start.theta_dot",
@@ -70,16 +79,22 @@ constexpr std::array<std::string_view, 2> form_names = {"momentum", "velocity"};
 constexpr std::array<std::string_view, 3> solver_names = {"auto", "chain", "dense"};
 constexpr std::array<std::string_view, 3> iteration_names = {"auto", "newton", "fixed-point"};
 
-/// The sections of a document, each with known keys only.
-struct Sections {
-  explicit Sections(const toml::table& document)
+/// The sections of a document that every scenario has, each with known keys only.
+struct RunSections {
+  explicit RunSections(const toml::table& document)
       : root(Entry(document, ""), section_names, all_keys),
-        chain(root, "chain", chain_keys, all_keys),
-        start(root, "start", start_keys, all_keys),
         run(root, "run", run_keys, all_keys),
         output(root, "output", output_keys, all_keys) {}
 
-  Section root, chain, start, run, output;
+  Section root, run, output;
+};
+
+/// The same of a chain.
+struct Sections : RunSections {
+  explicit Sections(const toml::table& document)
+      : RunSections(document), chain(root, "chain", chain_keys, all_keys), start(root, "start", start_keys, all_keys) {}
+
+  Section chain, start;
 };
 
 double number(const Section& section, std::string_view key, double otherwise, Sign sign = Sign::any) {
@@ -227,8 +242,6 @@ std::optional<NaturalUnits> make_natural(const Section& chain, ChainParameters<S
   return units;
 }
 
-constexpr double degree = std::numbers::pi / 180;
-
 /// One number a link of each coordinate, (dof·n); 0 where a key is not there.
 template <class Space>
 Coordinates<Space, Eigen::Dynamic> read_coordinates(const Section& start, Names keys, const LinkCount& count,
@@ -342,6 +355,20 @@ Chain<Space> build_chain(const Section& section, ChainParameters<Space> paramete
   }
 }
 
+/// What [run] and [output] say.
+void read_plan(const RunSections& sections, RunPlan& plan) {
+  plan.run = read_run(sections.run);
+  plan.duration = read_duration(sections.run, plan.run);
+  const std::vector<std::string> unused = unused_keys(sections.run, plan.run.method);
+  plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
+  if (const auto every = sections.output.find("every")) {
+    plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
+  }
+  for (const std::string_view key : run_keys) {
+    if (const auto entry = sections.run.find(key)) plan.places[std::string(key)] = entry->place();
+  }
+}
+
 template <class Space>
 Scenario<Space> read(const Sections& sections) {
   require_keys(sections);
@@ -349,23 +376,11 @@ Scenario<Space> read(const Sections& sections) {
   ChainParameters<Space> parameters = read_chain<Space>(sections.chain, count);
   const std::optional<NaturalUnits> natural = make_natural(sections.chain, parameters);
   const Chain<Space> chain = build_chain(sections.chain, std::move(parameters));
-  const RunOptions run = read_run(sections.run);
-  Scenario<Space> scenario{chain,
-                           read_start(sections.start, count, chain, natural ? natural->time : 1),
-                           run,
-                           read_duration(sections.run, run),
-                           10,
-                           natural,
-                           unused_keys(sections.run, run.method),
-                           {}};
+  Scenario<Space> scenario(chain, read_start(sections.start, count, chain, natural ? natural->time : 1));
+  read_plan(sections, scenario);
+  scenario.natural = natural;
   warn_of_degrees(sections.start, scenario.warnings);
-  if (const auto every = sections.output.find("every")) {
-    scenario.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
-  }
   scenario.places["links"] = count.place;
-  for (const std::string_view key : run_keys) {
-    if (const auto entry = sections.run.find(key)) scenario.places[std::string(key)] = entry->place();
-  }
   return scenario;
 }
 
@@ -397,18 +412,27 @@ std::string read_text(const std::filesystem::path& file) {
 
 }  // namespace
 
-AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides) {
+AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides,
+                           const FindSystem& find) {
   const toml::table document = parse_toml(text, name, overrides);
+  if (document.contains("system")) {
+    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+    const RunSections sections(document);
+    SystemScenario scenario = read_system(sections.root, folder, find);
+    read_plan(sections, scenario);
+    return scenario;
+  }
   const Sections sections(document);
   const Entry space = sections.chain.require("space", "\"planar\" or \"spatial\"");
   if (space.choice(space_names) == 0) return read<Planar>(sections);
   return read<Spatial>(sections);
 }
 
-AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides) {
+AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides,
+                          const FindSystem& find) {
   const std::string standard_input = "standard input";
-  if (file == "-") return parse_scenario(read_stream(std::cin, standard_input), standard_input, overrides);
-  return parse_scenario(read_text(file), file.string(), overrides);
+  if (file == "-") return parse_scenario(read_stream(std::cin, standard_input), standard_input, overrides, find);
+  return parse_scenario(read_text(file), file.string(), overrides, find);
 }
 
 }  // namespace pendula::io

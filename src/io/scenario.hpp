@@ -4,13 +4,18 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/state.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <pendula/system/kernel_registry.hpp>
+#include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -25,29 +30,52 @@ inline constexpr int max_links = 1'000'000;
 /// Most steps that a run may have: beyond 2⁵³ a step no longer changes the time.
 inline constexpr double max_steps = 9e15;
 
-/// A run as its file describes it, checked. Numbers are in SI, or all in `natural` units where the file says so.
-template <class Space>
-struct Scenario {
-  Chain<Space> chain;
-  State<Space> start;
+/// How a run goes, as its file describes it, checked.
+struct RunPlan {
   RunOptions run;
   double duration = 10;
   std::int64_t every = 10;              ///< steps from row to row
-  std::optional<NaturalUnits> natural;  ///< units of all numbers here; empty for SI
+  std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
   std::vector<std::string> warnings;    ///< what is odd but no error, one sentence each
   /// `where: key` of what [run] sets, by key, and of what tells the number of links, by "links": for errors yet to
   /// come.
   std::map<std::string, std::string, std::less<>> places;
 };
 
-using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>>;
+/// A chain to run. Numbers are in SI, or all in `natural` units where the file says so.
+template <class Space>
+struct Scenario : RunPlan {
+  Chain<Space> chain;
+  State<Space> start;
+
+  Scenario(Chain<Space> moved, State<Space> from) : chain(std::move(moved)), start(std::move(from)) {}
+};
+
+/// Any other system to run.
+struct SystemScenario : RunPlan {
+  std::shared_ptr<const SystemSubject> system;
+  Motion start;
+};
+
+using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>, SystemScenario>;
+
+/// Finds the kernel of the system that a scenario names: a model file, relative to the scenario's folder, or the name
+/// of a built-in model; links are none where the scenario says nothing of them. Throws InputError without a place.
+using FindSystem = std::function<std::shared_ptr<const SystemEntry>(const std::string& model, std::optional<int> links,
+                                                                    const std::filesystem::path& folder)>;
+
+/// One that knows the kernels of this build only.
+std::shared_ptr<const SystemEntry> built_in_system(const std::string& model, std::optional<int> links,
+                                                   const std::filesystem::path& folder);
 
 /// Reads a scenario from TOML text; `name` stands for the file in messages. Each override is `key.path=value`, the
 /// value in TOML, or a bare word for a string; it replaces what the text says. Keys and defaults: docs/scenario.md.
 /// Throws InputError with a message `name:line: key: expected …, got …`, or `--set key.path=value: key: …`.
-AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {});
+AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
+                           const FindSystem& find = built_in_system);
 
 /// The same from a file, "-" being standard input; a file that cannot be read is an InputError too.
-AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides = {});
+AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides = {},
+                          const FindSystem& find = built_in_system);
 
 }  // namespace pendula::io

@@ -59,6 +59,34 @@ Json to_json(const Snapshot& snapshot) {
   return json;
 }
 
+Json to_json(const std::optional<NaturalUnits>& natural) {
+  if (!natural) return nullptr;
+  return {{"length", natural->length}, {"mass", natural->mass}, {"time", natural->time}};
+}
+
+/// An object of named values.
+template <class Value>
+Json named(const std::vector<std::pair<std::string, Value>>& values) {
+  Json json = Json::object();
+  for (const auto& [name, value] : values) json[name] = value;
+  return json;
+}
+
+Json to_json(const SystemSnapshot& snapshot) {
+  return {{"t", snapshot.time}, {"q", named(snapshot.q)}, {"v", named(snapshot.v)}, {"points", named(snapshot.points)}};
+}
+
+/// What was moved, as the first keys of a summary.
+Json to_json(const ModelSummary& model) {
+  if (model.space.empty()) {
+    return {{"model", model.model}, {"links", model.links}, {"parameters", named(model.parameters)}};
+  }
+  return {{"space", model.space},
+          {"links", model.links},
+          {"units", model.natural ? "natural" : "SI"},
+          {"natural_units", to_json(model.natural)}};
+}
+
 Json to_json(const Ending& ending) {
   Json json{{"status", ending.status}};
   if (!ending.ok()) json["message"] = ending.message;
@@ -67,13 +95,12 @@ Json to_json(const Ending& ending) {
   json["step"] = ending.step.step;
   json["iterations"] = ending.step.iterations;
   json["residual"] = ending.step.residual;
-  json["link"] = where(ending.step.link >= 0, ending.step.link + 1);
+  if (ending.coordinate.empty()) {
+    json["link"] = where(ending.step.part >= 0, ending.step.part + 1);
+  } else {
+    json["coordinate"] = ending.coordinate;
+  }
   return json;
-}
-
-Json to_json(const std::optional<NaturalUnits>& natural) {
-  if (!natural) return nullptr;
-  return {{"length", natural->length}, {"mass", natural->mass}, {"time", natural->time}};
 }
 
 // The text: labels in one column, values in the next.
@@ -114,14 +141,26 @@ std::string duration_text(double seconds) {
   return rounded(seconds * 1e6, 3) + " us";
 }
 
+std::string what_was_moved(const ModelSummary& model) {
+  if (model.space.empty()) {
+    std::string numbers;
+    for (const auto& [name, values] : model.parameters) {
+      numbers += ", " + name + " " + rounded(values.front());
+      if (std::ranges::any_of(values, [&](double value) { return value != values.front(); })) numbers += " ...";
+    }
+    return line("system", model.model + (model.links > 1 ? ", " + plural(model.links, "link") : "") + numbers);
+  }
+  const UnitNames unit = unit_names(model.natural);
+  const std::string acceleration = model.natural ? " g" : " m/s^2";
+  return line("chain", model.space + ", " + plural(model.links, "link") + ", mass " + rounded(model.mass) +
+                           std::string(unit.mass) + ", length " + rounded(model.length) + std::string(unit.length) +
+                           ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
+}
+
 std::string settings(const Summary& summary) {
   const ModelSummary& model = summary.model;
   const UnitNames unit = unit_names(model.natural);
-  const std::string acceleration = model.natural ? " g" : " m/s^2";
-  std::string text =
-      line("chain", model.space + ", " + plural(model.links, "link") + ", mass " + rounded(model.mass) +
-                        std::string(unit.mass) + ", length " + rounded(model.length) + std::string(unit.length) +
-                        ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
+  std::string text = what_was_moved(model);
   std::string method = name_of(summary.run.method);
   if (has_stages(summary)) {
     method += ", " + plural(summary.run.stages, "stage") + " (order " +
@@ -151,16 +190,12 @@ std::string error_name(const Summary& summary) {
 
 std::string table(const Summary& summary) {
   constexpr std::size_t width = 15;
-  constexpr std::string_view axes = "xyz";
   std::string text = right("t", value_width);
-  const std::string last = std::to_string(summary.model.links);
-  for (Eigen::Index axis = 0; axis < summary.final.bobs.rows(); ++axis) {
-    text += right(std::string(1, axes[static_cast<std::size_t>(axis)]) + "_" + last, width);
-  }
+  for (const std::string& column : summary.shown) text += right(column, width);
   text += right("energy " + error_name(summary), width) + "\n";
   for (const TableRow& row : summary.table) {
     text += right(rounded(row.time), value_width);
-    for (const double coordinate : row.bob) text += right(rounded(coordinate, 9), width);
+    for (const double coordinate : row.shown) text += right(rounded(coordinate, 9), width);
     text += right(shown_or_dash(row.energy_error, 3), width) + "\n";
   }
   return text;
@@ -183,24 +218,38 @@ std::string statistics(const Summary& summary) {
 
 std::string energies(const Summary& summary) {
   const std::string unit(unit_names(summary.model.natural).energy);
-  const std::string of = summary.model.gravity != 0 ? "of the sum of M_i g l_i" : "of the energy at the start";
+  const std::string of = summary.model.space.empty()  ? "of the largest |T| + |U|"
+                         : summary.model.gravity != 0 ? "of the sum of M_i g l_i"
+                                                      : "of the energy at the start";
   return line("energy at start", shown_or_dash(summary.energy_error.initial, 12) + unit) +
          line("energy at end", shown_or_dash(summary.energy_final, 12) + unit) +
          line("largest " + error_name(summary), shown_or_dash(summary.energy_error.largest, 3),
               of + ", over " + plural(summary.rows, "row"));
 }
 
-std::string ending(const Summary& summary) {
+/// Where the last bob is, or of a system what its table shows.
+std::string place(const Summary& summary) {
   constexpr std::string_view axes = "xyz";
   const UnitNames unit = unit_names(summary.model.natural);
-  const auto bob = summary.final.bobs.col(summary.final.bobs.cols() - 1);
   std::string position;
-  for (Eigen::Index axis = 0; axis < bob.size(); ++axis) {
-    position += (axis == 0 ? "" : ", ") + std::string(1, axes[static_cast<std::size_t>(axis)]) + " = ";
-    append_number(position, bob[axis]);
+  const auto add = [&](std::string_view name, double value) {
+    position += (position.empty() ? "" : ", ") + std::string(name) + " = ";
+    append_number(position, value);
+  };
+  if (summary.model.space.empty()) {
+    const std::vector<double> none(summary.shown.size(), std::nan(""));
+    const std::vector<double>& last = summary.table.empty() ? none : summary.table.back().shown;
+    for (std::size_t k = 0; k < last.size(); ++k) add(summary.shown[k], last[k]);
+    return line("last row", position + " at t = " + rounded(summary.system.time, 12) + " s");
   }
-  std::string text = line("last bob", position + std::string(unit.length) +
-                                          " at t = " + rounded(summary.final.time, 12) + std::string(unit.time));
+  const auto bob = summary.final.bobs.col(summary.final.bobs.cols() - 1);
+  for (Eigen::Index axis = 0; axis < bob.size(); ++axis) add(axes.substr(static_cast<std::size_t>(axis), 1), bob[axis]);
+  return line("last bob", position + std::string(unit.length) + " at t = " + rounded(summary.final.time, 12) +
+                              std::string(unit.time));
+}
+
+std::string ending(const Summary& summary) {
+  std::string text = place(summary);
   if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));
   if (!summary.ending.ok()) text += line("ended early", summary.ending.message);
   return text;
@@ -208,44 +257,76 @@ std::string ending(const Summary& summary) {
 
 }  // namespace
 
-Ending ending_of(const Outcome& outcome) {
+Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates) {
   if (outcome) return {};
   std::string status = name_of(outcome.status);
   std::ranges::replace(status, ' ', '_');
-  return {status, message(outcome), outcome};
+  const bool is_named = outcome.part >= 0 && !coordinates.empty();
+  const auto part = static_cast<std::size_t>(outcome.part);
+  return {status, message(outcome, coordinates), outcome, is_named ? std::string(coordinates[part]) : ""};
+}
+
+ModelSummary model_summary(const std::string& scenario, const SystemSubject& system) {
+  ModelSummary model;
+  const SystemInfo& info = system.info();
+  model.scenario = scenario;
+  model.model = info.model;
+  model.links = info.links;
+  model.loaded = system.loaded();
+  auto next = system.numbers().parameters.begin();
+  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+    const auto end = next + info.parameter_sizes[k];
+    model.parameters.emplace_back(info.parameters[k], std::vector<double>(next, end));
+    next = end;
+  }
+  return model;
+}
+
+SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion) {
+  SystemSnapshot snapshot;
+  const SystemInfo& info = system.info();
+  snapshot.time = motion.time;
+  for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
+    snapshot.q.emplace_back(info.coordinates[k], motion.q[static_cast<Eigen::Index>(k)]);
+    snapshot.v.emplace_back(info.coordinates[k], motion.v[static_cast<Eigen::Index>(k)]);
+  }
+  const Observation seen = system.observe(motion);
+  auto next = seen.points.begin();
+  for (std::size_t k = 0; k < info.points.size(); ++k) {
+    const auto end = next + info.point_sizes[k];
+    snapshot.points.emplace_back(info.points[k], std::vector<double>(next, end));
+    next = end;
+  }
+  return snapshot;
 }
 
 std::string to_json(const Summary& summary) {
   const bool staged = has_stages(summary);
   const bool adaptive = is_adaptive(summary.run.method);
-  const Json json{{"pendula", version},
-                  {"scenario", summary.model.scenario},
-                  {"space", summary.model.space},
-                  {"links", summary.model.links},
-                  {"units", summary.model.natural ? "natural" : "SI"},
-                  {"natural_units", to_json(summary.model.natural)},
-                  {"method", name_of(summary.run.method)},
-                  {"stages", where(staged, summary.run.stages)},
-                  {"form", where(staged, name_of(summary.run.form))},
-                  {"solver", or_null(summary.description.solver)},
-                  {"iteration", or_null(summary.description.iteration)},
-                  {"kernel", or_null(summary.description.kernel)},
-                  {"step", where(!adaptive, summary.run.step)},
-                  {"tolerance", where(adaptive, summary.run.tolerance)},
-                  {"duration", summary.duration},
-                  {"every", summary.every},
-                  {"steps", summary.statistics.steps},
-                  {"rejected_steps", summary.statistics.rejected_steps},
-                  {"newton_iterations", summary.statistics.newton_iterations},
-                  {"rows", summary.trajectory ? summary.rows_written : summary.rows},
-                  {"trajectory", or_null(summary.trajectory.value_or(""))},
-                  {"energy_initial", summary.energy_error.initial},
-                  {"energy_final", summary.energy_final},
-                  {"energy_error_max", summary.energy_error.largest},
-                  {"wall_seconds", summary.wall_seconds},
-                  {"outcome", to_json(summary.ending)},
-                  {"warnings", summary.warnings},
-                  {"final", to_json(summary.final)}};
+  Json json{{"pendula", version}, {"scenario", summary.model.scenario}};
+  json.update(to_json(summary.model));
+  json.update(Json{{"method", name_of(summary.run.method)},
+                   {"stages", where(staged, summary.run.stages)},
+                   {"form", where(staged, name_of(summary.run.form))},
+                   {"solver", or_null(summary.description.solver)},
+                   {"iteration", or_null(summary.description.iteration)},
+                   {"kernel", or_null(summary.description.kernel)},
+                   {"step", where(!adaptive, summary.run.step)},
+                   {"tolerance", where(adaptive, summary.run.tolerance)},
+                   {"duration", summary.duration},
+                   {"every", summary.every},
+                   {"steps", summary.statistics.steps},
+                   {"rejected_steps", summary.statistics.rejected_steps},
+                   {"newton_iterations", summary.statistics.newton_iterations},
+                   {"rows", summary.trajectory ? summary.rows_written : summary.rows},
+                   {"trajectory", or_null(summary.trajectory.value_or(""))},
+                   {"energy_initial", summary.energy_error.initial},
+                   {"energy_final", summary.energy_final},
+                   {"energy_error_max", summary.energy_error.largest},
+                   {"wall_seconds", summary.wall_seconds},
+                   {"outcome", to_json(summary.ending)},
+                   {"warnings", summary.warnings},
+                   {"final", summary.model.space.empty() ? to_json(summary.system) : to_json(summary.final)}});
   constexpr int one_line = -1;
   return json.dump(one_line, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -7,9 +7,13 @@
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/state.hpp>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/system_subject.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "io/natural_units.hpp"
@@ -20,7 +24,9 @@ namespace pendula::io {
 /// What was moved.
 struct ModelSummary {
   std::string scenario;  ///< the file, as it was named
-  std::string space;     ///< "planar" or "spatial"
+  std::string space;     ///< "planar" or "spatial"; empty for systems that are no chains
+  std::string model;     ///< of such a system
+  std::vector<std::pair<std::string, std::vector<double>>> parameters;  ///< of such a system
   int links = 0;
   double mass = 0;    ///< Σ m_i
   double length = 0;  ///< Σ l_i
@@ -36,11 +42,19 @@ struct Snapshot {
   Eigen::MatrixXd bobs, velocities;                ///< (dimension x n)
 };
 
+/// A state of a system that is no chain.
+struct SystemSnapshot {
+  double time = 0;
+  std::vector<std::pair<std::string, double>> q, v;
+  std::vector<std::pair<std::string, std::vector<double>>> points;
+};
+
 /// How a run ended.
 struct Ending {
   std::string status = "ok";  ///< a word for programs
   std::string message;        ///< a sentence for people; empty for "ok"
   Outcome step;               ///< the step that failed, where one did
+  std::string coordinate;     ///< that it failed in, of a system that is no chain
 
   bool ok() const { return message.empty(); }
 };
@@ -59,24 +73,37 @@ struct Summary {
   EnergyError energy_error;
   double energy_final = 0;
   std::vector<TableRow> table;
-  Snapshot final;                         ///< the last state reached
+  std::vector<std::string> shown;         ///< columns of the table
+  Snapshot final;                         ///< the last state reached, of a chain
+  SystemSnapshot system;                  ///< of any other system
   std::int64_t rows = 0;                  ///< that were taken
   std::optional<std::string> trajectory;  ///< the file that they were written to; "-" is standard output
   std::int64_t rows_written = 0;          ///< that are in this file: fewer, where the disk is full
 };
 
-/// How a run ended that ended with `outcome`.
-Ending ending_of(const Outcome& outcome);
+/// How a run ended that ended with `outcome`; `coordinates` as pendula::message takes them.
+Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates = {});
 
 template <class Space>
 ModelSummary model_summary(const std::string& scenario, const Chain<Space>& chain,
                            const std::optional<NaturalUnits>& natural) {
-  return {scenario,        std::string(Space::name), chain.links(), chain.masses().sum(), chain.lengths().sum(),
-          chain.gravity(), chain.loaded(),           natural};
+  ModelSummary model;
+  model.scenario = scenario;
+  model.space = Space::name;
+  model.links = chain.links();
+  model.mass = chain.masses().sum();
+  model.length = chain.lengths().sum();
+  model.gravity = chain.gravity();
+  model.loaded = chain.loaded();
+  model.natural = natural;
+  return model;
 }
 
-template <class Space>
-Snapshot snapshot(const Chain<Space>& chain, const State<Space>& state) {
+ModelSummary model_summary(const std::string& scenario, const SystemSubject& system);
+
+template <class Space, class Motion>
+Snapshot snapshot(const Chain<Space>& chain, const Motion& motion) {
+  const State<Space> state = motion;
   Snapshot snapshot{
       state.time, state.theta(), {}, state.theta_dot(), {}, bob_positions(chain, state), bob_velocities(chain, state)};
   if constexpr (Space::dof == 2) {
@@ -85,6 +112,8 @@ Snapshot snapshot(const Chain<Space>& chain, const State<Space>& state) {
   }
   return snapshot;
 }
+
+SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion);
 
 /// The summary as one JSON object, ended by a newline. Numbers are read back as the same doubles; what does not apply
 /// is null (the stages of "rk4", say), as is a number that is not finite.

@@ -289,6 +289,12 @@ std::int64_t Entry::integer(std::int64_t least, std::int64_t most) const {
   return value->get();
 }
 
+std::string Entry::text() const {
+  const auto* value = node_->as_string();
+  if (value == nullptr || value->get().empty()) fail("a text");
+  return value->get();
+}
+
 std::size_t Entry::choice(std::span<const std::string_view> choices) const {
   const auto* value = node_->as_string();
   const auto found = value == nullptr ? choices.end() : std::ranges::find(choices, std::string_view(value->get()));

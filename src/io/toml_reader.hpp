@@ -60,6 +60,8 @@ class Entry {
   /// A number; where there are `units`, also a string of a number and one of them.
   double number(Sign sign = Sign::any, Units units = {}) const;
   std::int64_t integer(std::int64_t least, std::int64_t most) const;
+  /// Any string but an empty one.
+  std::string text() const;
   /// A string out of `choices`, as its index there.
   std::size_t choice(std::span<const std::string_view> choices) const;
   /// One number a link; a single number stands for every link.  (n)

@@ -9,7 +9,8 @@ namespace pendula {
 
 template <class Space, int S>
 std::unique_ptr<PlainIntegrator> make_chain_stages(const Chain<Space>& chain, const RunOptions& options) {
-  return std::make_unique<GaussIntegrator<ChainSolver<Space, S>>>(chain, S, "chain", "", options.iteration,
+  const GaussDescription described{"chain", "", chain.links()};
+  return std::make_unique<GaussIntegrator<ChainSolver<Space, S>>>(chain, S, described, options.iteration,
                                                                   family_of(options.method));
 }
 

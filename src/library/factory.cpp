@@ -42,8 +42,8 @@ const KernelEntry& require_kernel(int links) {
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
   if (const KernelEntry* kernel = find_kernel<Space>(chain.links)) return kernel->make(chain, options);
-  return make_explicit_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain_of<Space>(chain)), chain.links,
-                                  Space::dof, options, "");
+  return make_explicit_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain_of<Space>(chain)),
+                                  Space::dof * chain.links, chain.links, options, "");
 }
 
 // In momentum form the chain solver is the faster one, on one spatial link with one stage as fast as the dense one,
@@ -54,11 +54,6 @@ Solver solver_for(const RunOptions& options) {
   return options.form == Form::velocity ? Solver::dense : Solver::chain;
 }
 
-void require_newton(Iteration iteration) {
-  if (iteration != Iteration::fixed_point) return;
-  throw std::invalid_argument("iteration: the dense solver has newton only, got fixed-point");
-}
-
 }  // namespace
 
 template <class Space>
@@ -66,7 +61,6 @@ std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, 
   if (is_explicit(options.method)) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
   if (solver_for(options) == Solver::chain) return make_chain_integrator(chain_of<Space>(chain), options);
-  require_newton(options.iteration);
   return require_kernel<Space>(chain.links).make(chain, options);
 }
 

@@ -4,12 +4,14 @@
 /// <pendula/kernels/planar_2.hpp>.
 
 #include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/chain_solver.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/momenta.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/gauss/dense_newton.hpp>
+#include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/velocity_newton.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/simulation.hpp>
 #include <pendula/system/options.hpp>

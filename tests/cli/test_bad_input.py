@@ -89,7 +89,7 @@ def test_text_that_is_no_toml_is_told_with_its_line(pendula, double):
         ),
         (
             "step=1",
-            "step: expected one of chain, start, run, output",
+            "step: expected one of chain, system, start, run, output",
             'the unknown key "step" (did you mean run.step?)',
         ),
         ("run.step", "expected KEY=VALUE such as run.step=1e-4", '"run.step"'),
@@ -154,7 +154,7 @@ def test_a_chain_without_a_kernel_names_what_to_configure(pendula, double, tmp_p
 
 
 def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, double):
-    run = pendula("simulate", double, *settings("run.solver=dense", "run.iteration=fixed-point"))
+    run = pendula("simulate", double, *settings("run.form=velocity", "run.iteration=fixed-point"))
     assert run.status == 2
     assert run.err.startswith("pendula: --set run.iteration=fixed-point: run.iteration: ")
 
@@ -162,7 +162,7 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
 @pytest.mark.parametrize(
     ("arguments", "command", "message"),
     [
-        ([], "", "expected a command: simulate, check or kernels"),
+        ([], "", "expected a command: simulate, check, kernels, build or new-model"),
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),
         (["simulate"], " simulate", "SCENARIO is required"),

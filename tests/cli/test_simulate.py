@@ -95,7 +95,7 @@ def test_summary_has_the_keys_of_the_interface(pendula, double):
     assert summary["links"] == 2
     assert summary["method"] == "gauss"
     assert summary["solver"] == "dense"
-    assert summary["iteration"] == "newton"
+    assert summary["iteration"] == "fixed-point"
     assert summary["kernel"] == "planar_2"
     assert summary["steps"] == 200
     assert summary["newton_iterations"] >= summary["steps"]
@@ -345,7 +345,7 @@ def test_text_summary_tells_settings_counts_energy_and_last_bob(pendula, double)
     lines = {line[:18].strip(): line[19:] for line in run.out.splitlines() if line[:1].isalpha()}
     assert lines["chain"] == "planar, 2 links, mass 2 kg, length 2 m, gravity 9.81 m/s^2"
     assert lines["method"] == "gauss, 6 stages (order 12), momentum form"
-    assert lines["solver"] == "dense, newton, kernel planar_2"
+    assert lines["solver"] == "dense, fixed-point, kernel planar_2"
     assert lines["step"] == "0.005 s"
     assert lines["duration"] == "10 s, a row every 10 steps"
     assert lines["steps"] == "2000"

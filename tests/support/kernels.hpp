@@ -50,7 +50,7 @@ struct KernelInputs {
   explicit KernelInputs(unsigned seed)
       : random(seed),
         chain(random_chain<Space>(random, Kernel::links, true)),
-        parameters(kernel_parameters<Kernel>(chain)) {
+        parameters(system_of<Kernel>(chain).parameters(0)) {
     chain.torque(0, torque);
     const State<Space> state = random_state<Space>(random, Kernel::links);
     q = state.q;
@@ -63,12 +63,7 @@ struct KernelInputs {
 template <class Kernel, class Real>
 typename Kernel::template Parameters<Real> parameters_as(const typename Kernel::template Parameters<double>& from) {
   typename Kernel::template Parameters<Real> to;
-  for (int i = 0; i < Kernel::links; ++i) {
-    to.masses[i] = Real(from.masses[i]);
-    to.lengths[i] = Real(from.lengths[i]);
-    to.damping[i] = Real(from.damping[i]);
-  }
-  to.gravity = Real(from.gravity);
+  Kernel::cast_parameters(from, to);
   return to;
 }
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 #include <pendula/chain/chain.hpp>
-#include <pendula/chain/kernel_traits.hpp>
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/state.hpp>
 #include <random>
 

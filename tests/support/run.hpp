@@ -31,8 +31,8 @@ State<Space> final_state(const Chain<Space>& chain, const State<Space>& start, c
 }
 
 /// Largest difference of any angle or rate.
-template <class Space>
-double distance(const State<Space>& a, const State<Space>& b) {
+template <class A, class B>
+double distance(const A& a, const B& b) {
   return std::max((a.q - b.q).cwiseAbs().maxCoeff(), (a.v - b.v).cwiseAbs().maxCoeff());
 }
 

@@ -2,7 +2,7 @@
 
 #include <pendula/chain/chain_stages.hpp>
 #include <pendula/chain/stage_change.hpp>
-#include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/stage_solver.hpp>
 
 namespace pendula {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <pendula/chain/chain_stages.hpp>
 #include <pendula/chain/stage_change.hpp>
-#include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/stage_solver.hpp>
 #include <pendula/numeric/block.hpp>
 
 namespace pendula {

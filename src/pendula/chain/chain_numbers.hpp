@@ -4,15 +4,20 @@
 #include <algorithm>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/plain_chain.hpp>
+#include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_model.hpp>
 #include <span>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace pendula {
 
 /// A chain's sinusoidal torques as plain numbers.
-template <class Space>
-std::vector<PlainChain::Drive> plain_drives(const Chain<Space>& chain) {
+template <class Space, int N>
+std::vector<PlainChain::Drive> plain_drives(const Chain<Space, N>& chain) {
   std::vector<PlainChain::Drive> drives;
   for (const Drive<Space>& drive : chain.drives()) {
     PlainChain::Drive plain{drive.link, {}, drive.frequency, drive.phase};
@@ -23,8 +28,8 @@ std::vector<PlainChain::Drive> plain_drives(const Chain<Space>& chain) {
 }
 
 /// `chain` as plain numbers, which live as long as it and `drives`.
-template <class Space>
-PlainChain plain(const Chain<Space>& chain, std::span<const PlainChain::Drive> drives) {
+template <class Space, int N>
+PlainChain plain(const Chain<Space, N>& chain, std::span<const PlainChain::Drive> drives) {
   return {chain.links(),
           chain.gravity(),
           chain.masses().data(),
@@ -51,6 +56,48 @@ Chain<Space> chain_of(const PlainChain& plain) {
     parameters.drives.push_back(drive);
   }
   return Chain<Space>(std::move(parameters));
+}
+
+/// A chain's numbers as a generated kernel takes them: masses, lengths, damping and gravity are its parameters, the
+/// components of the torques its inputs.
+class ChainSystem {
+ public:
+  ChainSystem(const PlainChain& chain, int torque_components)
+      : inputs_(chain.torque, chain.torque + chain.links * torque_components) {
+    for (const double* numbers : {chain.masses, chain.lengths, chain.damping}) {
+      parameters_.insert(parameters_.end(), numbers, numbers + chain.links);
+    }
+    parameters_.push_back(chain.gravity);
+    for (const PlainChain::Drive& drive : chain.drives) {
+      for (int k = 0; k < torque_components; ++k) {
+        if (drive.amplitude[k] == 0) continue;
+        sines_.push_back({drive.link * torque_components + k, drive.amplitude[k], drive.frequency, drive.phase});
+      }
+    }
+  }
+
+  /// Lives as long as this.
+  PlainSystem plain() const { return {parameters_.data(), inputs_.data(), sines_}; }
+
+ private:
+  std::vector<double> parameters_, inputs_;
+  std::vector<InputSine> sines_;
+};
+
+/// The space that a chain's generated kernel lives in.
+template <class Kernel>
+using SpaceOf = std::conditional_t<Kernel::dof == 1, Planar, Spatial>;
+
+/// The system that a generated kernel makes of a chain. Throws std::invalid_argument if the kernel is for another
+/// number of links.
+template <class Kernel, class Space, int N>
+SystemModel<Kernel> system_of(const Chain<Space, N>& chain) {
+  if (chain.links() != Kernel::links) {
+    throw std::invalid_argument("kernel " + std::string(Kernel::name) + ": expected a chain of " +
+                                std::to_string(Kernel::links) + " links, got " + std::to_string(chain.links()));
+  }
+  const std::vector<PlainChain::Drive> drives = plain_drives(chain);
+  return SystemModel<Kernel>(ChainSystem(plain(chain, drives), Space::torque_components).plain());
 }
 
 }  // namespace pendula

@@ -5,9 +5,14 @@
 #include <cmath>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/space.hpp>
-#include <pendula/chain/state.hpp>
+#include <type_traits>
+#include <utility>
 
 namespace pendula {
+
+/// The number type of a state: of whatever has coordinates q and rates v.
+template <class Motion>
+using NumberOf = typename std::remove_cvref_t<decltype(std::declval<const Motion&>().q)>::Scalar;
 
 namespace detail {
 
@@ -17,11 +22,11 @@ struct LinkMotion {
   Eigen::Matrix<Real, Space::dimension, 1> direction, rate;
   Eigen::Matrix<Real, Space::dimension, Space::dof> derivatives;
 
-  template <int N>
-  LinkMotion(const State<Space, N, Real>& state, int link) {
+  template <class Motion>
+  LinkMotion(const Motion& motion, int links, int link) {
     using Link = typename Space::Link;
     std::array<Real, Space::dof> q;
-    for (int a = 0; a < Space::dof; ++a) q[static_cast<std::size_t>(a)] = state.q[a * state.links() + link];
+    for (int a = 0; a < Space::dof; ++a) q[static_cast<std::size_t>(a)] = motion.q[a * links + link];
     typename Link::template Trig<Real> trig;
     Link::trig(q, trig);
     std::array<Real, Space::dimension> u;
@@ -33,7 +38,7 @@ struct LinkMotion {
     for (int a = 0; a < Space::dof; ++a) {
       const auto& derivative = u_a[static_cast<std::size_t>(a)];
       derivatives.col(a) = Eigen::Map<const Eigen::Matrix<Real, Space::dimension, 1>>(derivative.data());
-      rate += state.v[a * state.links() + link] * derivatives.col(a);
+      rate += motion.v[a * links + link] * derivatives.col(a);
     }
   }
 };
@@ -41,13 +46,14 @@ struct LinkMotion {
 }  // namespace detail
 
 /// Visits every bob from the pivot out: visit(i, position r_i [m], velocity ṙ_i [m/s]).
-template <class Space, int N, int M, class Real, class Visit>
-void for_each_bob(const Chain<Space, N>& chain, const State<Space, M, Real>& state, Visit visit) {
+template <class Space, int N, class Motion, class Visit>
+void for_each_bob(const Chain<Space, N>& chain, const Motion& motion, Visit visit) {
+  using Real = NumberOf<Motion>;
   Eigen::Matrix<Real, Space::dimension, 1> position, velocity;
   position.setZero();
   velocity.setZero();
   for (int i = 0; i < chain.links(); ++i) {
-    const detail::LinkMotion<Space, Real> link(state, i);
+    const detail::LinkMotion<Space, Real> link(motion, chain.links(), i);
     const Real l = Real(chain.lengths()[i]);
     position += l * link.direction;
     velocity += l * link.rate;
@@ -56,18 +62,18 @@ void for_each_bob(const Chain<Space, N>& chain, const State<Space, M, Real>& sta
 }
 
 /// Positions r_i = Σ_{j≤i} l_j û_j, (dimension x n)  [m]  (paper eq. 1, 2; 24–26).
-template <class Space, int N, int M, class Real>
-Points<Space, N, Real> bob_positions(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+template <class Space, int N, class Motion, class Real = NumberOf<Motion>>
+Points<Space, N, Real> bob_positions(const Chain<Space, N>& chain, const Motion& motion) {
   Points<Space, N, Real> points(Space::dimension, chain.links());
-  for_each_bob(chain, state, [&](int i, const auto& position, const auto&) { points.col(i) = position; });
+  for_each_bob(chain, motion, [&](int i, const auto& position, const auto&) { points.col(i) = position; });
   return points;
 }
 
 /// Velocities of the bobs, (dimension x n)  [m/s].
-template <class Space, int N, int M, class Real>
-Points<Space, N, Real> bob_velocities(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+template <class Space, int N, class Motion, class Real = NumberOf<Motion>>
+Points<Space, N, Real> bob_velocities(const Chain<Space, N>& chain, const Motion& motion) {
   Points<Space, N, Real> points(Space::dimension, chain.links());
-  for_each_bob(chain, state, [&](int i, const auto&, const auto& velocity) { points.col(i) = velocity; });
+  for_each_bob(chain, motion, [&](int i, const auto&, const auto& velocity) { points.col(i) = velocity; });
   return points;
 }
 
@@ -78,11 +84,11 @@ struct Energies {
   Real total() const { return kinetic + potential; }
 };
 
-template <class Space, int N, int M, class Real>
-Energies<Real> energies(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+template <class Space, int N, class Motion, class Real = NumberOf<Motion>>
+Energies<Real> energies(const Chain<Space, N>& chain, const Motion& motion) {
   Energies<Real> energies;
   const Real g = Real(chain.gravity());
-  for_each_bob(chain, state, [&](int i, const auto& position, const auto& velocity) {
+  for_each_bob(chain, motion, [&](int i, const auto& position, const auto& velocity) {
     const Real m = Real(chain.masses()[i]);
     energies.kinetic += m * velocity.squaredNorm() / 2;
     energies.potential += m * g * position[Space::dimension - 1];
@@ -91,9 +97,9 @@ Energies<Real> energies(const Chain<Space, N>& chain, const State<Space, M, Real
 }
 
 /// H = T + U  [J].
-template <class Space, int N, int M, class Real>
-Real energy(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
-  return energies(chain, state).total();
+template <class Space, int N, class Motion, class Real = NumberOf<Motion>>
+Real energy(const Chain<Space, N>& chain, const Motion& motion) {
+  return energies(chain, motion).total();
 }
 
 /// What energies are compared to: Σ M_i |g| l_i  [J]; zero without gravity.
@@ -103,32 +109,31 @@ double energy_scale(const Chain<Space, N>& chain) {
 }
 
 /// Angular momentum about the vertical through the pivot, conserved in space without loads  [kg m²/s].
-template <int N, int M, class Real>
-Real vertical_angular_momentum(const Chain<Spatial, N>& chain, const State<Spatial, M, Real>& state) {
+template <int N, class Motion, class Real = NumberOf<Motion>>
+Real vertical_angular_momentum(const Chain<Spatial, N>& chain, const Motion& motion) {
   Real momentum(0);
-  for_each_bob(chain, state, [&](int i, const auto& r, const auto& v) {
+  for_each_bob(chain, motion, [&](int i, const auto& r, const auto& v) {
     momentum += Real(chain.masses()[i]) * (r[0] * v[1] - r[1] * v[0]);
   });
   return momentum;
 }
 
 /// Power that damping takes out, Σ λ_i |û̇_i|²  [W].
-template <class Space, int N, int M, class Real>
-Real dissipation(const Chain<Space, N>& chain, const State<Space, M, Real>& state) {
+template <class Space, int N, class Motion, class Real = NumberOf<Motion>>
+Real dissipation(const Chain<Space, N>& chain, const Motion& motion) {
   Real power(0);
   for (int i = 0; i < chain.links(); ++i) {
-    power += Real(chain.damping()[i]) * detail::LinkMotion<Space, Real>(state, i).rate.squaredNorm();
+    power += Real(chain.damping()[i]) * detail::LinkMotion<Space, Real>(motion, chain.links(), i).rate.squaredNorm();
   }
   return power;
 }
 
 /// Power that torque and damping bring, Σ torque_i·(û_i × û̇_i) − λ_i |û̇_i|²  [W]; torque: (torque_components x n).
-template <class Space, int N, int M, class Real, class Derived>
-Real load_power(const Chain<Space, N>& chain, const State<Space, M, Real>& state,
-                const Eigen::MatrixBase<Derived>& torque) {
-  Real power = -dissipation(chain, state);
+template <class Space, int N, class Motion, class Derived, class Real = NumberOf<Motion>>
+Real load_power(const Chain<Space, N>& chain, const Motion& motion, const Eigen::MatrixBase<Derived>& torque) {
+  Real power = -dissipation(chain, motion);
   for (int i = 0; i < chain.links(); ++i) {
-    const detail::LinkMotion<Space, Real> link(state, i);
+    const detail::LinkMotion<Space, Real> link(motion, chain.links(), i);
     typename Space::Link::template Torque<Real> on_link;
     std::array<Real, Space::dimension> u, load;
     for (std::size_t k = 0; k < on_link.size(); ++k) on_link[k] = Real(torque(static_cast<Eigen::Index>(k), i));

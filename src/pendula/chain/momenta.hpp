@@ -23,7 +23,7 @@ Coordinates<Space, Eigen::Dynamic> momenta(const Chain<Space>& chain, const Stat
   Eigen::Matrix<double, Space::dimension, 1> P = Eigen::Matrix<double, Space::dimension, 1>::Zero();
   for (int i = n; i-- > 0;) {
     P += chain.masses()[i] * velocities.col(i);
-    const detail::LinkMotion<Space, double> link(state, i);
+    const detail::LinkMotion<Space, double> link(state, n, i);
     for (int a = 0; a < Space::dof; ++a) p[a * n + i] = chain.lengths()[i] * link.derivatives.col(a).dot(P);
   }
   return p;
@@ -108,7 +108,7 @@ Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Chain<Space>& chain,
       throw std::invalid_argument("link " + std::to_string(i + 1) + ": expected 0 where sin(theta) = 0");
     }
     carried.inertia.diagonal().array() += chain.masses()[i];
-    const detail::LinkMotion<Space, double> motion(placed, i);
+    const detail::LinkMotion<Space, double> motion(placed, n, i);
     links.emplace_back(chain.lengths()[i] * motion.derivatives, at_pole, of_link, carried);
   }
   Coordinates<Space, Eigen::Dynamic> v(q.size());

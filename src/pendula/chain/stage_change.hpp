@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <pendula/chain/chain_links.hpp>
-#include <pendula/gauss/stepper.hpp>
+#include <pendula/gauss/stage_solver.hpp>
 #include <pendula/numeric/lanes.hpp>
 
 namespace pendula::detail {

@@ -14,6 +14,16 @@ struct State {
   Coordinates<Space, N, Real> q;  ///< angles θ_1..θ_n, then in space φ_1..φ_n, (dof·n)  rad
   Coordinates<Space, N, Real> v;  ///< their rates, (dof·n)  rad/s
 
+  State() = default;
+  State(double at, const Coordinates<Space, N, Real>& angles, const Coordinates<Space, N, Real>& rates)
+      : time(at), q(angles), v(rates) {}
+  /// Of whatever has a time, coordinates and rates: what an integrator gives, say.
+  template <class Other>
+  requires requires(const Other& other) {
+    Coordinates<Space, N, Real>(other.q), Coordinates<Space, N, Real>(other.v), other.time;
+  }
+  State(const Other& other) : time(other.time), q(other.q), v(other.v) {}  // NOLINT(google-explicit-constructor)
+
   int links() const { return static_cast<int>(q.size()) / Space::dof; }
   auto theta() const { return q.head(links()); }
   auto theta_dot() const { return v.head(links()); }

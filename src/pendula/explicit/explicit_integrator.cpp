@@ -34,10 +34,10 @@ RightHandSide right_hand_side_of(ForwardDynamics& dynamics, std::size_t coordina
 /// What fixed and adaptive steps share.
 class ExplicitIntegrator : public PlainIntegrator {
  public:
-  ExplicitIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int links, int dof, std::string_view kernel)
-      : x_(2 * static_cast<std::size_t>(links * dof)),
+  ExplicitIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel)
+      : x_(2 * static_cast<std::size_t>(coordinates)),
         dynamics_(std::move(dynamics)),
-        links_(links),
+        parts_(parts),
         kernel_(kernel),
         right_hand_side_(right_hand_side_of(*dynamics_, x_.size() / 2)) {}
 
@@ -71,7 +71,7 @@ class ExplicitIntegrator : public PlainIntegrator {
 
   Outcome failure(Status status, double h, const Vector& at) {
     ++statistics_.rejected_steps;
-    return {status, time(), h, 0, 0, non_finite_link(at)};
+    return {status, time(), h, 0, 0, non_finite_part(at)};
   }
 
   static bool is_finite(const Vector& x) {
@@ -87,16 +87,16 @@ class ExplicitIntegrator : public PlainIntegrator {
     Vector rate(x_.size());
     right_hand_side()(x_, rate, time());
     if (is_finite(rate)) return {Status::ok, time(), 0, 0, 0, -1};
-    return {Status::singular_mass_matrix, time(), 0, 0, 0, non_finite_link(rate)};
+    return {Status::singular_mass_matrix, time(), 0, 0, 0, non_finite_part(rate)};
   }
 
-  int non_finite_link(const Vector& x) const {
+  int non_finite_part(const Vector& x) const {
     const auto at = std::find_if(x.begin(), x.end(), [](double value) { return !std::isfinite(value); });
-    return at == x.end() ? -1 : static_cast<int>((at - x.begin()) % links_);
+    return at == x.end() ? -1 : static_cast<int>((at - x.begin()) % parts_);
   }
 
   std::unique_ptr<ForwardDynamics> dynamics_;
-  int links_;
+  int parts_;
   std::string kernel_;
   RightHandSide right_hand_side_;
   Compensated<double> time_{};
@@ -138,9 +138,9 @@ class FixedStepIntegrator : public ExplicitIntegrator {
 template <class Stepper>
 class AdaptiveIntegrator : public ExplicitIntegrator {
  public:
-  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int links, int dof, std::string_view kernel,
+  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                      double tolerance)
-      : ExplicitIntegrator(std::move(dynamics), links, dof, kernel),
+      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
         tolerance_(tolerance),
         stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
 
@@ -185,8 +185,9 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
 
 }  // namespace
 
-std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<ForwardDynamics> dynamics, int links, int dof,
-                                                          const RunOptions& options, std::string_view kernel) {
+std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates,
+                                                          int parts, const RunOptions& options,
+                                                          std::string_view kernel) {
   using Dopri5 = AdaptiveIntegrator<odeint::runge_kutta_dopri5<Vector>>;
   using Fehlberg78 = AdaptiveIntegrator<odeint::runge_kutta_fehlberg78<Vector>>;
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
@@ -194,11 +195,11 @@ std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<Forwar
   }
   switch (options.method) {
     case Method::rk4:
-      return std::make_unique<FixedStepIntegrator>(std::move(dynamics), links, dof, kernel);
+      return std::make_unique<FixedStepIntegrator>(std::move(dynamics), coordinates, parts, kernel);
     case Method::dopri5:
-      return std::make_unique<Dopri5>(std::move(dynamics), links, dof, kernel, options.tolerance);
+      return std::make_unique<Dopri5>(std::move(dynamics), coordinates, parts, kernel, options.tolerance);
     case Method::fehlberg78:
-      return std::make_unique<Fehlberg78>(std::move(dynamics), links, dof, kernel, options.tolerance);
+      return std::make_unique<Fehlberg78>(std::move(dynamics), coordinates, parts, kernel, options.tolerance);
     case Method::gauss:
     case Method::radau:
       break;

@@ -5,6 +5,7 @@
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <stdexcept>
 #include <string_view>
 
 namespace pendula {
@@ -14,41 +15,58 @@ constexpr Family family_of(Method method) {
   return method == Method::radau ? Family::radau : Family::gauss;
 }
 
+/// Throws std::invalid_argument where a solver that has Newton only is asked for fixed points.
+inline void require_newton(Iteration iteration) {
+  if (iteration != Iteration::fixed_point) return;
+  throw std::invalid_argument("iteration: the velocity form has newton only, got fixed-point");
+}
+
+/// What an integrator says of itself.
+struct GaussDescription {
+  std::string_view solver, kernel;  ///< literals
+  int parts = 0;                    ///< what failures name: links of a chain, or coordinates
+};
+
 /// A Gauss–Legendre stepper behind the run-time interface: one virtual call a step.
-template <class StageSolver>
+template <StageSolver Solver>
 class GaussIntegrator : public PlainIntegrator {
-  using Chain = typename StageSolver::Chain;
-  using State = typename StageSolver::State;
+  using Model = typename Solver::Model;
+  using State = typename Solver::State;
 
  public:
-  /// `solver` and `kernel` are what describe() says, literals.
   template <class... SolverOptions>
-  GaussIntegrator(const Chain& chain, int stages, std::string_view solver, std::string_view kernel,
+  GaussIntegrator(const Model& model, int stages, const GaussDescription& described,
                   const SolverOptions&... solver_options)
-      : stepper_(chain, stages, {}, solver_options...),
-        coordinates_(StageSolver::Space::dof * chain.links()),
-        solver_(solver),
-        kernel_(kernel) {}
+      : stepper_(model, stages, {}, solver_options...), described_(described) {}
 
   Outcome start(double time, const double* q, const double* v) override {
     using Numbers = Eigen::Map<const Eigen::VectorXd>;
-    return stepper_.start(State{time, Numbers(q, coordinates_), Numbers(v, coordinates_)});
+    return named(stepper_.start(State{time, Numbers(q, coordinates()), Numbers(v, coordinates())}));
   }
-  Outcome step(double h) override { return stepper_.step(h); }
+  Outcome step(double h) override { return named(stepper_.step(h)); }
   double time() const override { return stepper_.time(); }
   void read_state(double* q, double* v) const override {
     using Numbers = Eigen::Map<Eigen::VectorXd>;
     const State state = stepper_.state();
-    Numbers(q, coordinates_) = state.q;
-    Numbers(v, coordinates_) = state.v;
+    Numbers(q, coordinates()) = state.q;
+    Numbers(v, coordinates()) = state.v;
   }
   const Statistics& statistics() const override { return stepper_.statistics(); }
-  Description describe() const override { return {solver_, name_of(stepper_.solver().iteration()), kernel_}; }
+  Description describe() const override {
+    return {described_.solver, name_of(stepper_.solver().iteration()), described_.kernel};
+  }
 
  private:
-  GaussStepper<StageSolver> stepper_;
-  Eigen::Index coordinates_;
-  std::string_view solver_, kernel_;
+  Eigen::Index coordinates() const { return stepper_.solver().coordinates(); }
+
+  // Coordinates of a chain are ordered by kind, those of one link a number of links apart.
+  Outcome named(Outcome outcome) const {
+    if (outcome.part >= 0) outcome.part %= described_.parts;
+    return outcome;
+  }
+
+  GaussStepper<Solver> stepper_;
+  GaussDescription described_;
 };
 
 }  // namespace pendula

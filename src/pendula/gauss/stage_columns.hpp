@@ -7,19 +7,23 @@
 
 namespace pendula::detail {
 
-/// The coefficients of a step, one column a stage, padded to lanes.
-template <int S, class Real>
+/// The coefficients of a step, one column a stage, padded to `Width` lanes. S may be Eigen::Dynamic: then columns are
+/// padded like rows, and what lanes beyond the stages hold must be finite.
+template <int S, class Real, int Width = lanes_for<Real>(S)>
 class StageColumns {
-  using L = Lanes<S, Real>;
-  static constexpr std::size_t stages = S, Z = L::size;
+  using L = Pack<Width, RegisterFor<Width, Real>>;
+  static constexpr std::size_t columns = S == Eigen::Dynamic ? Width : S, Z = Width;
 
  public:
-  explicit StageColumns(Family family = Family::gauss) : coefficients_(tableau_of<S, Real>(family, S)) {
-    for (int i = 0; i < S; ++i) {
-      for (int j = 0; j < S; ++j) m_[j][i] = coefficients_.m(i, j);
+  explicit StageColumns(Family family = Family::gauss, int stages = S)
+      : coefficients_(tableau_of<S, Real>(family, stages)) {
+    for (int i = 0; i < stages; ++i) {
+      for (int j = 0; j < stages; ++j) m_[j][i] = coefficients_.m(i, j);
     }
     fold();
   }
+
+  int stages() const { return coefficients_.stages(); }
 
   /// For a step of `h` after one of `previous` (0: there is none).
   void prepare(Real h, Real previous) {
@@ -56,7 +60,7 @@ class StageColumns {
   /// The polynomial through stage values that hold the factor h b, at the start of their step.
   Real at_start(const Real* x) const {
     Real sum = start_[0] * x[0];
-    for (std::size_t j = 1; j < stages; ++j) sum += start_[j] * x[j];
+    for (std::size_t j = 1; j < columns; ++j) sum += start_[j] * x[j];
     return sum;
   }
   Real predictor_gain() const { return coefficients_.predictor_gain(); }
@@ -70,24 +74,24 @@ class StageColumns {
   /// That polynomial in the middle of this step.
   Real at_half(const Real* last) const {
     Real sum = half_[0] * last[0];
-    for (std::size_t j = 1; j < stages; ++j) sum += half_[j] * last[j];
+    for (std::size_t j = 1; j < columns; ++j) sum += half_[j] * last[j];
     return sum;
   }
 
  private:
-  static L product(const Real (&columns)[stages][Z], const Real* x, const L& start = L(Real(0))) {
-    L even = fma(L(x[0]), L::load(columns[0]), start);
-    if constexpr (S == 1) return even;
-    L odd = L(x[S > 1]) * L::load(columns[S > 1]);
-    for (std::size_t j = 2; j < S; j += 2) {
-      even = fma(L(x[j]), L::load(columns[j]), even);
-      if (j + 1 < S) odd = fma(L(x[j + 1]), L::load(columns[j + 1]), odd);
+  static L product(const Real (&column)[columns][Z], const Real* x, const L& start = L(Real(0))) {
+    L even = fma(L(x[0]), L::load(column[0]), start);
+    if constexpr (columns == 1) return even;
+    L odd = L(x[columns > 1]) * L::load(column[columns > 1]);
+    for (std::size_t j = 2; j < columns; j += 2) {
+      even = fma(L(x[j]), L::load(column[j]), even);
+      if (j + 1 < columns) odd = fma(L(x[j + 1]), L::load(column[j + 1]), odd);
     }
     return even + odd;
   }
 
   void fold() {
-    for (int i = 0; i < S; ++i) {
+    for (int i = 0; i < stages(); ++i) {
       const Twofold<Real> exact = exact_product(h_, coefficients_.c(i));
       hc_[i] = exact.value;
       hc_low_[i] = exact.low + h_ * coefficients_.c_low(i);
@@ -98,9 +102,9 @@ class StageColumns {
 
   // b_i/b_j, not of h b: of a step of no length that would be no number.
   void extrapolate() {
-    for (int j = 0; j < S; ++j) {
+    for (int j = 0; j < stages(); ++j) {
       half_[j] = coefficients_.lagrange(j, 1 + ratio_ / 2);
-      for (int i = 0; i < S; ++i) {
+      for (int i = 0; i < stages(); ++i) {
         extrapolation_[j][i] = coefficients_.extrapolation(i, j);
         increments_[j][i] = ratio_ * (coefficients_.b(i) / coefficients_.b(j)) * extrapolation_[j][i];
       }
@@ -109,13 +113,13 @@ class StageColumns {
 
   StepCoefficients<S, Real> coefficients_;
   Real h_{0}, ratio_{0};
-  alignas(pack_alignment) Real m_[stages][Z] = {};
-  alignas(pack_alignment) Real extrapolation_[stages][Z] = {};
-  alignas(pack_alignment) Real increments_[stages][Z] = {};
+  alignas(pack_alignment) Real m_[columns][Z] = {};
+  alignas(pack_alignment) Real extrapolation_[columns][Z] = {};
+  alignas(pack_alignment) Real increments_[columns][Z] = {};
   alignas(pack_alignment) Real hb_[Z] = {};
   alignas(pack_alignment) Real hc_[Z] = {};
   alignas(pack_alignment) Real hc_low_[Z] = {};
-  Real half_[stages] = {}, start_[stages] = {};
+  Real half_[columns] = {}, start_[columns] = {};
 };
 
 }  // namespace pendula::detail

@@ -4,65 +4,35 @@
 #include <cmath>
 #include <limits>
 #include <pendula/gauss/roundoff.hpp>
+#include <pendula/gauss/stage_solver.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 
 namespace pendula {
 
-/// What one iteration on the stages did.
-struct Correction {
-  double relative = 0;  ///< largest change of an unknown, relative to the size of the unknowns
-  int link = -1;        ///< 0-based link where it happened; −1: ask the solver
-};
-
 struct StepperOptions {
   int max_iterations = 50;
 };
 
-/// Takes implicit Gauss–Legendre steps with any solver of the stage equations.
-///
-/// A `StageSolver` owns the model and the workspace, is built from (chain, stages, options of its own…), and offers
-///   using Chain, State;
-///   using Real;                            what it computes in: round-off is that of this type
-///   Status start(const State&);            takes over a state; may find it singular
-///   void prepare(double time, double h);   predicts the stages of the next step
-///   Correction correct();                  improves the stages once
-///   Convergence convergence() const;       how its corrections shrink; may change from one to the next
-///   int worst_link();                      where a correction was largest that did not say; where a step failed only
-///   int singular_link() const;             link whose coordinates fail at the stages, −1 where none does
-///   double turn() const;                   the most that a coordinate turns in the step  [rad]
-///   static double largest_turn;            beyond which its stage equations have solutions that are not the motion
-///   bool continues() const;                false where the stages cannot be those of the motion: Newton's pivots
-///   double energy_defect();                of the end of the step against its start and the work of loads, relative to
-///                                          all energy that the chain has
-///   double work() const;                   what torque and damping bring in the step  [J]
-///   double defect();                       how far, at the start of the step, the polynomial through its stage
-///                                          velocities is off: of the bobs, relative to the fastest so far
-///   double predictor_gain() const;         how much larger the error of a prediction is than such a defect
-///   bool loaded(), damped(), dissipates(), int stages() const;
-///   void accept();                         moves the state to the end of the step
-///   void save(); void restore();           keep a state and go back to it; neither allocates
-///   State state(double time) const;        the state as users read it
-///   Iteration iteration() const;           what it iterates by
-/// and the stepper does not know which one it has.
-template <class StageSolver>
+/// Takes implicit Gauss–Legendre steps with any solver of the stage equations, and does not know which one it has.
+template <StageSolver Solver>
 class GaussStepper {
  public:
-  using Chain = typename StageSolver::Chain;
-  using State = typename StageSolver::State;
+  using Model = typename Solver::Model;
+  using State = typename Solver::State;
 
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
   template <class... SolverOptions>
-  GaussStepper(const Chain& chain, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
-      : solver_(chain, stages, solver_options...), options_(options), at_roundoff_(chain.links(), epsilon()) {}
+  GaussStepper(const Model& model, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
+      : solver_(model, stages, solver_options...), options_(options), at_roundoff_(solver_.parts(), epsilon()) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
     time_.assign(state.time);
     statistics_ = {};
     const Status status = solver_.start(state);
-    return {status, time(), 0, 0, 0, status == Status::ok ? -1 : solver_.singular_link()};
+    return {status, time(), 0, 0, 0, status == Status::ok ? -1 : solver_.singular_part()};
   }
 
   /// Advances by `h`. Where the stage equations cannot be solved, the step is taken in halves, quarters … as far as
@@ -77,13 +47,13 @@ class GaussStepper {
   double time() const { return time_.value; }
   State state() const { return solver_.state(time()); }
   const Statistics& statistics() const { return statistics_; }
-  const StageSolver& solver() const { return solver_; }
+  const Solver& solver() const { return solver_; }
 
   /// A failing step is tried in parts down to this fraction of it.
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
-  static double epsilon() { return static_cast<double>(std::numeric_limits<typename StageSolver::Real>::epsilon()); }
+  static double epsilon() { return static_cast<double>(std::numeric_limits<typename Solver::Real>::epsilon()); }
 
   // From where on the defect of a step is looked for. It is told, not acted on: steps of different sizes would cost
   // what symplectic ones are taken for, and long chains move well in modes far slower than their fastest.
@@ -117,7 +87,7 @@ class GaussStepper {
   // damp what they do not resolve are asked for no more than that energy does not grow.
   Status status_of_solution(double first) {
     const double turn = solver_.turn();
-    if (!solver_.continues() || !(turn < StageSolver::largest_turn)) return Status::wrong_root;
+    if (!solver_.continues() || !(turn < solver_.largest_turn())) return Status::wrong_root;
     if (first > trusted_prediction || turn > trusted_turn) {
       const double energy = solver_.energy_defect();
       if (!(energy < largest_energy_defect)) return Status::wrong_root;
@@ -156,7 +126,7 @@ class GaussStepper {
   }
 
   Outcome accept(double h, int iterations, const Correction& correction) {
-    if (solver_.singular_link() >= 0) return failure(Status::singular_mass_matrix, h, iterations, correction);
+    if (solver_.singular_part() >= 0) return failure(Status::singular_mass_matrix, h, iterations, correction);
     if (solver_.loaded()) statistics_.load_work += solver_.work();
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
     solver_.accept();
@@ -167,13 +137,13 @@ class GaussStepper {
   // A failure where coordinates are singular is theirs, whatever shape it took.
   Outcome failure(Status status, double h, int iterations, const Correction& correction) {
     ++statistics_.rejected_steps;
-    const int singular = solver_.singular_link();
+    const int singular = solver_.singular_part();
     if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
-    const int link = correction.link >= 0 || status == Status::wrong_root ? correction.link : solver_.worst_link();
-    return {status, time(), h, iterations, correction.relative, link};
+    const int part = correction.part >= 0 || status == Status::wrong_root ? correction.part : solver_.worst_part();
+    return {status, time(), h, iterations, correction.relative, part};
   }
 
-  StageSolver solver_;
+  Solver solver_;
   StepperOptions options_;
   RoundoffStop at_roundoff_;
   Compensated<double> time_{};

@@ -197,6 +197,12 @@ class Pack {
                 c);
   }
 
+  /// operation(x) of every register.
+  template <class Operation>
+  friend Pack mapped(Operation operation, const Pack& a) {
+    return each(operation, a);
+  }
+
   friend Pack abs(const Pack& a) {
     return each(
         [](const Register& x) -> Register {

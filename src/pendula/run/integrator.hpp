@@ -1,16 +1,18 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/plain_chain.hpp>
-#include <pendula/chain/state.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_integrator.hpp>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -23,19 +25,19 @@ struct Description {
   std::string kernel;     ///< the fixed-n kernel in use, or empty
 };
 
-/// Any method on any chain of a space, the number of links chosen at run time.
-template <class Space>
+/// Any method on any system, chosen at run time.
 class Integrator {
  public:
-  Integrator(std::unique_ptr<PlainIntegrator> integrator, int links)
-      : integrator_(std::move(integrator)), coordinates_(Space::dof * links) {}
+  /// `coordinates` is how many the system has; `system` how messages call it.
+  Integrator(std::unique_ptr<PlainIntegrator> integrator, Eigen::Index coordinates, std::string_view system)
+      : integrator_(std::move(integrator)), coordinates_(coordinates), system_(system) {}
 
-  /// Starts a run. Fails where the method's coordinates do (at a pole). Throws std::invalid_argument on a state of
-  /// another number of links.
-  Outcome start(const State<Space>& state) {
-    require_size("angles", state.q.size());
-    require_size("rates", state.v.size());
-    return integrator_->start(state.time, state.q.data(), state.v.data());
+  /// Starts a run. Fails where the method's coordinates do (at a pole). Throws std::invalid_argument on another number
+  /// of coordinates.
+  Outcome start(const Motion& motion) {
+    require_size("coordinates", motion.q.size());
+    require_size("rates", motion.v.size());
+    return integrator_->start(motion.time, motion.q.data(), motion.v.data());
   }
 
   /// Advances by `h`; an adaptive method takes one accepted step of its own size, at most `h`. On failure the state
@@ -44,13 +46,10 @@ class Integrator {
 
   double time() const { return integrator_->time(); }
 
-  State<Space> state() const {
-    State<Space> state;
-    state.time = time();
-    state.q.resize(coordinates_);
-    state.v.resize(coordinates_);
-    integrator_->read_state(state.q.data(), state.v.data());
-    return state;
+  Motion state() const {
+    Motion motion(time(), Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
+    integrator_->read_state(motion.q.data(), motion.v.data());
+    return motion;
   }
 
   const Statistics& statistics() const { return integrator_->statistics(); }
@@ -64,11 +63,12 @@ class Integrator {
   void require_size(const char* what, Eigen::Index got) const {
     if (got == coordinates_) return;
     throw std::invalid_argument(std::string("state: ") + what + ": expected " + std::to_string(coordinates_) +
-                                " numbers for this chain, got " + std::to_string(got));
+                                " numbers for this " + system_ + ", got " + std::to_string(got));
   }
 
   std::unique_ptr<PlainIntegrator> integrator_;
   Eigen::Index coordinates_;
+  std::string system_;
 };
 
 /// Thrown where a run needs a fixed-n kernel that this build does not have.
@@ -81,10 +81,10 @@ class NoKernel : public std::runtime_error {
 /// PENDULA_KERNELS to configure, where a dense kernel is needed and not built in; std::invalid_argument for options
 /// that make no sense, and for a PENDULA_ARCH as library() does.
 template <class Space>
-std::unique_ptr<Integrator<Space>> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
+std::unique_ptr<Integrator> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
   const std::vector<PlainChain::Drive> drives = plain_drives(chain);
-  return std::make_unique<Integrator<Space>>(library_of<Space>().make_integrator(plain(chain, drives), options),
-                                             chain.links());
+  return std::make_unique<Integrator>(library_of<Space>().make_integrator(plain(chain, drives), options),
+                                      Space::dof * chain.links(), "chain");
 }
 
 /// The fixed-n kernels in this build, by space and number of links.

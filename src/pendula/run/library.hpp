@@ -25,6 +25,7 @@ struct SpaceLibrary {
 struct Library {
   std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" where there is one only
   SpaceLibrary planar, spatial;
+  std::span<const SystemEntry* const> systems;  ///< kernels of this build that are no chains
 };
 
 /// The library for the best instruction set that this processor has, or for the lesser one that the environment

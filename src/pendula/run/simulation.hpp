@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <pendula/chain/state.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/system/outcome.hpp>
 #include <stdexcept>
@@ -48,12 +47,11 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 
 }  // namespace detail
 
-/// Runs `integrator` from `start` over `schedule`, and calls on_row(const State<Space>&) at the start, every
+/// Runs `integrator` from `start` over `schedule`, and calls on_row(const Motion&) at the start, every
 /// `schedule.every` accepted steps, and at the last state, also where the run fails or is stopped: bool stop() is asked
 /// after every step. Throws std::invalid_argument on a schedule that makes no sense.
-template <class Space, class OnRow, class Stop>
-RunResult simulate(Integrator<Space>& integrator, const State<Space>& start, const Schedule& schedule, OnRow on_row,
-                   Stop stop) {
+template <class OnRow, class Stop>
+RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row, Stop stop) {
   using Clock = std::chrono::steady_clock;
   detail::require(schedule);
   RunResult result{integrator.start(start)};
@@ -76,8 +74,8 @@ RunResult simulate(Integrator<Space>& integrator, const State<Space>& start, con
 }
 
 /// The same to the end of the schedule.
-template <class Space, class OnRow>
-RunResult simulate(Integrator<Space>& integrator, const State<Space>& start, const Schedule& schedule, OnRow on_row) {
+template <class OnRow>
+RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row) {
   return simulate(integrator, start, schedule, on_row, [] { return false; });
 }
 

@@ -8,8 +8,8 @@
 #include <initializer_list>
 #include <limits>
 #include <pendula/system/kernel_registry.hpp>
+#include <pendula/system/system_model.hpp>
 #include <random>
-#include <tuple>
 #include <utility>
 
 namespace pendula {
@@ -21,9 +21,16 @@ inline void keep_largest(double& largest, double error) {
   if (!std::isnan(largest) && !(error <= largest)) largest = error;
 }
 
+inline double largest_of(std::initializer_list<double> errors) {
+  double worst = 0;
+  for (const double error : errors) keep_largest(worst, error);
+  return worst;
+}
+
 /// Largest entry of a − b, relative to the largest of b (or to 1 where b is small).
 template <class A, class B>
 double relative_error(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) {
+  if (a.size() == 0) return 0;
   if (!a.allFinite() || !b.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   return (a - b).cwiseAbs().maxCoeff() / std::max(1.0, b.cwiseAbs().maxCoeff());
 }
@@ -47,205 +54,326 @@ double jacobian_error(const F& f, const Vector& x, const Matrix& jacobian) {
   return relative_error(jacobian, differences);
 }
 
-/// One random chain in one random state, with what is checked there.
-template <class Kernel>
-class KernelDraw {
-  using Vector = typename Kernel::template Vector<double>;
-  using Matrix = typename Kernel::template Matrix<double>;
-  using Points = typename Kernel::template Points<double>;
-
+/// A system with random parameters in a random state, and what is checked there.
+template <System S>
+class SystemDraw {
  public:
-  explicit KernelDraw(std::mt19937& random) {
-    fill(random, chain_.masses, 0.5, 2);
-    fill(random, chain_.lengths, 0.5, 2);
-    fill(random, chain_.damping, 0.1, 1);
-    chain_.gravity = 9.81;
-    fill(random, q_, 0.3, 2.8);  // away from sin θ = 0, where (θ, φ) fails
-    fill(random, v_, -2, 2);
-    fill(random, a_, -2, 2);
-    fill(random, torque_, -1, 1);
+  using Vector = typename S::template Vector<double>;
+  using Matrix = typename S::template Matrix<double>;
+  using Number = Eigen::Matrix<double, 1, 1>;
+
+  explicit SystemDraw(std::mt19937& random) {
+    draw_parameters(random);
+    for (std::size_t k = 0; k < S::coordinates; ++k) {
+      // Away from where (θ, φ) and the like fail.
+      q_[index(k)] = S::coordinate_is_angle[k] ? uniform(random, 0.3, 2.8) : uniform(random, 1, 2);
+      v_[index(k)] = uniform(random, -2, 2);
+      a_[index(k)] = uniform(random, -2, 2);
+    }
+    for (Eigen::Index i = 0; i < inputs_.size(); ++i) inputs_.data()[i] = uniform(random, -1, 1);
+    time_ = uniform(random, 0, 2);
+    set_time(time_);
   }
 
-  /// ∂E/∂q, ∂E/∂v, ∂E/∂a, from their own entry points and from the one for all.
+  /// ∂E/∂q, ∂E/∂v, ∂E/∂a.
   double residual_jacobians() const {
     Vector residual;
-    Matrix d_q, d_v, d_a, only_d_q, only_d_v, only_d_a;
-    Kernel::residual_with_jacobians(chain_, q_, v_, a_, torque_, residual, d_q, d_v, d_a);
-    Kernel::residual_D_q(chain_, q_, v_, a_, torque_, only_d_q);
-    Kernel::residual_D_v(chain_, q_, v_, a_, torque_, only_d_v);
-    Kernel::residual_D_a(chain_, q_, v_, a_, torque_, only_d_a);
+    Matrix d_q, d_v, d_a;
+    S::residual_with_jacobians(parameters_, q_, v_, a_, inputs_, residual, d_q, d_v, d_a);
     const auto of_q = [&](const Vector& q) { return this->residual(q, v_, a_); };
     const auto of_v = [&](const Vector& v) { return this->residual(q_, v, a_); };
     const auto of_a = [&](const Vector& a) { return this->residual(q_, v_, a); };
-    return largest({jacobian_error(of_q, q_, d_q), jacobian_error(of_v, v_, d_v), jacobian_error(of_a, a_, d_a),
-                    relative_error(only_d_q, d_q), relative_error(only_d_v, d_v), relative_error(only_d_a, d_a)});
+    return largest_of({jacobian_error(of_q, q_, d_q), jacobian_error(of_v, v_, d_v), jacobian_error(of_a, a_, d_a)});
   }
 
-  /// ∂p/∂q, ∂p/∂v, ∂f/∂q, ∂f/∂v and those of the generalised force.
-  double momentum_and_force_jacobians() const {
-    Vector p, f, force;
-    Matrix p_q, p_v, f_q, f_v, force_q, force_v;
-    Kernel::momentum_form_with_jacobians(chain_, q_, v_, torque_, p, f, p_q, p_v, f_q, f_v);
-    Kernel::generalized_force_with_jacobians(chain_, q_, v_, torque_, force, force_q, force_v);
-    const auto of_q = [this](auto part) { return [this, part](const Vector& q) { return (this->*part)(q, v_); }; };
-    const auto of_v = [this](auto part) { return [this, part](const Vector& v) { return (this->*part)(q_, v); }; };
-    return largest(
-        {jacobian_error(of_q(&KernelDraw::momentum), q_, p_q), jacobian_error(of_v(&KernelDraw::momentum), v_, p_v),
-         jacobian_error(of_q(&KernelDraw::rate), q_, f_q), jacobian_error(of_v(&KernelDraw::rate), v_, f_v),
-         jacobian_error(of_q(&KernelDraw::force), q_, force_q), jacobian_error(of_v(&KernelDraw::force), v_, force_v)});
+  /// ∂p/∂q, ∂p/∂v, ∂f/∂q, ∂f/∂v.
+  double momentum_jacobians() const {
+    Vector p, f;
+    Matrix p_q, p_v, f_q, f_v;
+    S::momentum_form_with_jacobians(parameters_, q_, v_, inputs_, p, f, p_q, p_v, f_q, f_v);
+    const auto p_of_q = [&](const Vector& q) { return form(q, v_).first; };
+    const auto p_of_v = [&](const Vector& v) { return form(q_, v).first; };
+    const auto f_of_q = [&](const Vector& q) { return form(q, v_).second; };
+    const auto f_of_v = [&](const Vector& v) { return form(q_, v).second; };
+    return largest_of({jacobian_error(p_of_q, q_, p_q), jacobian_error(p_of_v, v_, p_v),
+                       jacobian_error(f_of_q, q_, f_q), jacobian_error(f_of_v, v_, f_v)});
   }
 
-  /// ∂L/∂q, ∂L/∂v against differences of L; the Hessian against differences of those.
-  double lagrangian_derivatives() const {
-    Vector l_q, l_v;
-    Matrix l_qq, l_qv, l_vv;
-    Kernel::lagrangian_gradient(chain_, q_, v_, l_q, l_v);
-    Kernel::lagrangian_hessian(chain_, q_, v_, l_qq, l_qv, l_vv);
-    const auto l_of_q = [&](const Vector& q) { return this->lagrangian(q, v_); };
-    const auto l_of_v = [&](const Vector& v) { return this->lagrangian(q_, v); };
-    const auto gradient_of_q = [&](const Vector& q) { return this->gradient(q, v_).first; };
-    const auto l_q_of_v = [&](const Vector& v) { return this->gradient(q_, v).first; };
-    const auto l_v_of_v = [&](const Vector& v) { return this->gradient(q_, v).second; };
-    using Row = Eigen::Matrix<double, 1, Kernel::coordinates>;
-    return largest({jacobian_error(l_of_q, q_, Row(l_q.transpose())), jacobian_error(l_of_v, v_, Row(l_v.transpose())),
-                    jacobian_error(gradient_of_q, q_, l_qq), jacobian_error(l_q_of_v, v_, l_qv),
-                    jacobian_error(l_v_of_v, v_, l_vv)});
-  }
-
-  /// Entry points with Jacobians give the same values as those without.
-  double values_with_jacobians() const {
-    Vector residual, p, f, force;
+  /// Entry points that give the same values give the same values.
+  double same_values() const {
+    Vector residual, p, f, v, force;
     Matrix unused_1, unused_2, unused_3, unused_4;
-    Kernel::residual_with_jacobians(chain_, q_, v_, a_, torque_, residual, unused_1, unused_2, unused_3);
-    Kernel::momentum_form_with_jacobians(chain_, q_, v_, torque_, p, f, unused_1, unused_2, unused_3, unused_4);
-    Kernel::generalized_force_with_jacobians(chain_, q_, v_, torque_, force, unused_1, unused_2);
-    return largest({relative_error(residual, this->residual(q_, v_, a_)), relative_error(p, momentum(q_, v_)),
-                    relative_error(f, rate(q_, v_)), relative_error(force, this->force(q_, v_))});
+    S::residual_with_jacobians(parameters_, q_, v_, a_, inputs_, residual, unused_1, unused_2, unused_3);
+    S::momentum_form_with_jacobians(parameters_, q_, v_, inputs_, p, f, unused_1, unused_2, unused_3, unused_4);
+    const auto [momentum, rate] = form(q_, v_);
+    S::hamiltonian_form(parameters_, q_, momentum, inputs_, v, force);
+    return largest_of({relative_error(residual, this->residual(q_, v_, a_)), relative_error(p, momentum),
+                       relative_error(f, rate), relative_error(v, v_), relative_error(force, rate)});
   }
 
   /// E = dp/dt − f: both forms are the same equation of motion.
   double both_forms_agree() const {
     Vector p, f;
     Matrix p_q, p_v, f_q, f_v;
-    Kernel::momentum_form_with_jacobians(chain_, q_, v_, torque_, p, f, p_q, p_v, f_q, f_v);
-    return relative_error(residual(q_, v_, a_), Vector(p_q * v_ + p_v * a_ - f));
+    S::momentum_form_with_jacobians(parameters_, q_, v_, inputs_, p, f, p_q, p_v, f_q, f_v);
+    return relative_error(residual(q_, v_, a_), Vector(p_q * v_ + p_v * a_ + momentum_slope() - f));
   }
 
   /// The acceleration leaves no residual, and velocity ↦ momentum ↦ velocity is the identity.
   double solves_agree() const {
     Vector p, v, a;
-    Kernel::acceleration(chain_, q_, v_, torque_, a);
-    Kernel::momentum_from_velocity(chain_, q_, v_, p);
-    Kernel::velocity_from_momentum(chain_, q_, p, v);
+    S::acceleration(parameters_, q_, v_, inputs_, a);
+    S::momentum_from_velocity(parameters_, q_, v_, p);
+    S::velocity_from_momentum(parameters_, q_, p, v);
     const Vector at_rest = residual(q_, v_, Vector::Zero());  // sets the size of the terms that must cancel
-    return largest({relative_error(Vector(at_rest - residual(q_, v_, a)), at_rest), relative_error(v, v_)});
+    return largest_of({relative_error(Vector(at_rest - residual(q_, v_, a)), at_rest), relative_error(v, v_)});
   }
 
-  /// ṙ = dr/dt, p = ∂L/∂v = A v, and H, T + U, L + 2U agree.
-  double kinematics_and_energy() const {
-    Points velocities;
+  /// Along the motion energy changes by the power of forces and of what holds time.
+  double energy_balances() const {
+    Vector a;
+    double power = 0;
+    S::acceleration(parameters_, q_, v_, inputs_, a);
+    S::power(parameters_, q_, v_, inputs_, power);
+    using Along = Eigen::Matrix<double, 2 * S::coordinates + 1, 1>;
+    Along here, motion;
+    here << q_, v_, time_;
+    motion << v_, a, 1;
+    const auto energy = [&](const Along& x) { return Number(this->energy(x)); };
+    return relative_error(directional_difference(energy, here, motion), Number(power));
+  }
+
+  /// Velocities of the points are derivatives of their positions.
+  double points_move() const {
+    if constexpr (requires { &S::template positions<double>; }) {
+      using Points = typename S::template Points<double>;
+      Points velocities;
+      S::velocities(parameters_, q_, v_, velocities);
+      using Along = Eigen::Matrix<double, S::coordinates + 1, 1>;
+      Along here, motion;
+      here << q_, time_;
+      motion << v_, 1;
+      const auto positions = [&](const Along& x) {
+        Points points;
+        const Vector q = x.template head<S::coordinates>();
+        S::positions(at_time(x[S::coordinates]), q, points);
+        return points;
+      };
+      return relative_error(velocities, directional_difference(positions, here, motion));
+    }
+    return 0;
+  }
+
+ protected:
+  using Parameters = typename S::template Parameters<double>;
+
+  Vector residual(const Vector& q, const Vector& v, const Vector& a) const {
+    Vector residual;
+    S::residual(parameters_, q, v, a, inputs_, residual);
+    return residual;
+  }
+  std::pair<Vector, Vector> form(const Vector& q, const Vector& v) const {
+    std::pair<Vector, Vector> form;
+    S::momentum_form(parameters_, q, v, inputs_, form.first, form.second);
+    return form;
+  }
+
+  Parameters parameters_{};
+  typename S::template Inputs<double> inputs_;
+  Vector q_, v_, a_;
+
+ private:
+  static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
+  static double uniform(std::mt19937& random, double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  }
+
+  // Around the defaults: what a model is for is near them.
+  void draw_parameters(std::mt19937& random) {
+    std::array<double, static_cast<std::size_t>(std::max(1, parameter_count<S>()))> numbers{};
+    std::size_t at = 0;
+    for (std::size_t k = 0; k < S::parameter_names.size(); ++k) {
+      const double usual = S::parameter_defaults[k];
+      for (int i = 0; i < S::parameter_sizes[k]; ++i) {
+        const double factor = uniform(random, 0.5, 2);
+        numbers[at++] = std::isfinite(usual) && usual != 0 ? usual * factor
+                        : S::parameter_is_positive[k]      ? factor
+                                                           : 0.1 * factor;
+      }
+    }
+    S::template read_parameters<double>(numbers.data(), parameters_);
+  }
+
+  void set_time(double time) { parameters_ = at_time(time); }
+  Parameters at_time(double time) const {
+    Parameters parameters = parameters_;
+    if constexpr (holds_time<S>) parameters.time = time;
+    return parameters;
+  }
+
+  double energy(const Eigen::Matrix<double, 2 * S::coordinates + 1, 1>& x) const {
+    double energy = 0;
+    const Vector q = x.template head<S::coordinates>(), v = x.template segment<S::coordinates>(S::coordinates);
+    S::energy(at_time(x[2 * S::coordinates]), q, v, energy);
+    return energy;
+  }
+
+  // ∂p/∂t.
+  Vector momentum_slope() const {
+    const auto momentum = [&](const Number& time) {
+      Vector p;
+      S::momentum_from_velocity(at_time(time[0]), q_, v_, p);
+      return p;
+    };
+    return directional_difference(momentum, Number(time_), Number(1.0));
+  }
+
+  double time_ = 0;
+};
+
+/// A random state of a chain, with what its kernel has besides: the paper's derivatives, each by itself.
+template <System S>
+class ChainDraw : public SystemDraw<S> {
+  using Base = SystemDraw<S>;
+  using Base::parameters_, Base::inputs_, Base::q_, Base::v_, Base::a_;
+  using typename Base::Matrix, typename Base::Number, typename Base::Vector;
+
+ public:
+  using Base::Base;
+
+  /// ∂E/∂q, ∂E/∂v, ∂E/∂a alone; ∂Q/∂q, ∂Q/∂v.
+  double single_jacobians() const {
+    Vector residual, force;
+    Matrix d_q, d_v, d_a, only_d_q, only_d_v, only_d_a, force_q, force_v;
+    S::residual_with_jacobians(parameters_, q_, v_, a_, inputs_, residual, d_q, d_v, d_a);
+    S::residual_D_q(parameters_, q_, v_, a_, inputs_, only_d_q);
+    S::residual_D_v(parameters_, q_, v_, a_, inputs_, only_d_v);
+    S::residual_D_a(parameters_, q_, v_, a_, inputs_, only_d_a);
+    S::generalized_force_with_jacobians(parameters_, q_, v_, inputs_, force, force_q, force_v);
+    const auto of_q = [&](const Vector& q) { return this->force(q, v_); };
+    const auto of_v = [&](const Vector& v) { return this->force(q_, v); };
+    return largest_of({relative_error(only_d_q, d_q), relative_error(only_d_v, d_v), relative_error(only_d_a, d_a),
+                       relative_error(force, this->force(q_, v_)), jacobian_error(of_q, q_, force_q),
+                       jacobian_error(of_v, v_, force_v)});
+  }
+
+  /// ∂L/∂q, ∂L/∂v against differences of L; the Hessian against differences of those.
+  double lagrangian_derivatives() const {
+    Vector l_q, l_v;
+    Matrix l_qq, l_qv, l_vv;
+    S::lagrangian_gradient(parameters_, q_, v_, l_q, l_v);
+    S::lagrangian_hessian(parameters_, q_, v_, l_qq, l_qv, l_vv);
+    const auto l_of_q = [&](const Vector& q) { return this->lagrangian(q, v_); };
+    const auto l_of_v = [&](const Vector& v) { return this->lagrangian(q_, v); };
+    const auto gradient_of_q = [&](const Vector& q) { return this->gradient(q, v_).first; };
+    const auto l_q_of_v = [&](const Vector& v) { return this->gradient(q_, v).first; };
+    const auto l_v_of_v = [&](const Vector& v) { return this->gradient(q_, v).second; };
+    using Row = Eigen::Matrix<double, 1, S::coordinates>;
+    return largest_of({jacobian_error(l_of_q, q_, Row(l_q.transpose())),
+                       jacobian_error(l_of_v, v_, Row(l_v.transpose())), jacobian_error(gradient_of_q, q_, l_qq),
+                       jacobian_error(l_q_of_v, v_, l_qv), jacobian_error(l_v_of_v, v_, l_vv)});
+  }
+
+  /// p = ∂L/∂v = A v, and H, T + U, L + 2U agree.
+  double energies() const {
     Matrix mass;
-    double kinetic, potential, energy, lagrangian, hamiltonian;
-    const Vector p = momentum(q_, v_);
-    Kernel::velocities(chain_, q_, v_, velocities);
-    Kernel::mass_matrix(chain_, q_, mass);
-    Kernel::kinetic_energy(chain_, q_, v_, kinetic);
-    Kernel::potential_energy(chain_, q_, potential);
-    Kernel::energy(chain_, q_, v_, energy);
-    Kernel::lagrangian(chain_, q_, v_, lagrangian);
-    Kernel::hamiltonian(chain_, q_, p, hamiltonian);
-    const auto positions = [&](const Vector& q) { return this->positions(q); };
+    double kinetic = 0, potential = 0, energy = 0, lagrangian = 0, hamiltonian = 0;
+    const Vector p = this->form(q_, v_).first;
+    S::mass_matrix(parameters_, q_, mass);
+    S::kinetic_energy(parameters_, q_, v_, kinetic);
+    S::potential_energy(parameters_, q_, potential);
+    S::energy(parameters_, q_, v_, energy);
+    S::lagrangian(parameters_, q_, v_, lagrangian);
+    S::hamiltonian(parameters_, q_, p, hamiltonian);
     const Eigen::Vector3d energies(energy, lagrangian + 2 * potential, hamiltonian);
-    return largest({relative_error(velocities, directional_difference(positions, q_, v_)),
-                    relative_error(Vector(mass * v_), p),
-                    relative_error(energies, Eigen::Vector3d::Constant(kinetic + potential))});
+    return largest_of({relative_error(Vector(mass * v_), p),
+                       relative_error(energies, Eigen::Vector3d::Constant(kinetic + potential))});
   }
 
  private:
-  template <class Values>
-  static void fill(std::mt19937& random, Values& values, double low, double high) {
-    std::uniform_real_distribution<double> draw(low, high);
-    for (Eigen::Index i = 0; i < values.size(); ++i) values.data()[i] = draw(random);
-  }
-
-  static double largest(std::initializer_list<double> errors) {
-    double worst = 0;
-    for (const double error : errors) keep_largest(worst, error);
-    return worst;
-  }
-
-  Points positions(const Vector& q) const {
-    Points points;
-    Kernel::positions(chain_, q, points);
-    return points;
-  }
-  Vector residual(const Vector& q, const Vector& v, const Vector& a) const {
-    Vector residual;
-    Kernel::residual(chain_, q, v, a, torque_, residual);
-    return residual;
-  }
-  Vector momentum(const Vector& q, const Vector& v) const {
-    Vector p, f;
-    Kernel::momentum_form(chain_, q, v, torque_, p, f);
-    return p;
-  }
-  Vector rate(const Vector& q, const Vector& v) const {
-    Vector p, f;
-    Kernel::momentum_form(chain_, q, v, torque_, p, f);
-    return f;
-  }
   Vector force(const Vector& q, const Vector& v) const {
     Vector force;
-    Kernel::generalized_force(chain_, q, v, torque_, force);
+    S::generalized_force(parameters_, q, v, inputs_, force);
     return force;
   }
-  Eigen::Matrix<double, 1, 1> lagrangian(const Vector& q, const Vector& v) const {
-    double value;
-    Kernel::lagrangian(chain_, q, v, value);
-    return Eigen::Matrix<double, 1, 1>(value);
+  Number lagrangian(const Vector& q, const Vector& v) const {
+    double value = 0;
+    S::lagrangian(parameters_, q, v, value);
+    return Number(value);
   }
   std::pair<Vector, Vector> gradient(const Vector& q, const Vector& v) const {
     std::pair<Vector, Vector> gradient;
-    Kernel::lagrangian_gradient(chain_, q, v, gradient.first, gradient.second);
+    S::lagrangian_gradient(parameters_, q, v, gradient.first, gradient.second);
     return gradient;
   }
-
-  typename Kernel::template Parameters<double> chain_;
-  typename Kernel::template Torque<double> torque_;
-  Vector q_, v_, a_;
 };
+
+/// One statement, and what measures it on a draw.
+template <class Draw>
+struct CheckItem {
+  KernelCheck::Line line;
+  double (Draw::*measure)() const;
+};
+
+template <class Draw>
+void run_checks(unsigned seed, std::initializer_list<CheckItem<Draw>> items, KernelCheck& check) {
+  constexpr int draws = 5;
+  std::mt19937 random(seed);
+  const int first = check.count;
+  for (const CheckItem<Draw>& item : items) check.lines[static_cast<std::size_t>(check.count++)] = item.line;
+  for (int i = 0; i < draws; ++i) {
+    const Draw draw(random);
+    auto at = static_cast<std::size_t>(first);
+    for (const CheckItem<Draw>& item : items) keep_largest(check.lines[at++].error, (draw.*item.measure)());
+  }
+}
 
 }  // namespace detail
 
-/// Checks a generated kernel against itself on seeded random chains and states: each Jacobian against differences of
-/// the function it belongs to, each pair of entry points that must agree. The errors measured beside the limits are the
-/// largest of 2500 draws with three links in space.
-template <class Kernel>
+/// Checks a generated kernel against itself with seeded random parameters in random states: each Jacobian against
+/// differences of the function it belongs to, each pair of entry points that must agree. A model may have slopes that
+/// differences of one size do not follow: those limits are wide, and far below what a wrong derivative gives.
+template <System S>
 KernelCheck check_kernel(unsigned seed) {
-  using Draw = detail::KernelDraw<Kernel>;
-  struct Item {
-    KernelCheck::Line line;
-    double (Draw::*measure)() const;
-  };
-  const std::array<Item, std::tuple_size_v<decltype(KernelCheck::lines)>> items = {{
-      {{"Jacobians of E against differences", 0, 1e-10}, &Draw::residual_jacobians},  // measured 1.4e-12
-      {{"Jacobians of p, f, Q against differences", 0, 1e-10}, &Draw::momentum_and_force_jacobians},  // 1.4e-12
-      {{"derivatives of L against differences", 0, 1e-10}, &Draw::lagrangian_derivatives},            // 2.6e-12
-      {{"same values with and without Jacobian", 0, 1e-13}, &Draw::values_with_jacobians},            // 8.4e-16
-      {{"velocity form = momentum form", 0, 1e-13}, &Draw::both_forms_agree},                         // 1.0e-15
-      {{"solves for acceleration and velocity", 0, 1e-11}, &Draw::solves_agree},                      // 9.4e-15
-      {{"bob velocities, momenta, energies", 0, 1e-11}, &Draw::kinematics_and_energy},                // 2.0e-13
-  }};
-  constexpr int draws = 5;
-  std::mt19937 random(seed);
+  using Draw = detail::SystemDraw<S>;
   KernelCheck check;
-  for (std::size_t k = 0; k < items.size(); ++k) check.lines[k] = items[k].line;
-  for (int i = 0; i < draws; ++i) {
-    const Draw draw(random);
-    for (std::size_t k = 0; k < items.size(); ++k) {
-      detail::keep_largest(check.lines[k].error, (draw.*items[k].measure)());
-    }
-  }
+  detail::run_checks<Draw>(
+      seed,
+      {
+          // Beside each the largest error of the built-in models.
+          {{"Jacobians of E against differences", 0, 1e-6}, &Draw::residual_jacobians},     // 4.4e-12
+          {{"Jacobians of p, f against differences", 0, 1e-6}, &Draw::momentum_jacobians},  // 4.4e-12
+          {{"same values from all entry points", 0, 1e-9}, &Draw::same_values},             // 9.7e-16
+          {{"velocity form = momentum form", 0, 1e-6}, &Draw::both_forms_agree},            // 7.5e-15
+          {{"solves for acceleration and velocity", 0, 1e-8}, &Draw::solves_agree},         // 9.7e-16
+          {{"energy changes by the power", 0, 1e-6}, &Draw::energy_balances},               // 1.1e-11
+          {{"velocities of points", 0, 1e-6}, &Draw::points_move},                          // 6.0e-14
+      },
+      check);
+  return check;
+}
+
+/// The same of a chain's kernel, whose limits are sharp, and what it has besides. Beside the limits stands the
+/// largest error of the committed kernels.
+template <System S>
+KernelCheck check_chain_kernel(unsigned seed) {
+  using Draw = detail::ChainDraw<S>;
+  KernelCheck check;
+  detail::run_checks<Draw>(
+      seed,
+      {
+          {{"Jacobians of E against differences", 0, 1e-10}, &Draw::residual_jacobians},        // 3.0e-12
+          {{"Jacobians of p, f against differences", 0, 1e-10}, &Draw::momentum_jacobians},     // 4.7e-12
+          {{"Jacobians of E and Q, one by one", 0, 1e-11}, &Draw::single_jacobians},            // 5.5e-14
+          {{"derivatives of L against differences", 0, 1e-10}, &Draw::lagrangian_derivatives},  // 2.3e-12
+          {{"same values from all entry points", 0, 1e-13}, &Draw::same_values},                // 1.9e-15
+          {{"velocity form = momentum form", 0, 1e-13}, &Draw::both_forms_agree},               // 4.7e-16
+          {{"solves for acceleration and velocity", 0, 1e-11}, &Draw::solves_agree},            // 1.4e-15
+          {{"energy changes by the power", 0, 1e-8}, &Draw::energy_balances},                   // 3.7e-10
+          {{"velocities of bobs", 0, 1e-11}, &Draw::points_move},                               // 6.1e-14
+          {{"momenta and energies", 0, 1e-11}, &Draw::energies},                                // 1.2e-15
+      },
+      check);
   return check;
 }
 

@@ -2,12 +2,15 @@
 
 #include <array>
 #include <memory>
-#include <pendula/chain/plain_chain.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/plain_system.hpp>
 #include <string_view>
 
 namespace pendula {
+
+struct PlainChain;
+class ForwardDynamics;
 
 /// What a generated kernel's self-test measured.
 struct KernelCheck {
@@ -16,14 +19,13 @@ struct KernelCheck {
     std::string_view what;
     double error = 0;
     double limit = 0;
-
-    bool ok() const { return error <= limit; }  // false for NaN
   };
 
-  std::array<Line, 7> lines;
+  std::array<Line, 10> lines;
+  int count = 0;
 };
 
-/// A fixed-n kernel of this build.
+/// A fixed-n kernel of a chain.
 struct KernelInfo {
   std::string_view name;   ///< "planar_2"
   std::string_view space;  ///< "planar" or "spatial"
@@ -36,5 +38,28 @@ struct KernelEntry {
   std::unique_ptr<PlainIntegrator> (*make)(const PlainChain&, const RunOptions&);
   KernelCheck (*check)(unsigned seed);
 };
+
+/// Energies of a system in one state  [J].
+struct SystemEnergies {
+  double kinetic = 0;  ///< T = ½ vᵀ M v
+  double total = 0;    ///< h = v·∂L/∂v − L
+};
+
+/// The kernel of any other system, and what was compiled from it.
+struct SystemEntry {
+  SystemInfo info;
+  std::unique_ptr<PlainIntegrator> (*make)(const PlainSystem&, const RunOptions&);  ///< of implicit methods
+  std::unique_ptr<ForwardDynamics> (*dynamics)(const PlainSystem&);
+  KernelCheck (*check)(unsigned seed);
+  /// Energies in one state, and the components of its points, one after the other.
+  SystemEnergies (*observe)(const PlainSystem&, double time, const double* q, const double* v, double* points);
+  /// Rates that go with momenta p; not finite where the mass matrix is singular.
+  void (*rates)(const PlainSystem&, double time, const double* q, const double* p, double* v);
+  /// Whether energy may come from outside, or go there.
+  bool (*loaded)(const PlainSystem&);
+};
+
+/// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
+inline constexpr int system_interface = 1;
 
 }  // namespace pendula

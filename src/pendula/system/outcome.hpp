@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <ostream>
+#include <span>
 #include <sstream>
 #include <string>
+#include <string_view>
 
 namespace pendula {
 
@@ -14,7 +16,7 @@ enum class Status {
   wrong_root,            ///< they were, but not by the motion: energy came from nowhere, or went there
   tolerance_not_met,     ///< an explicit method shrank its step to nothing
   not_finite,            ///< a value became infinite or NaN
-  singular_mass_matrix,  ///< the coordinates of a link fail: in (θ, φ), sin θ = 0
+  singular_mass_matrix,  ///< a coordinate fails: φ in (θ, φ) where sin θ = 0
 };
 
 inline std::ostream& operator<<(std::ostream& out, Status status) {
@@ -42,21 +44,26 @@ struct Outcome {
   double step = 0;      ///< step size that was tried  [s]
   int iterations = 0;   ///< Newton (or fixed-point) iterations of the last attempt
   double residual = 0;  ///< last correction relative to the size of the unknowns
-  int link = -1;        ///< 0-based link that the failure points at, −1 where there is none
+  int part = -1;        ///< 0-based link of a chain, coordinate of another system, that it points at; −1: none
 
   explicit operator bool() const { return status == Status::ok; }
 };
 
-/// One sentence that says what happened, when, and where.
-inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
-  if (outcome) return out << "ok";
+/// One sentence that says what happened, when, and where. Of a system that is no chain, with the names of its
+/// coordinates.
+inline std::string message(const Outcome& outcome, std::span<const std::string_view> coordinates = {}) {
+  if (outcome) return "ok";
+  std::ostringstream out;
+  const bool is_chain = coordinates.empty();
   const auto where = [&](const char* before) -> std::string {
-    return outcome.link < 0 ? "" : before + std::to_string(outcome.link + 1);
+    if (outcome.part < 0) return "";
+    const auto part = static_cast<std::size_t>(outcome.part);
+    return before + (is_chain ? "link " + std::to_string(part + 1) : std::string(coordinates[part]));
   };
   out << "at t = " << outcome.time << " s: ";
   switch (outcome.status) {
     case Status::not_converged:
-      out << "the stage equations did not converge" << where(", worst at link ") << " (step " << outcome.step << " s, "
+      out << "the stage equations did not converge" << where(", worst at ") << " (step " << outcome.step << " s, "
           << outcome.iterations << " iterations, last relative correction " << outcome.residual
           << "); a smaller step may help";
       break;
@@ -65,27 +72,29 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
           << outcome.step << " s, " << outcome.iterations << " iterations); a smaller step may help";
       break;
     case Status::tolerance_not_met:
-      out << "the error of a step stays above the tolerance, or a value infinite" << where(" at link ")
+      out << "the error of a step stays above the tolerance, or a value infinite" << where(" at ")
           << ", down to steps of " << outcome.step << " s";
       break;
     case Status::not_finite:
-      out << "a value became infinite or NaN" << where(" at link ") << " (step " << outcome.step << " s, iteration "
+      out << "a value became infinite or NaN" << where(" at ") << " (step " << outcome.step << " s, iteration "
           << outcome.iterations << "); a smaller step may help";
       break;
     case Status::singular_mass_matrix:
-      out << "the mass matrix in (theta, phi) is singular" << where(": sin(theta) = 0 at link ")
-          << ", where phi has no meaning";
+      if (is_chain) {
+        out << "the mass matrix in (theta, phi) is singular" << where(": sin(theta) = 0 at ")
+            << ", where phi has no meaning";
+      } else {
+        out << "the mass matrix is singular" << where(": no inertia is left in ") << ", which has no meaning there";
+      }
       break;
     case Status::ok:
       break;
   }
-  return out;
+  return out.str();
 }
 
-inline std::string message(const Outcome& outcome) {
-  std::ostringstream text;
-  text << outcome;
-  return text.str();
+inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
+  return out << message(outcome);
 }
 
 /// Counts over a run.

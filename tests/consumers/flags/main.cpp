@@ -2,8 +2,9 @@
 // right and can be freed.
 #include <iostream>
 #include <memory>
-#include <pendula/explicit/dense_forward_dynamics.hpp>
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/explicit/explicit_integrator.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/kernels/planar_3.hpp>
 #include <pendula/pendula.hpp>
 #include <stdexcept>
@@ -43,7 +44,7 @@ State<Space> start() {
 
 // States go both ways in every row, and are kept and freed here.
 template <class Space>
-State<Space> end_of_run(Integrator<Space>& integrator) {
+State<Space> end_of_run(Integrator& integrator) {
   std::vector<State<Space>> rows;
   const auto result = simulate(integrator, start<Space>(), {step, duration, 1},
                                [&](const State<Space>& state) { rows.push_back(state); });
@@ -53,7 +54,7 @@ State<Space> end_of_run(Integrator<Space>& integrator) {
 
 template <class Space>
 State<Space> by_library(const RunOptions& options) {
-  return end_of_run(*make_integrator(loaded_chain<Space>(), options));
+  return end_of_run<Space>(*make_integrator(loaded_chain<Space>(), options));
 }
 
 // The same compiled here.
@@ -99,9 +100,9 @@ int main() {
   good = same("in the plane", by_library<Planar>(exact_chain), by_library<Planar>(exact_dense)) && good;
   good = same("in space", by_library<Spatial>(exact_chain), by_library<Spatial>(exact_dense)) && good;
   // The method from there, the accelerations from here.
-  auto accelerations = std::make_unique<DenseForwardDynamics<kernels::Planar3>>(planar);
-  Integrator<Planar> ours(make_explicit_integrator(std::move(accelerations), 3, 1, rk4, ""), 3);
-  good = same("explicit ones", by_library<Planar>(rk4), end_of_run(ours)) && good;
+  auto accelerations = std::make_unique<SystemForwardDynamics<kernels::Planar3>>(system_of<kernels::Planar3>(planar));
+  Integrator ours(make_explicit_integrator(std::move(accelerations), 3, 3, rk4, ""), 3, "chain");
+  good = same("explicit ones", by_library<Planar>(rk4), end_of_run<Planar>(ours)) && good;
 
   for (const KernelInfo& kernel : built_in_kernels()) std::cout << kernel.name << ' ';
   std::cout << make_integrator(planar, dense)->describe().kernel << '\n';

@@ -2,7 +2,7 @@
 
 from sympy import Matrix, Rational, atan2, cos, sin, symbols
 
-from pendula_codegen.model import LinkModel
+from pendula_codegen.link_model import LinkModel
 
 theta, m, length, g, damping, sigma = symbols("theta m l g lambda sigma")
 

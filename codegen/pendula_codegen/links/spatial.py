@@ -2,7 +2,7 @@
 
 from sympy import Matrix, Rational, atan2, cos, sin, sqrt, symbols
 
-from pendula_codegen.model import LinkModel
+from pendula_codegen.link_model import LinkModel
 
 theta, phi, m, length, g, damping = symbols("theta phi m l g lambda")
 tau = symbols("tau_x tau_y tau_z")

@@ -1,0 +1,373 @@
+"""Kernels as C++: the only file that knows how a place, a number, a statement or a function is written there."""
+
+from __future__ import annotations
+
+import textwrap
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from pendula_codegen.entry_points import Function, SystemKernel
+from pendula_codegen.places import Place
+from pendula_codegen.polynomial import Number
+from pendula_codegen.program import Program
+from pendula_codegen.straight_line import UNIT, ZERO, Term
+
+# Names that mean something else inside a member function, and those of functions that it calls.
+_MEANT = (
+    "Real Vector Matrix Points Inputs Parameters sine_and_cosine solve_symmetric sin cos tan asin acos atan sinh cosh "
+    "tanh exp log sqrt cbrt pow time"
+)
+RESERVED = frozenset(_MEANT.split())
+COLUMNS = 120  # of the project's style
+WIDTH = 112  # of a statement inside a member function
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What a function costs; recorded per entry point, may not grow unnoticed."""
+
+    temporaries: int
+    operations: int
+    trig: int
+
+    def __str__(self) -> str:
+        temporaries = _count(self.temporaries, "temporary", "temporaries")
+        return f"{temporaries}, {self.arithmetic}, {self.trig} sin/cos."
+
+    @property
+    def arithmetic(self) -> str:
+        return _count(self.operations, "operation", "operations")
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+@dataclass(frozen=True)
+class Body:
+    """The statements of a function, its costs, and which of its arguments it reads."""
+
+    lines: list[str]
+    counts: Counts
+    sources: frozenset[str]
+
+
+def place(where: Place, entry: Callable[[tuple[int, ...]], str]) -> str:
+    """C++ for a place; `entry` writes an index."""
+    return where.argument + (f".{where.field}" if where.field else "") + entry(where.index)
+
+
+def eigen_entry(index: tuple[int, ...]) -> str:
+    return f"[{index[0]}]" if len(index) == 1 else f"({', '.join(map(str, index))})" if index else ""
+
+
+def array_entry(index: tuple[int, ...]) -> str:
+    return "".join(f"[{k}]" for k in index)
+
+
+def print_body(
+    program: Program,
+    reserved: Iterable[str] = (),
+    solve: Sequence[str] = (),
+    solved: int = 0,
+    entry: Callable[[tuple[int, ...]], str] = eigen_entry,
+) -> Body:
+    """The statements of `program`; none of its variables is called as one of `reserved`.
+
+    solve    statements that come after the first `solved` outputs, and make what others read
+    entry    how an entry of an array is written
+    """
+    return _Printer(program, reserved, entry).body(solve, solved)
+
+
+class _Printer:
+    def __init__(self, program: Program, reserved: Iterable[str], entry: Callable[[tuple[int, ...]], str]):
+        self._program = program
+        self._graph = program.graph
+        self._atoms = program.atoms
+        self._entry = entry
+        self._taken = {*reserved, *RESERVED}
+        self._names: dict[int, str] = {}
+        for node, atom in enumerate(program.atoms):
+            self._names[node] = self._free(atom.name)
+        self._numbered = 0
+        self._printed: set[int] = set()
+
+    def _free(self, name: str) -> str:
+        while name in self._taken:
+            name += "_"
+        self._taken.add(name)
+        return name
+
+    def body(self, solve: Sequence[str], solved: int) -> Body:
+        nodes = self._program.order
+        uses = Counter(child for node in nodes for child in self._graph.children(node))
+        uses.update(node for _, node in self._program.outputs)
+        known = self._program.needed_by(solved) if solve else 0
+        outputs = [*zip(self._program.targets, self._program.outputs, strict=True)]
+        lines, temporaries = self._part(nodes[:known], outputs[:solved] if solve else [], uses)
+        more, others = self._part(nodes[known:], outputs[solved:] if solve else outputs, uses)
+        return Body(
+            lines=[piece for line in [*lines, *solve, *more] for piece in wrap(line)],
+            counts=Counts(temporaries + others, self._program.operations, self._program.trig),
+            sources=frozenset(self._atoms[node].place.argument for node in nodes if self._is_read(node)),
+        )
+
+    def _part(
+        self, nodes: Sequence[int], outputs: Sequence[tuple[Place, Term]], uses: Counter
+    ) -> tuple[list[str], int]:
+        """Statements for some nodes and the outputs that need no others, and how many temporaries they are."""
+        lines = self._fetch(nodes)
+        computed = [self._temporary(node) for node in nodes if self._is_temporary(node, uses[node])]
+        lines += [line for lines_of_one in computed for line in lines_of_one]
+        lines += [self._statement(place(target, self._entry), term) for target, term in outputs]
+        return lines, len(computed)
+
+    def _is_read(self, node: int) -> bool:
+        return node < len(self._atoms) and self._atoms[node].place is not None
+
+    def _fetch(self, nodes: Sequence[int]) -> list[str]:
+        """References to what is read, then sines and cosines, as the arguments have them."""
+        leaves = sorted(
+            (node for node in nodes if self._is_read(node)), key=lambda k: self._atoms[k].position
+        )
+        lines: list[str] = []
+        for node in leaves:
+            atom = self._atoms[node]
+            where = place(atom.place, self._entry)
+            if atom.function:
+                lines += self._sine_or_both(node, where)
+            else:
+                lines.append(f"const Real& {self._names[node]} = {where};")
+        return lines
+
+    def _sine_or_both(self, node: int, argument: str) -> list[str]:
+        """A sine or a cosine; both of the same argument at once, where both are needed."""
+        if node in self._printed:
+            return []
+        function = self._atoms[node].function
+        other = self._partner(node)
+        if other is None:
+            return [f"const Real {self._names[node]} = {function}({argument});"]
+        self._printed |= {node, other}
+        sine, cosine = (node, other) if function == "sin" else (other, node)
+        names = f"{self._names[sine]}, {self._names[cosine]}"
+        return [f"Real {names};", f"sine_and_cosine({argument}, {names});"]
+
+    def _partner(self, node: int) -> int | None:
+        """The cosine that goes with a sine, or the sine with a cosine, where the program needs it."""
+        atom = self._atoms[node]
+        wanted = "cos" if atom.function == "sin" else "sin"
+        for other in self._program.order:
+            twin = self._atoms[other] if other < len(self._atoms) else None
+            if twin and (twin.function, twin.place, twin.argument) == (wanted, atom.place, atom.argument):
+                return other
+        return None
+
+    def _is_temporary(self, node: int, uses: int) -> bool:
+        if node in self._graph.definitions:
+            return True
+        if node < len(self._atoms):
+            return False
+        is_alias = len(self._graph.products.get(node, (0, 0))) == 1
+        return uses > 1 and not is_alias
+
+    def _temporary(self, node: int) -> list[str]:
+        if node in self._graph.definitions and self._atoms[node].function:
+            return self._call(node)
+        if node in self._graph.definitions:
+            return [self._statement(f"const Real {self._names[node]}", self._graph.definitions[node])]
+        text = self._expression(node)
+        self._names[node] = self._name(node)
+        return [f"const Real {self._names[node]} = {text};"]
+
+    def _call(self, node: int) -> list[str]:
+        """A function of a polynomial."""
+        function = self._atoms[node].function
+        argument = self._value(self._graph.definitions[node])
+        if function in ("sin", "cos"):
+            return self._sine_or_both(node, argument)
+        if function == "inverse":
+            value = f"Real(1.0) / {argument if argument.isidentifier() else f'({argument})'}"
+        elif isinstance(function, tuple):
+            value = f"pow({argument}, {_number(function[1])})"
+        else:
+            value = f"{function}({argument})"
+        return [f"const Real {self._names[node]} = {value};"]
+
+    def _name(self, node: int) -> str:
+        """Products of two atoms are called after them; other temporaries are numbered."""
+        factors = self._graph.products.get(node, ())
+        if len(factors) == 2 and all(f < len(self._atoms) for f in factors):
+            first, second = sorted((self._atoms[f] for f in factors), key=lambda atom: atom.position)
+            name = f"{first.name}_squared" if first == second else f"{first.name}_{second.name}"
+            if name not in self._taken:
+                return self._free(name)
+        self._numbered += 1
+        return self._free(f"t{self._numbered}")
+
+    def _statement(self, target: str, term: Term) -> str:
+        return f"{target} = {self._value(term)};"
+
+    def _value(self, term: Term) -> str:
+        coefficient, node = term
+        if term == ZERO:
+            return "Real(0.0)"
+        if node == UNIT:
+            return _number(coefficient)
+        return self._scaled(coefficient, node)
+
+    def _scaled(self, coefficient: Number, node: int) -> str:
+        if coefficient == 1:
+            return self._expression(node)
+        terms = self._graph.sums.get(node, ()) if node not in self._names else ()
+        if coefficient == -1 and any(scale < 0 for scale, _ in terms):
+            return self._sum([(-scale, part) for scale, part in terms])
+        return _scale(coefficient, self._factor(node))
+
+    def _expression(self, node: int) -> str:
+        if node in self._names:
+            return self._names[node]
+        if node in self._graph.products:
+            return " * ".join(self._factor(f) for f in self._graph.products[node])
+        return self._sum(self._graph.sums[node])
+
+    def _factor(self, node: int) -> str:
+        text = self._expression(node)
+        return f"({text})" if node not in self._names and node in self._graph.sums else text
+
+    def _sum(self, terms: Sequence[Term]) -> str:
+        """A positive term first, so that no sum begins with a sign."""
+        text = ""
+        for coefficient, node in sorted(terms, key=lambda term: term[0] < 0):
+            size = abs(coefficient)
+            piece = _number(size) if node == UNIT else _scale(size, self._factor(node))
+            if not text:
+                text = piece if coefficient > 0 else f"-{piece}"
+            else:
+                text += f" {'+' if coefficient > 0 else '-'} {piece}"
+        return text
+
+
+def _number(value: Number) -> str:
+    if (
+        value.denominator & (value.denominator - 1) == 0
+        or max(abs(value.numerator), value.denominator) > 2**53
+    ):
+        return f"Real({float(value)!r})"
+    return f"Real({value.numerator}.0 / {value.denominator}.0)"
+
+
+def _scale(coefficient: Number, text: str) -> str:
+    if abs(coefficient) == 1:
+        return text if coefficient > 0 else f"-{text}"
+    return f"{_number(coefficient)} * {text}"
+
+
+def wrap(line: str) -> list[str]:
+    """A statement broken at spaces to the width of the project's style."""
+    return textwrap.wrap(
+        line, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
+
+
+# --- functions
+
+TYPES = {
+    "scalar": "Real",
+    "parameters": "Parameters<Real>",
+    "inputs": "Inputs<Real>",
+    "vector": "Vector<Real>",
+    "matrix": "Matrix<Real>",
+    "points": "Points<Real>",
+    "link_vector": "LinkVector<Real>",
+    "link_matrix": "LinkMatrix<Real>",
+}
+
+
+@dataclass(frozen=True)
+class RenderedFunction:
+    """A member function: its name, doc comment, parameters and statements."""
+
+    name: str
+    documentation: list[str]
+    arguments: list[str]
+    lines: list[str]
+    counts: Counts
+
+
+def render_function(kernel: SystemKernel, function: Function) -> RenderedFunction:
+    program = kernel.program(function)
+    names = [argument.name for argument in function.inputs] + [output.name for output in function.written]
+    solve = function.solve
+    if solve is None:
+        body = print_body(program, names)
+    else:
+        local, solution = solve.matrix, solve.solution
+        steps = [f"solve_symmetric({local.name}, {solution.name});"]
+        body = print_body(program, [*names, local.name], steps, len(solve.assignments))
+    declared = [] if solve is None else [f"{TYPES[solve.matrix.type]} {solve.matrix.name};"]
+    # An input that the mathematics does not need stays, unnamed.
+    read = [
+        f"const {TYPES[argument.type]}& {argument.name if argument.name in body.sources else f'/*{argument.name}*/'}"
+        for argument in function.inputs
+    ]
+    return RenderedFunction(
+        function.name,
+        documentation(function, body.counts),
+        [*read, *(f"{TYPES[output.type]}& {output.name}" for output in function.written)],
+        [*declared, *body.lines],
+        body.counts,
+    )
+
+
+def documentation(function: Function, counts: Counts) -> list[str]:
+    """Doc comment of a function: equation, outputs with shapes and units, counts."""
+    rows = [(output.name, f"out, {output.meaning}", output.unit) for output in function.written]
+    width = max(len(row[0]) for row in rows) + 2
+    column = max(len(row[1]) for row in rows) + 2
+    lines = [f"{name:<{width}}{meaning:<{column}}{unit}".rstrip() for name, meaning, unit in rows]
+    return [function.title, "", *lines, str(counts)]
+
+
+def signature(name: str, arguments: list[str]) -> str:
+    """First lines of a static member function, broken at arguments to the width of the project's style."""
+    head = f"  static void {name}("
+    lines = [head]
+    for k, argument in enumerate(arguments):
+        piece = argument + (") {" if k == len(arguments) - 1 else ",")
+        if len(lines[-1]) + 1 + len(piece) > COLUMNS:
+            lines.append(" " * len(head) + piece)
+        else:
+            lines[-1] += piece if lines[-1].endswith("(") else f" {piece}"
+    return "\n".join(lines)
+
+
+def literal(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    return "std::numeric_limits<double>::quiet_NaN()" if value is None else repr(value)
+
+
+def constants(names: Sequence[tuple[str, str, Sequence[object]]]) -> list[str]:
+    """Static members of a kernel: (type of an element, name, values) each."""
+    lines = []
+    for element, name, values in names:
+        head = f"static constexpr std::array<{element}, {len(values)}> {name} = {{"
+        pieces = [f"{literal(value)}," for value in values[:-1]] + [literal(value) for value in values[-1:]]
+        lines += fill(head, [*pieces[:-1], f"{pieces[-1]}}};"] if pieces else ["};"])
+    return lines
+
+
+def fill(head: str, pieces: Sequence[str]) -> list[str]:
+    """`head` and pieces one after the other, broken between pieces to the width of a statement."""
+    lines = [head]
+    for piece in pieces:
+        if len(lines[-1]) + 1 + len(piece) > WIDTH:
+            lines.append(f"    {piece}")
+        else:
+            lines[-1] += piece if lines[-1].endswith("{") else f" {piece}"
+    return lines

@@ -1,0 +1,260 @@
+#include "io/kernel_cache.hpp"
+
+#include <dlfcn.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <pendula/run/library.hpp>
+#include <pendula/version.hpp>
+#include <string_view>
+#include <system_error>
+
+#include "io/process.hpp"
+#include "io/scenario.hpp"
+#include "toolchain.hpp"
+
+namespace pendula::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string environment(const char* name, const std::string& otherwise) {
+  const char* value = std::getenv(name);
+  return value == nullptr || *value == '\0' ? otherwise : std::string(value);
+}
+
+fs::path this_program() {
+  std::error_code none;
+  return fs::read_symlink("/proc/self/exe", none);
+}
+
+fs::path cache_folder() {
+  const std::string kept = environment("XDG_CACHE_HOME", "");
+  if (!kept.empty()) return fs::path(kept) / "pendula";
+  const std::string home = environment("HOME", "");
+  return (home.empty() ? fs::temp_directory_path() : fs::path(home) / ".cache") / "pendula";
+}
+
+/// FNV-1a, of whatever decides what a compiled kernel is.
+class Key {
+ public:
+  Key& add(std::string_view text) {
+    for (const char byte : text) hash_ = (hash_ ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+    hash_ = (hash_ ^ 0x1ffU) * 0x100000001b3U;  // an end that no text has
+    return *this;
+  }
+  /// Size and time of a file.
+  Key& add_file(const fs::path& file) {
+    std::error_code none;
+    const auto time = fs::last_write_time(file, none).time_since_epoch().count();
+    return add(file.string()).add(std::to_string(fs::file_size(file, none))).add(std::to_string(time));
+  }
+  std::string text() const {
+    constexpr std::string_view digits = "0123456789abcdef";
+    std::string text;
+    for (int shift = 60; shift >= 0; shift -= 4) text += digits[(hash_ >> shift) & 15];
+    return text;
+  }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325U;
+};
+
+std::string read_model(const fs::path& file) {
+  if (fs::is_directory(file)) throw ModelError("expected a model file, got the folder " + file.string());
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw ModelError("expected a model file that can be read, got " + file.string() + ": " + std::strerror(errno));
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+fs::path models_folder(const Toolchain& toolchain) {
+  return toolchain.codegen / "pendula_codegen" / "models";
+}
+
+fs::path find_model(const std::string& model, const fs::path& folder, const Toolchain& toolchain) {
+  if (model.ends_with(".py")) return fs::path(model).is_absolute() ? fs::path(model) : folder / model;
+  const std::vector<std::string> names = built_in_models(toolchain);
+  if (std::ranges::find(names, model) != names.end()) return models_folder(toolchain) / (model + ".py");
+  std::string text;
+  for (const std::string& name : names) text += ", " + name;
+  throw ModelError("expected a model file ending in .py, or a built-in model" +
+                   (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model);
+}
+
+/// planar_2 as Planar2: the generator's name of the structure.
+std::string struct_name(const std::string& name) {
+  std::string text;
+  bool first = true;
+  for (const char letter : name) {
+    if (letter != '_') text += first ? static_cast<char>(std::toupper(static_cast<unsigned char>(letter))) : letter;
+    first = letter == '_';
+  }
+  return text;
+}
+
+/// Flags for the instruction set that the library runs with, as in cmake/PendulaLibrary.cmake.
+std::vector<std::string> architecture_flags() {
+  const std::string_view set = library().instruction_set;
+  if (set == "sse2") return {"-march=x86-64", "-mno-sse3"};
+  if (set == "avx2") return {"-march=x86-64", "-mavx2", "-mfma"};
+  if (set == "avx512") {
+    return {"-march=x86-64", "-mavx2", "-mfma", "-mavx512f", "-mavx512cd", "-mavx512dq", "-mavx512bw", "-mavx512vl"};
+  }
+  return {};
+}
+
+/// A folder that is gone when it is done with.
+class Workshop {
+ public:
+  explicit Workshop(const fs::path& parent) {
+    std::error_code error;
+    fs::create_directories(parent, error);
+    std::string name = (parent / "making-XXXXXX").string();
+    if (error || mkdtemp(name.data()) == nullptr) {
+      throw ModelError("expected to write compiled kernels to " + parent.string() + ", got: " +
+                       (error ? error.message() : std::strerror(errno)) + " (XDG_CACHE_HOME names another folder)");
+    }
+    folder_ = name;
+  }
+  Workshop(const Workshop&) = delete;
+  Workshop& operator=(const Workshop&) = delete;
+  ~Workshop() {
+    std::error_code none;
+    fs::remove_all(folder_, none);
+  }
+  const fs::path& folder() const { return folder_; }
+
+ private:
+  fs::path folder_;
+};
+
+std::string last_line(const std::string& text) {
+  const std::size_t end = text.find_last_not_of('\n');
+  if (end == std::string::npos) return "";
+  const std::size_t begin = text.find_last_of('\n', end);
+  return text.substr(begin == std::string::npos ? 0 : begin + 1,
+                     end - (begin == std::string::npos ? 0 : begin + 1) + 1);
+}
+
+void derive(const fs::path& model, std::optional<int> links, const fs::path& header, const Toolchain& toolchain) {
+  std::vector<std::string> command{toolchain.python, "-m", "pendula_codegen", "model", "--model", model.string()};
+  if (links) command.insert(command.end(), {"--links", std::to_string(*links)});
+  command.insert(command.end(), {"--output", header.string()});
+  const Ended ended = run_process(command, {"PYTHONPATH=" + toolchain.codegen.string(), "PYTHONDONTWRITEBYTECODE=1"});
+  if (ended.status == 0) return;
+  constexpr std::string_view told = "pendula_codegen: error: ";
+  const std::string line = last_line(ended.output);
+  if (ended.status == 2 && line.starts_with(told)) throw ModelError(line.substr(told.size()));
+  throw ModelError("models take a Python with the packages of " + (toolchain.codegen / "requirements.txt").string() +
+                   "; " + toolchain.python + ": " + line + " (PENDULA_PYTHON names another one)");
+}
+
+void compile(const std::string& name, const fs::path& folder, const fs::path& object, const Toolchain& toolchain) {
+  const fs::path source = folder / "kernel.cpp";
+  std::ofstream(source) << "#include \"" << name << ".hpp\"\n"
+                        << "#include <pendula/run/system_entry.hpp>\n"
+                        << "#define EXPORTED extern \"C\" __attribute__((visibility(\"default\")))\n"
+                        << "EXPORTED constinit const int pendula_interface = pendula::system_interface;\n"
+                        << "EXPORTED constinit const pendula::SystemEntry pendula_system =\n"
+                        << "    pendula::system_entry<pendula::kernels::" << struct_name(name) << ">();\n";
+  std::vector<std::string> command{toolchain.compiler,
+                                   "-std=c++20",
+                                   "-O3",
+                                   "-DNDEBUG",
+                                   "-w",
+                                   "-fPIC",
+                                   "-shared",
+                                   "-fvisibility=hidden",
+                                   "-fvisibility-inlines-hidden",
+                                   "-Wl,-Bsymbolic"};
+  for (const std::string& flag : architecture_flags()) command.push_back(flag);
+  for (const fs::path& include : toolchain.includes) command.push_back("-I" + include.string());
+  command.insert(command.end(), {source.string(), "-o", object.string()});
+  const Ended ended = run_process(command);
+  if (ended.status == 0) return;
+  std::string error = ended.output.substr(0, ended.output.find('\n', ended.output.find("error")));
+  if (ended.status == 127) {
+    throw ModelError("models take a C++20 compiler; " + toolchain.compiler + ": " + ended.output +
+                     " (CXX names another one)");
+  }
+  throw ModelError("the compiler " + toolchain.compiler + " refuses the kernel of " + name + ": " + last_line(error));
+}
+
+std::shared_ptr<const SystemEntry> load(const fs::path& object) {
+  void* handle = dlopen(object.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) throw ModelError("the kernel " + object.string() + " cannot be loaded: " + dlerror());
+  const auto* interface = static_cast<const int*>(dlsym(handle, "pendula_interface"));
+  const auto* entry = static_cast<const SystemEntry*>(dlsym(handle, "pendula_system"));
+  if (interface == nullptr || entry == nullptr || *interface != system_interface) {
+    dlclose(handle);
+    throw ModelError("the kernel " + object.string() + " is of another pendula; remove it to have it made again");
+  }
+  return {entry, [handle](const SystemEntry*) { dlclose(handle); }};
+}
+
+}  // namespace
+
+Toolchain Toolchain::of_this_program() {
+  Toolchain toolchain;
+  toolchain.python = environment("PENDULA_PYTHON", configured::python);
+  toolchain.compiler = environment("CXX", configured::compiler);
+  toolchain.codegen = configured::codegen;
+  for (const char* folder : configured::includes) toolchain.includes.emplace_back(folder);
+  const fs::path prefix = this_program().parent_path().parent_path();
+  if (fs::exists(prefix / configured::installed_include / "pendula" / "pendula.hpp")) {
+    toolchain.codegen = prefix / configured::installed_codegen;
+    toolchain.includes.front() = prefix / configured::installed_include;
+  }
+  toolchain.cache = cache_folder();
+  return toolchain;
+}
+
+std::vector<std::string> built_in_models(const Toolchain& toolchain) {
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(models_folder(toolchain), none)) {
+    if (entry.path().extension() == ".py" && entry.path().stem() != "__init__") names.push_back(entry.path().stem());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+ModelKernel find_kernel(const std::string& model, std::optional<int> links, const fs::path& folder,
+                        const Toolchain& toolchain, const std::function<void(const std::string&)>& tell) {
+  const std::string stem = fs::path(model).stem().string();
+  const std::string name = links ? stem + "_" + std::to_string(*links) : stem;
+  if (!model.ends_with(".py")) {
+    for (const SystemEntry* entry : library().systems) {
+      if (entry->info.name == name) return {{}, {entry, [](const SystemEntry*) {}}};
+    }
+  }
+  const fs::path file = find_model(model, folder, toolchain);
+  Key key;
+  key.add(read_model(file)).add(name).add(version).add(library().instruction_set);
+  key.add(toolchain.python).add(toolchain.compiler).add_file(this_program());
+  std::error_code none;
+  for (const auto& source : fs::recursive_directory_iterator(toolchain.codegen / "pendula_codegen", none)) {
+    if (source.path().extension() == ".py" || source.path().extension() == ".j2") key.add_file(source.path());
+  }
+  const fs::path object = toolchain.cache / (name + "-" + key.text() + ".so");
+  const bool was_there = fs::exists(object);
+  if (!was_there) {
+    const Workshop workshop(toolchain.cache);
+    tell("deriving and compiling the kernel of " + name + ", once");
+    derive(file, links, workshop.folder() / (name + ".hpp"), toolchain);
+    compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
+    fs::rename(workshop.folder() / "kernel.so", object);
+  }
+  return {object, load(object), was_there};
+}
+
+}  // namespace pendula::io

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <pendula/system/kernel_registry.hpp>
+#include <string>
+#include <vector>
+
+#include "io/input_error.hpp"
+
+namespace pendula::io {
+
+/// What it takes to make a kernel of a model, and where it is kept.
+struct Toolchain {
+  std::string python;                           ///< with the packages of the generator
+  std::string compiler;                         ///< C++20
+  std::filesystem::path codegen;                ///< folder of the Python package pendula_codegen
+  std::vector<std::filesystem::path> includes;  ///< of pendula, its generated headers, Eigen and xsimd
+  std::filesystem::path cache;                  ///< folder of compiled kernels
+
+  /// That of this program: what it was configured with, or where it was installed to; PENDULA_PYTHON and CXX in the
+  /// environment go before. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  static Toolchain of_this_program();
+};
+
+/// A compiled kernel of a model.
+struct ModelKernel {
+  std::filesystem::path file;  ///< empty where it is part of this program
+  std::shared_ptr<const SystemEntry> entry;
+  bool was_there = true;  ///< not made just now
+};
+
+/// Finds the kernel of a model: one of this build, one kept, or one derived and compiled now. `model` is a file ending
+/// in .py, relative to `folder`, or the name of a built-in model; tell(what) is called before anything takes long.
+/// Throws ModelError where the model is wrong or something is missing that it takes.
+ModelKernel find_kernel(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
+                        const Toolchain& toolchain, const std::function<void(const std::string&)>& tell);
+
+/// Names of the built-in models.
+std::vector<std::string> built_in_models(const Toolchain& toolchain);
+
+}  // namespace pendula::io

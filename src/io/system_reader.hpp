@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+#include <numbers>
+
+#include "io/scenario.hpp"
+#include "io/toml_reader.hpp"
+
+namespace pendula::io {
+
+inline constexpr double degree = std::numbers::pi / 180;
+
+/// What the tables [system] and [start] say of a system that is no chain; `root` is the document. Throws InputError.
+SystemScenario read_system(const Section& root, const std::filesystem::path& folder, const FindSystem& find);
+
+}  // namespace pendula::io

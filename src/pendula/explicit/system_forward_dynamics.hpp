@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/system/system_model.hpp>
+
+namespace pendula {
+
+/// Accelerations from a generated kernel: O(n³).
+template <System S>
+class SystemForwardDynamics : public ForwardDynamics {
+  using Vector = typename S::template Vector<double>;
+
+ public:
+  explicit SystemForwardDynamics(const SystemModel<S>& model) : model_(model) {}
+
+  void acceleration(double time, const double* q, const double* v, double* acceleration) override {
+    const Vector fixed_q = Eigen::Map<const Vector>(q), fixed_v = Eigen::Map<const Vector>(v);
+    Vector fixed_acceleration;
+    S::acceleration(model_.parameters(time), fixed_q, fixed_v, model_.inputs(time), fixed_acceleration);
+    Eigen::Map<Vector> result(acceleration);
+    result = fixed_acceleration;
+  }
+
+ private:
+  SystemModel<S> model_;
+};
+
+}  // namespace pendula

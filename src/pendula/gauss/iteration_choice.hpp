@@ -1,0 +1,90 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <pendula/system/options.hpp>
+
+namespace pendula {
+
+/// Whether a fixed point, whose corrections were `last` and `correction` relative to the unknowns, contracts so slowly
+/// that Newton costs less; far from round-off, so that rounding is not taken for it. `count` iterations were made.
+inline bool diverges(double correction, double last, int count, double epsilon) {
+  if (!std::isfinite(correction)) return true;
+  const bool far = correction > 67 * std::sqrt(epsilon);  // 1e-6 in double
+  return far && ((count > 3 && correction > 0.7 * last) || count > 20);
+}
+
+/// Chooses between the two iterations by what they take: iterations a step, counted while the run goes, times the cost
+/// of one. The other one is tried for a step now and then, so that the choice follows the motion. Nothing here depends
+/// on a clock: the same run makes the same choices.
+class IterationChoice {
+ public:
+  IterationChoice(Iteration wanted, double newton_cost)
+      : wanted_(wanted),
+        preferred_(wanted == Iteration::automatic ? Iteration::fixed_point : wanted),
+        active_(preferred_),
+        cost_{newton_cost, 1.0} {}
+
+  Iteration active() const { return active_; }
+  Iteration preferred() const { return preferred_; }
+  bool is_automatic() const { return wanted_ == Iteration::automatic; }
+
+  void begin_step() {
+    active_ = preferred_;
+    iterations_ = {};
+    if (is_automatic() && ++steps_ % trial_interval == trial_step && may_win(other(preferred_))) {
+      active_ = other(preferred_);
+    }
+  }
+
+  void count_iteration() { ++iterations_[index(active_)]; }
+
+  /// A fixed point that does not contract leaves the rest of the step to Newton.
+  void give_up_fixed_point() {
+    active_ = Iteration::newton;
+    gave_up_ = true;
+  }
+
+  void end_step() {
+    if (!is_automatic()) return;
+    if (gave_up_) {
+      preferred_ = Iteration::newton;
+      spent_[index(Iteration::fixed_point)] = forbidden;
+    } else {
+      spent_[index(active_)] = cost_of(active_, iterations_[index(active_)]);
+    }
+    gave_up_ = false;
+    const Iteration rival = other(preferred_);
+    if (spent_[index(rival)] > 0 && spent_[index(rival)] < worthwhile * spent_[index(preferred_)]) preferred_ = rival;
+  }
+
+ private:
+  static std::size_t index(Iteration iteration) { return iteration == Iteration::newton ? 0 : 1; }
+  static Iteration other(Iteration iteration) {
+    return iteration == Iteration::newton ? Iteration::fixed_point : Iteration::newton;
+  }
+
+  double cost_of(Iteration iteration, int iterations) const {
+    return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
+  }
+
+  // A trial is for nothing where two iterations cost more than steps do: a step that needs but one of Newton's takes
+  // hardly more of the other.
+  bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
+
+  static constexpr int trial_interval = 64, trial_step = 8;
+  static constexpr double last_evaluation = 0.3;  // of forces after the last Newton iteration, in iterations
+  static constexpr double worthwhile = 0.9;       // what a change has to save
+  static constexpr double forbidden = 1e300;
+
+  Iteration wanted_, preferred_, active_;
+  std::array<double, 2> cost_;
+  std::array<double, 2> spent_{};  // by the last step with each iteration, 0: none yet
+  std::array<int, 2> iterations_{};
+  bool gave_up_ = false;
+  std::int64_t steps_ = 0;
+};
+
+}  // namespace pendula

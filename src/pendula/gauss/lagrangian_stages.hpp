@@ -1,0 +1,301 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <pendula/gauss/stage_columns.hpp>
+#include <pendula/numeric/functions.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/system/mass_scale.hpp>
+#include <pendula/system/outcome.hpp>
+#include <pendula/system/system_model.hpp>
+
+namespace pendula {
+
+/// The stages of a step of any system in momentum form, q̇ = v(q, p), ṗ = f(q, v): what both iterations on them share.
+///
+/// Stages are held as increments, h b v of a coordinate and h b f of its momentum, all stages of one number in the
+/// lanes of a pack; the state carries what it has lost to rounding:
+///   Q = q + m U_q,  P = p + m U_p,  m_ij = a_ij / b_j.
+/// `Width` is at least the number of stages, which is a run-time number: lanes beyond it repeat the start of the step.
+///
+/// Coordinates may have any units. Changes of them are compared as √M_kk dq_k, and those of momenta as dp_k / √M_kk.
+template <System S, int Width>
+class LagrangianStages {
+ public:
+  static constexpr int K = S::coordinates;
+  static constexpr std::size_t count = K;
+  using L = Pack<Width, RegisterFor<Width>>;
+  using Lanes = typename S::template Vector<L>;
+  using Vector = typename S::template Vector<double>;
+  using Matrix = typename S::template Matrix<double>;
+  using Model = SystemModel<S>;
+  /// One number a lane.
+  using Stored = double[static_cast<std::size_t>(Width)];
+
+  LagrangianStages(const Model& model, int stages, Family family) : model_(model), columns_(family, stages) {
+    S::cast_parameters(model.parameters(0), parameters_);
+  }
+
+  const Model& model() const { return model_; }
+  const detail::StageColumns<Eigen::Dynamic, double, Width>& columns() const { return columns_; }
+  int stages() const { return columns_.stages(); }
+  double time_of(int stage) const { return time_ + columns_.h() * columns_.c(static_cast<std::size_t>(stage)); }
+
+  // --- The state ---
+
+  Status start(double time, const Vector& q, const Vector& v) {
+    time_ = time;
+    forget();
+    fastest_ = 0;
+    steps_ = 0;
+    masses_.start(model_.parameters(time), q);
+    Vector p;
+    S::momentum_from_velocity(model_.parameters(time), q, v, p);
+    for (std::size_t k = 0; k < count; ++k) {
+      q_[k] = {q[at(k)], 0};
+      p_[k] = {p[at(k)], 0};
+    }
+    read_masses();
+    return masses_.singular() < 0 ? Status::ok : Status::singular_mass_matrix;
+  }
+
+  Vector position() const { return values(q_); }
+  Vector momentum() const { return values(p_); }
+  Vector velocity(double time) const {
+    Vector v;
+    S::velocity_from_momentum(model_.parameters(time), position(), momentum(), v);
+    return v;
+  }
+
+  void save() { saved_ = {q_, p_}; }
+  void restore() {
+    q_ = saved_[0];
+    p_ = saved_[1];
+    forget();
+  }
+
+  // --- A step ---
+
+  /// Predicts the stages of a step of size h: from the last step's, or cold where there was none like it.
+  void prepare(double time, double h) {
+    const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
+    time_ = time;
+    columns_.prepare(h, alike ? last_h_ : 0);
+    is_predicted_ = alike;
+    set_context();
+    if (alike) {
+      for (auto& increments : U_) columns_.extrapolated_increments(increments).store(increments);
+    } else {
+      start_cold();
+    }
+    last_h_ = 0;  // what was predicted from is gone until the step is accepted
+    step_ = h;
+    set_scales();
+  }
+
+  /// Stages of a motion that goes on as at the start of the step.
+  void start_cold() {
+    const Vector q = position(), p = momentum();
+    Vector v, f;
+    S::hamiltonian_form(model_.parameters(time_), q, p, model_.inputs(time_), v, f);
+    for (std::size_t k = 0; k < count; ++k) {
+      (columns_.hb() * L(v[at(k)])).store(U_[k]);
+      (columns_.hb() * L(f[at(k)])).store(U_[count + k]);
+    }
+    last_h_ = 0;
+  }
+
+  /// Coordinates, momenta at the stages.
+  L position(std::size_t k) const { return L(q_[k].value) + columns_.integral(U_[k], L(q_[k].compensation)); }
+  L momentum(std::size_t k) const { return L(p_[k].value) + columns_.integral(U_[count + k], L(p_[k].compensation)); }
+  Lanes positions() const {
+    Lanes Q;
+    for (std::size_t k = 0; k < count; ++k) Q[at(k)] = position(k);
+    return Q;
+  }
+  const Compensated<double>& momentum_before(std::size_t k) const { return p_[k]; }
+
+  /// h b v of coordinate k, h b f of its momentum.
+  Stored& moved(std::size_t k) { return U_[k]; }
+  Stored& pushed(std::size_t k) { return U_[count + k]; }
+  const Stored& moved(std::size_t k) const { return U_[k]; }
+
+  const typename S::template Parameters<L>& parameters() const { return parameters_; }
+  const typename S::template Inputs<L>& inputs() const { return inputs_; }
+
+  /// √M_kk at the start of the step.
+  double weight(std::size_t k) const { return weight_[k]; }
+  /// h over that.
+  double inverse_weight(std::size_t k) const { return inverse_weight_[k]; }
+  /// What a correction is compared with, at least: nothing smaller would show in the coordinates.
+  double floor() const { return floor_; }
+
+  // --- What the stepper asks of a solution ---
+
+  /// The most that an angle turns in the step, one whose inertia nearly vanishes twice: it does not go on like that.
+  double turn() const {
+    double turn = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!S::coordinate_is_angle[k]) continue;
+      double sum = 0;
+      for (int j = 0; j < stages(); ++j) sum += std::abs(U_[k][j]);
+      turn = std::max(turn, masses_.is_small(k) ? 2 * sum : sum);
+    }
+    return turn;
+  }
+
+  /// Energy at the end of the step less that of its start and what loads bring, relative to the largest kinetic energy
+  /// that there was.
+  double energy_defect() {
+    const double brought = model_.loaded() ? work() : 0, end_time = time_ + step_;
+    const auto [q, p] = end();
+    Vector v, v_end;
+    double h = 0, h_end = 0, T = 0, T_end = 0;
+    const auto start = model_.parameters(time_), finish = model_.parameters(end_time);
+    S::velocity_from_momentum(start, position(), momentum(), v);
+    S::velocity_from_momentum(finish, q, p, v_end);
+    S::energy(start, position(), v, h);
+    S::energy(finish, q, v_end, h_end);
+    S::kinetic_energy(start, position(), v, T);
+    S::kinetic_energy(finish, q, v_end, T_end);
+    most_kinetic_ = std::max(most_kinetic_, T);
+    const double scale = std::max(most_kinetic_, T_end) + std::abs(brought);
+    return scale > 0 ? (h_end - h - brought) / scale : 0;
+  }
+
+  /// How far, at the start of the step, the polynomial through the stages' rates is off, relative to the fastest motion
+  /// that there was; both as √(Σ M_kk v_k²).
+  double defect() {
+    const Vector v = velocity(time_);
+    double missed = 0, speed = 0, later = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double weight = weight_[k];
+      const double off = weight * (columns_.at_start(U_[k]) - v[at(k)]);
+      const double last = weight * U_[k][stages() - 1] / columns_.hb(static_cast<std::size_t>(stages() - 1));
+      missed += off * off;
+      speed += weight * weight * v[at(k)] * v[at(k)];
+      later += last * last;
+    }
+    fastest_ = std::max({fastest_, speed, later});
+    return missed > 0 ? std::sqrt(missed / fastest_) : 0;
+  }
+  double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
+
+  /// Energy that forces, and what holds time, bring in the step.
+  double work() const {
+    Lanes V;
+    for (std::size_t k = 0; k < count; ++k) V[at(k)] = L::load(U_[k]);
+    // Of increments h b v, not of rates: lanes beyond the stages have b = 0, where nothing can be divided by it.
+    const L inverse = inverse_hb();
+    for (std::size_t k = 0; k < count; ++k) V[at(k)] = V[at(k)] * inverse;
+    L power(0.0);
+    S::power(parameters_, positions(), V, inputs_, power);
+    alignas(pack_alignment) Stored each;
+    (columns_.hb() * power).store(each);
+    double work = 0;
+    for (int j = 0; j < stages(); ++j) work += each[j];
+    return work;
+  }
+
+  /// A coordinate whose inertia has vanished at the end of the step, −1 where none has.
+  int singular_coordinate() const { return masses_.singular(); }
+
+  /// Moves the state to the end of the step.
+  void accept() {
+    for (std::size_t k = 0; k < count; ++k) {
+      q_[k].add(sum(U_[k]));
+      p_[k].add(sum(U_[count + k]));
+    }
+    last_h_ = step_;
+    time_ += step_;
+    if (!S::constant_masses || ++steps_ % 16 == 0) read_masses();
+  }
+
+  void forget() { last_h_ = 0; }
+
+ private:
+  using State = std::array<Compensated<double>, count>;
+
+  // Farther than this the polynomial of the last step is no prediction.
+  static constexpr double farthest_extrapolation = 1.5;
+
+  static constexpr Eigen::Index at(std::size_t k) { return static_cast<Eigen::Index>(k); }
+
+  static Vector values(const State& state) {
+    Vector values;
+    for (std::size_t k = 0; k < count; ++k) values[at(k)] = state[k].value;
+    return values;
+  }
+
+  double sum(const Stored& increments) const {
+    double sum = 0;
+    for (int j = 0; j < stages(); ++j) sum += increments[j];
+    return sum;
+  }
+
+  // Where the step ends.
+  std::array<Vector, 2> end() const {
+    std::array<Vector, 2> end{position(), momentum()};
+    for (std::size_t k = 0; k < count; ++k) {
+      end[0][at(k)] += q_[k].compensation + sum(U_[k]);
+      end[1][at(k)] += p_[k].compensation + sum(U_[count + k]);
+    }
+    return end;
+  }
+
+  L inverse_hb() const {
+    alignas(pack_alignment) Stored inverse;
+    for (int j = 0; j < Width; ++j) {
+      inverse[j] = j < stages() ? 1 / columns_.hb(static_cast<std::size_t>(j)) : 0;
+    }
+    return L::load(inverse);
+  }
+
+  // Time and inputs at the stages.
+  void set_context() {
+    if (is_set_ && !model_.driven()) return;
+    alignas(pack_alignment) Stored times;
+    for (int j = 0; j < Width; ++j) times[j] = j < stages() ? time_of(j) : time_;
+    if constexpr (holds_time<S>) parameters_.time = L::load(times);
+    alignas(pack_alignment) std::array<Stored, static_cast<std::size_t>(Model::Inputs::SizeAtCompileTime)> given;
+    for (int j = 0; j < Width; ++j) {
+      const auto inputs = model_.inputs(times[j]);
+      for (std::size_t i = 0; i < given.size(); ++i) given[i][j] = inputs.data()[i];
+    }
+    for (std::size_t i = 0; i < given.size(); ++i) inputs_.data()[i] = L::load(given[i]);
+    is_set_ = true;
+  }
+
+  void read_masses() {
+    masses_.read(model_.parameters(time_), position());
+    for (std::size_t k = 0; k < count; ++k) weight_[k] = std::sqrt(masses_.inertia(k));
+  }
+
+  void set_scales() {
+    static constexpr double invisible = 1e-9;
+    floor_ = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double size = std::max(std::abs(q_[k].value), S::coordinate_is_angle[k] ? 1.0 : 0.0);
+      floor_ = std::max(floor_, invisible * weight_[k] * size);
+      inverse_weight_[k] = std::abs(step_) / weight_[k];
+    }
+  }
+
+  Model model_;
+  detail::StageColumns<Eigen::Dynamic, double, Width> columns_;
+  typename S::template Parameters<L> parameters_;
+  typename S::template Inputs<L> inputs_;
+  alignas(pack_alignment) Stored U_[2 * count];
+  State q_, p_;
+  std::array<State, 2> saved_;
+  MassScale<S> masses_;
+  std::array<double, count> weight_{}, inverse_weight_{};
+  double floor_ = 0, time_ = 0, step_ = 0, last_h_ = 0, fastest_ = 0, most_kinetic_ = 0;
+  std::int64_t steps_ = 0;
+  bool is_predicted_ = false, is_set_ = false;
+};
+
+}  // namespace pendula

@@ -1,0 +1,260 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <pendula/gauss/stage_solver.hpp>
+#include <pendula/gauss/stage_system.hpp>
+#include <pendula/gauss/tableau.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/system/mass_scale.hpp>
+#include <pendula/system/system_model.hpp>
+#include <vector>
+
+namespace pendula {
+
+/// The stage equations in the paper's velocity form, E(q, v, a, t) = 0, of any system over its generated kernel:
+/// symmetric, but not symplectic.
+///
+/// Unknown are the stage accelerations K_i, so that the mass matrix is never inverted;
+///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,  residual E(Q_i, V_i, K_i, t_i)  (paper eq.
+///   27).
+template <System S>
+class VelocityNewton {
+ public:
+  using Model = SystemModel<S>;
+  using Real = double;
+  using Vector = typename S::template Vector<double>;
+  using Matrix = typename S::template Matrix<double>;
+  using State = SystemState<S>;
+
+  /// Throws std::invalid_argument unless the method has so many stages.
+  VelocityNewton(const Model& model, int stages, Family family = Family::gauss)
+      : family_(family),
+        model_(model),
+        coefficients_(tableau_of<Eigen::Dynamic>(family, stages)),
+        system_(stages),
+        at_(static_cast<std::size_t>(stages)) {}
+
+  Status start(const State& state) {
+    forget();
+    fastest_ = most_kinetic_ = 0;
+    time_ = state.time;
+    q_.assign(state.q);
+    v_.assign(state.v);
+    const auto parameters = model_.parameters(time_);
+    masses_.start(parameters, state.q);
+    if (masses_.singular() >= 0) return Status::singular_mass_matrix;
+    S::acceleration(parameters, state.q, state.v, model_.inputs(time_), acceleration_);
+    return Status::ok;
+  }
+
+  void prepare(double time, double h) {
+    time_ = time;
+    coefficients_.prepare(h, last_h_);
+    for (int i = 0; i < stages(); ++i) {
+      Stage& stage = at(i);
+      stage.parameters = model_.parameters(time + coefficients_.hc(i));
+      stage.inputs = model_.inputs(time + coefficients_.hc(i));
+      stage.a = acceleration_;
+      if (last_h_ != 0) extrapolate(stage.a, i);
+    }
+    set_weights();
+  }
+
+  Correction correct() {
+    evaluate_with_jacobians();
+    for (int i = 0; i < stages(); ++i) {
+      system_.residual(i) = at(i).residual;
+      for (int j = 0; j < stages(); ++j) system_.block(i, j) = block(i, j);
+    }
+    system_.solve();
+    return apply();
+  }
+
+  static constexpr Convergence convergence() { return Convergence::quadratic; }
+  static constexpr Iteration iteration() { return Iteration::newton; }
+  static constexpr int worst_part() { return -1; }
+  int singular_part() const { return masses_.singular(); }
+  static constexpr bool continues() { return true; }
+  static constexpr double largest_turn() { return S::constant_masses ? 3 : 0.25; }
+  bool loaded() const { return model_.loaded(); }
+  bool damped() const { return model_.damped(); }
+  bool dissipates() const { return family_ == Family::radau; }
+  int stages() const { return coefficients_.stages(); }
+  static constexpr int parts() { return S::coordinates; }
+  static constexpr int coordinates() { return S::coordinates; }
+  double predictor_gain() const { return last_h_ == 0 ? 1 : coefficients_.predictor_gain(); }
+
+  double turn() const {
+    double most = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!S::coordinate_is_angle[k]) continue;
+      double turn = 0;
+      for (int i = 0; i < stages(); ++i) turn += std::abs(coefficients_.hb(i) * at(i).v[index(k)]);
+      most = std::max(most, masses_.is_small(k) ? 2 * turn : turn);
+    }
+    return most;
+  }
+
+  double energy_defect() {
+    const auto [moved, pushed] = increments();
+    const double brought = model_.loaded() ? work() : 0;
+    const auto [h, T] = energies(time_, q_.value, v_.value);
+    const auto [h_end, T_end] = energies(time_ + coefficients_.h(), q_.value + moved, v_.value + pushed);
+    most_kinetic_ = std::max(most_kinetic_, T);
+    const double scale = std::max(most_kinetic_, T_end) + std::abs(brought);
+    return scale > 0 ? (h_end - h - brought) / scale : 0;
+  }
+
+  double defect() {
+    Vector missed = -v_.value;
+    for (int i = 0; i < stages(); ++i) missed += coefficients_.lagrange(i, 0) * at(i).v;
+    const auto squared = [&](const Vector& v) { return v.cwiseProduct(weight_).squaredNorm(); };
+    fastest_ = std::max({fastest_, squared(v_.value), squared(at(stages() - 1).v)});
+    const double off = squared(missed);
+    return off > 0 ? std::sqrt(off / fastest_) : 0;
+  }
+
+  double work() const {
+    double work = 0;
+    for (int i = 0; i < stages(); ++i) {
+      double power = 0;
+      S::power(at(i).parameters, at(i).q, at(i).v, at(i).inputs, power);
+      work += coefficients_.hb(i) * power;
+    }
+    return work;
+  }
+
+  void accept() {
+    const auto [moved, pushed] = increments();
+    q_.add(moved);
+    v_.add(pushed);
+    last_h_ = coefficients_.h();
+    for (Stage& stage : at_) stage.last_a = stage.a;
+  }
+
+  void save() { saved_ = {q_, v_}; }
+
+  void restore() {
+    q_ = saved_[0];
+    v_ = saved_[1];
+    forget();
+  }
+
+  State state(double time) const { return {time, q_.value, v_.value}; }
+
+ private:
+  static constexpr std::size_t count = S::coordinates;
+
+  struct Stage {
+    typename Model::Parameters parameters;
+    typename Model::Inputs inputs;
+    Vector q, v, a, last_a, residual;
+    Matrix E_D_q, E_D_v, E_D_a;
+  };
+
+  static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
+  Stage& at(int i) { return at_[static_cast<std::size_t>(i)]; }
+  const Stage& at(int i) const { return at_[static_cast<std::size_t>(i)]; }
+
+  void forget() { last_h_ = 0; }
+
+  void extrapolate(Vector& a, int i) const {
+    a.setZero();
+    for (int j = 0; j < stages(); ++j) a += coefficients_.extrapolation(i, j) * at(j).last_a;
+  }
+
+  void set_weights() {
+    for (std::size_t k = 0; k < count; ++k) weight_[index(k)] = std::sqrt(masses_.inertia(k));
+  }
+
+  void place_stages() {
+    for (int i = 0; i < stages(); ++i) {
+      Vector moved = q_.compensation + coefficients_.hc(i) * v_.value;
+      Vector pushed = v_.compensation;
+      for (int j = 0; j < stages(); ++j) {
+        moved += coefficients_.h2a2(i, j) * at(j).a;
+        pushed += coefficients_.m(i, j) * (coefficients_.hb(j) * at(j).a);
+      }
+      at(i).q = q_.value + moved;
+      at(i).v = v_.value + pushed;
+    }
+  }
+
+  // Of q and v, over the step.
+  std::array<Vector, 2> increments() {
+    place_stages();
+    Vector moved = Vector::Zero(), pushed = Vector::Zero();
+    for (int j = 0; j < stages(); ++j) {
+      moved += coefficients_.hb(j) * at(j).v;
+      pushed += coefficients_.hb(j) * at(j).a;
+    }
+    return {moved, pushed};
+  }
+
+  void evaluate_with_jacobians() {
+    place_stages();
+    for (Stage& stage : at_) {
+      S::residual_with_jacobians(stage.parameters, stage.q, stage.v, stage.a, stage.inputs, stage.residual, stage.E_D_q,
+                                 stage.E_D_v, stage.E_D_a);
+      masses_.see(stage.E_D_a);
+    }
+  }
+
+  Matrix block(int i, int k) const {
+    Matrix block = coefficients_.ha(i, k) * at(i).E_D_v + coefficients_.h2a2(i, k) * at(i).E_D_q;
+    if (i == k) block += at(i).E_D_a;
+    return block;
+  }
+
+  // Subtracts the solution from the accelerations; compared are the changes of rates that they make.
+  Correction apply() {
+    const double h = std::abs(coefficients_.h());
+    double scale = v_.value.cwiseProduct(weight_).cwiseAbs().maxCoeff(), largest = 0;
+    int worst = -1;
+    for (int i = 0; i < stages(); ++i) {
+      const Vector change = system_.correction(i);
+      if (!change.allFinite()) return {std::numeric_limits<double>::quiet_NaN(), first_not_finite(change)};
+      at(i).a -= change;
+      scale = std::max(scale, h * at(i).a.cwiseProduct(weight_).cwiseAbs().maxCoeff());
+      Eigen::Index k = 0;
+      const double size = h * change.cwiseProduct(weight_).cwiseAbs().maxCoeff(&k);
+      if (size < largest) continue;
+      largest = size;
+      worst = static_cast<int>(k);
+    }
+    return {largest > 0 ? largest / scale : 0, worst};
+  }
+
+  static int first_not_finite(const Vector& x) {
+    Eigen::Index i = 0;
+    while (i + 1 < x.size() && std::isfinite(x[i])) ++i;
+    return static_cast<int>(i);
+  }
+
+  // h and T.
+  std::array<double, 2> energies(double time, const Vector& q, const Vector& v) const {
+    const auto parameters = model_.parameters(time);
+    double energy = 0, kinetic = 0;
+    S::energy(parameters, q, v, energy);
+    S::kinetic_energy(parameters, q, v, kinetic);
+    return {energy, kinetic};
+  }
+
+  Family family_;
+  Model model_;
+  StepCoefficients<Eigen::Dynamic> coefficients_;
+  detail::StageSystem<S::coordinates, Eigen::Dynamic> system_;
+  std::vector<Stage> at_;
+  Compensated<Vector> q_, v_;
+  std::array<Compensated<Vector>, 2> saved_;
+  Vector acceleration_;  // at the start: the cold start of the predictor
+  Vector weight_;
+  MassScale<S> masses_;
+  double time_ = 0, last_h_ = 0, fastest_ = 0, most_kinetic_ = 0;
+};
+
+}  // namespace pendula

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace pendula {
+
+/// Coordinates and rates of any system at one time: what users give, get and keep.
+struct Motion {
+  double time = 0;    ///< s
+  Eigen::VectorXd q;  ///< coordinates
+  Eigen::VectorXd v;  ///< their rates
+
+  Motion() = default;
+  Motion(double at, const Eigen::VectorXd& coordinates, const Eigen::VectorXd& rates)
+      : time(at), q(coordinates), v(rates) {}
+  /// Of whatever has a time, coordinates and rates: the state of a chain, say.
+  template <class Other>
+  requires requires(const Other& other) { Eigen::VectorXd(other.q), Eigen::VectorXd(other.v), other.time; }
+  Motion(const Other& other) : time(other.time), q(other.q), v(other.v) {}  // NOLINT(google-explicit-constructor)
+};
+
+}  // namespace pendula

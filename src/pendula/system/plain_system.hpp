@@ -1,0 +1,63 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <type_traits>
+
+namespace pendula {
+
+/// A sine added to one input: amplitude · sin(frequency t + phase).
+struct InputSine {
+  int input;         ///< 0-based
+  double amplitude;  ///< in the unit of the input
+  double frequency;  ///< rad/s
+  double phase;      ///< rad
+};
+
+/// The numbers of a system as they cross from a program to compiled code (run/library.hpp). Everything pointed at
+/// belongs to the caller.
+struct PlainSystem {
+  const double* parameters;  ///< one after the other, as the kernel's parameter_names tell
+  const double* inputs;      ///< constant part of each, as its input_names tell
+  std::span<const InputSine> sines;
+};
+static_assert(std::is_trivially_copyable_v<PlainSystem> && std::is_standard_layout_v<PlainSystem>);
+
+/// What a kernel says of itself, as it crosses from compiled code to a program.
+struct SystemInfo {
+  std::string_view name;   ///< "cart_chain_2"
+  std::string_view model;  ///< "cart_chain"
+  int links = 1;
+  std::span<const std::string_view> coordinates, coordinate_units;
+  std::span<const bool> is_angle;
+  std::span<const std::string_view> parameters, parameter_units;
+  std::span<const int> parameter_sizes;
+  std::span<const double> parameter_defaults;  ///< NaN where there is none
+  std::span<const bool> is_positive, is_per_link;
+  std::span<const std::string_view> inputs, input_units;
+  std::span<const std::string_view> points;
+  std::span<const int> point_sizes;  ///< components of each
+};
+
+/// What the generated kernel S says of itself.
+template <class S>
+constexpr SystemInfo info_of() {
+  return {S::name,
+          S::model,
+          S::links,
+          S::coordinate_names,
+          S::coordinate_units,
+          S::coordinate_is_angle,
+          S::parameter_names,
+          S::parameter_units,
+          S::parameter_sizes,
+          S::parameter_defaults,
+          S::parameter_is_positive,
+          S::parameter_is_per_link,
+          S::input_names,
+          S::input_units,
+          S::point_names,
+          S::point_sizes};
+}
+
+}  // namespace pendula

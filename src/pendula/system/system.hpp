@@ -1,0 +1,49 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <string_view>
+
+namespace pendula {
+
+/// What the runtime asks of a mechanical system: a set of pure functions of parameters, coordinates q, rates v, momenta
+/// p and inputs, outputs by reference, for any number type. Generated kernels are (pendula_codegen/entry_points.py);
+/// what they depend on time by is in their parameters.
+template <class S>
+concept System = requires(const typename S::template Parameters<double>& parameters,
+                          const typename S::template Vector<double>& x,
+                          const typename S::template Inputs<double>& inputs, typename S::template Vector<double>& out,
+                          typename S::template Matrix<double>& jacobian, double& number) {
+  { S::name } -> std::convertible_to<std::string_view>;
+  { S::coordinates } -> std::convertible_to<int>;
+  { S::constant_masses } -> std::convertible_to<bool>;
+  { S::coordinate_names[0] } -> std::convertible_to<std::string_view>;
+  { S::coordinate_is_angle[0] } -> std::convertible_to<bool>;
+  S::kinetic_energy(parameters, x, x, number);
+  S::energy(parameters, x, x, number);
+  S::power(parameters, x, x, inputs, number);
+  S::mass_matrix(parameters, x, jacobian);
+  S::momentum_from_velocity(parameters, x, x, out);
+  S::velocity_from_momentum(parameters, x, x, out);
+  S::hamiltonian_form(parameters, x, x, inputs, out, out);
+  S::momentum_form(parameters, x, x, inputs, out, out);
+  S::momentum_form_with_jacobians(parameters, x, x, inputs, out, out, jacobian, jacobian, jacobian, jacobian);
+  S::residual_with_jacobians(parameters, x, x, x, inputs, out, jacobian, jacobian, jacobian);
+  S::acceleration(parameters, x, x, inputs, out);
+};
+
+/// Whether a system's functions depend on time.
+template <System S>
+inline constexpr bool holds_time = requires(typename S::template Parameters<double>& parameters) {
+  parameters.time;
+};
+
+/// Numbers in all parameters of a system.
+template <System S>
+constexpr int parameter_count() {
+  int count = 0;
+  for (const int size : S::parameter_sizes) count += size;
+  return count;
+}
+
+}  // namespace pendula

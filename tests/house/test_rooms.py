@@ -1,0 +1,68 @@
+"""The arrows between the rooms of the source: who may include whom."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[2] / "src"
+
+# A room, and those that it knows besides itself.
+KNOWS = {
+    "pendula/numeric": set(),
+    "pendula/system": {"pendula/numeric"},
+    "pendula/gauss": {"pendula/system", "pendula/numeric"},
+    "pendula/explicit": {"pendula/system", "pendula/numeric"},
+    "pendula/chain": {"pendula/explicit", "pendula/gauss", "pendula/system", "pendula/numeric"},
+    "pendula/run": {
+        "pendula/chain",
+        "pendula/explicit",
+        "pendula/gauss",
+        "pendula/system",
+        "pendula/numeric",
+    },
+    "library": {
+        "pendula/run",
+        "pendula/chain",
+        "pendula/explicit",
+        "pendula/gauss",
+        "pendula/system",
+        "pendula/numeric",
+    },
+    "io": {"pendula/run", "pendula/chain", "pendula/system"},
+    "cli": {"io", "pendula/run", "pendula/chain", "pendula/system"},
+}
+GENERATED = {"pendula/kernels"}
+
+
+def included(file: Path) -> set[str]:
+    """Folders of this project's headers that a file includes."""
+    names = re.findall(r'#include [<"]((?:pendula|io|cli|library)/[\w/]+\.hpp)[>"]', file.read_text())
+    return {name.rsplit("/", 1)[0] for name in names}
+
+
+@pytest.mark.parametrize("room", KNOWS)
+def test_a_room_knows_what_is_below_it_only(room):
+    allowed = KNOWS[room] | GENERATED | {room}
+    files = [file for file in (SOURCE / room).iterdir() if file.suffix in (".hpp", ".cpp")]
+    assert files
+    wrong = {
+        f"{file.name} -> {other}"
+        for file in files
+        for other in included(file) - allowed
+        if other != "pendula"
+    }
+    assert not wrong
+
+
+def test_every_room_has_its_arrows():
+    rooms = {path.relative_to(SOURCE).parent.as_posix() for path in SOURCE.rglob("*.hpp")}
+    assert rooms - {"pendula"} == set(KNOWS)
+
+
+def test_the_arrows_make_no_circle():
+    done: set[str] = set()
+    while len(done) < len(KNOWS):
+        ready = {room for room in KNOWS if room not in done and KNOWS[room] <= done}
+        assert ready, f"a circle among {set(KNOWS) - done}"
+        done |= ready

@@ -1,0 +1,58 @@
+"""docs/your-own-model.md from its first block to its last."""
+
+import re
+import subprocess
+
+import pytest
+from conftest import ROOT
+
+PAGE = (ROOT / "docs" / "your-own-model.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    sprung, lame = blocks("python")
+    (tmp_path / "sprung.py").write_text(sprung)
+    (tmp_path / "lame.py").write_text(lame)
+    (tmp_path / "sprung.toml").write_text(blocks("toml")[0])
+    return tmp_path
+
+
+def test_the_commands_do_what_the_page_says(folder, pendula):
+    commands = re.findall(r"```\n\$ pendula (.*?)\n(.*?)```", PAGE, re.DOTALL)
+    assert len(commands) == 4
+    for command, output in commands:
+        ended = pendula(*command.split(), cwd=folder)
+        assert ended.returncode == (2 if "lame" in command else 0), ended.stderr
+        assert ended.stdout.endswith(output) or ended.stderr.endswith(output)
+    assert pendula("check", "start.py", cwd=folder).returncode == 0
+
+
+def test_the_program_compiles_and_ends_where_the_scenario_does(folder, pendula, environment):
+    """Against an undriven run of the scenario."""
+    program = blocks("cpp")[0]
+    source = folder / "main.cpp"
+    source.write_text(program)
+    kept = environment.get("PENDULA_CONSUMER_FLAGS")
+    if kept is None:
+        pytest.fail("PENDULA_CONSUMER_FLAGS: expected the flags that compile and link a program with pendula")
+    generator = environment["PENDULA_PYTHON"]
+    made = [generator, "-m", "pendula_codegen", "model", "--model", "sprung.py", "--links", "2", "--output"]
+    header = folder / "pendula" / "kernels" / "sprung_2.hpp"
+    subprocess.run(
+        [*made, header], cwd=folder, check=True, env={**environment, "PYTHONPATH": str(ROOT / "codegen")}
+    )
+    compiler, *flags = kept.split()
+    subprocess.run(
+        [compiler, "-std=c++20", "-O1", f"-I{folder}", source, *flags, "-o", folder / "sway"], check=True
+    )
+    ran = subprocess.run([folder / "sway"], capture_output=True, text=True, check=True)
+    ours = [float(x) for x in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", ran.stdout)]
+    overrides = ["--set=system.drive=[]", "--set=start.theta=[0.35, 0.0]", "--set=run.duration=10.0"]
+    ended = pendula("simulate", "sprung.toml", "--json", *overrides, cwd=folder)
+    theirs = [float(x) for x in re.findall(r'"theta_\d":(-?[\d.e-]+)', ended.stdout)[:2]]
+    assert ours == pytest.approx(theirs, abs=1e-5)  # six digits are printed
