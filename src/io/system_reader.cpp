@@ -47,7 +47,7 @@ std::vector<double> read_parameters(const Section& system, const SystemInfo& inf
       throw InputError(system.where() + ": system.parameters." + name + ": expected " + what + ", got no such key");
     }
     if (value && info.is_per_link[k]) {
-      const Eigen::VectorXd each = value->per_link({size, "system.links", system.where()}, sign);
+      const Eigen::VectorXd each = value->per_link({size, "the model", system.where()}, sign);
       numbers.insert(numbers.end(), each.begin(), each.end());
     } else {
       numbers.insert(numbers.end(), static_cast<std::size_t>(size),
@@ -147,8 +147,7 @@ class StartTable {
         values[static_cast<Eigen::Index>(k)] = entry->number(Sign::any, units);
       } else if (const auto all = stem.empty() ? std::nullopt : table_->find(name(stem))) {
         const int count = members(stem);
-        const Eigen::VectorXd each =
-            all->per_link({count, "the coordinates " + stem + "_1 ...", all->where()}, Sign::any, units);
+        const Eigen::VectorXd each = all->per_link({count, "the model", all->where()}, Sign::any, units);
         values[static_cast<Eigen::Index>(k)] = each[number_of(k, stem)];
       }
     }

@@ -7,7 +7,7 @@ def define(model, links):
     x = model.coordinate("x", "m")  # of the cart
     theta = [model.coordinate(f"theta_{i + 1}", "rad") for i in range(links)]  # from hanging down
     m = model.parameter("masses", "kg", default=1.0, positive=True, per_link=True)
-    l = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)  # noqa: E741
+    length = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)
     damping = model.parameter("damping", "N m s", default=0.0, per_link=True)
     cart = model.parameter("cart_mass", "kg", default=1.0, positive=True)
     friction = model.parameter("cart_friction", "N s/m", default=0.0)
@@ -19,7 +19,7 @@ def define(model, links):
     kinetic, potential = cart * model.rate(x) ** 2 / 2, 0
     dissipated = friction * model.rate(x) ** 2
     for i in range(links):
-        position = (position[0] + l[i] * sin(theta[i]), position[1] - l[i] * cos(theta[i]))
+        position = (position[0] + length[i] * sin(theta[i]), position[1] - length[i] * cos(theta[i]))
         kinetic += m[i] * (model.rate(position[0]) ** 2 + model.rate(position[1]) ** 2) / 2
         potential += m[i] * g * position[1]
         dissipated += damping[i] * model.rate(theta[i]) ** 2

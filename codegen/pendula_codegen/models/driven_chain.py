@@ -6,7 +6,7 @@ from sympy import Rational, cos, pi, sin
 def define(model, links):
     theta = [model.coordinate(f"theta_{i + 1}", "rad") for i in range(links)]  # from hanging down
     m = model.parameter("masses", "kg", default=1.0, positive=True, per_link=True)
-    l = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)  # noqa: E741
+    length = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)
     damping = model.parameter("damping", "N m s", default=0.0, per_link=True)
     x_amplitude = model.parameter("x_amplitude", "m", default=0.0)
     y_amplitude = model.parameter("y_amplitude", "m", default=0.0)
@@ -20,7 +20,7 @@ def define(model, links):
     model.point("pivot", position)
     kinetic, potential, dissipated = 0, 0, 0
     for i in range(links):
-        position = (position[0] + l[i] * sin(theta[i]), position[1] - l[i] * cos(theta[i]))
+        position = (position[0] + length[i] * sin(theta[i]), position[1] - length[i] * cos(theta[i]))
         kinetic += m[i] * (model.rate(position[0]) ** 2 + model.rate(position[1]) ** 2) / 2
         potential += m[i] * g * position[1]
         dissipated += damping[i] * model.rate(theta[i]) ** 2

@@ -9,7 +9,7 @@ def define(model, links):
     inertia = model.parameter("arm_inertia", "kg m^2", default=0.05, positive=True)  # about the axis
     r = model.parameter("arm_length", "m", default=0.3, positive=True)
     m = model.parameter("mass", "kg", default=0.2, positive=True)  # of the rod
-    l = model.parameter("center", "m", default=0.2, positive=True)  # noqa: E741  from joint to centre of mass
+    to_center = model.parameter("center", "m", default=0.2, positive=True)  # from joint to centre of mass
     own = model.parameter("rod_inertia", "kg m^2", default=0.003, positive=True)  # about the centre of mass
     g = model.parameter("gravity", "m/s^2", default=9.81)
     arm_friction = model.parameter("arm_friction", "N m s", default=0.0)
@@ -19,9 +19,9 @@ def define(model, links):
     joint = (r * cos(alpha), r * sin(alpha), 0)
     # The rod swings in the vertical plane across the arm.
     center = (
-        joint[0] - l * sin(theta) * sin(alpha),
-        joint[1] + l * sin(theta) * cos(alpha),
-        -l * cos(theta),
+        joint[0] - to_center * sin(theta) * sin(alpha),
+        joint[1] + to_center * sin(theta) * cos(alpha),
+        -to_center * cos(theta),
     )
     alpha_dot, theta_dot = model.rate(alpha), model.rate(theta)
     speed_squared = sum(model.rate(component) ** 2 for component in center)

@@ -6,7 +6,7 @@ from sympy import Rational, cos, sin
 def define(model, links):
     theta = [model.coordinate(f"theta_{i + 1}", "rad") for i in range(links)]  # from hanging down
     m = model.parameter("masses", "kg", default=1.0, positive=True, per_link=True)
-    l = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)  # noqa: E741
+    length = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)
     stiffness = model.parameter("stiffness", "N m", default=1.0, per_link=True)
     damping = model.parameter("damping", "N m s", default=0.0, per_link=True)
     rest = model.parameter("rest_angles", "rad", default=0.0, per_link=True)  # relative to the link before
@@ -15,7 +15,7 @@ def define(model, links):
     position, before, before_dot = (0, 0), 0, 0
     kinetic, potential, dissipated = 0, 0, 0
     for i in range(links):
-        position = (position[0] + l[i] * sin(theta[i]), position[1] - l[i] * cos(theta[i]))
+        position = (position[0] + length[i] * sin(theta[i]), position[1] - length[i] * cos(theta[i]))
         theta_dot = model.rate(theta[i])
         kinetic += m[i] * (model.rate(position[0]) ** 2 + model.rate(position[1]) ** 2) / 2
         potential += m[i] * g * position[1]

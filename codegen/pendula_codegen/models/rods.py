@@ -6,7 +6,7 @@ from sympy import Rational, cos, sin
 def define(model, links):
     theta = [model.coordinate(f"theta_{i + 1}", "rad") for i in range(links)]  # from hanging down
     m = model.parameter("masses", "kg", default=1.0, positive=True, per_link=True)
-    l = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)  # noqa: E741  joint to joint
+    length = model.parameter("lengths", "m", default=1.0, positive=True, per_link=True)  # joint to joint
     # What follows is that of a uniform rod of 1 kg and 1 m.
     center = model.parameter("centers", "m", default=0.5, per_link=True)  # joint to centre of mass
     inertia = model.parameter(
@@ -20,7 +20,7 @@ def define(model, links):
     for i in range(links):
         along = (sin(theta[i]), -cos(theta[i]))
         middle = tuple(a + center[i] * u for a, u in zip(joint, along, strict=True))
-        joint = tuple(a + l[i] * u for a, u in zip(joint, along, strict=True))
+        joint = tuple(a + length[i] * u for a, u in zip(joint, along, strict=True))
         theta_dot = model.rate(theta[i])
         kinetic += m[i] * (model.rate(middle[0]) ** 2 + model.rate(middle[1]) ** 2) / 2
         kinetic += inertia[i] * theta_dot**2 / 2

@@ -80,6 +80,7 @@ class ChainSolver {
   int singular_part() const { return -1; }
   static constexpr double largest_turn() { return 3; }
   double turn() const { return stages_.turn(); }
+  static constexpr int turning_part() { return -1; }
   double defect() { return stages_.defect(); }
   double predictor_gain() const { return stages_.predictor_gain(); }
   bool loaded() const { return stages_.loaded(); }

@@ -11,6 +11,7 @@
 #include <pendula/system/mass_scale.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/system_model.hpp>
+#include <utility>
 
 namespace pendula {
 
@@ -136,16 +137,9 @@ class LagrangianStages {
   // --- What the stepper asks of a solution ---
 
   /// The most that an angle turns in the step, one whose inertia nearly vanishes twice: it does not go on like that.
-  double turn() const {
-    double turn = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!S::coordinate_is_angle[k]) continue;
-      double sum = 0;
-      for (int j = 0; j < stages(); ++j) sum += std::abs(U_[k][j]);
-      turn = std::max(turn, masses_.is_small(k) ? 2 * sum : sum);
-    }
-    return turn;
-  }
+  double turn() const { return farthest_turn().first; }
+  /// Which angle that is; −1 where none turns.
+  int turning_coordinate() const { return farthest_turn().second; }
 
   /// Energy at the end of the step less that of its start and what loads bring, relative to the largest kinetic energy
   /// that there was.
@@ -234,6 +228,18 @@ class LagrangianStages {
     double sum = 0;
     for (int j = 0; j < stages(); ++j) sum += increments[j];
     return sum;
+  }
+
+  std::pair<double, int> farthest_turn() const {
+    std::pair<double, int> farthest{0, -1};
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!S::coordinate_is_angle[k]) continue;
+      double turn = 0;
+      for (int j = 0; j < stages(); ++j) turn += std::abs(U_[k][j]);
+      if (masses_.is_small(k)) turn *= 2;
+      if (turn > farthest.first) farthest = {turn, static_cast<int>(k)};
+    }
+    return farthest;
   }
 
   // Where the step ends.

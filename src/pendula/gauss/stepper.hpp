@@ -139,7 +139,9 @@ class GaussStepper {
     ++statistics_.rejected_steps;
     const int singular = solver_.singular_part();
     if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
-    const int part = correction.part >= 0 || status == Status::wrong_root ? correction.part : solver_.worst_part();
+    const int part = status == Status::wrong_root ? solver_.turning_part()
+                     : correction.part >= 0       ? correction.part
+                                                  : solver_.worst_part();
     return {status, time(), h, iterations, correction.relative, part};
   }
 

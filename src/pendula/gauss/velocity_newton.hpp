@@ -11,6 +11,7 @@
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/mass_scale.hpp>
 #include <pendula/system/system_model.hpp>
+#include <utility>
 #include <vector>
 
 namespace pendula {
@@ -88,16 +89,8 @@ class VelocityNewton {
   static constexpr int coordinates() { return S::coordinates; }
   double predictor_gain() const { return last_h_ == 0 ? 1 : coefficients_.predictor_gain(); }
 
-  double turn() const {
-    double most = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!S::coordinate_is_angle[k]) continue;
-      double turn = 0;
-      for (int i = 0; i < stages(); ++i) turn += std::abs(coefficients_.hb(i) * at(i).v[index(k)]);
-      most = std::max(most, masses_.is_small(k) ? 2 * turn : turn);
-    }
-    return most;
-  }
+  double turn() const { return farthest_turn().first; }
+  int turning_part() const { return farthest_turn().second; }
 
   double energy_defect() {
     const auto [moved, pushed] = increments();
@@ -182,6 +175,19 @@ class VelocityNewton {
       at(i).q = q_.value + moved;
       at(i).v = v_.value + pushed;
     }
+  }
+
+  // Of all angles, one whose inertia nearly vanishes counted twice; and whose it is.
+  std::pair<double, int> farthest_turn() const {
+    std::pair<double, int> farthest{0, -1};
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!S::coordinate_is_angle[k]) continue;
+      double turn = 0;
+      for (int i = 0; i < stages(); ++i) turn += std::abs(coefficients_.hb(i) * at(i).v[index(k)]);
+      if (masses_.is_small(k)) turn *= 2;
+      if (turn > farthest.first) farthest = {turn, static_cast<int>(k)};
+    }
+    return farthest;
   }
 
   // Of q and v, over the step.

@@ -8,6 +8,7 @@
 #include <pendula/run/subject.hpp>
 #include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/plain_system.hpp>
+#include <stdexcept>
 #include <utility>
 
 namespace pendula {
@@ -33,6 +34,9 @@ class SystemSubject : public Subject {
 
   std::unique_ptr<Integrator> make_integrator(const RunOptions& options) const override {
     const int count = static_cast<int>(info().coordinates.size());
+    if (options.solver == Solver::chain) {
+      throw std::invalid_argument("solver: the chain solver is for chains, got chain; dense is for any system");
+    }
     std::unique_ptr<PlainIntegrator> integrator =
         is_explicit(options.method)
             ? make_explicit_integrator(entry_->dynamics(numbers_.plain()), count, count, options, info().name)

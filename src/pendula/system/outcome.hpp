@@ -68,8 +68,9 @@ inline std::string message(const Outcome& outcome, std::span<const std::string_v
           << "); a smaller step may help";
       break;
     case Status::wrong_root:
-      out << "the stage equations have a solution that is not the motion, its energy does not balance (step "
-          << outcome.step << " s, " << outcome.iterations << " iterations); a smaller step may help";
+      out << "the stage equations have a solution that is not the motion, its energy does not balance"
+          << where(" or it turns too far, farthest in ") << " (step " << outcome.step << " s, " << outcome.iterations
+          << " iterations); a smaller step may help";
       break;
     case Status::tolerance_not_met:
       out << "the error of a step stays above the tolerance, or a value infinite" << where(" at ")
