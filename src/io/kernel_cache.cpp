@@ -205,15 +205,22 @@ std::shared_ptr<const SystemEntry> load(const fs::path& object) {
 
 Toolchain Toolchain::of_this_program() {
   Toolchain toolchain;
-  toolchain.python = environment("PENDULA_PYTHON", configured::python);
-  toolchain.compiler = environment("CXX", configured::compiler);
-  toolchain.codegen = configured::codegen;
-  for (const char* folder : configured::includes) toolchain.includes.emplace_back(folder);
-  const fs::path prefix = this_program().parent_path().parent_path();
-  if (fs::exists(prefix / configured::installed_include / "pendula" / "pendula.hpp")) {
+  const fs::path folder = this_program().parent_path(), prefix = folder.parent_path();
+  // Of a program in its build folder: a Python, the generator, folders of headers, a line each.
+  std::ifstream beside(folder / "pendula.toolchain");
+  if (beside) {
+    std::string line;
+    std::getline(beside, toolchain.python);
+    if (std::getline(beside, line)) toolchain.codegen = line;
+    while (std::getline(beside, line)) toolchain.includes.emplace_back(line);
+  } else {
+    toolchain.python = "python3";
     toolchain.codegen = prefix / configured::installed_codegen;
-    toolchain.includes.front() = prefix / configured::installed_include;
+    toolchain.includes.push_back(prefix / configured::installed_include);
   }
+  for (const char* include : configured::includes) toolchain.includes.emplace_back(include);
+  toolchain.python = environment("PENDULA_PYTHON", toolchain.python);
+  toolchain.compiler = environment("CXX", configured::compiler);
   toolchain.cache = cache_folder();
   return toolchain;
 }

@@ -20,8 +20,8 @@ struct Toolchain {
   std::vector<std::filesystem::path> includes;  ///< of pendula, its generated headers, Eigen and xsimd
   std::filesystem::path cache;                  ///< folder of compiled kernels
 
-  /// That of this program: what it was configured with, or where it was installed to; PENDULA_PYTHON and CXX in the
-  /// environment go before. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  /// That of this program: of its build, told by the file pendula.toolchain beside it, or of where it is installed;
+  /// PENDULA_PYTHON and CXX in the environment go before. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
   static Toolchain of_this_program();
 };
 
