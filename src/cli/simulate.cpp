@@ -96,10 +96,9 @@ std::unique_ptr<io::TrajectoryFile> open_trajectory(const SimulateOptions& optio
 /// One run: who takes the rows, and how it ended.
 class Run {
  public:
-  Run(std::shared_ptr<const Subject> subject, const Motion& start, const io::RunPlan& plan,
-      const SimulateOptions& options)
+  Run(std::shared_ptr<const Subject> subject, Motion start, const io::RunPlan& plan, const SimulateOptions& options)
       : subject_(std::move(subject)),
-        start_(start),
+        start_(std::move(start)),
         plan_(plan),
         options_(options),
         columns_(subject_->columns()),

@@ -44,7 +44,7 @@ std::vector<double> read_parameters(const Section& system, const SystemInfo& inf
       const std::string what =
           "a number [" + std::string(info.parameter_units[k]) + "], which the model has no default for";
       if (given) given->require(name, what);
-      throw InputError(system.where() + ": system.parameters." + name + ": expected " + what + ", got no such key");
+      throw InputError(system.where(), "system.parameters." + name, what, "no such key");
     }
     if (value && info.is_per_link[k]) {
       const Eigen::VectorXd each = value->per_link({size, "the model", system.where()}, sign);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 
 namespace pendula {
 
@@ -11,8 +12,8 @@ struct Motion {
   Eigen::VectorXd v;  ///< their rates
 
   Motion() = default;
-  Motion(double at, const Eigen::VectorXd& coordinates, const Eigen::VectorXd& rates)
-      : time(at), q(coordinates), v(rates) {}
+  Motion(double at, Eigen::VectorXd coordinates, Eigen::VectorXd rates)
+      : time(at), q(std::move(coordinates)), v(std::move(rates)) {}
   /// Of whatever has a time, coordinates and rates: the state of a chain, say.
   template <class Other>
   requires requires(const Other& other) { Eigen::VectorXd(other.q), Eigen::VectorXd(other.v), other.time; }
