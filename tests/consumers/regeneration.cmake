@@ -35,7 +35,7 @@ if(NOT first STREQUAL second)
   message(FATAL_ERROR "a second build made something again: ${made}\n${first}\n${second}\n${output}")
 endif()
 
-file(APPEND "${project}/codegen/pendula_codegen/models/planar.py" "\n# An edit.\n")
+file(APPEND "${project}/codegen/pendula_codegen/links/planar.py" "\n# An edit.\n")
 step(${build})
 read_times(third)
 expect_made_again("${second}" "${third}")
@@ -47,5 +47,5 @@ if(NOT third STREQUAL fourth)
 endif()
 
 # The generator's complaint ends the build, and leaves no header behind.
-file(APPEND "${project}/codegen/pendula_codegen/models/planar.py" "\nMODEL = None\n")
+file(APPEND "${project}/codegen/pendula_codegen/links/planar.py" "\nMODEL = None\n")
 step_fails("planar" ${build})
