@@ -1,3 +1,3 @@
-"""From a SymPy model of one link to C++ kernels for chains of n links."""
+"""From SymPy models of mechanical systems, chains of n links among them, to C++ kernels."""
 
-__version__ = "1.0.0"
+__version__ = "0.1.0"

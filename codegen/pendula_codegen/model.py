@@ -278,13 +278,20 @@ class Model:
             return sympify(value)
         self._fail(f"{what}: expected a SymPy expression, got {type(value).__name__} {value!r}")
 
-    def _check(self, value: Expr, what: str, known: Iterable[Symbol], where: str | None = None) -> None:
-        names = {symbol.name for symbol in known}
-        strangers = sorted(s.name for s in value.free_symbols if s.name not in names or s not in set(known))
-        if strangers:
-            hint = self._names.get(strangers[0])
-            why = f", which is {hint}" if hint else ", which the model does not declare"
-            raise GenerationError(f"{where or self._line()}: {what} holds the symbol '{strangers[0]}'{why}")
+    def _check(self, value: Expr, what: str, known: Sequence[Symbol], where: str | None = None) -> None:
+        strangers = sorted(value.free_symbols - set(known), key=lambda symbol: symbol.name)
+        if not strangers:
+            return
+        symbol = strangers[0]
+        what_it_is = self._names.get(symbol.name)
+        own = {*self._positions(), *self._rates(), *(i.symbol for i in self.inputs)}
+        if what_it_is is None:
+            why = f"the symbol '{symbol}', which the model does not declare"
+        elif symbol in own:
+            why = f"'{symbol}', {what_it_is}, which may not stand in it"
+        else:
+            why = f"a symbol '{symbol}' that is not the model's own, {what_it_is}"
+        raise GenerationError(f"{where or self._line()}: {what} holds {why}")
 
     def _declare(self, name: str, what: str) -> Symbol:
         self._name(name)

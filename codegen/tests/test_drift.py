@@ -1,6 +1,7 @@
 """generated/ is what the generator makes today."""
 
 from conftest import REPOSITORY
+from pendula_codegen import __version__
 
 REFRESH = "refresh with: PYTHONPATH=codegen python -m pendula_codegen refresh --output generated"
 
@@ -16,6 +17,10 @@ def test_committed_set():
     names = {path.stem for path in (REPOSITORY / "generated").glob("*.hpp")}
     planar, spatial = {f"planar_{n}" for n in range(1, 5)}, {f"spatial_{n}" for n in range(1, 4)}
     assert names == planar | spatial | {"planar_link", "spatial_link", "gauss_tableaux"}
+
+
+def test_the_generator_has_the_version_of_the_project():
+    assert f"project(pendula VERSION {__version__} " in (REPOSITORY / "CMakeLists.txt").read_text()
 
 
 def test_banner_says_how_to_make_the_header_again(fresh_headers):

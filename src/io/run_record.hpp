@@ -11,7 +11,8 @@
 
 namespace pendula::io {
 
-/// Energy errors |H − H₀|, relative to Σ M_i |g| l_i, or to |H₀| where there is no gravity.
+/// Energy errors |H − H₀|, relative to Σ M_i |g| l_i of a chain, or to |H₀| where there is no gravity; of any other
+/// system to the largest |T| + |U| over the rows.
 struct EnergyError {
   double initial = std::nan("");  ///< H₀, NaN before the first row
   double scale = 0;               ///< what errors are divided by
@@ -69,8 +70,9 @@ class RunRecord {
   const Motion& last() const { return last_; }  ///< state of the last row
 
   EnergyBalance balance() const {
+    if (scale_) return balance_;
     if (!(whole_ > 0)) return {};
-    return {most_ / whole_, least_ / whole_};
+    return {balance_.most / whole_, balance_.least / whole_};
   }
 
   /// The thinned table; it ends in the last row.
@@ -86,6 +88,7 @@ class RunRecord {
   void start(const Observation& seen, double work) {
     initial_ = seen.energy;
     brought_before_ = work;
+    whole_ = scale_.value_or(0) + seen.kinetic;
   }
 
   void follow(const Observation& seen, double work) {
@@ -94,11 +97,13 @@ class RunRecord {
     if (!std::isnan(largest_) && !(error <= largest_)) largest_ = error;
     largest_sum_ = std::max(largest_sum_, std::abs(seen.kinetic) + std::abs(seen.potential()));
     const double brought = work - brought_before_, off = energy_ - initial_ - brought;
-    // All that there was: what gravity can give, or else what was seen to move.
-    const double moved = scale_ ? *scale_ + (rows_ == 1 ? seen.kinetic : 0) : seen.kinetic;
-    whole_ = std::max(whole_, moved + std::abs(brought));
-    most_ = std::max(most_, off);
-    least_ = std::min(least_, off);
+    // All that there was: of a chain, what gravity can give and it began with; else what was seen to move, which is
+    // known when the run is over.
+    if (!scale_) whole_ = std::max(whole_, seen.kinetic + std::abs(brought));
+    const double whole = scale_ ? whole_ + std::abs(brought) : 1;
+    if (off == 0 || !(whole > 0)) return;
+    balance_.most = std::max(balance_.most, off / whole);
+    balance_.least = std::min(balance_.least, off / whole);
   }
 
   double compared_with() const { return !scale_ ? largest_sum_ : *scale_ > 0 ? *scale_ : std::abs(initial_); }
@@ -110,7 +115,8 @@ class RunRecord {
   std::int64_t rows_ = 0;
   double initial_ = std::nan(""), energy_ = std::nan(""), brought_before_ = 0;
   double largest_ = 0, largest_sum_ = 0;  // error; |T| + |U|  [J]
-  double whole_ = 0, most_ = 0, least_ = 0;
+  double whole_ = 0;                      // that energies are balanced against  [J]
+  EnergyBalance balance_;                 // of systems that are no chains in joules
   Motion last_;
   TableRow last_row_;  // here and in the table, energy errors are in joules
   std::vector<TableRow> table_;

@@ -167,13 +167,27 @@ class StartTable {
   std::optional<Section> table_;
 };
 
+/// Throws InputError where some momenta have no rates: where the mass matrix is singular. Infinite is the rate of the
+/// coordinate that has no inertia; of those that hang together with it they are no numbers.
+void require_inertia(const StartTable& table, const SystemSubject& system, const Eigen::VectorXd& q) {
+  const Eigen::VectorXd rates = system.rates(0, q, Eigen::VectorXd::Ones(q.size()));
+  if (rates.allFinite()) return;
+  std::string got = "a singular one";
+  for (Eigen::Index k = 0; k < q.size(); ++k) {
+    if (std::isinf(rates[k])) {
+      got = "no inertia in " + std::string(system.info().coordinates[static_cast<std::size_t>(k)]);
+    }
+  }
+  throw InputError(table.where(), "start", "coordinates where the mass matrix is not singular", got);
+}
+
 Motion read_start(const Section& root, const SystemSubject& system) {
   const StartTable table(root, system.info());
   Motion start(0, table.positions(), table.rates());
+  require_inertia(table, system, start.q);
   if (const std::optional<Entry> momentum = table.first_momentum()) {
     if (const auto rate = table.first_rate()) rate->fail("no rates beside the momenta " + momentum->key());
     start.v = system.rates(0, start.q, table.momenta());
-    if (!start.v.allFinite()) momentum->fail("a start where the mass matrix is not singular");
   }
   return start;
 }

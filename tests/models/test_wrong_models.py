@@ -13,9 +13,17 @@ WRONG = {
         "    x = model.coordinate('x', 'm')\n    model.lagrangian = model.rate(x)**2 / 2 - Symbol('k') * x**2\n",
         "wrong.py:6: lagrangian holds the symbol 'k', which the model does not declare",
     ),
+    "another symbol of the same name": (
+        "    x = model.coordinate('x', 'm')\n    model.lagrangian = model.rate(x)**2 / 2 - Symbol('x')**2\n",
+        "wrong.py:6: lagrangian holds a symbol 'x' that is not the model's own, a coordinate",
+    ),
     "no kinetic energy": (
         "    x, y = two(model)\n    model.lagrangian = model.rate(x)**2 - y**2\n",
         "wrong.py:6: lagrangian: the coordinate y has no kinetic energy: its rate y_dot does not stand in it",
+    ),
+    "rate in a point": (
+        "    x = model.coordinate('x', 'm')\n    model.point('bob', (model.rate(x), 0))\n",
+        "wrong.py:6: point bob holds 'x_dot', the rate of x, which may not stand in it",
     ),
     "singular everywhere": (
         "    x, y = two(model)\n    model.lagrangian = (model.rate(x) + model.rate(y))**2\n",
@@ -131,8 +139,9 @@ def test_missing_tools_are_named(pendula, tmp_path):
 def test_a_singular_start_names_the_coordinate(pendula, tmp_path):
     text = '[system]\nmodel = "swinging_atwood"\n[start]\nr = 0.0\ntheta = 1.0\n[run]\nduration = 1.0\n'
     ended = pendula("simulate", scenario(tmp_path, text))
-    assert ended.returncode == 1
-    assert "the mass matrix is singular: no inertia is left in theta" in ended.stderr + ended.stdout
+    assert ended.returncode == 2
+    expected = "start: expected coordinates where the mass matrix is not singular, got no inertia in theta"
+    assert ended.stderr.splitlines()[-1].endswith(f"run.toml:3: {expected}")
 
 
 def test_a_second_run_starts_at_once(pendula, tmp_path):

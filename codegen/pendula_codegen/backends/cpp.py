@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from pendula_codegen.entry_points import Function, SystemKernel
+from pendula_codegen.model import Coordinate, Input, Parameter
 from pendula_codegen.places import Place
 from pendula_codegen.polynomial import Number
 from pendula_codegen.program import Program
@@ -352,14 +354,83 @@ def literal(value: object) -> str:
     return "std::numeric_limits<double>::quiet_NaN()" if value is None else repr(value)
 
 
-def constants(names: Sequence[tuple[str, str, Sequence[object]]]) -> list[str]:
-    """Static members of a kernel: (type of an element, name, values) each."""
+def struct_name(name: str) -> str:
+    """planar_2 as Planar2."""
+    return "".join(part[:1].upper() + part[1:] for part in name.split("_"))
+
+
+def matrix(rows: int | str, columns: int | str) -> str:
+    return f"Eigen::Matrix<Real, {rows}, {columns}>"
+
+
+def parameter_field(parameter: Parameter) -> str:
+    """The field of a parameter in the structure Parameters."""
+    kind = matrix("links", 1) if parameter.per_link else "Real"
+    return f"{kind} {parameter.name};  ///< {parameter.unit}"
+
+
+def constants(
+    coordinates: Sequence[Coordinate],
+    parameters: Sequence[Parameter],
+    inputs: Sequence[Input],
+    points: Sequence[tuple[str, int]],
+    constant_masses: bool,
+) -> list[str]:
+    """Static members by which a kernel says what it is."""
+    members = [
+        ("std::string_view", "coordinate_names", [c.symbol.name for c in coordinates]),
+        ("std::string_view", "coordinate_units", [c.unit for c in coordinates]),
+        ("bool", "coordinate_is_angle", [c.is_angle for c in coordinates]),
+        ("std::string_view", "parameter_names", [p.name for p in parameters]),
+        ("std::string_view", "parameter_units", [p.unit for p in parameters]),
+        ("int", "parameter_sizes", [len(p.symbols) for p in parameters]),
+        ("double", "parameter_defaults", [p.default for p in parameters]),
+        ("bool", "parameter_is_positive", [p.positive for p in parameters]),
+        ("bool", "parameter_is_per_link", [p.per_link for p in parameters]),
+        ("std::string_view", "input_names", [i.symbol.name for i in inputs]),
+        ("std::string_view", "input_units", [i.unit for i in inputs]),
+        ("std::string_view", "point_names", [name for name, _ in points]),
+        ("int", "point_sizes", [size for _, size in points]),
+    ]
     lines = []
-    for element, name, values in names:
+    for element, name, values in members:
         head = f"static constexpr std::array<{element}, {len(values)}> {name} = {{"
         pieces = [f"{literal(value)}," for value in values[:-1]] + [literal(value) for value in values[-1:]]
         lines += fill(head, [*pieces[:-1], f"{pieces[-1]}}};"] if pieces else ["};"])
+    return [f"static constexpr bool constant_masses = {literal(constant_masses)};", *lines]
+
+
+def read_statements(parameters: Sequence[Parameter]) -> list[str]:
+    """Statements that read parameters out of numbers one after the other."""
+    lines, at = [], 0
+    for parameter in parameters:
+        name, size = parameter.name, len(parameter.symbols)
+        if parameter.per_link:
+            lines.append(f"for (int i = 0; i < {size}; ++i) to.{name}[i] = Real(from[{at} + i]);")
+        else:
+            lines.append(f"to.{name} = Real(from[{at}]);")
+        at += size
     return lines
+
+
+def cast_statements(parameters: Sequence[Parameter], holds_time: bool) -> list[str]:
+    """Statements that convert parameters from one number type to another."""
+    lines = [
+        f"for (int i = 0; i < {len(p.symbols)}; ++i) to.{p.name}[i] = To(from.{p.name}[i]);"
+        if p.per_link
+        else f"to.{p.name} = To(from.{p.name});"
+        for p in parameters
+    ]
+    return [*lines, "to.time = To(from.time);"] if holds_time else lines
+
+
+_MATH = re.compile(r"\b(sin|cos|tan|asin|acos|atan|sinh|cosh|tanh|exp|log|sqrt|cbrt|pow)\(")
+
+
+def using_declarations(function: RenderedFunction) -> list[str]:
+    """By which the functions of the standard library are found beside those of Real's namespace."""
+    used = sorted({name for line in function.lines for name in _MATH.findall(line)})
+    return [f"using {', '.join(f'std::{name}' for name in used)};"] if used else []
 
 
 def fill(head: str, pieces: Sequence[str]) -> list[str]:

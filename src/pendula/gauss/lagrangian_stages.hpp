@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
+#include <cstdint>
 #include <pendula/gauss/stage_columns.hpp>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -50,7 +50,7 @@ class LagrangianStages {
   Status start(double time, const Vector& q, const Vector& v) {
     time_ = time;
     forget();
-    fastest_ = 0;
+    fastest_ = most_kinetic_ = 0;
     steps_ = 0;
     masses_.start(model_.parameters(time), q);
     Vector p;
@@ -71,10 +71,12 @@ class LagrangianStages {
     return v;
   }
 
-  void save() { saved_ = {q_, p_}; }
+  void save() { saved_ = {q_, p_, time_}; }
   void restore() {
-    q_ = saved_[0];
-    p_ = saved_[1];
+    q_ = saved_.q;
+    p_ = saved_.p;
+    time_ = saved_.time;
+    read_masses();  // as they are here, not where the step failed
     forget();
   }
 
@@ -142,7 +144,7 @@ class LagrangianStages {
   int turning_coordinate() const { return farthest_turn().second; }
 
   /// Energy at the end of the step less that of its start and what loads bring, relative to the largest kinetic energy
-  /// that there was.
+  /// that was looked at.
   double energy_defect() {
     const double brought = model_.loaded() ? work() : 0, end_time = time_ + step_;
     const auto [q, p] = end();
@@ -296,7 +298,10 @@ class LagrangianStages {
   typename S::template Inputs<L> inputs_;
   alignas(pack_alignment) Stored U_[2 * count];
   State q_, p_;
-  std::array<State, 2> saved_;
+  struct {
+    State q, p;
+    double time;
+  } saved_{};
   MassScale<S> masses_;
   std::array<double, count> weight_{}, inverse_weight_{};
   double floor_ = 0, time_ = 0, step_ = 0, last_h_ = 0, fastest_ = 0, most_kinetic_ = 0;
