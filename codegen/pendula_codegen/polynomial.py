@@ -21,6 +21,7 @@ Call = str | tuple[str, Fraction]  # name of a function of one argument; ("pow",
 _TRIG = (sin, cos)
 _FUNCTIONS: tuple[type[Function], ...] = (acos, asin, atan, cosh, exp, log, sinh, tan, tanh)
 ONE: Polynomial = {(): 1}
+MOST_FACTORS = 64  # of a power, which is a product of as many
 
 
 def quotient(numerator: Number, denominator: Number) -> Number:
@@ -111,6 +112,10 @@ class Expander:
     def _power(self, base: Expr, exponent: Expr) -> Polynomial:
         if not exponent.is_Rational:
             return self._call("exp", multiply(self.expand(exponent), self._call("log", self.expand(base))))
+        if abs(exponent.p) > MOST_FACTORS:
+            raise GenerationError(
+                f"a kernel cannot evaluate {base**exponent}: it has powers up to {MOST_FACTORS}"
+            )
         root = self.expand(base)
         if exponent.q != 1:
             root = self._call(_root(int(exponent.q)), root)

@@ -91,6 +91,10 @@ ORDERS = (
 )
 
 
+# Of how many angles a sine is expanded in theirs; of more, terms that cancel would cost its digits.
+MOST_ANGLES = 4
+
+
 class Vocabulary:
     """All atoms that one program may be written in."""
 
@@ -177,7 +181,9 @@ class Vocabulary:
     def _trig(self, function: type, angle: Expr) -> Polynomial:
         """sin or cos, of an integer combination of angles by those of the angles."""
         parts = [term.as_coeff_Mul() for term in Add.make_args(angle)]
-        if any(symbol not in self._angles or not isinstance(c, Integer) for c, symbol in parts):
+        if any(symbol not in self._angles or not isinstance(c, Integer) for c, symbol in parts) or (
+            sum(abs(c) for c, _ in parts) > MOST_ANGLES
+        ):
             return self._call(function.__name__, self.polynomial(angle))
         parts.sort(key=lambda part: self._angles[part[1]])
         terms = [(int(c), symbol) for c, symbol in parts]

@@ -174,8 +174,21 @@ def test_what_a_kernel_cannot_compute_is_refused():
         vocabulary().polynomial(Abs(x))
     with pytest.raises(GenerationError, match=r"holds the symbol 'z', which is not an argument$"):
         vocabulary().polynomial(Symbol("z"))
+    with pytest.raises(GenerationError, match=r"x_1\*\*65: it has powers up to 64$"):
+        vocabulary().polynomial(x**65)
     with pytest.raises(GenerationError, match=r"no finite real number$"):
         vocabulary().polynomial(x * sqrt(Integer(-2)))
+
+
+def test_sines_of_many_times_an_angle_are_not_expanded():
+    """cos(10 x) by cos x has coefficients of a thousand that cancel; cos(10⁶ x) would never end."""
+    place = Place("q", index=(0,))
+    atoms = Vocabulary(
+        [Leaf(theta, place, "q")], [Angle(theta, place)], {}, Form(pair_angles=False, expanded=frozenset())
+    )
+    for times, expanded in ((3, True), (5, False), (1000000, False)):
+        program = shortest_program([[(Place("out"), cos(times * theta))]], [atoms])
+        assert (not program.graph.definitions) == expanded
 
 
 def test_functions_are_computed_once_for_each_argument():
@@ -200,6 +213,7 @@ def test_functions_are_computed_once_for_each_argument():
         tan(x) + atan(y) * log(x) - sinh(x * y),
         exp(-x) * sin(x * y + 1) + cos(x * y + 1) ** 2,
         x**y + pi * sqrt(2) * y + 0.1,
+        x**40 - y ** (-7),
         1 / (1 / x + 1 / y),
     ],
 )
