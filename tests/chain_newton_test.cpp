@@ -3,8 +3,7 @@
 
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/chain_solver.hpp>
-#include <pendula/gauss/lagrangian_solver.hpp>
-#include <pendula/gauss/stepper.hpp>
+#include <pendula/run/integrator.hpp>
 
 #include "support/kernels.hpp"
 #include "support/run.hpp"
@@ -33,34 +32,31 @@ class ChainStageEquations : public ::testing::Test {
     return Chain<Space>(parameters);
   }
 
-  template <class Stepper>
-  State<Space> run(Stepper&& stepper, int steps, double h) {
-    EXPECT_TRUE(stepper.start(start));
-    for (int i = 0; i < steps; ++i) {
-      const Outcome outcome = stepper.step(h);
-      EXPECT_TRUE(outcome) << outcome;
-    }
-    return stepper.state();
-  }
-
-  State<Space> along_chain(int stages, Iteration iteration, int steps, double h) {
+  Motion run(Solver solver, int stages, Iteration iteration, int steps, double h) {
     RunOptions options;
     options.stages = stages;
-    options.solver = Solver::chain;
+    options.solver = solver;
     options.iteration = iteration;
-    return run(*make_integrator(chain, options), steps, h);
+    const auto integrator = make_integrator(chain, options);
+    EXPECT_TRUE(integrator->start(start));
+    for (int i = 0; i < steps; ++i) {
+      const Outcome outcome = integrator->step(h);
+      EXPECT_TRUE(outcome) << outcome;
+    }
+    return integrator->state();
   }
 
-  State<Space> dense(int stages, int steps, double h) {
-    return run(GaussStepper<LagrangianSolver<Kernel>>(system_of<Kernel>(chain), stages), steps, h);
+  Motion along_chain(int stages, Iteration iteration, int steps, double h) {
+    return run(Solver::chain, stages, iteration, steps, h);
   }
+  Motion dense(int stages, int steps, double h) { return run(Solver::dense, stages, Iteration::automatic, steps, h); }
 
   Random random{7};
   Chain<Space> chain;
   State<Space> start;
 };
 
-TYPED_TEST_SUITE(ChainStageEquations, KernelsToFour, KernelName);
+TYPED_TEST_SUITE(ChainStageEquations, CommittedKernels, KernelName);
 
 TYPED_TEST(ChainStageEquations, HaveOneSolution) {
   for (int stages = 1; stages <= 8; ++stages) {

@@ -9,7 +9,6 @@
 #include <pendula/kernels/spatial_1.hpp>
 #include <pendula/kernels/spatial_2.hpp>
 #include <pendula/kernels/spatial_3.hpp>
-#include <pendula/kernels/spatial_4.hpp>
 
 #include "support/random_chain.hpp"
 
@@ -19,13 +18,9 @@ namespace pendula::test {
 /// code and not at numbers, and take a compiler minutes for each.
 #ifdef PENDULA_FEW_KERNELS
 using CommittedKernels = ::testing::Types<kernels::Planar2, kernels::Spatial2>;
-using KernelsToFour = CommittedKernels;
 #else
 using CommittedKernels = ::testing::Types<kernels::Planar1, kernels::Planar2, kernels::Planar3, kernels::Planar4,
                                           kernels::Spatial1, kernels::Spatial2, kernels::Spatial3>;
-/// … and spatial chains of four links, which the build generates.
-using KernelsToFour = ::testing::Types<kernels::Planar1, kernels::Planar2, kernels::Planar3, kernels::Planar4,
-                                       kernels::Spatial1, kernels::Spatial2, kernels::Spatial3, kernels::Spatial4>;
 #endif
 
 struct KernelName {

@@ -129,7 +129,7 @@ class LagrangianNewton {
     return {largest > 0 ? largest / scale : 0, worst};
   }
 
-  detail::StageSystem<S::coordinates, Eigen::Dynamic> system_;
+  detail::StageSystem<S::coordinates> system_;
   std::vector<Stage> at_;
 };
 

@@ -46,17 +46,32 @@ struct Tableau {
 
 namespace detail {
 
-template <std::size_t From, int S, class Real>
-void copy(const std::array<double, From>& from, StageVector<S, Real>& to) {
-  to = Eigen::Map<const Eigen::Matrix<double, static_cast<int>(From), 1>>(from.data()).template cast<Real>();
-}
+/// A generated tableau as what any of them is: matrices row by row.
+struct GeneratedTableau {
+  int stages;
+  const double *c, *c_low, *b, *b_low, *a, *a_low, *m, *m_low, *a_squared, *extrapolation;
+};
 
-template <std::size_t From, int S, class Real>
-void copy(const std::array<std::array<double, From>, From>& from, StageMatrix<S, Real>& to) {
-  constexpr auto size = static_cast<int>(From);
-  to =
-      Eigen::Map<const Eigen::Matrix<double, size, size, size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>(from[0].data())
-          .template cast<Real>();
+template <class Generated>
+inline constexpr GeneratedTableau generated_tableau{Generated::stages,
+                                                    Generated::c.data(),
+                                                    Generated::c_low.data(),
+                                                    Generated::b.data(),
+                                                    Generated::b_low.data(),
+                                                    Generated::a[0].data(),
+                                                    Generated::a_low[0].data(),
+                                                    Generated::m[0].data(),
+                                                    Generated::m_low[0].data(),
+                                                    Generated::a_squared[0].data(),
+                                                    Generated::extrapolation[0].data()};
+
+template <class Real, class Numbers>
+void copy(const double* from, int stages, Numbers& to) {
+  const Eigen::Index columns = Numbers::ColsAtCompileTime == 1 ? 1 : stages;
+  to.resize(stages, columns);
+  for (Eigen::Index i = 0; i < stages; ++i) {
+    for (Eigen::Index j = 0; j < columns; ++j) to(i, j) = static_cast<Real>(from[i * columns + j]);
+  }
 }
 
 // m in the bits of Real. Of m_ij and m_ji the larger is rounded, and 1 minus it is exact (Sterbenz).
@@ -71,23 +86,23 @@ void round_symplectic(const StageMatrix<S, Real>& low, StageMatrix<S, Real>& m) 
   }
 }
 
-template <class Generated, int S, class Real>
-Tableau<S, Real> make_tableau(Family family) {
-  constexpr auto size = static_cast<std::size_t>(Generated::stages);
+template <int S, class Real>
+Tableau<S, Real> make_tableau(Family family, const GeneratedTableau& from) {
   Tableau<S, Real> tableau;
   tableau.family = family;
   StageVector<S, Real> c, b_low;
   StageMatrix<S, Real> a_low, m_low;
-  copy<size, S>(Generated::c, c);
-  copy<size, S>(Generated::c_low, tableau.c_low);
-  copy<size, S>(Generated::b, tableau.b);
-  copy<size, S>(Generated::b_low, b_low);
-  copy<size, S>(Generated::a, tableau.a);
-  copy<size, S>(Generated::a_low, a_low);
-  copy<size, S>(Generated::m, tableau.m);
-  copy<size, S>(Generated::m_low, m_low);
-  copy<size, S>(Generated::a_squared, tableau.a_squared);
-  copy<size, S>(Generated::extrapolation, tableau.extrapolation);
+  const auto read = [&](const double* numbers, auto& to) { copy<Real>(numbers, from.stages, to); };
+  read(from.c, c);
+  read(from.c_low, tableau.c_low);
+  read(from.b, tableau.b);
+  read(from.b_low, b_low);
+  read(from.a, tableau.a);
+  read(from.a_low, a_low);
+  read(from.m, tableau.m);
+  read(from.m_low, m_low);
+  read(from.a_squared, tableau.a_squared);
+  read(from.extrapolation, tableau.extrapolation);
   tableau.c = c + tableau.c_low;
   tableau.c_low += c - tableau.c;
   tableau.b += b_low;
@@ -109,36 +124,35 @@ inline void require_stages(int stages) {
                               std::to_string(stages));
 }
 
-/// The tableau of `stages` stages; where S is fixed, `stages` must equal it. Throws std::invalid_argument.
-template <int S = Eigen::Dynamic, class Real = double>
-Tableau<S, Real> gauss_tableau(int stages) {
-  require_stages(stages);
-  if constexpr (S != Eigen::Dynamic) {
-    if (stages != S) throw std::invalid_argument("stages: this solver is compiled for " + std::to_string(S));
-    return detail::make_tableau<kernels::GaussTableau<S>, S, Real>(Family::gauss);
-  } else {
-    return [&]<int... less_one>(std::integer_sequence<int, less_one...>) {
-      static constexpr std::array make{&detail::make_tableau<kernels::GaussTableau<less_one + 1>, S, Real>...};
-      return make[static_cast<std::size_t>(stages - 1)](Family::gauss);
-    }
-    (std::make_integer_sequence<int, max_stages>());
-  }
+namespace detail {
+
+template <int... less_one>
+constexpr auto generated_gauss(std::integer_sequence<int, less_one...>) {
+  return std::array{generated_tableau<kernels::GaussTableau<less_one + 1>>...};
 }
+
+inline const GeneratedTableau& generated_of(Family family, int stages) {
+  static constexpr auto gauss = generated_gauss(std::make_integer_sequence<int, max_stages>());
+  static constexpr std::array radau = {generated_tableau<kernels::RadauTableau<2>>,
+                                       generated_tableau<kernels::RadauTableau<3>>};
+  if (family == Family::gauss) {
+    require_stages(stages);
+    return gauss[static_cast<std::size_t>(stages - 1)];
+  }
+  if (stages == 2 || stages == 3) return radau[static_cast<std::size_t>(stages - 2)];
+  throw std::invalid_argument("stages: expected 2 or 3 for radau, got " + std::to_string(stages));
+}
+
+}  // namespace detail
 
 /// The tableau of a method; where S is fixed, `stages` must equal it. Throws std::invalid_argument.
 template <int S = Eigen::Dynamic, class Real = double>
 Tableau<S, Real> tableau_of(Family family, int stages) {
-  if (family == Family::gauss) return gauss_tableau<S, Real>(stages);
-  if (stages == 2 || stages == 3) {
-    if constexpr (S == Eigen::Dynamic || S == 2) {
-      if (stages == 2) return detail::make_tableau<kernels::RadauTableau<2>, S, Real>(family);
-    }
-    if constexpr (S == Eigen::Dynamic || S == 3) {
-      if (stages == 3) return detail::make_tableau<kernels::RadauTableau<3>, S, Real>(family);
-    }
+  const detail::GeneratedTableau& generated = detail::generated_of(family, stages);
+  if (S != Eigen::Dynamic && stages != S) {
     throw std::invalid_argument("stages: this solver is compiled for " + std::to_string(S));
   }
-  throw std::invalid_argument("stages: expected 2 or 3 for radau, got " + std::to_string(stages));
+  return detail::make_tableau<S, Real>(family, generated);
 }
 
 /// The tableau with the step size folded in, and the predictor for the ratio of this step to the last.

@@ -253,7 +253,7 @@ class VelocityNewton {
   Family family_;
   Model model_;
   StepCoefficients<Eigen::Dynamic> coefficients_;
-  detail::StageSystem<S::coordinates, Eigen::Dynamic> system_;
+  detail::StageSystem<S::coordinates> system_;
   std::vector<Stage> at_;
   Compensated<Vector> q_, v_;
   std::array<Compensated<Vector>, 2> saved_;
