@@ -45,9 +45,27 @@ TEST(Factory, SaysWhatRuns) {
   EXPECT_EQ(description.kernel, "spatial_2");
 }
 
+template <class Space>
+std::string_view chosen(int links, int stages, Iteration iteration = Iteration::automatic) {
+  RunOptions options;
+  options.stages = stages;
+  options.iteration = iteration;
+  return make_integrator(equal_chain<Space>(links), options)->describe().solver;
+}
+
+TEST(Factory, ChoosesTheFasterSolver) {
+  for (int stages = 1; stages <= max_stages; ++stages) {
+    EXPECT_EQ(chosen<Planar>(1, stages), "dense");
+    EXPECT_EQ(chosen<Planar>(2, stages), stages > 2 ? "dense" : "chain");
+    EXPECT_EQ(chosen<Planar>(3, stages), stages > 3 ? "dense" : "chain");
+    EXPECT_EQ(chosen<Planar>(4, stages), "chain");
+    EXPECT_EQ(chosen<Spatial>(1, stages), "chain");
+  }
+  EXPECT_EQ(chosen<Planar>(2, 8, Iteration::newton), "chain");
+}
+
 TEST(Factory, ChoosesTheChainSolverForAnyNumberOfLinks) {
   RunOptions options;
-  EXPECT_EQ(make_integrator(equal_chain<Planar>(1), options)->describe().solver, "chain");
   const auto integrator = make_integrator(equal_chain<Spatial>(40), options);
   EXPECT_EQ(integrator->describe().solver, "chain");
   EXPECT_EQ(integrator->describe().kernel, "");

@@ -46,12 +46,20 @@ std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const Ru
                                   Space::dof * chain.links, chain.links, options, "");
 }
 
-// In momentum form the chain solver is the faster one, on one spatial link with one stage as fast as the dense one,
-// which cannot pass a pole (table "few links" in docs/benchmarks.md). The velocity form is the dense solver's alone,
-// and only that needs a kernel.
-Solver solver_for(const RunOptions& options) {
+// On few links in the plane fixed points over the generated kernel take less, whatever the registers are (table "few
+// links" in docs/benchmarks.md). In space kernels cannot pass a pole.
+template <class Space>
+bool kernel_is_faster(int links, const RunOptions& options) {
+  if (Space::dof != 1 || options.iteration == Iteration::newton || find_kernel<Space>(links) == nullptr) return false;
+  return links == 1 || (links <= 3 && options.stages > links);
+}
+
+// The velocity form is the dense solver's alone.
+template <class Space>
+Solver solver_for(int links, const RunOptions& options) {
   if (options.solver != Solver::automatic) return options.solver;
-  return options.form == Form::velocity ? Solver::dense : Solver::chain;
+  const bool dense = options.form == Form::velocity || kernel_is_faster<Space>(links, options);
+  return dense ? Solver::dense : Solver::chain;
 }
 
 }  // namespace
@@ -60,7 +68,8 @@ template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options) {
   if (is_explicit(options.method)) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
-  if (solver_for(options) == Solver::chain) return make_chain_integrator(chain_of<Space>(chain), options);
+  if (solver_for<Space>(chain.links, options) == Solver::chain)
+    return make_chain_integrator(chain_of<Space>(chain), options);
   return require_kernel<Space>(chain.links).make(chain, options);
 }
 
