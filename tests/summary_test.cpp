@@ -7,11 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/run_record.hpp>
 #include <set>
 #include <string>
 #include <vector>
-
-#include "io/run_record.hpp"
 
 namespace pendula::io {
 namespace {
@@ -52,7 +51,7 @@ Summary summary_of_a_run() {
   summary.duration = 10;
   summary.every = 5;
   summary.statistics = {1000, 2, 3000};
-  summary.wall_seconds = 0.25;
+  summary.stepping_seconds = 0.25;
   summary.energy_error = {-1.5, 100, 1e-12};
   summary.energy_final = -1.25;
   summary.shown = {"x_2", "y_2", "z_2"};
@@ -156,7 +155,10 @@ TEST(Summary, EnergiesThatAreNotKnownAreADash) {
 
 TEST(Summary, AFailedStepIsToldInFull) {
   Summary summary = summary_of_a_run();
-  summary.ending = ending_of({Status::not_converged, 0.5, 0.25, 50, 1e-3, 1});
+  RunReport report;
+  report.end = RunEnd::step_failed;
+  report.step = {Status::not_converged, 0.5, 0.25, 50, 1e-3, 1};
+  summary.ending = ending_of(report);
   const json outcome = json::parse(to_json(summary)).at("outcome");
   EXPECT_EQ(outcome.at("status"), "not_converged");
   EXPECT_EQ(outcome.at("t"), 0.5);

@@ -117,7 +117,7 @@ TEST(Trajectory, FileHoldsHeaderAndRows) {
   const ScratchFile scratch;
   TrajectoryFile file(scratch.path(), subject_of<Spatial>(2).columns());
   for (int i = 0; i < 3; ++i) file.write(row_of(i));
-  file.close();
+  file.finish();
   EXPECT_EQ(file.rows(), 3);
   const std::vector<std::string> lines = scratch.lines();
   ASSERT_EQ(lines.size(), 4u);
@@ -129,7 +129,7 @@ TEST(Trajectory, ManyRowsGoThroughManyBlocks) {
   const ScratchFile scratch;
   TrajectoryFile file(scratch.path(), subject_of<Spatial>(2).columns());
   for (int i = 0; i < 5000; ++i) file.write(row_of(i));
-  file.close();
+  file.finish();
   const std::vector<std::string> lines = scratch.lines();
   ASSERT_EQ(lines.size(), 5001u);
   for (int i = 0; i < 5000; ++i) ASSERT_EQ(numbers_of(lines[static_cast<std::size_t>(i) + 1]).back(), i);
@@ -161,7 +161,7 @@ TEST(Trajectory, AFullDiskIsAnOutputError) {
   const auto fill = [&](int rows) {
     TrajectoryFile file("/dev/full", subject_of<Planar>(1).columns());
     for (int i = 0; i < rows; ++i) file.write(std::vector<double>(6, 0.0));
-    file.close();
+    file.finish();
   };
   EXPECT_THROW(fill(0), OutputError);       // seen when closing
   EXPECT_THROW(fill(100000), OutputError);  // seen on the way

@@ -18,10 +18,10 @@
 #include <variant>
 #include <vector>
 
+#include <pendula/numeric/number_text.hpp>
 #include "cli/commands.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
-#include "io/number.hpp"
 #include "io/scenario.hpp"
 
 namespace pendula::cli {
@@ -214,8 +214,8 @@ double followed_time(const Subject& subject, const Motion& start) {
 
 void print(const CheckLine& line) {
   std::cout << std::left << std::setw(17) << line.kernel << std::setw(46) << line.what << std::right << std::setw(10)
-            << io::rounded(line.measured, 3) << (line.at_least ? "  >= " : "  <= ") << std::left << std::setw(8)
-            << io::rounded(line.limit, 3) << (line.ok() ? "ok" : "FAILED") << '\n';
+            << rounded(line.measured, 3) << (line.at_least ? "  >= " : "  <= ") << std::left << std::setw(8)
+            << rounded(line.limit, 3) << (line.ok() ? "ok" : "FAILED") << '\n';
 }
 
 /// What came of all lines so far.

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/number.hpp"
+#include <pendula/numeric/number_text.hpp>
 #include "io/system_reader.hpp"
 #include "io/toml_reader.hpp"
 

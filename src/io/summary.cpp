@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <exception>
 #include <nlohmann/json.hpp>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/version.hpp>
 #include <sstream>
 #include <string_view>
 
-#include "io/number.hpp"
+#include "io/line_file.hpp"
 
 namespace pendula::io {
 namespace {
@@ -212,8 +214,8 @@ std::string statistics(const Summary& summary) {
     text += line("iterations", std::to_string(counts.newton_iterations),
                  rounded(a_step(static_cast<double>(counts.newton_iterations)), 4) + " a step");
   }
-  return text + line("stepping time", duration_text(summary.wall_seconds),
-                     duration_text(a_step(summary.wall_seconds)) + " a step");
+  return text + line("stepping time", duration_text(summary.stepping_seconds),
+                     duration_text(a_step(summary.stepping_seconds)) + " a step");
 }
 
 std::string energies(const Summary& summary) {
@@ -255,15 +257,34 @@ std::string ending(const Summary& summary) {
   return text;
 }
 
-}  // namespace
-
 Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates) {
-  if (outcome) return {};
   std::string status = name_of(outcome.status);
   std::ranges::replace(status, ' ', '_');
   const bool is_named = outcome.part >= 0 && !coordinates.empty();
   const auto part = static_cast<std::size_t>(outcome.part);
   return {status, message(outcome, coordinates), outcome, is_named ? std::string(coordinates[part]) : ""};
+}
+
+}  // namespace
+
+Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates) {
+  switch (report.end) {
+    case RunEnd::complete:
+      return {};
+    case RunEnd::stopped:
+      return {"interrupted", "interrupted at t = " + shortest(report.last.time), {}, {}};
+    case RunEnd::step_failed:
+      return ending_of(report.step, coordinates);
+    case RunEnd::not_finite:
+      return {"not_finite", "at t = " + shortest(report.step.time) + ": the energy is not a finite number", {}, {}};
+    case RunEnd::observer_failed:
+      break;
+  }
+  try {
+    std::rethrow_exception(report.failure);
+  } catch (const OutputError& error) {
+    return {"output_failed", error.what(), {}, {}};
+  }
 }
 
 ModelSummary model_summary(const std::string& scenario, const SystemSubject& system) {
@@ -323,7 +344,7 @@ std::string to_json(const Summary& summary) {
                    {"energy_initial", summary.energy_error.initial},
                    {"energy_final", summary.energy_final},
                    {"energy_error_max", summary.energy_error.largest},
-                   {"wall_seconds", summary.wall_seconds},
+                   {"wall_seconds", summary.stepping_seconds},
                    {"outcome", to_json(summary.ending)},
                    {"warnings", summary.warnings},
                    {"final", summary.model.space.empty() ? to_json(summary.system) : to_json(summary.final)}});

@@ -6,7 +6,7 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/run/integrator.hpp>
+#include <pendula/run/run.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "io/natural_units.hpp"
-#include "io/run_record.hpp"
 
 namespace pendula::io {
 
@@ -59,30 +58,23 @@ struct Ending {
   bool ok() const { return message.empty(); }
 };
 
-/// Everything that is told about a run.
-struct Summary {
+/// Everything that is told about a run; the text leaves warnings out, since they were told as they came.
+struct Summary : RunReport {
   ModelSummary model;
-  RunOptions run;           ///< as asked for
-  Description description;  ///< as it ran
-  double duration = 0;      ///< as asked for
+  RunOptions run;       ///< as asked for
+  double duration = 0;  ///< as asked for
   std::int64_t every = 0;
   Ending ending;
-  std::vector<std::string> warnings;  ///< sentences; the text leaves them out, since they were told as they came
-  Statistics statistics;
-  double wall_seconds = 0;  ///< in the stepping loop alone
-  EnergyError energy_error;
-  double energy_final = 0;
-  std::vector<TableRow> table;
   std::vector<std::string> shown;         ///< columns of the table
   Snapshot final;                         ///< the last state reached, of a chain
   SystemSnapshot system;                  ///< of any other system
-  std::int64_t rows = 0;                  ///< that were taken
-  std::optional<std::string> trajectory;  ///< the file that they were written to; "-" is standard output
+  std::optional<std::string> trajectory;  ///< the file that rows were written to; "-" is standard output
   std::int64_t rows_written = 0;          ///< that are in this file: fewer, where the disk is full
 };
 
-/// How a run ended that ended with `outcome`; `coordinates` as pendula::message takes them.
-Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates = {});
+/// How a run ended; `coordinates` as pendula::message takes them. What an observer threw is thrown again, but for
+/// OutputError.
+Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates = {});
 
 template <class Space>
 ModelSummary model_summary(const std::string& scenario, const Chain<Space>& chain,

@@ -7,8 +7,8 @@
 #include <pendula/run/library.hpp>
 #include <set>
 
+#include <pendula/numeric/number_text.hpp>
 #include "io/nearest_name.hpp"
-#include "io/number.hpp"
 
 namespace pendula::io {
 namespace {

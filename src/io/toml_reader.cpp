@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <system_error>
 
+#include <pendula/numeric/number_text.hpp>
 #include "io/nearest_name.hpp"
-#include "io/number.hpp"
 #include "io/toml_nesting.hpp"
 
 namespace pendula::io {

@@ -1,6 +1,6 @@
 #include "io/trajectory.hpp"
 
-#include "io/number.hpp"
+#include <pendula/numeric/number_text.hpp>
 
 namespace pendula::io {
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <pendula/run/observer.hpp>
 #include <span>
 #include <string>
 
@@ -16,7 +17,7 @@ void append_header(std::string& text, std::span<const std::string> columns);
 void append_row(std::string& text, std::span<const double> numbers);
 
 /// A trajectory as a CSV file of whole rows.
-class TrajectoryFile {
+class TrajectoryFile : public Observer {
  public:
   /// Opens the file, as LineFile does, and begins it with the header. Throws InputError where it cannot be opened.
   TrajectoryFile(const std::string& file, std::span<const std::string> columns) : file_(file) {
@@ -24,13 +25,14 @@ class TrajectoryFile {
   }
 
   /// Throws OutputError where rows cannot be written.
+  void take(const Row& row) override { write(row.numbers); }
   void write(std::span<const double> numbers) {
     append_row(file_.pending(), numbers);
     file_.flush_if_due();
   }
 
   /// Writes what is left and closes the file. Throws OutputError.
-  void close() { file_.close(); }
+  void finish() override { file_.close(); }
 
   /// Rows that are in the file.
   std::int64_t rows() const { return std::max<std::int64_t>(file_.lines() - 1, 0); }

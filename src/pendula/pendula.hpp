@@ -12,7 +12,9 @@
 #include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/gauss/velocity_newton.hpp>
+#include <pendula/run/chain_subject.hpp>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/run.hpp>
 #include <pendula/run/simulation.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>

@@ -29,8 +29,8 @@ KNOWS = {
         "pendula/system",
         "pendula/numeric",
     },
-    "io": {"pendula/run", "pendula/chain", "pendula/system"},
-    "cli": {"io", "pendula/run", "pendula/chain", "pendula/system"},
+    "io": {"pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
+    "cli": {"io", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
 }
 GENERATED = {"pendula/kernels"}
 

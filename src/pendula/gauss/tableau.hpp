@@ -67,10 +67,9 @@ inline constexpr GeneratedTableau generated_tableau{Generated::stages,
 
 template <class Real, class Numbers>
 void copy(const double* from, int stages, Numbers& to) {
-  const Eigen::Index columns = Numbers::ColsAtCompileTime == 1 ? 1 : stages;
-  to.resize(stages, columns);
-  for (Eigen::Index i = 0; i < stages; ++i) {
-    for (Eigen::Index j = 0; j < columns; ++j) to(i, j) = static_cast<Real>(from[i * columns + j]);
+  to.resize(stages, Numbers::ColsAtCompileTime == 1 ? 1 : stages);
+  for (Eigen::Index i = 0; i < to.rows(); ++i) {
+    for (Eigen::Index j = 0; j < to.cols(); ++j) to(i, j) = static_cast<Real>(from[i * to.cols() + j]);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/invariants.hpp>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/subject.hpp>
 
 namespace pendula {
@@ -29,6 +30,23 @@ class ChainSubject : public Subject {
   std::optional<double> energy_scale() const override { return pendula::energy_scale(chain_); }
   bool loaded() const override { return chain_.loaded(); }
   bool damped() const override { return chain_.damped(); }
+
+  /// Damping so strong that a Gauss step does not follow it: Gauss methods are A-stable, but do not damp what they do
+  /// not resolve. The rate is that of a link alone, λ/l² (1/m_i + 1/m_{i−1}).
+  std::vector<std::string> expected_trouble(const RunOptions& options) const override {
+    if (options.method != Method::gauss) return {};
+    static constexpr double followed = 5;  // of one step, where e^{-x} is 0.7 %
+    for (int i = 0; i < chain_.links(); ++i) {
+      const double inverse_mass = 1 / chain_.masses()[i] + (i == 0 ? 0 : 1 / chain_.masses()[i - 1]);
+      const double rate = chain_.damping()[i] * inverse_mass / (chain_.lengths()[i] * chain_.lengths()[i]);
+      if (rate * options.step <= followed) continue;
+      return {"damping stops link " + std::to_string(i + 1) + " within " + shortest(1 / rate) +
+              " s, far less than run.step: its velocities may be wrong; run.method = \"radau\" is made for that"};
+    }
+    return {};
+  }
+
+  bool has_poles() const override { return Space::dof == 2; }
 
   /// `t`, per link `theta_i` (`phi_i`) `theta_dot_i` (`phi_dot_i`), bobs `x_i` `y_i` (`z_i`), `energy`.
   std::vector<std::string> columns() const override {

@@ -41,6 +41,11 @@ class Subject {
   virtual bool loaded() const = 0;
   virtual bool damped() const = 0;
 
+  /// Why a run with these options would be wrong, known beforehand: one sentence each.
+  virtual std::vector<std::string> expected_trouble(const RunOptions& options) const = 0;
+  /// Whether the dense solver's coordinates fail somewhere.
+  virtual bool has_poles() const = 0;
+
   /// Columns of a trajectory: time, coordinates, rates, points, energy; and the numbers of one row.
   virtual std::vector<std::string> columns() const = 0;
   virtual void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;

@@ -67,6 +67,8 @@ class SystemSubject : public Subject {
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return entry_->loaded(numbers_.plain()); }
   bool damped() const override { return loaded(); }
+  std::vector<std::string> expected_trouble(const RunOptions&) const override { return {}; }
+  bool has_poles() const override { return false; }
 
   /// `t`, coordinates, their rates, components of the points, `energy`.
   std::vector<std::string> columns() const override {

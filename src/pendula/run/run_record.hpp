@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace pendula::io {
+namespace pendula {
 
 /// Energy errors |H − H₀|, relative to Σ M_i |g| l_i of a chain, or to |H₀| where there is no gravity; of any other
 /// system to the largest |T| + |U| over the rows.
@@ -122,4 +122,4 @@ class RunRecord {
   std::vector<TableRow> table_;
 };
 
-}  // namespace pendula::io
+}  // namespace pendula

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-namespace pendula::io {
+namespace pendula {
 
 /// Characters that any double needs in any of the formats below.
 inline constexpr std::size_t longest_number = 32;
@@ -33,4 +33,4 @@ inline std::string shortest(double value) {
   return {text.data(), end.ptr};
 }
 
-}  // namespace pendula::io
+}  // namespace pendula

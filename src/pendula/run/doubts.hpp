@@ -1,0 +1,103 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/run_record.hpp>
+#include <pendula/run/run_report.hpp>
+#include <pendula/run/simulation.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+namespace detail {
+
+using Doubt = std::optional<std::string>;
+
+inline std::string smaller_step_advice(const RunOptions& run) {
+  if (is_adaptive(run.method)) return "a smaller run.tolerance may help";
+  if (run.method == Method::rk4) return "a smaller run.step, or run.method = \"gauss\", may help";
+  return run.stages < 4 ? "a smaller run.step or more run.stages may help" : "a smaller run.step may help";
+}
+
+/// The energy of an undamped motion is known, that of a damped one at least never grows.
+inline Doubt of_energy(const Subject& subject, const RunOptions& run, const EnergyBalance& balance) {
+  static constexpr double trusted = 1e-3;
+  if (is_explicit(run.method) && subject.loaded()) return {};  // nobody adds up the work
+  const bool sinks = run.method == Method::radau && subject.damped();
+  const double off = sinks ? balance.most : std::max(balance.most, -balance.least);
+  if (off <= trusted) return {};
+  const std::string whole = subject.coordinates().empty() ? "of all that the chain has; " : "of all that moved; ";
+  return "energy is off by " + rounded(off, 2) + " " + whole + smaller_step_advice(run);
+}
+
+inline Doubt of_defect(const RunOptions& run, double defect) {
+  static constexpr double trusted = 0.02;
+  if (defect <= trusted || run.stages == 1) return {};
+  return "a step missed the velocity by " + rounded(defect, 2) + " of the fastest; " + smaller_step_advice(run);
+}
+
+/// Near a pole φ moves faster than steps follow, even in parts.
+inline Doubt of_pole(const Subject& subject, const RunReport& report) {
+  const std::int64_t rejected = report.statistics.rejected_steps;
+  if (!subject.has_poles() || report.description.solver != "dense" || rejected == 0) return {};
+  return "the dense solver came near a pole of (theta, phi) and took " + std::to_string(rejected) +
+         " steps in parts; run.solver = \"chain\" knows no pole";
+}
+
+/// Whether a second run is worth its time: none that was wrong had followed the motion so closely.
+inline bool is_doubtful(const RunOptions& run, const Statistics& statistics) {
+  return run.method != Method::gauss || statistics.largest_defect > 2e-5;
+}
+
+/// Runs again with longer steps, or a tolerance a hundred times as large: where that ends elsewhere, the steps or the
+/// chaos of the motion decide where. Steps of twice the length, where some were taken in parts, would be taken in the
+/// same parts again.
+inline Doubt of_step(const RunSetup& setup, const RunReport& report, const std::function<bool()>& stop) {
+  static constexpr double trusted = 0.01;
+  const bool in_parts = report.statistics.rejected_steps > 0;
+  RunOptions coarser = setup.options;
+  coarser.step *= in_parts ? 3 : 2;
+  coarser.tolerance *= 100;
+  const auto integrator = setup.subject->make_integrator(coarser);
+  const double step = is_adaptive(coarser.method) ? std::numeric_limits<double>::infinity() : coarser.step;
+  Motion other = setup.start;
+  const RunResult result = simulate(
+      *integrator, setup.start, {step, setup.duration, std::numeric_limits<std::int64_t>::max()},
+      [&](const Motion& motion) { other = motion; }, stop);
+  if (result.stopped) return {};
+  const double off =
+      result.outcome ? setup.subject->distance(report.last, other) : std::numeric_limits<double>::infinity();
+  if (off <= trusted) return {};
+  const std::string what = is_adaptive(coarser.method) ? "with a hundred times the tolerance"
+                           : in_parts                  ? "with three times the step"
+                                                       : "with twice the step";
+  return what + " the motion ends " +
+         (std::isfinite(off) ? "elsewhere, by " + rounded(off, 2) + " of its size" : "before its time") +
+         ": the last state cannot be trusted; " + smaller_step_advice(setup.options);
+}
+
+}  // namespace detail
+
+/// What makes a run that ended well doubtful all the same, one sentence each. `stop` ends the search. Measured on
+/// random chains: docs/method.md.
+inline std::vector<std::string> doubts(const RunSetup& setup, const RunReport& report, const EnergyBalance& balance,
+                                       const std::function<bool()>& stop) {
+  std::vector<std::string> doubts;
+  const auto add = [&](detail::Doubt doubt) {
+    if (doubt) doubts.push_back(*std::move(doubt));
+  };
+  add(detail::of_energy(*setup.subject, setup.options, balance));
+  add(detail::of_defect(setup.options, report.statistics.largest_defect));
+  add(detail::of_pole(*setup.subject, report));
+  if (detail::is_doubtful(setup.options, report.statistics)) add(detail::of_step(setup, report, stop));
+  return doubts;
+}
+
+}  // namespace pendula

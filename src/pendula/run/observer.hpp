@@ -1,0 +1,31 @@
+#pragma once
+
+#include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <span>
+
+namespace pendula {
+
+/// One row of a run.
+struct Row {
+  const Motion& motion;
+  const Observation& seen;
+  std::span<const double> numbers;  ///< in the order of Subject::columns
+};
+
+/// Takes the rows of a run: a file, a picture, a line that shows how far it is. What it throws ends the run, which
+/// keeps all that it has.
+class Observer {
+ public:
+  Observer() = default;
+  Observer(const Observer&) = delete;
+  Observer& operator=(const Observer&) = delete;
+  virtual ~Observer() = default;
+
+  virtual void take(const Row& row) = 0;
+
+  /// After the last row, however the run ended.
+  virtual void finish() {}
+};
+
+}  // namespace pendula

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cmath>
+#include <exception>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <pendula/run/doubts.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/observer.hpp>
+#include <pendula/run/run_record.hpp>
+#include <pendula/run/run_report.hpp>
+#include <pendula/run/simulation.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// One run of anything that moves, once.
+class Run {
+ public:
+  /// Throws std::invalid_argument on options that make no sense, NoKernel.
+  explicit Run(RunSetup setup);
+
+  /// What is odd about it already: one sentence each.
+  std::vector<std::string> expected_trouble() const { return setup_.subject->expected_trouble(setup_.options); }
+
+  /// Hands every row to `observer`, which must outlive the run.
+  void add(Observer& observer) { observers_.push_back(&observer); }
+
+  /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons to doubt what came out,
+  /// which may take a second run with longer steps. A run that fails throws nothing: the report says so.
+  RunReport go(const std::function<bool()>& stop = [] { return false; });
+
+ private:
+  /// Ends a run at a state that is no row.
+  struct NotFinite {};
+
+  void integrate(const std::function<bool()>& stop, RunReport& report);
+  void take(const Motion& motion);
+  void finish(RunReport& report);
+
+  RunSetup setup_;
+  std::unique_ptr<Integrator> integrator_;
+  std::vector<Observer*> observers_;
+  RunRecord record_;
+  std::vector<double> row_;
+};
+
+inline Run::Run(RunSetup setup)
+    : setup_(std::move(setup)),
+      integrator_(setup_.subject->make_integrator(setup_.options)),
+      record_(*setup_.subject, setup_.duration) {}
+
+inline RunReport Run::go(const std::function<bool()>& stop) {
+  RunReport report;
+  report.stepping_seconds = std::nan("");
+  integrate(stop, report);
+  finish(report);
+  report.last = record_.rows() > 0 ? record_.last() : setup_.start;
+  report.rows = record_.rows();
+  report.description = integrator_->describe();
+  report.statistics = integrator_->statistics();
+  report.energy_error = record_.energy_error();
+  report.energy_final = record_.energy();
+  report.table = record_.table();
+  if (report.end == RunEnd::complete) report.warnings = doubts(setup_, report, record_.balance(), stop);
+  return report;
+}
+
+inline void Run::integrate(const std::function<bool()>& stop, RunReport& report) {
+  const RunOptions& options = setup_.options;
+  const double largest_step = is_adaptive(options.method) ? std::numeric_limits<double>::infinity() : options.step;
+  const Schedule schedule{largest_step, setup_.duration, setup_.every};
+  try {
+    const RunResult result = simulate(
+        *integrator_, setup_.start, schedule, [&](const Motion& motion) { take(motion); }, stop);
+    report.stepping_seconds = result.stepping_seconds;
+    report.step = result.outcome;
+    report.end = !result.outcome ? RunEnd::step_failed : result.stopped ? RunEnd::stopped : RunEnd::complete;
+  } catch (const NotFinite&) {
+    report.end = RunEnd::not_finite;
+    report.step.time = integrator_->time();
+  } catch (...) {
+    report.end = RunEnd::observer_failed;
+    report.failure = std::current_exception();
+  }
+}
+
+// The energy is not finite wherever anything else is not.
+inline void Run::take(const Motion& motion) {
+  const Observation seen = setup_.subject->observe(motion);
+  if (!std::isfinite(seen.energy)) throw NotFinite();
+  row_.clear();
+  setup_.subject->append_row(motion, seen, row_);
+  record_.add(motion, seen, row_, integrator_->statistics().load_work);
+  for (Observer* observer : observers_) observer->take({motion, seen, row_});
+}
+
+// The first failure is the one that is told.
+inline void Run::finish(RunReport& report) {
+  for (Observer* observer : observers_) {
+    try {
+      observer->finish();
+    } catch (...) {
+      if (report.end != RunEnd::complete && report.end != RunEnd::stopped) continue;
+      report.end = RunEnd::observer_failed;
+      report.failure = std::current_exception();
+    }
+  }
+}
+
+}  // namespace pendula

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <pendula/run/run_record.hpp>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
+#include <string>
+#include <vector>
+
+namespace pendula {
+
+/// What is run, from where, and how.
+struct RunSetup {
+  std::shared_ptr<const Subject> subject;
+  Motion start;
+  RunOptions options;
+  double duration = 10;     ///< s
+  std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
+};
+
+/// Why a run was over.
+enum class RunEnd {
+  complete,         ///< it came to its end
+  stopped,          ///< it was asked to stop
+  step_failed,      ///< RunReport::step says how
+  not_finite,       ///< the energy of its last state is not a number; that state is no row
+  observer_failed,  ///< RunReport::failure is what an observer threw
+};
+
+/// All that is known of a run when it is over. A run that failed has everything up to there.
+struct RunReport {
+  RunEnd end = RunEnd::complete;
+  Outcome step;                ///< the last one
+  std::exception_ptr failure;  ///< of an observer
+  Motion last;                 ///< the last state that is a row; the start where none is
+  std::int64_t rows = 0;
+  Description description;
+  Statistics statistics;
+  double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN where a row ended the run
+  EnergyError energy_error;
+  double energy_final = 0;            ///< of the last row  [J]
+  std::vector<TableRow> table;        ///< a few rows, evenly over the run, the last one among them
+  std::vector<std::string> warnings;  ///< why not to trust a run that ended well: one sentence each
+};
+
+}  // namespace pendula

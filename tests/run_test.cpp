@@ -1,0 +1,125 @@
+// A run as a program of one's own makes it: who is told its rows, how it ends, what is left of it then.
+
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/run.hpp>
+#include <stdexcept>
+
+#include "support/random_chain.hpp"
+#include "support/run.hpp"
+
+namespace pendula::test {
+namespace {
+
+RunSetup double_pendulum(double duration) {
+  RunSetup setup{std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(2)),
+                 State<Planar>::from_angles(Eigen::Vector2d(1, 2)),
+                 {},
+                 duration,
+                 10};
+  setup.options.stages = 8;
+  setup.options.step = 0.01;
+  return setup;
+}
+
+class Listener : public Observer {
+ public:
+  explicit Listener(double until = 1e300) : until_(until) {}
+
+  void take(const Row& row) override {
+    if (row.motion.time > until_) throw std::runtime_error("no more");
+    EXPECT_EQ(row.numbers[0], row.motion.time);
+    EXPECT_EQ(row.numbers.back(), row.seen.energy);
+    ++rows;
+  }
+  void finish() override { ++finished; }
+
+  int rows = 0, finished = 0;
+
+ private:
+  double until_;
+};
+
+TEST(Run, HandsEveryRowToEveryObserver) {
+  Listener one, two;
+  pendula::Run run(double_pendulum(1));
+  run.add(one);
+  run.add(two);
+  const RunReport report = run.go();
+  EXPECT_EQ(report.end, RunEnd::complete);
+  EXPECT_EQ(report.rows, 11);
+  EXPECT_EQ(one.rows, 11);
+  EXPECT_EQ(two.rows, 11);
+  EXPECT_EQ(one.finished, 1);
+  EXPECT_EQ(report.last.time, 1);
+  EXPECT_EQ(report.table.size(), 11U);
+  EXPECT_EQ(report.statistics.steps, 100);
+  EXPECT_LT(report.energy_error.largest, 1e-14);  // measured 1.3e-15
+  EXPECT_GT(report.stepping_seconds, 0);
+  EXPECT_TRUE(report.warnings.empty());
+}
+
+TEST(Run, KeepsWhatItHasWhereAnObserverFails) {
+  Listener failing(0.55), other;
+  pendula::Run run(double_pendulum(1));
+  run.add(other);
+  run.add(failing);
+  const RunReport report = run.go();
+  EXPECT_EQ(report.end, RunEnd::observer_failed);
+  EXPECT_THROW(std::rethrow_exception(report.failure), std::runtime_error);
+  EXPECT_EQ(other.finished, 1);
+  EXPECT_NEAR(report.last.time, 0.6, 1e-15);  // the row was taken by all before
+}
+
+TEST(Run, EndsAtAStateThatIsNoRow) {
+  RunSetup setup = double_pendulum(1);
+  setup.start.v[0] = 1e200;  // finite, but its energy is not
+  Listener listener;
+  pendula::Run run(setup);
+  run.add(listener);
+  const RunReport report = run.go();
+  EXPECT_EQ(report.end, RunEnd::not_finite);
+  EXPECT_EQ(listener.rows, 0);
+  EXPECT_EQ(report.last.q, setup.start.q);
+}
+
+TEST(Run, StopsWhereItIsTold) {
+  int asked = 0;
+  const RunReport report = pendula::Run(double_pendulum(1)).go([&] { return ++asked == 25; });
+  EXPECT_EQ(report.end, RunEnd::stopped);
+  EXPECT_NEAR(report.last.time, 0.25, 1e-15);
+  EXPECT_EQ(report.rows, 4);
+}
+
+TEST(Run, SaysHowAStepFailed) {
+  RunSetup setup = double_pendulum(2e4);
+  setup.options.step = 1e4;
+  const RunReport report = pendula::Run(setup).go();
+  EXPECT_EQ(report.end, RunEnd::step_failed);
+  EXPECT_FALSE(report.step);
+  EXPECT_EQ(report.last.time, 0);
+}
+
+// Chaos decides where this ends: the same with twice the step ends elsewhere.
+TEST(Run, DoubtsAnEndThatLongerStepsDoNotReach) {
+  RunSetup setup = double_pendulum(60);
+  setup.options.stages = 2;
+  setup.start.q = Eigen::Vector2d(3, 3);
+  const RunReport report = pendula::Run(setup).go();
+  EXPECT_EQ(report.end, RunEnd::complete);
+  ASSERT_EQ(report.warnings.size(), 1U);
+  EXPECT_NE(report.warnings[0].find("with twice the step the motion ends elsewhere"), std::string::npos);
+}
+
+TEST(Run, ExpectsTroubleWhereDampingOutrunsTheStep) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::Vector2d::Ones();
+  parameters.damping = Eigen::Vector2d(0, 1e6);
+  RunSetup setup = double_pendulum(1);
+  setup.subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters));
+  const std::vector<std::string> trouble = pendula::Run(setup).expected_trouble();
+  ASSERT_EQ(trouble.size(), 1U);
+  EXPECT_EQ(trouble[0].find("damping stops link 2 within 5e-07 s"), 0U) << trouble[0];
+}
+
+}  // namespace
+}  // namespace pendula::test
