@@ -34,13 +34,14 @@ inline Doubt of_energy(const Subject& subject, const RunOptions& run, const Ener
   const double off = sinks ? balance.most : std::max(balance.most, -balance.least);
   if (off <= trusted) return {};
   const std::string whole = subject.coordinates().empty() ? "of all that the chain has; " : "of all that moved; ";
-  return "energy is off by " + rounded(off, 2) + " " + whole + smaller_step_advice(run);
+  return "energy is off by " + pendula::rounded(off, 2) + " " + whole + smaller_step_advice(run);
 }
 
 inline Doubt of_defect(const RunOptions& run, double defect) {
   static constexpr double trusted = 0.02;
   if (defect <= trusted || run.stages == 1) return {};
-  return "a step missed the velocity by " + rounded(defect, 2) + " of the fastest; " + smaller_step_advice(run);
+  return "a step missed the velocity by " + pendula::rounded(defect, 2) + " of the fastest; " +
+         smaller_step_advice(run);
 }
 
 /// Near a pole φ moves faster than steps follow, even in parts.
@@ -79,7 +80,7 @@ inline Doubt of_step(const RunSetup& setup, const RunReport& report, const std::
                            : in_parts                  ? "with three times the step"
                                                        : "with twice the step";
   return what + " the motion ends " +
-         (std::isfinite(off) ? "elsewhere, by " + rounded(off, 2) + " of its size" : "before its time") +
+         (std::isfinite(off) ? "elsewhere, by " + pendula::rounded(off, 2) + " of its size" : "before its time") +
          ": the last state cannot be trusted; " + smaller_step_advice(setup.options);
 }
 
