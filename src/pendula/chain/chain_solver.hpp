@@ -103,6 +103,10 @@ class ChainSolver {
   }
 
   State state(double time) const { return stages_.state(time); }
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(stages_, choice_);
+  }
   void save() { stages_.save(); }
   void restore() { stages_.restore(); }
 

@@ -247,6 +247,15 @@ class ChainStages {
     last_h_ = step_;
   }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(state_, last_h_, fastest_, steps_);
+    for (int i = 0; i < links(); ++i) {
+      numbers(anchors_[i]);
+      numbers.range(stages_[i], (D + 1) * Z);
+    }
+  }
+
   /// The next step starts cold.
   void forget() { last_h_ = 0; }
 

@@ -140,6 +140,11 @@ class AngleAnchor {
 
   const Angles& angles() const { return q_; }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(u_, q_, reach_squared_);
+  }
+
  private:
   // Within it, angles near the anchor's are the only ones: in space a quarter of the distance from the axis.
   void set_reach() {

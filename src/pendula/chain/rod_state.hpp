@@ -83,6 +83,13 @@ class RodState {
     return heading;
   }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    for (int i = 0; i < links_; ++i) {
+      for (auto* part : {&along_, &along_low_, &free_, &free_low_, &gained_}) numbers.range((*part)[i], D);
+    }
+  }
+
   /// The rates ξ̇ of all rods, from the pivot out: visit(i, ξ̇_i, τ_i).
   template <class Visit>
   void for_each_rate(const Links& links, Visit visit) const {

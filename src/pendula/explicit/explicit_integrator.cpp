@@ -10,6 +10,7 @@
 #include <pendula/numeric/compensated.hpp>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -36,6 +37,7 @@ class ExplicitIntegrator : public PlainIntegrator {
  public:
   ExplicitIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel)
       : x_(2 * static_cast<std::size_t>(coordinates)),
+        rate_(x_.size()),
         dynamics_(std::move(dynamics)),
         parts_(parts),
         kernel_(kernel),
@@ -44,6 +46,7 @@ class ExplicitIntegrator : public PlainIntegrator {
   Outcome start(double time, const double* q, const double* v) override {
     time_.assign(time);
     statistics_ = {};
+    proposed_ = 0;
     const std::size_t k = x_.size() / 2;
     std::copy_n(v, k, std::copy_n(q, k, x_.begin()));
     return require_finite_rate();
@@ -59,6 +62,12 @@ class ExplicitIntegrator : public PlainIntegrator {
 
   const Statistics& statistics() const override { return statistics_; }
   Description describe() const override { return {"", "", kernel_}; }
+
+  void member(MemberNumbers& numbers) override {
+    numbers(time_, statistics_, proposed_);
+    numbers.range(x_.data(), x_.size());
+    numbers.range(rate_.data(), rate_.size());
+  }
 
  protected:
   RightHandSide& right_hand_side() { return right_hand_side_; }
@@ -78,16 +87,16 @@ class ExplicitIntegrator : public PlainIntegrator {
     return std::all_of(x.begin(), x.end(), [](double value) { return std::isfinite(value); });
   }
 
-  Vector x_;
+  Vector x_, rate_;      // rate: of the start, or what a method hands on from its last step
+  double proposed_ = 0;  // size of the next step, of an adaptive method; 0: not yet known
   Statistics statistics_;
 
  private:
   // At a pole the accelerations are infinite: better to say so than to start.
   Outcome require_finite_rate() {
-    Vector rate(x_.size());
-    right_hand_side()(x_, rate, time());
-    if (is_finite(rate)) return {Status::ok, time(), 0, 0, 0, -1};
-    return {Status::singular_mass_matrix, time(), 0, 0, 0, non_finite_part(rate)};
+    right_hand_side()(x_, rate_, time());
+    if (is_finite(rate_)) return {Status::ok, time(), 0, 0, 0, -1};
+    return {Status::singular_mass_matrix, time(), 0, 0, 0, non_finite_part(rate_)};
   }
 
   int non_finite_part(const Vector& x) const {
@@ -141,28 +150,21 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                      double tolerance)
       : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
-        tolerance_(tolerance),
-        stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
-
-  Outcome start(double time, const double* q, const double* v) override {
-    stepper_ = odeint::make_controlled<Stepper>(tolerance_, tolerance_);
-    proposed_ = 0;
-    return ExplicitIntegrator::start(time, q, v);
-  }
+        stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)),
+        next_(x_.size()),
+        next_rate_(x_.size()) {}
 
   Outcome step(double h) override {
     const bool cut = proposed_ > h;  // a step that is cut short says nothing about the size of the next one
     double tried = proposed_ == 0 ? std::min(h, first_step) : std::min(h, proposed_);
     for (int attempt = 0; attempt < max_attempts && tried > smallest_step(); ++attempt) {
       const double size = tried;
-      double at = time();
-      next_ = x_;
-      const bool accepted = stepper_.try_step(std::ref(right_hand_side()), next_, at, tried) == odeint::success;
-      if (!is_finite(next_) || !std::isfinite(tried)) {
-        stepper_ = odeint::make_controlled<Stepper>(tolerance_, tolerance_);  // it may keep a rate that is not finite
+      const bool accepted = try_step(tried);
+      if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(tried)) {
         tried = size / 8;
       } else if (accepted) {
         x_.swap(next_);
+        if (hands_on_rate) rate_.swap(next_rate_);
         if (!cut || tried < size) proposed_ = tried;
         return accept(size);
       }
@@ -172,15 +174,25 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   }
 
  private:
+  // The rate is kept here, not in the stepper, whose memory is no part of the member.
+  bool try_step(double& tried) {
+    double at = time();
+    if constexpr (hands_on_rate) {
+      return stepper_.try_step(std::ref(right_hand_side()), x_, rate_, at, next_, next_rate_, tried) == odeint::success;
+    } else {
+      return stepper_.try_step(std::ref(right_hand_side()), x_, at, next_, tried) == odeint::success;
+    }
+  }
+
   double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
 
+  static constexpr bool hands_on_rate =
+      std::is_same_v<typename Stepper::stepper_category, odeint::explicit_error_stepper_fsal_tag>;
   static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
   static constexpr int max_attempts = 100;
 
-  double tolerance_;
   typename odeint::result_of::make_controlled<Stepper>::type stepper_;
-  double proposed_ = 0;
-  Vector next_;
+  Vector next_, next_rate_;
 };
 
 }  // namespace

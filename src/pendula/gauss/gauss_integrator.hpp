@@ -52,6 +52,7 @@ class GaussIntegrator : public PlainIntegrator {
     Numbers(v, coordinates()) = state.v;
   }
   const Statistics& statistics() const override { return stepper_.statistics(); }
+  void member(MemberNumbers& numbers) override { numbers(stepper_); }
   Description describe() const override {
     return {described_.solver, name_of(stepper_.solver().iteration()), described_.kernel};
   }

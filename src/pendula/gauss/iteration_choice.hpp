@@ -39,6 +39,11 @@ class IterationChoice {
     }
   }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(preferred_, spent_, gave_up_, steps_);
+  }
+
   void count_iteration() { ++iterations_[index(active_)]; }
 
   /// A fixed point that does not contract leaves the rest of the step to Newton.

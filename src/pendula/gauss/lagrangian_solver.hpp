@@ -90,6 +90,10 @@ class LagrangianSolver {
 
   State state(double time) const { return {time, stages_.position(), stages_.velocity(time)}; }
   Vector momentum() const { return stages_.momentum(); }
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(stages_, choice_);
+  }
   void save() { stages_.save(); }
   void restore() { stages_.restore(); }
 

@@ -71,6 +71,10 @@ class LagrangianStages {
     return v;
   }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(time_, q_, p_, U_, last_h_, masses_, weight_, fastest_, most_kinetic_, steps_);
+  }
   void save() { saved_ = {q_, p_, time_}; }
   void restore() {
     q_ = saved_.q;
@@ -296,7 +300,7 @@ class LagrangianStages {
   detail::StageColumns<Eigen::Dynamic, double, Width> columns_;
   typename S::template Parameters<L> parameters_;
   typename S::template Inputs<L> inputs_;
-  alignas(pack_alignment) Stored U_[2 * count];
+  alignas(pack_alignment) Stored U_[2 * count]{};
   State q_, p_;
   struct {
     State q, p;

@@ -41,7 +41,11 @@ class RoundoffStop {
     return convergence == Convergence::linear ? linear_done() : quadratic_done();
   }
 
-  double last() const { return last_[0]; }
+  /// What is remembered from step to step.
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(convergence_, constant_, steps_);
+  }
 
  private:
   // A fixed point on velocities and forces is two interleaved sequences: velocities follow from the forces of the

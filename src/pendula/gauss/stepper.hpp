@@ -47,6 +47,12 @@ class GaussStepper {
   double time() const { return time_.value; }
   State state() const { return solver_.state(time()); }
   const Statistics& statistics() const { return statistics_; }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(time_, statistics_, at_roundoff_, solver_);
+  }
+
   const Solver& solver() const { return solver_; }
 
   /// A failing step is tried in parts down to this fraction of it.

@@ -37,7 +37,9 @@ class VelocityNewton {
         model_(model),
         coefficients_(tableau_of<Eigen::Dynamic>(family, stages)),
         system_(stages),
-        at_(static_cast<std::size_t>(stages)) {}
+        at_(static_cast<std::size_t>(stages)) {
+    for (Stage& stage : at_) stage.last_a.setZero();
+  }
 
   Status start(const State& state) {
     forget();
@@ -129,6 +131,11 @@ class VelocityNewton {
     for (Stage& stage : at_) stage.last_a = stage.a;
   }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(time_, q_, v_, acceleration_, last_h_, masses_, fastest_, most_kinetic_);
+    for (Stage& stage : at_) numbers(stage.last_a);
+  }
   void save() { saved_ = {q_, v_}; }
 
   void restore() {

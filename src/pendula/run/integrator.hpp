@@ -6,6 +6,7 @@
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/plain_chain.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/system/member.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
@@ -53,6 +54,30 @@ class Integrator {
   }
 
   const Statistics& statistics() const { return integrator_->statistics(); }
+
+  /// A copy of all that the next steps depend on.
+  Member member() const {
+    MemberNumbers counted(MemberNumbers::Pass::count);
+    integrator_->member(counted);
+    Member member{std::vector<double>(counted.count())};
+    MemberNumbers read(MemberNumbers::Pass::read, member.numbers.data());
+    integrator_->member(read);
+    return member;
+  }
+
+  /// Goes on where the integrator was that `member` is a copy of, to the last bit; instead of `start`. Throws
+  /// std::invalid_argument on a member of another system or of other options.
+  void resume(const Member& member) {
+    MemberNumbers counted(MemberNumbers::Pass::count);
+    integrator_->member(counted);
+    if (counted.count() != member.numbers.size()) {
+      throw std::invalid_argument("member: expected " + std::to_string(counted.count()) +
+                                  " numbers for these options, got " + std::to_string(member.numbers.size()));
+    }
+    std::vector<double> numbers = member.numbers;
+    MemberNumbers write(MemberNumbers::Pass::write, numbers.data());
+    integrator_->member(write);
+  }
 
   Description describe() const {
     const auto [solver, iteration, kernel] = integrator_->describe();

@@ -50,6 +50,11 @@ class MassScale {
     }
   }
 
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(inertia_, pivot_, largest_, singular_);
+  }
+
   /// M_kk, where it was looked at last.
   double inertia(std::size_t k) const { return inertia_[k]; }
 

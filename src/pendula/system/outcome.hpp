@@ -105,6 +105,11 @@ struct Statistics {
   std::int64_t newton_iterations = 0;  ///< Newton or fixed-point iterations, all attempts
   double load_work = 0;                ///< energy that torque and damping brought  [J]; NaN where nobody counts
   double largest_defect = 0;           ///< of a step that was accepted: GaussStepper::step
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(steps, rejected_steps, newton_iterations, load_work, largest_defect);
+  }
 };
 
 }  // namespace pendula

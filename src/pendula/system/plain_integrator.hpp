@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pendula/system/member.hpp>
 #include <pendula/system/outcome.hpp>
 #include <string_view>
 
@@ -24,6 +25,9 @@ class PlainIntegrator {
   virtual void read_state(double* q, double* v) const = 0;
   virtual const Statistics& statistics() const = 0;
   virtual Description describe() const = 0;
+
+  /// All that the next steps depend on, of an integrator that was started or is being given another one's member.
+  virtual void member(MemberNumbers& numbers) = 0;
 };
 
 }  // namespace pendula

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <pendula/numeric/compensated.hpp>
+#include <type_traits>
+#include <vector>
+
+namespace pendula {
+
+/// The copyable state of a run: all that its next steps depend on besides the model and the options. Two runs that have
+/// the same member go on alike to the last bit.
+struct Member {
+  std::vector<double> numbers;
+
+  /// To the last bit.
+  bool operator==(const Member& other) const {
+    const auto bits = [](double number) { return std::bit_cast<std::uint64_t>(number); };
+    return std::ranges::equal(numbers, other.numbers, {}, bits, bits);
+  }
+};
+
+/// Goes through the numbers of a member, to count, to read or to write them: what has some lists them once,
+///   template <class Numbers> void member(Numbers& numbers) { numbers(first, second, …); }
+class MemberNumbers {
+ public:
+  enum class Pass { count, read, write };
+
+  /// `at` is where numbers go to (read) or come from (write).
+  explicit MemberNumbers(Pass pass, double* at = nullptr) : pass_(pass), at_(at) {}
+
+  template <class... Values>
+  void operator()(Values&... values) {
+    (pass(values), ...);
+  }
+
+  /// The `count` numbers from `first` on.
+  template <class Number>
+  void range(Number* first, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) pass(first[k]);
+  }
+
+  std::size_t count() const { return count_; }
+
+ private:
+  template <class Number>
+  requires std::is_arithmetic_v<Number> || std::is_enum_v<Number>
+  void pass(Number& value) {
+    if (pass_ == Pass::read) at_[count_] = static_cast<double>(value);
+    if (pass_ == Pass::write) value = static_cast<Number>(at_[count_]);
+    ++count_;
+  }
+  template <class Value, std::size_t size>
+  void pass(std::array<Value, size>& values) {
+    for (Value& value : values) pass(value);
+  }
+  template <class Value, std::size_t size>
+  void pass(Value (&values)[size]) {
+    for (Value& value : values) pass(value);
+  }
+  template <class Value>
+  void pass(Compensated<Value>& sum) {
+    pass(sum.value);
+    pass(sum.compensation);
+  }
+  template <class Matrix>
+  requires requires(Matrix& matrix) { matrix.reshaped(); }
+  void pass(Matrix& matrix) {
+    for (double& value : matrix.reshaped()) pass(value);
+  }
+  template <class Part>
+  requires requires(Part& part, MemberNumbers& numbers) { part.member(numbers); }
+  void pass(Part& part) { part.member(*this); }
+
+  Pass pass_;
+  double* at_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace pendula
