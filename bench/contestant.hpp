@@ -41,6 +41,9 @@ void add_cvode(std::vector<Contestant>& contestants);
 void add_mujoco(std::vector<Contestant>& contestants);
 void add_pendula(std::vector<Contestant>& contestants);
 
+/// Generated kernels, of chains and of other systems.
+void add_kernels(std::vector<Contestant>& contestants);
+
 /// GSL's rk4imp, the 2-stage Gauss method, with a constant step; also timed step by step. Its Newton iteration stops at
 /// the driver's tolerance.
 std::unique_ptr<Run> make_rk4imp(const Problem& problem, int steps, double step, double newton_tolerance);

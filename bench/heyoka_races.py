@@ -1,11 +1,11 @@
-"""Sends heyoka into the races of races.json and adds it there and to benchmarks.json.
+"""Sends heyoka into the races of a file and adds it there and to the figures of the other contestants.
 
-usage: python bench/heyoka_races.py FIGURES_FOLDER [--repetitions N] [--longest SECONDS]
+usage: python bench/heyoka_races.py RACES.json FIGURES.json [--repetitions N] [--longest SECONDS]
 
 heyoka (Biscani, Izzo 2021; doi:10.1093/mnras/stab1032) compiles the Taylor recursions of the equations that
 it is given while the program runs. It comes as a Python package, so it races in a process of its own, on the
-problems that pendula_bench left in races.json; a run is one call into compiled code, and compiling is not
-counted.
+problems that pendula_bench left in the first file; a run is one call into compiled code, and compiling is not
+counted. Chains it gets by the tensions of their rods, other systems by their Lagrangians.
 """
 
 import argparse
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import heyoka as hy
 import numpy as np
+from heyoka_systems import System
 
 NAME = "heyoka"
 TOLERANCES = (1e-8, 1e-10, 1e-12, 1e-13, 1e-14, 1e-15, 1e-16, 1e-17)
@@ -27,8 +28,8 @@ UNROLLED_LINKS = 20
 
 
 @dataclass
-class Problem:
-    """A chain of equal links, all horizontal and at rest, and where it ends."""
+class Chain:
+    """A chain of equal links, all horizontal and at rest, and where it ends; fields as in the file."""
 
     links: int
     mass: float
@@ -38,21 +39,34 @@ class Problem:
     duration: float
     floor: float
     end: list[str]
+    sizes: list[float]
     trials: dict = field(default_factory=dict)
+
+    @property
+    def unrolled(self) -> bool:
+        """Whether it is compiled without loops."""
+        return self.links <= UNROLLED_LINKS
 
     def start(self) -> np.ndarray:
         """Angles and rates at the start."""
         return np.concatenate([np.full(self.links, self.angle), np.zeros(self.links)])
 
-    def error(self, state: np.ndarray) -> float:
-        """As error_of in problems.hpp."""
-        reference = np.array([np.longdouble(value) for value in self.end])
-        off = np.abs(state.astype(np.longdouble) - reference)
-        off[self.links :] /= np.abs(reference[self.links :]).max()
-        return float(off.max()) if np.isfinite(off).all() else math.inf
+    def formulations(self) -> list[list[tuple]]:
+        """Equations of motion, of which the faster ones count."""
+        return [equations(self)]
 
 
-def equations(problem: Problem) -> list[tuple]:
+Problem = Chain | System
+
+
+def error_of(problem: Problem, state: np.ndarray) -> float:
+    """As in problems.hpp."""
+    reference = np.array([np.longdouble(value) for value in problem.end])
+    off = np.abs(state.astype(np.longdouble) - reference) / problem.sizes
+    return float(off.max()) if np.isfinite(off).all() else math.inf
+
+
+def equations(problem: Chain) -> list[tuple]:
     """The chain by the tensions of its rods, whose equations are tridiagonal: O(n), and n small divisions.
 
     Bob i accelerates by (T_{i+1} u_{i+1} − T_i u_i)/m + g; along rod i, u_i·(a_i − a_{i−1}) = −l θ̇_i², across
@@ -85,12 +99,12 @@ def equations(problem: Problem) -> list[tuple]:
 class Run:
     """One whole run, made ready."""
 
-    def __init__(self, problem: Problem, tolerance: float) -> None:
+    def __init__(self, problem: Problem, formulation: list[tuple], tolerance: float) -> None:
         """Compiles."""
         self.problem = problem
         self.start = problem.start()
         self.integrator = hy.taylor_adaptive(
-            equations(problem), self.start.copy(), tol=tolerance, compact_mode=problem.links > UNROLLED_LINKS
+            formulation, self.start.copy(), tol=tolerance, compact_mode=not problem.unrolled
         )
 
     def __call__(self) -> float:
@@ -103,7 +117,7 @@ class Run:
 
     def error(self) -> float:
         """Of the last run."""
-        return self.problem.error(self.integrator.state)
+        return error_of(self.problem, self.integrator.state)
 
 
 def attempt(run: Run) -> float:
@@ -119,13 +133,14 @@ def attempt(run: Run) -> float:
 def scan(problem: Problem, longest: float) -> tuple[list[dict], Run, dict]:
     """Every setting; then run and trial that count: the cheapest good one, or the most accurate."""
     trials, runs = [], []
-    for tolerance in TOLERANCES:
-        run = Run(problem, tolerance)
-        seconds = attempt(run)
-        trials.append({"setting": tolerance, "milliseconds": seconds * 1e3, "error": run.error()})
-        runs.append(run)
-        if seconds > longest:
-            break
+    for formulation in problem.formulations():
+        for tolerance in TOLERANCES:
+            run = Run(problem, formulation, tolerance)
+            seconds = attempt(run)
+            trials.append({"setting": tolerance, "milliseconds": seconds * 1e3, "error": run.error()})
+            runs.append(run)
+            if seconds > longest:
+                break
     good = [t for t in trials if t["error"] <= ALLOWED_FLOORS * problem.floor]
     chosen = min(good, key=lambda t: t["milliseconds"]) if good else min(trials, key=lambda t: t["error"])
     return trials, runs[trials.index(chosen)], chosen
@@ -143,6 +158,18 @@ def measure(run: Run, repetitions: int) -> tuple[float, float]:
     return statistics.median(times), round(spread, 4)
 
 
+def long_double_error(problem: System) -> float:
+    """How far the reference is from an end by these equations in 80 bits: neither they nor the method are ours."""
+    integrator = hy.taylor_adaptive(
+        problem.formulations(np.longdouble)[0],
+        problem.start().astype(np.longdouble),
+        tol=np.longdouble("1e-19"),
+        fp_type=np.longdouble,
+    )
+    integrator.propagate_until(np.longdouble(problem.duration))
+    return error_of(problem, integrator.state)
+
+
 def finite(trial: dict) -> dict:
     """JSON knows no infinity."""
     return {**trial, "error": trial["error"] if math.isfinite(trial["error"]) else None}
@@ -151,14 +178,15 @@ def finite(trial: dict) -> dict:
 def main() -> None:
     """Reads both files, adds heyoka, writes them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("races", type=Path)
+    parser.add_argument("figures", type=Path)
     parser.add_argument("--repetitions", type=int, default=9)
     parser.add_argument("--longest", type=float, default=2)
     options = parser.parse_args()
-    files = [options.folder / name for name in ("races.json", "benchmarks.json")]
+    files = (options.races, options.figures)
     races, kept = (json.loads(file.read_text(encoding="utf-8")) for file in files)
     for name, race in races.items():
-        problem = Problem(**race)
+        problem = System(**race) if "kernel" in race else Chain(**race)
         trials, run, chosen = scan(problem, options.longest)
         race["trials"][NAME] = {"knob": "tolerance", "runs": [finite(trial) for trial in trials]}
         milliseconds, spread = measure(run, options.repetitions)
@@ -173,6 +201,9 @@ def main() -> None:
         floors = chosen["error"] / problem.floor
         setting = f"tolerance {chosen['setting']:g}"
         print(f"{name}, {NAME}: {setting}, {milliseconds:.3g} ms, error {floors:.3g} floors", flush=True)
+        if isinstance(problem, System):
+            race["end_in_80_bits"] = long_double_error(problem)
+            print(f"{name}: {race['end_in_80_bits']:.1e} from the end in 80 bits", flush=True)
     for file, content in zip(files, (races, kept), strict=True):
         file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 

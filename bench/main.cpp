@@ -1,7 +1,8 @@
-// pendula_bench [--races FILE [--longest SECONDS]] [flags of Google Benchmark]
+// pendula_bench [--races FILE | --kernels FILE] [--longest SECONDS] [flags of Google Benchmark]
 #include <benchmark/benchmark.h>
 
 #include <cstdlib>
+#include <functions.hpp>
 #include <iostream>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
@@ -30,6 +31,7 @@ std::string take(std::vector<char*>& arguments, const std::string& name, const s
 int main(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
   const std::string races = take(arguments, "--races", "");
+  const std::string kernels = take(arguments, "--kernels", "");
   const double longest = std::stod(take(arguments, "--longest", "2"));
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
@@ -38,9 +40,14 @@ int main(int argc, char** argv) {
   benchmark::AddCustomContext(
       "flags", BENCH_FLAGS + (" with the library for " + std::string(pendula::library().instruction_set)));
   bench::register_unit();
-  bench::register_few_links();
-  bench::register_chain_costs();
-  bench::register_against_rk4imp();
+  if (kernels.empty()) {
+    bench::register_few_links();
+    bench::register_chain_costs();
+    bench::register_against_rk4imp();
+  } else {  // generated kernels: a run, and figures, of their own
+    bench::register_functions();
+    bench::register_kernel_races(kernels, longest);
+  }
   if (!races.empty()) bench::register_races(races, longest);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

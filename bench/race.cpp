@@ -10,7 +10,9 @@
 #include <optional>
 #include <race.hpp>
 #include <references.hpp>
+#include <span>
 #include <sstream>
+#include <systems.hpp>
 
 namespace bench {
 namespace {
@@ -40,15 +42,21 @@ Trial attempt(const Contestant& contestant, const Problem& problem, const Refere
   return {setting, best * 1e3, error_of(run->end(), reference)};
 }
 
-/// From coarse to fine, a few settings past the first that is good enough.
+/// From coarse to fine, a few settings past the first that is good enough, and on while they get no dearer: finer steps
+/// take less time where coarse ones are cut up or end in Newton's iteration.
 std::vector<Trial> scan(const Contestant& contestant, const Problem& problem, const Reference& reference,
                         double longest) {
+  constexpr double dearer = 1.3;
   std::vector<Trial> trials;
   int good = 0;
+  double cheapest = std::numeric_limits<double>::infinity();
   for (const double setting : contestant.settings(problem)) {
-    trials.push_back(attempt(contestant, problem, reference, setting));
-    good += trials.back().error <= allowed_floors * reference.floor;
-    if (good > 4 || trials.back().milliseconds > longest * 1e3) break;
+    const Trial& trial = trials.emplace_back(attempt(contestant, problem, reference, setting));
+    if (trial.error <= allowed_floors * reference.floor) {
+      ++good;
+      cheapest = std::min(cheapest, trial.milliseconds);
+    }
+    if ((good > 4 && trial.milliseconds > dearer * cheapest) || trial.milliseconds > longest * 1e3) break;
   }
   return trials;
 }
@@ -94,33 +102,56 @@ nlohmann::json json_of(const std::vector<Trial>& trials) {
   return list;
 }
 
-/// The problem, for contestants that do not run here; its end in decimals, which have more digits than a double.
+/// A chain, for contestants that do not run here.
+nlohmann::json chain_json(const Problem& problem) {
+  return {{"links", problem.links},
+          {"mass", problem.mass},
+          {"length", problem.length},
+          {"gravity", problem.gravity},
+          {"angle", problem.angle}};
+}
+
+/// A system likewise: numbers in the order of its kernel, which is that of its model.
+nlohmann::json system_json(const Problem& problem) {
+  const SystemStart& start = system_start(problem);
+  const auto info = with_kernel(problem, []<class Kernel>() { return pendula::info_of<Kernel>(); });
+  const pendula::SystemNumbers numbers = numbers_of(start, info);
+  auto sines = nlohmann::json::array();
+  for (const pendula::InputSine& sine : numbers.sines) {
+    sines.push_back({sine.input, sine.amplitude, sine.frequency, sine.phase});
+  }
+  return {{"kernel", problem.kernel},
+          {"parameters", numbers.parameters},
+          {"inputs", numbers.inputs},
+          {"sines", sines},
+          {"q", start.q},
+          {"v", start.v}};
+}
+
+/// A problem, and its end in decimals, which have more digits than a double.
 nlohmann::json json_of(const Problem& problem, const Reference& reference) {
+  nlohmann::json entry = problem.kernel.empty() ? chain_json(problem) : system_json(problem);
   auto end = nlohmann::json::array();
   for (const long double value : reference.values) {
     std::ostringstream digits;
     digits << std::setprecision(std::numeric_limits<long double>::max_digits10) << value;
     end.push_back(digits.str());
   }
-  return {{"links", problem.links},
-          {"mass", problem.mass},
-          {"length", problem.length},
-          {"gravity", problem.gravity},
-          {"angle", problem.angle},
-          {"duration", problem.duration},
-          {"floor", reference.floor},
-          {"end", end},
-          {"trials", nlohmann::json::object()}};
+  std::vector<double> sizes;
+  for (const long double size : sizes_of(reference.values, reference.units)) sizes.push_back(static_cast<double>(size));
+  entry.update({{"duration", problem.duration},
+                {"floor", reference.floor},
+                {"end", end},
+                {"sizes", sizes},
+                {"trials", nlohmann::json::object()}});
+  return entry;
 }
 
-}  // namespace
-
-void register_races(const std::string& file, double longest) {
+void register_field(std::span<const Problem> problems, const std::vector<Contestant>& contestants,
+                    const std::string& file, double longest) {
   auto kept = nlohmann::json::object();
-  const std::vector<Contestant> contestants = everybody();
-  for (std::size_t i = 0; i < problems.size(); ++i) {
-    const Problem& problem = problems[i];
-    const Reference& reference = references[i];
+  for (const Problem& problem : problems) {
+    const Reference& reference = reference_of(problem, references);
     nlohmann::json& entry = kept[std::string(problem.name)] = json_of(problem, reference);
     for (const Contestant& contestant : contestants) {
       if (!contestant.enters(problem)) continue;
@@ -140,6 +171,18 @@ void register_races(const std::string& file, double longest) {
     }
   }
   std::ofstream(file) << kept.dump(1) << '\n';
+}
+
+}  // namespace
+
+void register_races(const std::string& file, double longest) {
+  register_field(problems, everybody(), file, longest);
+}
+
+void register_kernel_races(const std::string& file, double longest) {
+  std::vector<Contestant> contestants;
+  add_kernels(contestants);
+  register_field(kernel_problems, contestants, file, longest);
 }
 
 }  // namespace bench

@@ -9,4 +9,7 @@ namespace bench {
 /// one that took longer than `longest` seconds is tried.
 void register_races(const std::string& file, double longest);
 
+/// The same of generated kernels, on problems of their own.
+void register_kernel_races(const std::string& file, double longest);
+
 }  // namespace bench

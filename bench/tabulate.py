@@ -14,9 +14,16 @@ from pathlib import Path
 
 # The leads to reach: of races over GSL rk8pd at 1e-12 and over heyoka, of steps over GSL rk4imp.
 PROBLEMS = ("D", "P2", "P5", "P10", "P20", "P50", "P100")
+KERNEL_CHAINS = ("D", "P2", "P4")
+KERNEL_SYSTEMS = ("cart chain", "spring pendulum", "furuta", "swinging atwood")
 OVER_BASELINE = (7, 6, 5, 5, 6, 12, 40)
 OVER_HEYOKA = (2.5, 2.8, 4, 5, 6.5, 14, 12)
 STEPS = {2: 15, 10: 30, 100: 700}
+KERNELS_OVER_HEYOKA = {KERNEL_CHAINS: 2.5, KERNEL_SYSTEMS: 1.5}
+OVER_CASADI = {
+    "residual": ((1.8, "planar 1–4, spatial 1–3"), (1.5, "other systems")),
+    "residual_with_jacobians": ((2.7, "planar 1–4, spatial 1–3"), (2.5, "other systems")),
+}
 LINKS = (2, 5, 10, 20, 50, 100, 1000, 10_000, 100_000)
 BASELINE = "GSL rk8pd 1e-12"
 LINEAR = 1.5  # what caches may take; an O(n²) part would make it 100
@@ -43,10 +50,15 @@ class Figures:
     """The kept figures, by what the tables ask of them."""
 
     def __init__(self, folder: Path) -> None:
-        """Reads benchmarks.json, races.json, memory.json and iterations.json."""
+        """Reads benchmarks.json, races.json, memory.json and iterations.json, and of kernels kernels.json and
+        kernel_races.json."""
         kept = json.loads((folder / "benchmarks.json").read_text(encoding="utf-8"))
         self.context = kept["context"]
-        self.benchmarks = {name: e for name, e in kept["benchmarks"].items() if "failed" not in e}
+        self.benchmarks = succeeded(kept)
+        kernels = json.loads((folder / "kernels.json").read_text(encoding="utf-8"))
+        self.kernel_context = kernels["context"]
+        self.kernels = succeeded(kernels)
+        self.kernel_races = json.loads((folder / "kernel_races.json").read_text(encoding="utf-8"))
         self.races = json.loads((folder / "races.json").read_text(encoding="utf-8"))
         memory = (folder / "memory.json").read_text(encoding="utf-8").strip()
         self.memory = json.loads(memory) if memory else None
@@ -67,21 +79,49 @@ class Figures:
         prefix = f"race/{problem}/"
         return {n.removeprefix(prefix): e for n, e in self.benchmarks.items() if n.startswith(prefix)}
 
+    def kernel_field(self, problem: str) -> dict[str, dict]:
+        """Who ran a race of kernels, by name."""
+        prefix = f"race/{problem}/"
+        return {n.removeprefix(prefix): e for n, e in self.kernels.items() if n.startswith(prefix)}
+
+    def nanoseconds(self, name: str) -> float | None:
+        """Of one call of a function."""
+        entry = self.kernels.get(name)
+        return entry and entry["nanoseconds"]
+
+    def over_casadi(self, kernel: str, what: str, variants: Iterable[str]) -> float | None:
+        """Time of CasADi's code, of the fastest of the variants, over that of a kernel's function."""
+        ours = self.nanoseconds(f"function/{kernel}/{what}/pendula")
+        theirs = [self.nanoseconds(f"function/{kernel}/{what}/CasADi, {variant}") for variant in variants]
+        return min(theirs) / ours if ours and all(theirs) else None
+
     def finishers(self, problem: str, ours: bool) -> list[tuple[float, str]]:
         """(milliseconds, name) of those within 10 floors, the fastest first."""
         return sorted(
             (entry["time"], name)
             for name, entry in self.field(problem).items()
-            if entry["error"] <= 10 * entry["floor"]
-            and name.startswith("pendula") == ours
-            and name != BASELINE
+            if is_good(entry) and name.startswith("pendula") == ours and name != BASELINE
         )
+
+
+def succeeded(kept: dict) -> dict[str, dict]:
+    """The benchmarks of a file that ran through."""
+    return {name: e for name, e in kept["benchmarks"].items() if "failed" not in e}
 
 
 def machine(figures: Figures) -> str:
     """What the figures were measured with, and the unit."""
-    c = figures.context
-    unit = figures.benchmarks["sincos"]["nanoseconds"]
+    return told(figures.context, figures.benchmarks)
+
+
+def kernel_machine(figures: Figures) -> str:
+    """The same of what is measured of kernels."""
+    return told(figures.kernel_context, figures.kernels)
+
+
+def told(c: dict, benchmarks: dict[str, dict]) -> str:
+    """What a run was measured with."""
+    unit = benchmarks["sincos"]["nanoseconds"]
     return (
         f"{c['processor']}, one core; {c['compiler']}, `{c['flags']}`; "
         f"medians of {c['repetitions']} repetitions; {c['date']}. "
@@ -157,6 +197,63 @@ def memory_row(figures: Figures) -> Iterable[list[str]]:
         ]
 
 
+def is_good(entry: dict) -> bool:
+    """Whether a run ended within 10 floors."""
+    return entry["error"] <= 10 * entry["floor"]
+
+
+def kernel_lead(figures: Figures, problem: str) -> float | None:
+    """heyoka's time over that of the fastest good kernel."""
+    field = figures.kernel_field(problem)
+    ours = [entry["time"] for name, entry in field.items() if name.startswith("pendula") and is_good(entry)]
+    return field["heyoka"]["time"] / min(ours) if ours and "heyoka" in field else None
+
+
+def kernel_race_rows(figures: Figures) -> Iterable[list[str]]:
+    """The rows of races of generated kernels."""
+    for problems, want in KERNELS_OVER_HEYOKA.items():
+        leads = [kernel_lead(figures, problem) for problem in problems]
+        if any(leads):
+            found = ", ".join(f"{number(lead)}×" if lead else "–" for lead in leads)
+            yield ["generated kernels, " + ", ".join(problems) + ", against heyoka", f"≥ {want:g}×", found]
+
+
+def kernel_names(figures: Figures) -> list[str]:
+    """Kernels whose residuals were compared with CasADi's, in their order."""
+    return list(dict.fromkeys(name.split("/")[1] for name in figures.kernels if name.startswith("function/")))
+
+
+def is_chain(kernel: str) -> bool:
+    """Whether a kernel is that of a chain, planar or spatial."""
+    return kernel.startswith(("planar", "spatial"))
+
+
+def casadi_rows(figures: Figures) -> Iterable[list[str]]:
+    """The rows of residuals against CasADi's code as it comes."""
+    for what, goals in OVER_CASADI.items():
+        for (want, kind), chains in zip(goals, (True, False), strict=True):
+            kernels = [k for k in kernel_names(figures) if is_chain(k) == chains]
+            leads = [lead for k in kernels if (lead := figures.over_casadi(k, what, ["plain"]))]
+            if leads:
+                name = what.replace("_", " ").replace("jacobians", "Jacobians")
+                found = f"{number(min(leads))}–{number(max(leads))}×"
+                yield [f"generated {name} against CasADi's C, {kind}", f"≥ {want:g}×", found]
+
+
+def sines_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of the momentum form over its sines."""
+    rates = [over_sines(figures, f"planar_{n}", "scalar") for n in (2, 3, 4)]
+    if all(rates):
+        found = ", ".join(number(rate) for rate in rates)
+        yield ["momentum form over its sincos alone, planar 2, 3, 4", "≤ 1.3", found]
+
+
+def over_sines(figures: Figures, kernel: str, numbers: str) -> float | None:
+    """Time of the momentum form over that of its sines."""
+    whole, sines = (figures.nanoseconds(f"form/{kernel}/{numbers}/{part}") for part in ("whole", "sines"))
+    return whole / sines if whole and sines else None
+
+
 def goals(figures: Figures) -> str:
     """What was to be reached, and what was."""
     rows = [
@@ -169,27 +266,75 @@ def goals(figures: Figures) -> str:
         *race_row(figures, BASELINE, OVER_BASELINE),
         *race_row(figures, "heyoka", OVER_HEYOKA),
         *memory_row(figures),
+        *kernel_race_rows(figures),
+        *casadi_rows(figures),
+        *sines_row(figures),
     ]
     return table(["what", "to reach", "measured"], rows)
 
 
 def races(figures: Figures) -> str:
     """Every race: milliseconds of each contestant at its cheapest setting within 10 floors."""
-    names = list(dict.fromkeys(name for problem in PROBLEMS for name in figures.field(problem)))
+    return field_table({p: (figures.races[p]["floor"], figures.field(p)) for p in PROBLEMS})
+
+
+def kernel_races(figures: Figures) -> str:
+    """The same of generated kernels."""
+    problems = [p for p in (*KERNEL_CHAINS, *KERNEL_SYSTEMS) if p in figures.kernel_races]
+    return field_table({p: (figures.kernel_races[p]["floor"], figures.kernel_field(p)) for p in problems})
+
+
+def field_table(fields: dict[str, tuple[float, dict[str, dict]]]) -> str:
+    """Floor and contestants of each problem."""
+    names = list(dict.fromkeys(name for _, field in fields.values() for name in field))
     names.sort(key=lambda name: (not name.startswith("pendula"), name != BASELINE))
-    rows = [["floor of the error", *(f"{figures.races[p]['floor']:.1e}" for p in PROBLEMS)]]
+    rows = [["floor of the error", *(f"{floor:.1e}" for floor, _ in fields.values())]]
     for name in names:
         cells = []
-        for problem in PROBLEMS:
-            entry = figures.field(problem).get(name)
+        for _, field in fields.values():
+            entry = field.get(name)
             if entry is None:
                 cells.append("")
-            elif entry["error"] <= 10 * entry["floor"]:
+            elif is_good(entry):
                 cells.append(number(entry["time"]))
             else:
                 cells.append(f"*{number(entry['time'])} ({entry['error'] / entry['floor']:.0e})*")
         rows.append([name, *cells])
-    return table(["", *PROBLEMS], rows)
+    return table(["", *fields], rows)
+
+
+def functions(figures: Figures) -> str:
+    """Residuals, ours and CasADi's."""
+    rows = []
+    for kernel in kernel_names(figures):
+        cells = []
+        for what in OVER_CASADI:
+            ours = figures.nanoseconds(f"function/{kernel}/{what}/pendula")
+            leads = [
+                figures.over_casadi(kernel, what, ["plain"]),
+                figures.over_casadi(kernel, what, ["differences", "angles"]),
+            ]
+            cells.append(number(ours) if ours else "–")
+            cells += [f"{number(lead)}×" if lead else "–" for lead in leads]
+        rows.append([kernel.replace("_", " "), *cells])
+    columns = ("CasADi as it comes", "without common subexpressions")
+    return table(["", "residual, ns", *columns, "with Jacobians, ns", *columns], rows)
+
+
+def sines(figures: Figures) -> str:
+    """The momentum form and its sines."""
+    rows = []
+    for kernel in ("planar_2", "planar_3", "planar_4"):
+        cells = []
+        for numbers in ("scalar", "lanes"):
+            for part in ("sines", "whole"):
+                time = figures.nanoseconds(f"form/{kernel}/{numbers}/{part}")
+                cells.append(number(time) if time else "–")
+            rate = over_sines(figures, kernel, numbers)
+            cells.append(number(rate) if rate else "–")
+        rows.append([kernel.replace("_", " "), *cells])
+    head = ["", "sincos alone, ns", "(q, p) → (q̇, ṗ), ns", "over it"]
+    return table([*head, "eight lanes: sincos alone, ns", "whole, ns", "over it"], rows)
 
 
 def peers(figures: Figures) -> str:
@@ -293,6 +438,10 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "chain": chain,
     "simplified": simplified,
     "few links": few,
+    "kernel machine": kernel_machine,
+    "kernel races": kernel_races,
+    "functions": functions,
+    "sines": sines,
 }
 
 

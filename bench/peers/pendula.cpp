@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <contestant.hpp>
 #include <peers/pendula.hpp>
+#include <systems.hpp>
 
 namespace bench {
 namespace {
@@ -9,12 +11,19 @@ using pendula::Form, pendula::Iteration, pendula::Method, pendula::Planar, pendu
 class PendulaRun : public Run {
  public:
   PendulaRun(const Problem& problem, const RunOptions& options, int steps, double step, double last_step)
-      : problem_(problem),
-        steps_(steps),
-        step_(step),
-        last_step_(last_step),
-        start_(pendula::State<Planar>::from_angles(Eigen::VectorXd::Constant(problem.links, problem.angle))),
-        integrator_(pendula::make_integrator(chain_of(problem), options)) {}
+      : problem_(problem), steps_(steps), step_(step), last_step_(last_step) {
+    if (problem.kernel.empty()) {
+      start_ = pendula::State<Planar>::from_angles(Eigen::VectorXd::Constant(problem.links, problem.angle));
+      integrator_ = pendula::make_integrator(chain_of(problem), options);
+    } else {
+      const SystemStart& start = system_start(problem);
+      const auto vector = [](const std::vector<double>& values) {
+        return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+      };
+      start_ = {0, vector(start.q), vector(start.v)};
+      integrator_ = subject_of(problem)->make_integrator(options);
+    }
+  }
 
   void operator()() override {
     outcome_ = integrator_->start(start_);
@@ -31,7 +40,7 @@ class PendulaRun : public Run {
   Problem problem_;
   int steps_;
   double step_, last_step_;
-  pendula::State<Planar> start_;
+  pendula::Motion start_;
   std::unique_ptr<pendula::Integrator> integrator_;
   pendula::Outcome outcome_;
 };
@@ -49,10 +58,11 @@ void add(std::vector<Contestant>& contestants, const std::string& name, const Ru
          double factor, int count) {
   const auto built_in = [options](const Problem& problem) {
     if (options.solver != Solver::dense) return true;
-    for (const auto& kernel : pendula::built_in_kernels()) {
-      if (kernel.space == Planar::name && kernel.links == problem.links) return true;
-    }
-    return false;
+    if (!problem.kernel.empty()) return subject_of(problem) != nullptr;
+    const auto kernels = pendula::built_in_kernels();
+    return std::any_of(kernels.begin(), kernels.end(), [&](const pendula::KernelInfo& kernel) {
+      return kernel.space == Planar::name && kernel.links == problem.links;
+    });
   };
   const auto settings = [=](const Problem& problem) { return step_counts(problem, coarsest, factor, count); };
   const auto make = [options](const Problem& problem, double steps) {
@@ -74,7 +84,16 @@ void add_pendula(std::vector<Contestant>& contestants) {
   add(contestants, "s = 8 Newton", chain(8, Iteration::newton), 0.7, 1.1, 30);
   add(contestants, "s = 4 Newton", chain(4, Iteration::newton), 1, 1.5, 14);
   add(contestants, "s = 2 Newton", chain(2, Iteration::newton), 1, 2, 12);
-  add(contestants, "s = 8 dense kernel", options_of(8, Solver::dense, Iteration::newton), 0.7, 1.1, 30);
+}
+
+void add_kernels(std::vector<Contestant>& contestants) {
+  const auto kernel = [](int stages, Iteration iteration) { return options_of(stages, Solver::dense, iteration); };
+  for (const int stages : {8, 6}) {
+    const std::string name = "kernel s = " + std::to_string(stages);
+    add(contestants, name, kernel(stages, Iteration::automatic), 0.7, 1.07, 40);
+    add(contestants, name + " fixed point", kernel(stages, Iteration::fixed_point), 0.7, 1.07, 40);
+  }
+  add(contestants, "kernel s = 8 Newton", kernel(8, Iteration::newton), 0.7, 1.1, 30);
 }
 
 }  // namespace bench
