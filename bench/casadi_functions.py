@@ -4,11 +4,9 @@ usage: python bench/casadi_functions.py FOLDER KERNEL...
 
 CasADi (Andersson et al. 2019; doi:10.1007/s12532-018-0139-4) differentiates the same Lagrangian by itself:
 
-    E = ∂p/∂q v + ∂p/∂v a + ∂p/∂t − ∂L/∂q − Q,  p = ∂L/∂v
+    E = ∂p/∂q v + ∂p/∂v a + ∂p/∂t − ∂L/∂q − Q,  p = ∂L/∂v,
 
-Its code as it comes calls a sine wherever one stands. It has a pass that eliminates common subexpressions, too, for
-those who ask; then L is handed over with cosines of differences of angles as they are, which is shorter, and written
-out, which has fewer sines.
+with its pass for common subexpressions. L is handed over in all FORMS of lagrangians.py.
 """
 
 import sys
@@ -27,10 +25,9 @@ TABLE = """// Written by bench/casadi_functions.py.
 
 namespace bench {{
 
-/// One function of one kernel, as CasADi makes it, of arguments q, v, a, parameters, inputs and time: plain, or with
-/// common subexpressions eliminated, in sines of angles and of their differences or of angles alone.
+/// One function of one kernel, as CasADi makes it of a form of L; of arguments q, v, a, parameters, inputs and time.
 struct CasadiFunction {{
-  std::string_view kernel, what, variant;
+  std::string_view kernel, what, form;
   int (*evaluate)(const double**, double**, long long*, double*, int);
 }};
 
@@ -42,10 +39,9 @@ inline constexpr std::array casadi_functions{{
 """
 
 
-def functions_of(kernel: str, variant: str) -> dict[str, ca.Function]:
+def functions_of(kernel: str, form: str) -> dict[str, ca.Function]:
     """The residual, and the residual with its Jacobians by q, v and a, all dense."""
-    said = statement(kernel, variant if variant in FORMS else FORMS[0])
-    shared = ca.cse if variant in FORMS else list
+    said = statement(kernel, form)
     count = len(said.coordinates)
     q, v, a = (ca.SX.sym(name, count) for name in "qva")
     numbers, inputs = ca.SX.sym("numbers", len(said.numbers)), ca.SX.sym("inputs", len(said.inputs))
@@ -55,9 +51,7 @@ def functions_of(kernel: str, variant: str) -> dict[str, ca.Function]:
     arguments = [q, v, a, numbers, inputs, time]
     outputs = {"residual": [residual], "residual_with_jacobians": [residual, *jacobians]}
     return {
-        what: ca.Function(
-            f"{kernel}_{what}_{variant}", arguments, [ca.densify(each) for each in shared(found)]
-        )
+        what: ca.Function(f"{kernel}_{what}_{form}", arguments, [ca.densify(each) for each in ca.cse(found)])
         for what, found in outputs.items()
     }
 
@@ -79,10 +73,10 @@ def main() -> None:
     generator = ca.CodeGenerator("casadi_functions.cpp", {"cpp": True, "with_header": True})
     entries = []
     for kernel in kernels:
-        for variant in ("plain", *FORMS):
-            for what, function in functions_of(kernel, variant).items():
+        for form in FORMS:
+            for what, function in functions_of(kernel, form).items():
                 generator.add(function)
-                entries.append(f'    CasadiFunction{{"{kernel}", "{what}", "{variant}", {function.name()}}},')
+                entries.append(f'    CasadiFunction{{"{kernel}", "{what}", "{form}", {function.name()}}},')
     generator.generate(f"{folder}/")
     table = TABLE.format(entries="\n".join(entries))
     Path(folder, "casadi_table.hpp").write_text(table, encoding="utf-8")

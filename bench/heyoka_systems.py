@@ -31,7 +31,7 @@ class System:
         return np.array([*self.q, *self.v])
 
     def formulations(self, number: type = float) -> list[list[tuple]]:
-        """Equations of motion by heyoka's own derivation, from either form of the Lagrangian.
+        """Equations of motion by heyoka's own derivation, from each form of the Lagrangian.
 
         Numbers are of a type, so that what heyoka makes of constants is as accurate as that.
         """

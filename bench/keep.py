@@ -48,11 +48,14 @@ def is_kept(entry: dict) -> bool:
 
 
 def kept(raw: dict) -> dict:
-    """Benchmarks by name: `time` in `time_unit`, and the counters."""
+    """Benchmarks by name: `time` in `time_unit`, and the counters; `fastest` of all repetitions, too."""
     benchmarks: dict[str, dict] = {}
     spread: dict[str, float] = {}
+    fastest: dict[str, list[dict]] = {}
     for entry in raw["benchmarks"]:
         name = entry["run_name"].removesuffix("/manual_time")
+        if entry["run_type"] == "iteration" and not entry.get("error_occurred"):
+            fastest.setdefault(name, []).append(entry)
         if entry.get("error_occurred"):
             benchmarks[name] = {"failed": entry["error_message"]}
         elif entry.get("aggregate_name") == "cv":
@@ -62,6 +65,9 @@ def kept(raw: dict) -> dict:
     for name, entry in benchmarks.items():
         if "failed" not in entry:
             entry["time"] = entry.pop("real_time")
+            entry["fastest"] = min(each["real_time"] for each in fastest[name])
+            if "nanoseconds" in entry:
+                entry["fastest_nanoseconds"] = min(each["nanoseconds"] for each in fastest[name])
             entry["relative_spread"] = spread.get(name, 0.0)
     return {"context": context(raw["context"]), "benchmarks": benchmarks}
 

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sympy import Expr, Symbol, expand_trig, lambdify
@@ -11,11 +11,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "codegen"))
 
 from pendula_codegen.chain import Chain
 from pendula_codegen.links import LINKS
-from pendula_codegen.mechanics import LagrangianSystem
-from pendula_codegen.model import read_model
+from pendula_codegen.model import Model, read_model
 from pendula_codegen.models import find_model
 
-FORMS = ("differences", "angles")  # that sines and cosines are of
+# L as people write it, by the speeds of points; as the generator shortens it, with sines and cosines of differences of
+# angles; and that in sines and cosines of angles alone.
+FORMS = ("written", "differences", "angles")
 
 
 @dataclass(frozen=True)
@@ -37,39 +38,50 @@ class Statement:
 
 
 def statement(kernel: str, form: str) -> Statement:
-    """Of a kernel such as planar_2, cart_chain_2 or furuta, in sines of angles or of differences of them too."""
+    """Of a kernel such as planar_2, cart_chain_2 or furuta, in one of FORMS."""
     model, _, links = kernel.rpartition("_")
-    if not links.isdigit():
-        system = read_model(find_model(kernel)).system
-        found = _whole(system, system.parameters, system.inputs, system.lagrangian)
-    elif model in LINKS:
-        found = _of_chain(Chain(LINKS[model], int(links)))
+    if model in LINKS:
+        found = _of_chain(Chain(LINKS[model], int(links)), form)
+    elif links.isdigit():
+        found = _of_model(read_model(find_model(model), int(links)), form)
     else:
-        system = read_model(find_model(model), int(links)).system
-        found = _whole(system, system.parameters, system.inputs, system.lagrangian)
-    lagrangian = expand_trig(found.lagrangian) if form == "angles" else found.lagrangian
-    return Statement(**{**vars(found), "lagrangian": lagrangian})
+        found = _of_model(read_model(find_model(kernel)), form)
+    if form == "angles":
+        return replace(found, lagrangian=expand_trig(found.lagrangian))
+    return found
 
 
-def _whole(
-    system: LagrangianSystem, numbers: Sequence[Symbol], inputs: Sequence[Symbol], lagrangian: Expr
-) -> Statement:
-    time = system.time or Symbol("t", real=True)
+def _of_model(model: Model, form: str) -> Statement:
+    system = model.system
+    lagrangian = model.lagrangian if form == "written" else system.lagrangian
     return Statement(
         system.coordinates,
         system.velocities,
-        tuple(numbers),
-        tuple(inputs),
-        time,
+        system.parameters,
+        system.inputs,
+        model.time,
         lagrangian,
         system.forces,
     )
 
 
-def _of_chain(chain: Chain) -> Statement:
+def _of_chain(chain: Chain, form: str) -> Statement:
     kinds = (chain.mass, chain.length, chain.damping)
-    numbers = [kind(i) for kind in kinds for i in chain.numbers]
+    numbers = [*(kind(i) for kind in kinds for i in chain.numbers), chain.model.gravity]
     torques = [component for i in chain.numbers for component in chain.torque(i)]
+    kinetic = chain.kinetic_energy
+    if form == "written":
+        symbols = (symbol for rate in chain.rate_symbols for symbol in rate)
+        rates = (component for rate in chain.rates for component in rate)
+        kinetic = chain.kinetic_energy_of_bobs.subs(dict(zip(symbols, rates, strict=True)))
     # Inertias are of sums of masses, which are symbols of their own, too.
-    lagrangian = chain.system.lagrangian.subs(chain.definitions).subs(chain.definitions)
-    return _whole(chain.system, [*numbers, chain.model.gravity], torques, lagrangian)
+    lagrangian = (kinetic - chain.potential_energy).subs(chain.definitions).subs(chain.definitions)
+    return Statement(
+        chain.coordinates,
+        chain.velocities,
+        tuple(numbers),
+        tuple(torques),
+        Symbol("t", real=True),
+        lagrangian,
+        tuple(chain.forces),
+    )

@@ -57,7 +57,10 @@ class Figures:
         self.benchmarks = succeeded(kept)
         kernels = json.loads((folder / "kernels.json").read_text(encoding="utf-8"))
         self.kernel_context = kernels["context"]
-        self.kernels = succeeded(kernels)
+        self.kernels = {
+            name: {**entry, "time": entry["fastest"], "nanoseconds": entry.get("fastest_nanoseconds")}
+            for name, entry in succeeded(kernels).items()
+        }
         self.kernel_races = json.loads((folder / "kernel_races.json").read_text(encoding="utf-8"))
         self.races = json.loads((folder / "races.json").read_text(encoding="utf-8"))
         memory = (folder / "memory.json").read_text(encoding="utf-8").strip()
@@ -89,10 +92,10 @@ class Figures:
         entry = self.kernels.get(name)
         return entry and entry["nanoseconds"]
 
-    def over_casadi(self, kernel: str, what: str, variants: Iterable[str]) -> float | None:
-        """Time of CasADi's code, of the fastest of the variants, over that of a kernel's function."""
+    def over_casadi(self, kernel: str, what: str, forms: Iterable[str]) -> float | None:
+        """Time of CasADi's code, of the fastest of the forms, over that of a kernel's function."""
         ours = self.nanoseconds(f"function/{kernel}/{what}/pendula")
-        theirs = [self.nanoseconds(f"function/{kernel}/{what}/CasADi, {variant}") for variant in variants]
+        theirs = [self.nanoseconds(f"function/{kernel}/{what}/CasADi, {form}") for form in forms]
         return min(theirs) / ours if ours and all(theirs) else None
 
     def finishers(self, problem: str, ours: bool) -> list[tuple[float, str]]:
@@ -111,20 +114,20 @@ def succeeded(kept: dict) -> dict[str, dict]:
 
 def machine(figures: Figures) -> str:
     """What the figures were measured with, and the unit."""
-    return told(figures.context, figures.benchmarks)
+    return told(figures.context, figures.benchmarks, "medians")
 
 
 def kernel_machine(figures: Figures) -> str:
     """The same of what is measured of kernels."""
-    return told(figures.kernel_context, figures.kernels)
+    return told(figures.kernel_context, figures.kernels, "the fastest")
 
 
-def told(c: dict, benchmarks: dict[str, dict]) -> str:
-    """What a run was measured with."""
+def told(c: dict, benchmarks: dict[str, dict], counts: str) -> str:
+    """What a run was measured with, and which of its repetitions count."""
     unit = benchmarks["sincos"]["nanoseconds"]
     return (
         f"{c['processor']}, one core; {c['compiler']}, `{c['flags']}`; "
-        f"medians of {c['repetitions']} repetitions; {c['date']}. "
+        f"{counts} of {c['repetitions']} repetitions; {c['date']}. "
         f"One scalar `sincos` (std::sin and std::cos of the same argument): {unit:.1f} ns."
     )
 
@@ -219,8 +222,9 @@ def kernel_race_rows(figures: Figures) -> Iterable[list[str]]:
 
 
 def kernel_names(figures: Figures) -> list[str]:
-    """Kernels whose residuals were compared with CasADi's, in their order."""
-    return list(dict.fromkeys(name.split("/")[1] for name in figures.kernels if name.startswith("function/")))
+    """Kernels whose residuals were compared with CasADi's: chains first."""
+    names = {name.split("/")[1] for name in figures.kernels if name.startswith("function/")}
+    return sorted(names, key=lambda name: (not is_chain(name), name))
 
 
 def is_chain(kernel: str) -> bool:
@@ -229,11 +233,11 @@ def is_chain(kernel: str) -> bool:
 
 
 def casadi_rows(figures: Figures) -> Iterable[list[str]]:
-    """The rows of residuals against CasADi's code as it comes."""
+    """The rows of residuals against CasADi's code for the same L as people write it."""
     for what, goals in OVER_CASADI.items():
         for (want, kind), chains in zip(goals, (True, False), strict=True):
             kernels = [k for k in kernel_names(figures) if is_chain(k) == chains]
-            leads = [lead for k in kernels if (lead := figures.over_casadi(k, what, ["plain"]))]
+            leads = [lead for k in kernels if (lead := figures.over_casadi(k, what, ["written"]))]
             if leads:
                 name = what.replace("_", " ").replace("jacobians", "Jacobians")
                 found = f"{number(min(leads))}–{number(max(leads))}×"
@@ -311,13 +315,13 @@ def functions(figures: Figures) -> str:
         for what in OVER_CASADI:
             ours = figures.nanoseconds(f"function/{kernel}/{what}/pendula")
             leads = [
-                figures.over_casadi(kernel, what, ["plain"]),
+                figures.over_casadi(kernel, what, ["written"]),
                 figures.over_casadi(kernel, what, ["differences", "angles"]),
             ]
             cells.append(number(ours) if ours else "–")
             cells += [f"{number(lead)}×" if lead else "–" for lead in leads]
         rows.append([kernel.replace("_", " "), *cells])
-    columns = ("CasADi as it comes", "without common subexpressions")
+    columns = ("CasADi", "L shortened")
     return table(["", "residual, ns", *columns, "with Jacobians, ns", *columns], rows)
 
 
