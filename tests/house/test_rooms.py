@@ -30,14 +30,15 @@ KNOWS = {
         "pendula/numeric",
     },
     "io": {"pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
-    "cli": {"io", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
+    "view": {"io", "pendula/run", "pendula/chain", "pendula/system"},
+    "cli": {"view", "io", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
 }
 GENERATED = {"pendula/kernels"}
 
 
 def included(file: Path) -> set[str]:
     """Folders of this project's headers that a file includes."""
-    names = re.findall(r'#include [<"]((?:pendula|io|cli|library)/[\w/]+\.hpp)[>"]', file.read_text())
+    names = re.findall(r'#include [<"]((?:pendula|io|view|cli|library)/[\w/]+\.hpp)[>"]', file.read_text())
     return {name.rsplit("/", 1)[0] for name in names}
 
 

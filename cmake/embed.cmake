@@ -1,0 +1,49 @@
+# The sources of pages as a C++ file: cmake -D FOLDER=… -D THREE=… -D OUTPUT=… -P embed.cmake
+cmake_minimum_required(VERSION 3.25)
+
+# Scripts of a page, in the order in which they stand in one module: each knows the names of those before it.
+set(before format data motion palette player gestures plots)
+set(after pickers panels controls main)
+
+# Appends a constant NAME with the bytes of the files that follow: as numbers, which any compiler takes in any amount.
+function(embed name)
+  set(bytes "")
+  foreach(file IN LISTS ARGN)
+    file(READ "${file}" piece HEX)
+    string(APPEND bytes "${piece}")
+  endforeach()
+  string(REGEX REPLACE "(................................)" "\\1\n" bytes "${bytes}")
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "'\\\\x\\1'," bytes "${bytes}")
+  file(APPEND "${OUTPUT}.new" "constexpr char ${name}_bytes[] = {\n${bytes}};\n"
+                              "const std::string_view ${name}(${name}_bytes, sizeof(${name}_bytes));\n\n")
+endfunction()
+
+function(scripts out)
+  list(TRANSFORM ARGN PREPEND "${FOLDER}/")
+  list(TRANSFORM ARGN APPEND ".js")
+  set(${out} "${ARGN}" PARENT_SCOPE)
+endfunction()
+
+file(READ "${THREE}" three)
+if(NOT three MATCHES "REVISION *= *[\"']([0-9]+)")
+  message(FATAL_ERROR "pendula: expected three.js at ${THREE}, got a file without its REVISION")
+endif()
+set(version "${CMAKE_MATCH_1}")
+unset(three)
+
+file(WRITE "${OUTPUT}.new" "// Made by cmake/embed.cmake.\n#include \"view/assets.hpp\"\n\nnamespace pendula::view::assets {\n\n")
+embed(page "${FOLDER}/page.html")
+embed(style "${FOLDER}/page.css")
+scripts(files ${before})
+embed(script_before ${files})
+scripts(files ${after})
+embed(script_after ${files})
+embed(script_plane "${FOLDER}/plane.js")
+embed(script_space "${FOLDER}/camera.js" "${FOLDER}/space.js")
+embed(script_lanes "${FOLDER}/lanes.js")
+file(ARCHIVE_CREATE OUTPUT "${OUTPUT}.gz" PATHS "${THREE}" FORMAT raw COMPRESSION GZip COMPRESSION_LEVEL 9
+     MTIME "1970-01-01 00:00:00 UTC")
+embed(three "${OUTPUT}.gz")
+embed(three_licence "${FOLDER}/three.licence.txt")
+file(APPEND "${OUTPUT}.new" "const std::string_view three_version = \"${version}\";\n\n}  // namespace pendula::view::assets\n")
+file(RENAME "${OUTPUT}.new" "${OUTPUT}")

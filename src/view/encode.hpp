@@ -1,0 +1,41 @@
+#pragma once
+
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+namespace pendula::view {
+
+/// Numbers one after the other, lowest byte first: the order of every machine that a browser runs on.
+class Bytes {
+ public:
+  template <std::floating_point Real>
+  void add(Real number) {
+    using Bits = std::conditional_t<sizeof(Real) == 8, std::uint64_t, std::uint32_t>;
+    static_assert(sizeof(Real) == sizeof(Bits));
+    const Bits bits = std::bit_cast<Bits>(number);
+    for (std::size_t k = 0; k < sizeof(Bits); ++k) bytes_ += static_cast<char>((bits >> (8 * k)) & 0xff);
+  }
+
+  std::string_view view() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+/// Appends `bytes` in base64 (RFC 4648, padded).
+void append_base64(std::string& text, std::string_view bytes);
+
+/// Text as it may stand between tags of HTML; what is no UTF-8 becomes U+FFFD.
+std::string html_text(std::string_view text);
+
+/// JSON as it may stand in a <script>: nothing in it closes or opens a tag or a comment.
+std::string script_json(const nlohmann::json& value);
+
+}  // namespace pendula::view

@@ -1,0 +1,257 @@
+#include "view/page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "view/assets.hpp"
+#include "view/encode.hpp"
+
+namespace pendula::view {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t enough_rows = 2048;  // of exact ones
+constexpr std::size_t fewest_rows = 512;   // before a page may grow
+
+/// Bytes of a row in base64: the time, the numbers, and two floats that tell its energy error and its distance.
+std::size_t row_bytes(std::size_t numbers, std::size_t size) {
+  return (8 + numbers * size + 8) * 4 / 3 + 1;
+}
+
+/// All but the time.
+std::vector<std::size_t> all_columns(const Scene& scene) {
+  std::vector<std::size_t> columns(std::max<std::size_t>(scene.columns.size(), 1) - 1);
+  std::iota(columns.begin(), columns.end(), std::size_t{1});
+  return columns;
+}
+
+/// Those that a drawing needs: without points where angles tell them.
+std::vector<std::size_t> drawn_columns(const Scene& scene) {
+  std::vector<std::size_t> columns;
+  for (const Coordinate& coordinate : scene.coordinates) {
+    columns.push_back(coordinate.column);
+    columns.push_back(coordinate.rate_column);
+  }
+  for (const Point& point : scene.lengths.empty() ? scene.points : std::vector<Point>()) {
+    for (int axis = 0; axis < point.components; ++axis) {
+      columns.push_back(point.column + static_cast<std::size_t>(axis));
+    }
+  }
+  return columns;
+}
+
+const char* name_of(Rods rods) {
+  switch (rods) {
+    case Rods::in_order:
+      return "in order";
+    case Rods::rigid:
+      return "rigid";
+    case Rods::none:
+      break;
+  }
+  return "none";
+}
+
+}  // namespace
+
+Page::Page(const std::string& file, Scene scene, std::size_t runs, const PageLimits& limits)
+    : scene_(std::move(scene)),
+      limits_(limits),
+      expected_(std::max<std::size_t>(runs, 1)),
+      all_columns_(all_columns(scene_)),
+      drawn_columns_(drawn_columns(scene_)),
+      file_(file) {}
+
+void Page::begin_run(const std::string& label) {
+  if (!runs_.empty() && runs_.back().rows.size() == 0) runs_.pop_back();
+  const std::size_t run = runs_.size();
+  runs_.push_back({label, KeptRows(scene_.columns.size(), most_rows(run)), share_of(run), {}});
+}
+
+void Page::add_row(std::span<const double> row) {
+  if (runs_.empty()) throw std::logic_error("page: expected begin_run before a row");
+  if (row.size() != scene_.columns.size()) {
+    throw std::invalid_argument("page: expected a row of " + std::to_string(scene_.columns.size()) + " numbers, got " +
+                                std::to_string(row.size()));
+  }
+  runs_.back().rows.add(row);
+}
+
+void Page::end_run(const io::EnergyError& energy) {
+  if (!runs_.empty()) runs_.back().energy = energy;
+}
+
+void Page::close() {
+  if (!runs_.empty() && runs_.back().rows.size() == 0) runs_.pop_back();
+  if (!runs_.empty()) file_.write(text());
+}
+
+// The first run has half of the page, the others the rest.
+std::size_t Page::share_of(std::size_t run) const {
+  if (expected_ == 1) return limits_.rows;
+  return run == 0 ? limits_.rows / 2 : limits_.rows / 2 / (expected_ - 1);
+}
+
+std::size_t Page::most_rows(std::size_t run) const {
+  const std::size_t exact = share_of(run) / row_bytes(all_columns_.size(), sizeof(double));
+  if (exact >= enough_rows && run == 0) return exact;
+  const std::size_t drawn = row_bytes(drawn_columns_.size(), sizeof(float));
+  return std::max({share_of(run) / drawn, std::min(fewest_rows, limits_.long_rows / expected_ / drawn), exact});
+}
+
+bool Page::is_exact(const Run& run) const {
+  return &run == runs_.data() && run.rows.size() * row_bytes(all_columns_.size(), sizeof(double)) <= run.share;
+}
+
+const std::vector<std::size_t>& Page::columns_of(const Run& run) const {
+  return is_exact(run) ? all_columns_ : drawn_columns_;
+}
+
+std::vector<float> Page::energy_errors(const Run& run) const {
+  const auto found = std::find(scene_.columns.begin(), scene_.columns.end(), "energy");
+  if (found == scene_.columns.end() || std::isnan(run.energy.initial)) return {};
+  const auto column = static_cast<std::size_t>(found - scene_.columns.begin());
+  std::vector<float> errors;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    errors.push_back(static_cast<float>(run.energy.of(run.rows[i][column])));
+  }
+  return errors;
+}
+
+// From the first run, at the rows that have their times in common: as doubles, before they become floats.
+std::vector<float> Page::separations(const Run& run) const {
+  const KeptRows& first = runs_.front().rows;
+  std::vector<float> separations;
+  if (&run == runs_.data()) return separations;
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    const std::span<const double> row = run.rows[i];
+    while (k + 1 < first.size() && first[k][0] < row[0]) ++k;
+    const bool together = first[k][0] == row[0];
+    separations.push_back(together ? static_cast<float>(distance(first[k], row))
+                                   : std::numeric_limits<float>::quiet_NaN());
+  }
+  return separations;
+}
+
+// The largest of any point, or of any coordinate where there are none.
+double Page::distance(std::span<const double> a, std::span<const double> b) const {
+  double largest = 0;
+  for (const Point& point : scene_.points) {
+    double square = 0;
+    for (std::size_t k = point.column; k < point.column + static_cast<std::size_t>(point.components); ++k) {
+      square += (a[k] - b[k]) * (a[k] - b[k]);
+    }
+    largest = std::max(largest, std::sqrt(square));
+  }
+  if (!scene_.points.empty()) return largest;
+  for (const Coordinate& coordinate : scene_.coordinates) {
+    largest = std::max(largest, std::abs(a[coordinate.column] - b[coordinate.column]));
+  }
+  return largest;
+}
+
+// Times, columns one after the other, errors of the energy, distances.
+std::string Page::encoded(const Run& run) const {
+  Bytes bytes;
+  const std::size_t rows = run.rows.size();
+  for (std::size_t i = 0; i < rows; ++i) bytes.add(run.rows[i][0]);
+  const bool exact = is_exact(run);
+  for (const std::size_t column : columns_of(run)) {
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double number = run.rows[i][column];
+      if (exact) {
+        bytes.add(number);
+      } else {
+        bytes.add(static_cast<float>(number));
+      }
+    }
+  }
+  for (const float error : energy_errors(run)) bytes.add(error);
+  for (const float distance : separations(run)) bytes.add(distance);
+  std::string text;
+  append_base64(text, bytes.view());
+  return text;
+}
+
+json Page::described(const Run& run) const {
+  return {{"label", run.label},
+          {"rows", run.rows.size()},
+          {"seen", run.rows.seen()},
+          {"stride", run.rows.stride()},
+          {"exact", is_exact(run)},
+          {"columns", columns_of(run)},
+          {"energy", !energy_errors(run).empty()},
+          {"separation", &run != runs_.data()}};
+}
+
+json Page::described() const {
+  json coordinates = json::array(), points = json::array(), runs = json::array();
+  for (const Coordinate& each : scene_.coordinates) {
+    coordinates.push_back({each.name, each.unit, each.is_angle, each.column, each.rate_column});
+  }
+  for (const Point& each : scene_.points) points.push_back({each.name, each.column, each.components, each.mass});
+  for (const Run& run : runs_) runs.push_back(described(run));
+  return {{"title", scene_.title},
+          {"subject", scene_.subject},
+          {"scenario", scene_.scenario},
+          {"version", scene_.version},
+          {"columns", scene_.columns},
+          {"dimension", scene_.dimension()},
+          {"coordinates", coordinates},
+          {"points", points},
+          {"rods", name_of(scene_.rods)},
+          {"lengths", scene_.lengths},
+          {"timeUnit", scene_.time_unit},
+          {"lengthUnit", scene_.length_unit},
+          {"loaded", scene_.loaded},
+          {"three", assets::three_version},
+          {"runs", runs}};
+}
+
+/// What stands for {{name}}.
+std::string Page::part(const std::string& name) const {
+  const bool in_space = scene_.dimension() == 3;
+  if (name == "title") return html_text(scene_.title);
+  if (name == "version") return html_text(scene_.version);
+  if (name == "style") return std::string(assets::style);
+  if (name == "scene") return script_json(described());
+  if (name == "script") {
+    const std::string_view stage = in_space                  ? assets::script_space
+                                   : scene_.dimension() == 2 ? assets::script_plane
+                                                             : assets::script_lanes;
+    return std::string(assets::script_before) + std::string(stage) + std::string(assets::script_after);
+  }
+  std::string text;
+  if (name == "runs") {
+    for (const Run& run : runs_) text += "<script type=\"text/plain\" class=\"run\">" + encoded(run) + "</script>\n";
+  } else if (name == "three" && in_space) {
+    text += "<!-- three.js r" + std::string(assets::three_version) + "\n\n" + std::string(assets::three_licence) +
+            "-->\n<script type=\"text/plain\" id=\"three\">";
+    append_base64(text, assets::three);
+    text += "</script>";
+  }
+  return text;
+}
+
+std::string Page::text() const {
+  std::string text;
+  std::string_view rest = assets::page;
+  for (std::size_t begin = rest.find("{{"); begin != std::string_view::npos; begin = rest.find("{{")) {
+    const std::size_t end = rest.find("}}", begin);
+    text += rest.substr(0, begin);
+    text += part(std::string(rest.substr(begin + 2, end - begin - 2)));
+    rest.remove_prefix(end + 2);
+  }
+  text += rest;
+  return text;
+}
+
+}  // namespace pendula::view

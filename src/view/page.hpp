@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/run_record.hpp"
+#include "view/kept_rows.hpp"
+#include "view/scene.hpp"
+#include "view/whole_file.hpp"
+
+namespace pendula::view {
+
+/// How large a page may become: bytes of the rows in it, as text.
+struct PageLimits {
+  std::size_t rows = 1'100'000;  ///< of all runs; the rest of a page is 90 kB, in space 320
+  /// Where a row is so long that `rows` leaves less than 512 of them to a run, up to so many.
+  std::size_t long_rows = 6'000'000;
+};
+
+/// A page to look at one run, or at several together: one HTML file that needs nothing else.
+///
+/// Rows are thinned, evenly and in bounded memory, and the page says so. As long as 2048 of them can be kept with all
+/// their columns as doubles, they are, and the CSV that the page gives is the trajectory's own text; longer rows, and
+/// those of the second run and later ones, are floats of what is drawn.
+class Page {
+ public:
+  /// Opens the file. `runs` is how many will follow: they share the page. Throws io::InputError.
+  Page(const std::string& file, Scene scene, std::size_t runs = 1, const PageLimits& limits = {});
+
+  /// Rows that follow are those of a run that the page calls `label`.
+  void begin_run(const std::string& label);
+
+  /// Takes a row, in the order of the columns.
+  void add_row(std::span<const double> row);
+
+  /// Says what the energies of the run are compared with: RunRecord::energy_error, which is complete with the last row.
+  /// Without it the page has no energy errors of the run.
+  void end_run(const io::EnergyError& energy);
+
+  /// Writes the page; does nothing, and leaves no file, where no row came. Throws io::OutputError.
+  void close();
+
+ private:
+  struct Run {
+    std::string label;
+    KeptRows rows;
+    std::size_t share;  // bytes for the rows, as text
+    io::EnergyError energy;
+  };
+
+  std::size_t share_of(std::size_t run) const;
+  std::size_t most_rows(std::size_t run) const;
+  bool is_exact(const Run& run) const;
+  const std::vector<std::size_t>& columns_of(const Run& run) const;
+  std::vector<float> energy_errors(const Run& run) const;
+  std::vector<float> separations(const Run& run) const;
+  double distance(std::span<const double> a, std::span<const double> b) const;
+  std::string encoded(const Run& run) const;
+  nlohmann::json described(const Run& run) const;
+  nlohmann::json described() const;
+  std::string part(const std::string& name) const;
+  std::string text() const;
+
+  Scene scene_;
+  PageLimits limits_;
+  std::size_t expected_;
+  std::vector<std::size_t> all_columns_, drawn_columns_;  // besides the time
+  WholeFile file_;
+  std::vector<Run> runs_;
+};
+
+}  // namespace pendula::view

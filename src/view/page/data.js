@@ -1,0 +1,91 @@
+// What the page holds: the scene, and the rows of its runs.
+
+const scene = JSON.parse(document.getElementById("scene").textContent);
+
+function bytesOfBase64(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  const binary = atob(text);
+  const bytes = new Uint8Array(binary.length);
+  for (let k = 0; k < binary.length; ++k) bytes[k] = binary.charCodeAt(k);
+  return bytes;
+}
+
+/// The rows of one run, column by column.
+class Run {
+  #columns = new Map();
+
+  constructor(described, base64) {
+    Object.assign(this, described);
+    const bytes = bytesOfBase64(base64);
+    let offset = 0;
+    const take = (Kind) => {
+      const numbers = new Kind(bytes.buffer, bytes.byteOffset + offset, this.rows);
+      offset += numbers.byteLength;
+      return numbers;
+    };
+    this.t = take(Float64Array);
+    for (const column of described.columns) {
+      this.#columns.set(column, take(this.exact ? Float64Array : Float32Array));
+    }
+    this.energyError = described.energy ? take(Float32Array) : null;
+    this.separations = described.separation ? take(Float32Array) : null;
+  }
+
+  /// The numbers of a column, undefined where the page has not got them.
+  column(index) {
+    return index === 0 ? this.t : this.#columns.get(index);
+  }
+
+  get start() {
+    return this.t[0];
+  }
+  get end() {
+    return this.t[this.rows - 1];
+  }
+
+  /// The last row that is not later than a time.
+  rowAt(time) {
+    let low = 0;
+    let high = this.rows - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.t[middle] <= time) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  /// The rows as text, those columns that the page has: all 17 digits of doubles, the 9 that tell a float.
+  csv() {
+    const held = scene.columns.map((name, index) => ({ name, numbers: this.column(index) })).filter((c) => c.numbers);
+    const lines = [held.map((c) => c.name).join(",")];
+    const write = this.exact ? exactNumber : (x) => String(Number(x.toPrecision(9)));
+    for (let row = 0; row < this.rows; ++row) {
+      lines.push(held.map((c, k) => (k === 0 ? exactNumber : write)(c.numbers[row])).join(","));
+    }
+    return `${lines.join("\n")}\n`;
+  }
+
+  /// What was left out of the run, in a sentence; empty where nothing was.
+  get thinning() {
+    if (this.stride === 1) return "";
+    return `Every ${this.stride}th of ${this.seen} rows is here, and the last.`;
+  }
+}
+
+const runs = [...document.querySelectorAll("script.run")].map((text, k) => new Run(scene.runs[k], text.textContent));
+
+/// Coordinates that can be plotted on one axis: the angles of a chain's links by name, otherwise those of one unit.
+const groups = (() => {
+  const byKind = new Map();
+  scene.coordinates.forEach(([name, unit, isAngle, column, rate]) => {
+    const stem = scene.lengths.length ? name.split("_")[0] : unit;
+    if (!byKind.has(stem)) byKind.set(stem, { unit, isAngle, isLink: scene.lengths.length > 0, stem, members: [] });
+    byKind.get(stem).members.push({ name, column, rate });
+  });
+  for (const group of byKind.values()) {
+    const names = group.members.length <= 3 ? group.members.map((m) => symbol(m.name)).join(", ") : "";
+    group.label = group.isLink ? symbol(group.stem) : names || `in ${group.unit}`;
+  }
+  return [...byKind.values()];
+})();

@@ -1,0 +1,64 @@
+// Numbers and small pieces of text.
+
+/// A number with 17 significant digits, from which the same double is read back: written as C's %.17g writes it.
+function exactNumber(x) {
+  if (!Number.isFinite(x)) return Number.isNaN(x) ? "nan" : x > 0 ? "inf" : "-inf";
+  if (x === 0) return Object.is(x, -0) ? "-0" : "0";
+  const [digits, exponent] = x.toExponential(16).split("e");
+  const power = Number(exponent);
+  if (power >= -4 && power < 17) return trimmed(x.toFixed(Math.min(16 - power, 100)));
+  return `${trimmed(digits)}e${power < 0 ? "-" : "+"}${String(Math.abs(power)).padStart(2, "0")}`;
+}
+
+/// Without zeros at the end of a fraction.
+function trimmed(text) {
+  return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
+}
+
+/// A number as people read it; a true minus sign.
+function readable(x, digits = 4) {
+  if (!Number.isFinite(x)) return "–";
+  if (x === 0) return "0";
+  const size = Math.abs(x);
+  const text = size >= 1e5 || size < 1e-3 ? trimmedExponential(x, digits) : String(Number(x.toPrecision(digits)));
+  return text.replace("-", "−");
+}
+
+function trimmedExponential(x, digits) {
+  const [mantissa, exponent] = x.toExponential(digits - 1).split("e");
+  return `${trimmed(mantissa)}e${Number(exponent)}`;
+}
+
+/// A power of ten, 10⁻⁷.
+function powerOfTen(exponent) {
+  const raised = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+  return `10${[...String(exponent)].map((c) => raised[c]).join("")}`;
+}
+
+/// theta_12_dot as θ₁₂: what a plot calls a coordinate.
+function symbol(name) {
+  const greek = { theta: "θ", phi: "φ", psi: "ψ", alpha: "α", beta: "β", gamma: "γ" };
+  const lowered = "₀₁₂₃₄₅₆₇₈₉";
+  const [stem, ...rest] = name.split("_");
+  const index = rest.join("_");
+  const below = /^\d+$/.test(index) ? [...index].map((c) => lowered[c]).join("") : index && `_${index}`;
+  return (greek[stem] ?? stem) + below;
+}
+
+/// Steps of 1, 2 or 5 powers of ten that divide a range in about `count`.
+function niceTicks(low, high, count) {
+  const rough = (high - low) / Math.max(count, 1);
+  if (!(rough > 0) || !Number.isFinite(rough)) return [low];
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * [1, 2, 5, 10].find((m) => m * power >= rough * 0.999);
+  const ticks = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; ++k) ticks.push(k * step);
+  return ticks;
+}
+
+/// An element with properties and children.
+function element(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}

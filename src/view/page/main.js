@@ -1,0 +1,81 @@
+// Puts the parts together.
+
+/// A stage for browsers that cannot draw in space: the plots still work.
+function emptyStage(host, error) {
+  host.append(element("p", { className: "notice", textContent: `This browser cannot draw in space: ${error.message}` }));
+  const nothing = () => {};
+  const canvas = element("canvas");
+  return { canvas, description: "", onChange: nothing, reset: nothing, zoom: nothing, turn: nothing, move: nothing, resize: nothing, themed: nothing, draw: nothing };
+}
+
+function makeStage(host) {
+  try {
+    return new Stage(host, new Motion());
+  } catch (error) {
+    return emptyStage(host, error);
+  }
+}
+
+/// What the page is about, how much of it is here, and whose colours are whose.
+function describePage() {
+  const [run] = runs;
+  const many = runs.length > 1 ? `${runs.length} runs · ` : "";
+  const stride = run.stride > 1 ? `every ${run.stride}th of ${run.seen} rows` : `${run.rows} rows`;
+  at("subtitle").textContent = `${scene.subject} · ${many}${stride} · pendula ${scene.version}`;
+}
+
+function drawLegend() {
+  if (runs.length < 2) return;
+  const mark = (colour) => Object.assign(element("i"), { style: `background: ${colour}` });
+  if (runs.length <= palette.curves.length) {
+    at("legend").replaceChildren(...runs.map((run, k) => element("span", {}, mark(rgba(palette.run(k))), run.label)));
+    return;
+  }
+  const ramp = mark(`linear-gradient(to right, ${[0, 0.25, 0.5, 0.75, 1].map((p) => rgba(palette.ramp(p))).join(",")})`);
+  ramp.className = "ramp";
+  at("legend").replaceChildren(element("span", {}, `${runs[0].label} `, ramp, runs.at(-1).label));
+}
+
+function start() {
+  const host = at("stage");
+  const player = new Player();
+  const stage = makeStage(host);
+  stage.canvas.setAttribute("role", "img");
+  stage.canvas.setAttribute("aria-label", stage.description);
+  document.documentElement.dataset.stage = Stage.kind;
+  if (Stage.kind === "lanes") document.querySelector(".corner").hidden = true;
+  const panels = makePanels(player);
+  let isDue = true;
+  const due = () => (isDue = true);
+  const controls = new Controls(player, stage, () => {
+    palette.read();
+    stage.themed();
+    drawLegend();
+    for (const each of panels) each.redraw();
+    due();
+  });
+  stage.onChange = due;
+  player.listen(due);
+  describePage();
+  drawLegend();
+  stage.resize();
+  new ResizeObserver(() => stage.resize()).observe(host);
+  for (const each of panels) new ResizeObserver(() => each.redraw()).observe(each.box.plot);
+
+  for (const each of panels) each.refresh();
+  const frame = (now) => {
+    if (player.advance(now) || isDue) {
+      isDue = false;
+      stage.draw(player.time, controls.trace);
+      for (const each of panels) each.drawCursor();
+    }
+    requestAnimationFrame(frame);
+  };
+  stage.draw(player.time, controls.trace);
+  performance.mark("pendula first frame");
+  requestAnimationFrame(frame);
+  // Motion starts by itself for those who do not mind motion.
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.play(true);
+}
+
+start();

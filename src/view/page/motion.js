@@ -1,0 +1,203 @@
+// Where the points are at any time, between rows too.
+
+const dimension = scene.dimension;
+const origin = -1;
+const free = -2;
+
+/// Vectors of one row: of a point that hangs on another by a rod, the rod; of any other its place. `hangs[i]` is the
+/// point that i hangs on, `origin`, or `free`.
+class Motion {
+  #kept = new Map(); // a few rows at a time, by run and row
+
+  constructor() {
+    this.count = scene.points.length;
+    this.hangs = scene.points.map((_, i) => (scene.rods === "none" ? free : i - 1));
+    if (scene.rods === "rigid") this.hangs = this.hangs.map((on, i) => (this.#isRigid(i, on) ? on : free));
+    this.#measure();
+  }
+
+  /// Places of all points of a run at a time, into `places`, one after the other.
+  at(run, time, places) {
+    const row = run.rowAt(time);
+    const next = Math.min(row + 1, run.rows - 1);
+    const here = this.#vectors(run, row);
+    if (next === row || time <= run.t[row]) return this.#hang(here, places);
+    const vectors = places; // mixed in place
+    this.#mix(run, row, time, vectors);
+    return this.#hang(vectors, places);
+  }
+
+  /// The same at a row.
+  atRow(run, row, places) {
+    return this.#hang(this.#vectors(run, row), places);
+  }
+
+  // Cubic in time through four rows (Catmull and Rom, for rows that are not evenly spaced); rods keep their length.
+  #mix(run, row, time, out) {
+    const last = run.rows - 1;
+    const t = run.t;
+    const before = Math.max(row - 1, 0);
+    const after = Math.min(row + 2, last);
+    const [p0, p1, p2, p3] = [before, row, row + 1, after].map((r) => this.#vectors(run, r));
+    const step = t[row + 1] - t[row];
+    const s = (time - t[row]) / step;
+    const lead = Math.max(t[row + 1] - t[before], step);
+    const trail = Math.max(t[after] - t[row], step);
+    const s2 = s * s;
+    const s3 = s2 * s;
+    const [h1, h2] = [2 * s3 - 3 * s2 + 1, 3 * s2 - 2 * s3];
+    const m1 = ((s3 - 2 * s2 + s) * step) / lead;
+    const m2 = ((s3 - s2) * step) / trail;
+    for (let k = 0; k < out.length; ++k) {
+      out[k] = h1 * p1[k] + h2 * p2[k] + m1 * (p2[k] - p0[k]) + m2 * (p3[k] - p1[k]);
+    }
+    for (let i = 0; i < this.count; ++i) {
+      if (this.hangs[i] === free) continue;
+      const length = norm(p1, i) * (1 - s) + norm(p2, i) * s;
+      const factor = length / (norm(out, i) || 1);
+      for (let axis = 0; axis < dimension; ++axis) out[i * dimension + axis] *= factor;
+    }
+  }
+
+  // Places from vectors; the two may be the same array.
+  #hang(vectors, places) {
+    for (let i = 0; i < this.count; ++i) {
+      const on = this.hangs[i];
+      for (let axis = 0; axis < dimension; ++axis) {
+        const k = i * dimension + axis;
+        places[k] = vectors[k] + (on >= 0 ? places[on * dimension + axis] : 0);
+      }
+    }
+    return places;
+  }
+
+  #vectors(run, row) {
+    const key = runs.indexOf(run) * 8 + (row & 7);
+    const kept = this.#kept.get(key);
+    if (kept?.row === row) return kept.vectors;
+    const vectors = kept?.vectors ?? new Float64Array(this.count * dimension);
+    if (run.column(scene.points[0][1])) this.#fromPoints(run, row, vectors);
+    else this.#fromAngles(run, row, vectors);
+    this.#kept.set(key, { row, vectors });
+    return vectors;
+  }
+
+  #fromPoints(run, row, vectors) {
+    const place = (i, axis) => (axis < scene.points[i][2] ? run.column(scene.points[i][1] + axis)[row] : 0);
+    for (let i = 0; i < this.count; ++i) {
+      const on = this.hangs[i];
+      for (let axis = 0; axis < dimension; ++axis) {
+        vectors[i * dimension + axis] = place(i, axis) - (on >= 0 ? place(on, axis) : 0);
+      }
+    }
+  }
+
+  // Of a chain: (sin θ, −cos θ), in space (sin θ cos φ, sin θ sin φ, −cos θ), by the lengths of its rods.
+  #fromAngles(run, row, vectors) {
+    for (let i = 0; i < this.count; ++i) {
+      const length = scene.lengths[i];
+      const theta = run.column(scene.coordinates[i * (dimension - 1)][3])[row];
+      if (dimension === 2) {
+        vectors[2 * i] = length * Math.sin(theta);
+        vectors[2 * i + 1] = -length * Math.cos(theta);
+      } else {
+        const phi = run.column(scene.coordinates[2 * i + 1][3])[row];
+        vectors[3 * i] = length * Math.sin(theta) * Math.cos(phi);
+        vectors[3 * i + 1] = length * Math.sin(theta) * Math.sin(phi);
+        vectors[3 * i + 2] = -length * Math.cos(theta);
+      }
+    }
+  }
+
+  // Whether point i stays where it is from the one before it, over the rows of the first run.
+  #isRigid(i, on) {
+    const run = runs[0];
+    const distance = (row) => {
+      let square = 0;
+      for (let axis = 0; axis < dimension; ++axis) {
+        const place = (j) => (j >= 0 && axis < scene.points[j][2] ? run.column(scene.points[j][1] + axis)[row] : 0);
+        square += (place(i) - place(on)) ** 2;
+      }
+      return Math.sqrt(square);
+    };
+    const first = distance(0);
+    const slack = (run.exact ? 1e-9 : 1e-5) * first;
+    for (let row = 1; row < run.rows; ++row) {
+      if (Math.abs(distance(row) - first) > slack) return false;
+    }
+    return first > 0;
+  }
+
+  // The box that all runs stay in, with the origin; from at most 500 rows a run. `reach` is what lengths compare with.
+  #measure() {
+    this.low = new Array(dimension).fill(0);
+    this.high = new Array(dimension).fill(0);
+    const places = new Float64Array(this.count * dimension);
+    for (const run of this.count ? runs : []) {
+      const stride = Math.max(1, Math.floor(run.rows / Math.min(500, Math.ceil(200000 / this.count))));
+      for (let row = 0; row < run.rows; row += stride) {
+        this.atRow(run, row, places);
+        for (let k = 0; k < places.length; ++k) {
+          const axis = k % dimension;
+          this.low[axis] = Math.min(this.low[axis], places[k]);
+          this.high[axis] = Math.max(this.high[axis], places[k]);
+        }
+      }
+    }
+    const spans = this.high.map((high, axis) => high - this.low[axis]);
+    const chain = scene.lengths.reduce((sum, length) => sum + length, 0);
+    this.reach = chain || Math.max(...spans, 1e-9) / 2;
+  }
+
+  /// The path of a point, finer than the rows where these are few: times, and places one after the other.
+  path(run, point) {
+    const parts = Math.max(1, Math.min(6, Math.floor(3000 / run.rows), Math.floor(1e6 / (run.rows * this.count))));
+    const samples = (run.rows - 1) * parts + 1;
+    const path = { times: new Float64Array(samples), places: new Float32Array(samples * dimension) };
+    const places = new Float64Array(this.count * dimension);
+    for (let sample = 0; sample < samples; ++sample) {
+      const row = Math.floor(sample / parts);
+      const part = (sample % parts) / parts;
+      const time = part ? run.t[row] + part * (run.t[row + 1] - run.t[row]) : run.t[row];
+      this.at(run, time, places);
+      path.times[sample] = time;
+      for (let axis = 0; axis < dimension; ++axis) {
+        path.places[sample * dimension + axis] = places[point * dimension + axis];
+      }
+    }
+    return path;
+  }
+
+  /// Radii of the bobs: volumes are in proportion to masses, and no bob is too small to see.
+  get radii() {
+    const masses = scene.points.map((point) => point[3]);
+    const largest = Math.max(...masses);
+    const size = this.reach * Math.min(0.055, Math.max(0.005, 0.07 / Math.sqrt(this.count)));
+    return masses.map((mass) => (largest > 0 && mass > 0 ? size * Math.max(Math.cbrt(mass / largest), 0.2) : 0.7 * size));
+  }
+}
+
+function norm(vectors, i) {
+  let square = 0;
+  for (let k = i * dimension; k < (i + 1) * dimension; ++k) square += vectors[k] * vectors[k];
+  return Math.sqrt(square);
+}
+
+/// Index of the last sample of a path that is not later than a time.
+function sampleAt(times, time) {
+  let low = 0;
+  let high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= time) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+/// Points whose paths are traced: the last of a chain; of a model all, if they are few and move.
+const traced = (() => {
+  const last = scene.points.length - 1;
+  if (last < 0 || scene.rods !== "rigid" || last > 3) return last < 0 ? [] : [last];
+  return scene.points.map((_, i) => i).filter((i) => i === last || i > 0);
+})();

@@ -1,0 +1,143 @@
+// The plots beside the stage.
+
+/// A titled box: options, a place for a plot, a key to its curves.
+function panel(title, options = [], kind = "") {
+  const plot = element("div", { className: "plot" });
+  const keys = element("div", { className: "keys" });
+  const heading = element("h2", { textContent: title });
+  const head = element("header", {}, heading, element("div", { className: "options" }, ...options));
+  const section = element("section", { className: `panel ${kind}` }, head, plot, keys);
+  document.getElementById("panels").append(section);
+  return { section, heading, plot, keys };
+}
+
+function checkbox(text, checked, onChange) {
+  const box = element("input", { type: "checkbox", checked });
+  box.addEventListener("change", onChange);
+  return { node: element("label", {}, box, text), get on() { return box.checked; }, box };
+}
+
+/// Curves of one number a run, over time, on a log scale.
+class LogPanel {
+  constructor(title, player, arrayOf, sentence) {
+    this.box = panel(title);
+    this.plot = new TimePlot(this.box.plot, title, player);
+    const held = runs.map((run, k) => ({ run, k, numbers: arrayOf(run) })).filter((each) => each.numbers);
+    const largest = held.reduce((most, { numbers }) => numbers.reduce((m, x) => (x > m ? x : m), most), 0);
+    this.plot.axes.describe(`${title} over time. ${sentence(readable(largest, 3))}`);
+    this.box.heading.title = sentence(readable(largest, 3));
+    const alpha = held.length > 8 ? 0.35 : 1;
+    this.curves = held.map(({ run, k, numbers }) => ({
+      run, numbers, alpha, colour: () => (runs.length > 1 ? palette.run(k) : palette.rgb.accent),
+    }));
+    this.box.keys.append(sentence(readable(largest, 3)));
+  }
+
+  refresh() {
+    this.plot.show(this.curves, "log");
+  }
+  redraw() {
+    this.plot.redraw();
+  }
+  drawCursor() {
+    this.plot.drawCursor();
+  }
+}
+
+/// Coordinates over time: of one run several, of several runs one.
+class CoordinatesPanel {
+  constructor(player) {
+    const refresh = () => this.refresh();
+    const title = groups.every((group) => group.isAngle) ? "Angles" : "Coordinates";
+    this.picker = runs.length > 1 ? new MemberPicker(title, refresh) : new RangePicker(title, refresh);
+    this.wrapped = checkbox("within ±π", groups.length > 0 && groups[0].isAngle && this.#turns(), refresh);
+    this.box = panel(title, [...this.picker.nodes, this.wrapped.node]);
+    this.plot = new TimePlot(this.box.plot, `${title} over time`, player);
+  }
+
+  refresh() {
+    const { group } = this.picker;
+    const members = runs.length > 1 ? [this.picker.member] : this.picker.members;
+    this.wrapped.node.hidden = !group.isAngle;
+    const curves = members.flatMap((member, m) => runs.map((run, k) => ({
+      run,
+      numbers: run.column(member.column),
+      colour: () => (runs.length > 1 ? palette.run(k) : palette.curves[m]),
+      alpha: runs.length > 8 ? 0.4 : 1,
+      name: runs.length > 1 ? run.label : symbol(member.name),
+    })));
+    this.plot.show(curves, group.isAngle && this.wrapped.on ? "wrapped" : "linear");
+    this.plot.axes.describe(`${members.map((m) => m.name).join(", ")} over time, in ${group.unit}`);
+    this.#name(curves, members, group);
+  }
+
+  redraw() {
+    this.plot.redraw();
+    this.#colourKeys();
+  }
+  drawCursor() {
+    this.plot.drawCursor();
+  }
+
+  #name(curves, members, group) {
+    const named = runs.length > 1 ? members.map((m) => symbol(m.name)).join(", ") : "";
+    this.named = runs.length > 1 ? [] : curves;
+    const chips = this.named.map((curve) => element("span", {}, element("i"), curve.name));
+    this.box.keys.replaceChildren(...chips, `${named} in ${group.unit}`.trim());
+    this.#colourKeys();
+  }
+
+  #colourKeys() {
+    this.box.keys.querySelectorAll("i").forEach((mark, k) => {
+      mark.style.background = rgba(this.named[k].colour());
+    });
+  }
+
+  // Whether any angle goes round.
+  #turns() {
+    const { members } = groups[0];
+    return members.some(({ column }) => runs[0].column(column).some((angle) => Math.abs(angle) > 2 * Math.PI));
+  }
+}
+
+/// The phase portrait of one coordinate.
+class PhasePanel {
+  constructor(player, isWrapped) {
+    this.isWrapped = isWrapped;
+    this.picker = new MemberPicker("Phase portrait", () => this.refresh());
+    this.box = panel("Phase portrait", this.picker.nodes, "square");
+    this.plot = new PhasePlot(this.box.plot, "Phase portrait", player);
+  }
+
+  refresh() {
+    const { group, member } = this.picker;
+    this.plot.show(member, group, group.isAngle && this.isWrapped());
+    this.plot.axes.describe(`Phase portrait: rate of ${member.name} against ${member.name}`);
+  }
+  redraw() {
+    this.plot.redraw();
+  }
+  drawCursor() {
+    this.plot.drawCursor();
+  }
+}
+
+/// All panels that the runs have numbers for.
+function makePanels(player) {
+  const made = [];
+  if (runs.length > 1) {
+    made.push(new LogPanel("Distance from the first run", player, (run) => run.separations,
+      (largest) => `At most ${largest} ${scene.dimension ? scene.lengthUnit : ""}`));
+  }
+  if (runs.some((run) => run.energyError)) {
+    const title = scene.loaded ? "Change of energy" : "Energy error";
+    made.push(new LogPanel(title, player, (run) => run.energyError, (largest) => `|H − H₀|, relative: at most ${largest}`));
+  }
+  if (groups.length > 0) {
+    const angles = new CoordinatesPanel(player);
+    const phase = new PhasePanel(player, () => angles.wrapped.on);
+    angles.wrapped.box.addEventListener("change", () => phase.refresh());
+    made.push(angles, phase);
+  }
+  return made;
+}

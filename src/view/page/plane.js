@@ -1,0 +1,216 @@
+// The stage of motions in the plane.
+
+class Stage {
+  constructor(host, motion) {
+    this.motion = motion;
+    this.radii = motion.radii;
+    this.canvas = host.appendChild(element("canvas", { tabIndex: 0 }));
+    this.pen = this.canvas.getContext("2d");
+    this.places = runs.map(() => new Float64Array(motion.count * 2));
+    this.paths = runs.map((run) => traced.map((point) => motion.path(run, point)));
+    this.view = { x: 0, y: 0, zoom: 1 };
+    this.onChange = () => {};
+    watchGestures(this.canvas, {
+      move: (dx, dy) => this.#moveBy(dx, dy),
+      zoom: (factor, x, y) => this.zoom(factor, x, y),
+    });
+    this.reset();
+  }
+
+  static kind = "plane";
+
+  get description() {
+    return `${scene.subject}, moving. Plots of the same motion follow.`;
+  }
+
+  reset() {
+    const { low, high, reach } = this.motion;
+    const room = 0.12 * reach;
+    this.home = {
+      x: (low[0] + high[0]) / 2,
+      y: (low[1] + high[1]) / 2,
+      width: Math.max(high[0] - low[0], reach) + 2 * room,
+      height: Math.max(high[1] - low[1], reach) + 2 * room,
+    };
+    this.view = { x: this.home.x, y: this.home.y, zoom: 1 };
+    this.onChange();
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    fitCanvas(this.canvas, width, height);
+    this.width = width;
+    this.height = height;
+    this.fine = this.canvas.width / Math.max(width, 1);
+    this.onChange();
+  }
+
+  /// Pixels of CSS to a metre.
+  get scale() {
+    return Math.min(this.width / this.home.width, this.height / this.home.height) * this.view.zoom;
+  }
+
+  zoom(factor, x = this.width / 2, y = this.height / 2) {
+    const before = this.scale;
+    this.view.zoom = Math.min(Math.max(this.view.zoom * factor, 0.2), 200);
+    const change = 1 / before - 1 / this.scale;
+    this.view.x += (x - this.width / 2) * change;
+    this.view.y -= (y - this.height / 2) * change;
+    this.onChange();
+  }
+
+  /// By keys: in parts of what is seen.
+  turn(x, y) {
+    this.move(x, y);
+  }
+  move(x, y) {
+    this.#moveBy(-x * this.width * 0.05, y * this.height * 0.05);
+  }
+
+  #moveBy(dx, dy) {
+    this.view.x -= dx / this.scale;
+    this.view.y += dy / this.scale;
+    this.onChange();
+  }
+
+  themed() {}
+
+  draw(time, trace) {
+    const { pen } = this;
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    pen.setTransform(this.fine, 0, 0, this.fine, 0, 0);
+    pen.lineJoin = pen.lineCap = "round";
+    this.#drawGrid();
+    runs.forEach((run, k) => this.motion.at(run, time, this.places[k]));
+    runs.forEach((_, k) => this.#drawTraces(k, time, trace));
+    for (let k = runs.length - 1; k >= 0; --k) this.#drawBodies(k);
+    this.#drawPivot();
+  }
+
+  #x(x) {
+    return this.width / 2 + (x - this.view.x) * this.scale;
+  }
+  #y(y) {
+    return this.height / 2 - (y - this.view.y) * this.scale;
+  }
+
+  #drawGrid() {
+    const { pen, width, height, scale } = this;
+    const [left, right] = [this.view.x - width / 2 / scale, this.view.x + width / 2 / scale];
+    const [bottom, top] = [this.view.y - height / 2 / scale, this.view.y + height / 2 / scale];
+    const ticks = niceTicks(0, right - left, width / 110);
+    const step = ticks.length > 1 ? ticks[1] - ticks[0] : right - left;
+    pen.strokeStyle = palette.css("line");
+    pen.lineWidth = 1;
+    for (let k = Math.ceil(left / step); k * step < right; ++k) {
+      const x = Math.round(this.#x(k * step)) + 0.5;
+      line(pen, x, 0, x, height);
+    }
+    for (let k = Math.ceil(bottom / step); k * step < top; ++k) {
+      const y = Math.round(this.#y(k * step)) + 0.5;
+      line(pen, 0, y, width, y);
+    }
+    this.#drawRule(step);
+  }
+
+  // How long the side of a square of the grid is.
+  #drawRule(step) {
+    const { pen } = this;
+    const y = this.height - 14;
+    const x1 = this.width - 14;
+    const x0 = x1 - step * this.scale;
+    pen.strokeStyle = pen.fillStyle = palette.css("quiet");
+    pen.lineWidth = 1.5;
+    line(pen, x0, y, x1, y);
+    pen.font = "11px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.fillText(`${readable(step)} ${scene.lengthUnit}`, (x0 + x1) / 2, y - 6);
+  }
+
+  // In pieces of one brightness each: a stroke costs much more than a point.
+  #drawTraces(k, time, trace) {
+    if (trace === 0) return;
+    const { pen } = this;
+    const since = time - trace * (runs[0].end - runs[0].start);
+    const pieces = runs.length > 8 ? 5 : 20;
+    pen.lineWidth = runs.length > 8 ? 1.2 : 2;
+    traced.forEach((point, n) => {
+      const { times, places } = this.paths[k][n];
+      const to = sampleAt(times, time);
+      const from = Math.min(sampleAt(times, since), to);
+      for (let piece = 0; piece < pieces; ++piece) {
+        const begin = from + Math.floor(((to - from) * piece) / pieces);
+        const end = from + Math.floor(((to - from) * (piece + 1)) / pieces);
+        const fade = trace >= 1 ? 0.55 : ((piece + 1) / pieces) ** 1.5;
+        pen.strokeStyle = rgba(this.#traceColour(k), fade * (runs.length > 8 ? 0.5 : 0.9));
+        pen.beginPath();
+        for (let s = begin; s <= end; ++s) pen.lineTo(this.#x(places[2 * s]), this.#y(places[2 * s + 1]));
+        if (piece === pieces - 1) this.#lineTo(this.places[k], point);
+        pen.stroke();
+      }
+    });
+  }
+
+  #traceColour(k) {
+    return palette.run(k);
+  }
+
+  #lineTo(places, point) {
+    this.pen.lineTo(this.#x(places[2 * point]), this.#y(places[2 * point + 1]));
+  }
+
+  #drawBodies(k) {
+    const { pen, motion } = this;
+    const many = runs.length > 1;
+    const places = this.places[k];
+    const alpha = runs.length > 8 ? 0.55 : 1;
+    pen.strokeStyle = many ? rgba(palette.run(k), alpha * 0.8) : palette.css("rod");
+    pen.lineWidth = many ? 1.5 : Math.max(1.2, Math.min(4, (0.012 * motion.reach * this.scale) / Math.sqrt(motion.count / 4 + 1)));
+    pen.beginPath();
+    for (let i = 0; i < motion.count; ++i) {
+      const on = motion.hangs[i];
+      if (on === free) continue;
+      if (i === 0 || on !== i - 1) pen.moveTo(this.#x(on < 0 ? 0 : places[2 * on]), this.#y(on < 0 ? 0 : places[2 * on + 1]));
+      else if (motion.hangs[i - 1] === free) pen.moveTo(this.#x(places[2 * on]), this.#y(places[2 * on + 1]));
+      this.#lineTo(places, i);
+    }
+    pen.stroke();
+    this.#drawBobs(k, places, alpha);
+  }
+
+  // The last one in the colour of its trace; of runs that are many only that one.
+  #drawBobs(k, places, alpha) {
+    const { pen, motion } = this;
+    const last = motion.count - 1;
+    const bob = (i) => {
+      const x = this.#x(places[2 * i]);
+      const y = this.#y(places[2 * i + 1]);
+      const radius = Math.max(this.radii[i] * this.scale, 1.2);
+      pen.moveTo(x + radius, y);
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+    };
+    if (runs.length <= 8) {
+      pen.fillStyle = runs.length > 1 ? rgba(palette.run(k)) : palette.css("bob");
+      pen.beginPath();
+      for (let i = 0; i < last; ++i) bob(i);
+      pen.fill();
+    }
+    pen.fillStyle = rgba(runs.length > 1 ? palette.run(k) : palette.rgb.trace, alpha);
+    pen.beginPath();
+    bob(last);
+    pen.fill();
+  }
+
+  #drawPivot() {
+    if (!this.motion.hangs.includes(origin)) return;
+    const { pen } = this;
+    pen.beginPath();
+    pen.arc(this.#x(0), this.#y(0), 4, 0, 2 * Math.PI);
+    pen.fillStyle = palette.css("panel");
+    pen.strokeStyle = palette.css("ink");
+    pen.lineWidth = 2;
+    pen.fill();
+    pen.stroke();
+  }
+}

@@ -1,0 +1,316 @@
+// The stage of motions in space: three.js, with a floor, a light, and shadows that the light throws straight down it.
+
+/// three.js, from the page; a loader of modules is what it takes us for, so that it leaves no global.
+async function loadThree() {
+  const packed = bytesOfBase64(document.getElementById("three").textContent);
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const source = await new Response(stream).text();
+  const door = `three ${Math.random()}`;
+  window[door] = {};
+  const script = element("script");
+  script.textContent = `(function (exports, module, define) {${source}\n}).call({}, window["${door}"], {});`;
+  document.head.append(script);
+  const three = window[door];
+  delete window[door];
+  script.remove();
+  return three;
+}
+
+const THREE = await loadThree().catch(() => null);
+
+/// Balls and rods of one run, and what they throw on the floor: one instanced mesh each.
+class Bodies {
+  constructor(motion, colours, radii, shadow) {
+    this.motion = motion;
+    this.radii = radii;
+    this.rods = motion.hangs.map((on, i) => ({ on, i })).filter(({ on }) => on !== free);
+    const fine = motion.count * runs.length;
+    const [around, along] = fine <= 40 ? [28, 18] : fine <= 300 ? [14, 9] : [8, 5];
+    const ball = new THREE.SphereBufferGeometry(1, around, along);
+    const rod = new THREE.CylinderBufferGeometry(1, 1, 1, fine <= 300 ? 10 : 5, 1, true);
+    rod.rotateX(Math.PI / 2); // along z, as a rod's matrix wants it
+    this.meshes = { balls: this.#mesh(ball, colours.ball, motion.count - 1), tip: this.#mesh(ball, colours.tip, 1) };
+    this.meshes.rods = this.#mesh(rod, colours.rod, this.rods.length);
+    this.shadows = shadow ? Object.values(this.meshes).map((mesh) => this.#shadowOf(mesh, shadow)) : [];
+    this.rodRadius = Math.min(0.008 * motion.reach, 0.35 * Math.min(...radii));
+  }
+
+  get objects() {
+    return [...Object.values(this.meshes), ...this.shadows];
+  }
+
+  colour({ ball, tip, rod }) {
+    this.meshes.balls.material.color.setRGB(...ball);
+    this.meshes.tip.material.color.setRGB(...tip);
+    this.meshes.rods.material.color.setRGB(...rod);
+  }
+
+  /// Puts all where `places` says.
+  move(places) {
+    const last = this.motion.count - 1;
+    const put = (mesh, k, i) => {
+      const m = mesh.instanceMatrix.array;
+      const r = this.radii[i];
+      m[16 * k] = m[16 * k + 5] = m[16 * k + 10] = r;
+      for (let axis = 0; axis < 3; ++axis) m[16 * k + 12 + axis] = places[3 * i + axis];
+      m[16 * k + 15] = 1;
+    };
+    for (let i = 0; i < last; ++i) put(this.meshes.balls, i, i);
+    put(this.meshes.tip, 0, last);
+    this.rods.forEach(({ on, i }, k) => this.#putRod(k, places, on, i));
+    for (const mesh of Object.values(this.meshes)) mesh.instanceMatrix.needsUpdate = true;
+  }
+
+  // A frame whose third axis is the rod; the first is across it, whichever way.
+  #putRod(k, places, on, i) {
+    const m = this.meshes.rods.instanceMatrix.array;
+    const at = (j, axis) => (j >= 0 ? places[3 * j + axis] : 0);
+    const [x, y, z] = [0, 1, 2].map((axis) => at(i, axis) - at(on, axis));
+    const flat = Math.hypot(x, y);
+    const [ax, ay] = flat > 1e-12 ? [-y / flat, x / flat] : [1, 0];
+    const length = Math.hypot(flat, z) || 1;
+    const b = [(-ay * z) / length, (ax * z) / length, (x * ay - y * ax) / length];
+    const r = this.rodRadius;
+    m.set([ax * r, ay * r, 0, 0, b[0] * r, b[1] * r, b[2] * r, 0, x, y, z, 0], 16 * k);
+    for (let axis = 0; axis < 3; ++axis) m[16 * k + 12 + axis] = (at(i, axis) + at(on, axis)) / 2;
+    m[16 * k + 15] = 1;
+  }
+
+  #mesh(geometry, colour, count) {
+    const material = new THREE.MeshPhongMaterial({ shininess: 40, specular: 0x2a2a2a });
+    const mesh = new THREE.InstancedMesh(geometry, material, Math.max(count, 1));
+    mesh.count = count;
+    mesh.visible = count > 0;
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+
+  #shadowOf(mesh, { matrix, material }) {
+    const shadow = new THREE.InstancedMesh(mesh.geometry, material, Math.max(mesh.count, 1));
+    shadow.instanceMatrix = mesh.instanceMatrix;
+    shadow.count = mesh.count;
+    shadow.visible = mesh.visible;
+    shadow.frustumCulled = false;
+    shadow.matrixAutoUpdate = false;
+    shadow.matrix.copy(matrix);
+    shadow.renderOrder = 1;
+    return shadow;
+  }
+}
+
+/// The path of a point behind it, fading into the background.
+class Trace {
+  constructor(path, most) {
+    this.path = path;
+    this.most = most;
+    this.geometry = new THREE.BufferGeometry();
+    const attribute = () => new THREE.BufferAttribute(new Float32Array(3 * most), 3).setUsage(THREE.DynamicDrawUsage);
+    this.geometry.setAttribute("position", attribute());
+    this.geometry.setAttribute("color", attribute());
+    this.line = new THREE.Line(this.geometry, new THREE.LineBasicMaterial({ vertexColors: THREE.VertexColors }));
+    this.line.frustumCulled = false;
+  }
+
+  move(since, time, tip, colour, background, fades) {
+    const { times, places } = this.path;
+    const to = sampleAt(times, time);
+    const from = Math.min(sampleAt(times, since), to);
+    const stride = Math.max(1, Math.ceil((to - from + 2) / (this.most - 1)));
+    const position = this.geometry.attributes.position.array;
+    const colours = this.geometry.attributes.color.array;
+    let count = 0;
+    for (let s = from; s <= to; s += stride) this.#add(count++, places, 3 * s, position);
+    this.#add(count++, tip, 0, position);
+    for (let k = 0; k < count; ++k) {
+      const fade = fades ? ((k + 1) / count) ** 1.4 : 0.7;
+      for (let c = 0; c < 3; ++c) colours[3 * k + c] = background[c] + (colour[c] - background[c]) * fade;
+    }
+    this.geometry.setDrawRange(0, count);
+    this.geometry.attributes.position.needsUpdate = this.geometry.attributes.color.needsUpdate = true;
+  }
+
+  #add(k, places, from, position) {
+    for (let axis = 0; axis < 3; ++axis) position[3 * k + axis] = places[from + axis];
+  }
+}
+
+class Stage {
+  constructor(host, motion) {
+    if (!THREE) throw new Error("three.js did not load");
+    this.motion = motion;
+    this.canvas = host.appendChild(element("canvas", { tabIndex: 0 }));
+    this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: false });
+    this.scene = new THREE.Scene();
+    this.places = runs.map(() => new Float64Array(motion.count * 3));
+    this.#measure();
+    this.#light();
+    this.#layFloor();
+    this.#addBodies();
+    this.onChange = () => {};
+    this.camera = new OrbitCamera(new THREE.PerspectiveCamera(32, 1, 0.1, 100), this.middle, this.radius);
+    this.#watch();
+    this.themed();
+  }
+
+  static kind = "space";
+
+  get description() {
+    return `${scene.subject}, moving, in perspective over a floor. Plots of the same motion follow.`;
+  }
+
+  #watch() {
+    watchGestures(this.canvas, {
+      turn: (dx, dy) => this.#change(() => this.camera.turn(-dx * 0.008, dy * 0.008)),
+      move: (dx, dy) => this.#change(() => this.camera.move(-dx / this.height, dy / this.height)),
+      zoom: (factor) => this.zoom(factor),
+    });
+  }
+
+  #change(change) {
+    change();
+    this.onChange();
+  }
+
+  reset() {
+    this.#change(() => this.camera.reset());
+  }
+  zoom(factor) {
+    this.#change(() => this.camera.zoom(factor));
+  }
+  turn(x, y) {
+    this.#change(() => this.camera.turn(x * 0.1, y * 0.1));
+  }
+  move(x, y) {
+    this.#change(() => this.camera.move(x * 0.05, y * 0.05));
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.height = Math.max(height, 1);
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.fit(width / this.height);
+    this.onChange();
+  }
+
+  // The middle of what moves, and the sphere about it; the floor is a little below.
+  #measure() {
+    const { low, high, reach } = this.motion;
+    this.floor = Math.min(low[2], -0.02 * reach) - 0.16 * reach;
+    this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (this.floor + Math.max(high[2], 0)) / 2];
+    const half = [0, 1, 2].map((axis) => Math.max(high[axis] - this.middle[axis], this.middle[axis] - low[axis]));
+    this.radius = Math.max(Math.hypot(Math.max(half[0], half[1]), half[2]), 0.6 * reach) * 1.08;
+  }
+
+  #light() {
+    const sun = new THREE.DirectionalLight(0xffffff, 0.75);
+    this.sun = [0.35, -0.25, 1];
+    sun.position.set(...this.sun);
+    const side = new THREE.DirectionalLight(0xffffff, 0.2);
+    side.position.set(-1, 0.6, 0.2);
+    this.scene.add(sun, side, new THREE.HemisphereLight(0xffffff, 0x777777, 0.45));
+  }
+
+  // A disc with a grid, which fades at its rim into what is behind.
+  #layFloor() {
+    const size = this.radius * 3.2;
+    const disc = new THREE.CircleBufferGeometry(size, 96);
+    this.disc = new THREE.Mesh(disc, new THREE.MeshBasicMaterial({ polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }));
+    this.disc.position.set(this.middle[0], this.middle[1], this.floor);
+    const ticks = niceTicks(0, size, 7);
+    this.square = ticks[1] - ticks[0];
+    this.grid = new THREE.LineSegments(this.#gridGeometry(size), new THREE.LineBasicMaterial({ vertexColors: THREE.VertexColors }));
+    this.grid.position.copy(this.disc.position);
+    const post = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(0, 0, 0), new THREE.Vector3(0, 0, this.floor)]);
+    this.post = new THREE.Line(post, new THREE.LineBasicMaterial());
+    this.pivot = new THREE.Mesh(new THREE.SphereBufferGeometry(0.014 * this.motion.reach, 16, 12), new THREE.MeshBasicMaterial());
+    this.post.visible = this.pivot.visible = this.motion.hangs.includes(origin);
+    this.scene.add(this.disc, this.grid, this.post, this.pivot);
+  }
+
+  #gridGeometry(size) {
+    const points = [];
+    this.rim = [];
+    const parts = 24;
+    const add = (x, y) => {
+      points.push(new THREE.Vector3(x, y, 0));
+      this.rim.push(Math.min(1, Math.hypot(x, y) / size));
+    };
+    const count = Math.floor(size / this.square);
+    for (let k = -count; k <= count; ++k) {
+      const across = k * this.square;
+      const half = Math.sqrt(Math.max(size * size - across * across, 0));
+      for (let part = 0; part < parts; ++part) {
+        const [a, b] = [part, part + 1].map((p) => -half + (2 * half * p) / parts);
+        add(a, across), add(b, across), add(across, a), add(across, b);
+      }
+    }
+    const geometry = new THREE.BufferGeometry().setFromPoints(points);
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * points.length), 3));
+    return geometry;
+  }
+
+  // Straight onto the floor, along the sun's rays: a matrix, no second look from the light.
+  #shadow() {
+    const [x, y, z] = this.sun;
+    const height = this.floor + 0.001 * this.radius;
+    const matrix = new THREE.Matrix4().set(1, 0, -x / z, (x / z) * height, 0, 1, -y / z, (y / z) * height, 0, 0, 0, height, 0, 0, 0, 1);
+    return { matrix, material: new THREE.MeshBasicMaterial() };
+  }
+
+  #addBodies() {
+    const { motion } = this;
+    const radii = motion.radii.map((radius) => (runs.length > 8 ? 0.6 * radius : radius));
+    this.shadow = this.#shadow();
+    this.bodies = runs.map((_, k) => new Bodies(motion, {}, radii, runs.length <= 8 || k === 0 ? this.shadow : null));
+    const most = runs.length > 8 ? 400 : 2000;
+    this.traces = runs.map((run) => traced.map((point) => new Trace(motion.path(run, point), most)));
+    for (const body of this.bodies) this.scene.add(...body.objects);
+    for (const trace of this.traces.flat()) this.scene.add(trace.line);
+  }
+
+  /// Takes the colours of the theme.
+  themed() {
+    const unit = (rgb) => rgb.map((c) => c / 255);
+    const { rgb } = palette;
+    this.background = unit(rgb.ground);
+    this.scene.background = new THREE.Color(...this.background);
+    this.scene.fog = new THREE.Fog(this.scene.background, 1, 2); // placed with each frame
+    this.disc.material.color.setRGB(...unit(rgb.floor));
+    this.shadow.material.color.setRGB(...unit(rgb.shade));
+    this.post.material.color.setRGB(...unit(rgb.edge));
+    this.pivot.material.color.setRGB(...unit(rgb.ink));
+    this.#colourGrid(unit(rgb.line), unit(rgb.floor));
+    this.bodies.forEach((body, k) => {
+      const own = unit(palette.run(k));
+      body.colour(runs.length > 1 ? { ball: own, tip: own, rod: own } : { ball: unit(rgb.bob), tip: own, rod: unit(rgb.rod) });
+    });
+  }
+
+  #colourGrid(colour, floor) {
+    const colours = this.grid.geometry.attributes.color;
+    this.rim.forEach((rim, k) => {
+      for (let c = 0; c < 3; ++c) colours.array[3 * k + c] = colour[c] + (floor[c] - colour[c]) * rim;
+    });
+    colours.needsUpdate = true;
+  }
+
+  draw(time, trace) {
+    const since = time - trace * (runs[0].end - runs[0].start);
+    runs.forEach((run, k) => {
+      const places = this.motion.at(run, time, this.places[k]);
+      this.bodies[k].move(places);
+      traced.forEach((point, n) => {
+        const { line } = this.traces[k][n];
+        line.visible = trace > 0;
+        if (trace === 0) return;
+        const tip = places.subarray(3 * point, 3 * point + 3);
+        const colour = palette.run(k).map((c) => c / 255);
+        this.traces[k][n].move(since, time, tip, colour, this.background, trace < 1);
+      });
+    });
+    this.scene.fog.near = this.camera.distance + 0.8 * this.radius;
+    this.scene.fog.far = this.camera.distance + 4 * this.radius;
+    this.renderer.render(this.scene, this.camera.camera);
+  }
+}

@@ -1,0 +1,76 @@
+#include "view/whole_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "io/input_error.hpp"
+#include "io/line_file.hpp"
+
+namespace pendula::view {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Why a file could not be opened; a missing folder is named.
+std::string reason(const fs::path& file, int error) {
+  std::error_code unknown;
+  const fs::path folder = file.parent_path();
+  if (error == ENOENT && !folder.empty() && !fs::exists(folder, unknown)) return folder.string() + "/ does not exist";
+  return std::strerror(error);
+}
+
+}  // namespace
+
+WholeFile::WholeFile(const std::string& name) : name_(name), target_(name) {
+  const auto reject = [&](const std::string& why) {
+    throw io::InputError(name_ + ": expected a file that can be written, got: " + why);
+  };
+  std::error_code unknown;
+  if (name.empty() || fs::is_directory(name, unknown)) reject(std::strerror(name.empty() ? ENOENT : EISDIR));
+  if (fs::is_symlink(name, unknown)) {
+    const fs::path followed = fs::weakly_canonical(name, unknown);
+    if (!unknown) target_ = followed.string();
+  }
+  const bool is_special = fs::exists(target_, unknown) && !fs::is_regular_file(target_, unknown);
+  if (fs::is_regular_file(target_, unknown) && access(target_.c_str(), W_OK) != 0) reject(std::strerror(errno));
+  if (!is_special) part_ = target_ + ".part" + std::to_string(getpid());
+  const std::string& opened = is_special ? target_ : part_;
+  descriptor_ = open(opened.c_str(), O_WRONLY | O_CLOEXEC | (is_special ? 0 : O_CREAT | O_TRUNC), 0666);
+  if (descriptor_ < 0) reject(reason(target_, errno));
+}
+
+WholeFile::~WholeFile() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  if (!part_.empty()) unlink(part_.c_str());
+}
+
+void WholeFile::write(std::string_view text) {
+  write_all(text);
+  if (::close(std::exchange(descriptor_, -1)) != 0) fail(errno);
+  if (!part_.empty() && std::rename(part_.c_str(), target_.c_str()) != 0) fail(errno);
+}
+
+void WholeFile::write_all(std::string_view text) const {
+  while (!text.empty()) {
+    const ssize_t bytes = ::write(descriptor_, text.data(), text.size());
+    if (bytes < 0 && errno == EINTR) continue;
+    if (bytes <= 0) fail(bytes < 0 ? errno : ENOSPC);
+    text.remove_prefix(static_cast<std::size_t>(bytes));
+  }
+}
+
+void WholeFile::fail(int error) const {
+  if (!part_.empty()) unlink(part_.c_str());
+  throw io::OutputError(name_ + ": could not be written: " + std::strerror(error));
+}
+
+}  // namespace pendula::view
