@@ -27,6 +27,16 @@ std::string reason(const fs::path& file, int error) {
   return std::strerror(error);
 }
 
+/// The file that a name leads to by links, whether it is there or not.
+std::string followed(const std::string& name) {
+  std::error_code unknown;
+  fs::path file = name;
+  for (int links = 0; links < 40 && fs::is_symlink(file, unknown); ++links) {
+    file = file.parent_path() / fs::read_symlink(file, unknown);
+  }
+  return file.string();
+}
+
 }  // namespace
 
 WholeFile::WholeFile(const std::string& name) : name_(name), target_(name) {
@@ -35,12 +45,9 @@ WholeFile::WholeFile(const std::string& name) : name_(name), target_(name) {
   };
   std::error_code unknown;
   if (name.empty() || fs::is_directory(name, unknown)) reject(std::strerror(name.empty() ? ENOENT : EISDIR));
-  if (fs::is_symlink(name, unknown)) {
-    const fs::path followed = fs::weakly_canonical(name, unknown);
-    if (!unknown) target_ = followed.string();
-  }
-  const bool is_special = fs::exists(target_, unknown) && !fs::is_regular_file(target_, unknown);
-  if (fs::is_regular_file(target_, unknown) && access(target_.c_str(), W_OK) != 0) reject(std::strerror(errno));
+  const bool is_special = fs::exists(name, unknown) && !fs::is_regular_file(name, unknown);
+  if (!is_special) target_ = followed(name);
+  if (fs::exists(target_, unknown) && access(target_.c_str(), W_OK) != 0) reject(std::strerror(errno));
   if (!is_special) part_ = target_ + ".part" + std::to_string(getpid());
   const std::string& opened = is_special ? target_ : part_;
   descriptor_ = open(opened.c_str(), O_WRONLY | O_CLOEXEC | (is_special ? 0 : O_CREAT | O_TRUNC), 0666);

@@ -32,7 +32,7 @@ class Controls {
     const digits = Math.min(Math.max(3 - Math.floor(Math.log10(player.duration || 1)), 0), 12);
     const text = `${player.time.toFixed(digits)} ${scene.timeUnit}`;
     at("clock").textContent = text;
-    at("time").textContent = `${text} of ${readable(player.end, 6)} ${scene.timeUnit}`;
+    at("time").textContent = text;
     const scrub = at("scrub");
     scrub.value = player.time;
     const whole = player.playing ? Math.floor(player.time) : text;
@@ -59,6 +59,7 @@ class Controls {
     const scrub = at("scrub");
     scrub.min = player.start;
     scrub.max = player.end;
+    at("whole").textContent = `of ${readable(player.end, 6)} ${scene.timeUnit}`;
     scrub.addEventListener("input", () => player.seek(Number(scrub.value)));
     at("play").addEventListener("click", () => this.#togglePlay());
     at("back").addEventListener("click", () => player.step(-1));

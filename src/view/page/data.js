@@ -69,7 +69,7 @@ class Run {
   /// What was left out of the run, in a sentence; empty where nothing was.
   get thinning() {
     if (this.stride === 1) return "";
-    return `Every ${this.stride}th of ${this.seen} rows is here, and the last.`;
+    return `Thinned: every ${ordinal(this.stride)} of ${this.seen} rows, and the last.`;
   }
 }
 
@@ -87,5 +87,5 @@ const groups = (() => {
     const names = group.members.length <= 3 ? group.members.map((m) => symbol(m.name)).join(", ") : "";
     group.label = group.isLink ? symbol(group.stem) : names || `in ${group.unit}`;
   }
-  return [...byKind.values()];
+  return [...byKind.values()].sort((a, b) => b.isAngle - a.isAngle); // angles first
 })();

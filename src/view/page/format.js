@@ -21,7 +21,7 @@ function readable(x, digits = 4) {
   if (x === 0) return "0";
   const size = Math.abs(x);
   const text = size >= 1e5 || size < 1e-3 ? trimmedExponential(x, digits) : String(Number(x.toPrecision(digits)));
-  return text.replace("-", "−");
+  return text.replaceAll("-", "−");
 }
 
 function trimmedExponential(x, digits) {
@@ -33,6 +33,12 @@ function trimmedExponential(x, digits) {
 function powerOfTen(exponent) {
   const raised = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
   return `10${[...String(exponent)].map((c) => raised[c]).join("")}`;
+}
+
+/// 2nd, 4th, 32nd.
+function ordinal(number) {
+  const teens = number % 100 > 10 && number % 100 < 14;
+  return `${number}${(!teens && { 1: "st", 2: "nd", 3: "rd" }[number % 10]) || "th"}`;
 }
 
 /// theta_12_dot as θ₁₂: what a plot calls a coordinate.

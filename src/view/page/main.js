@@ -16,14 +16,16 @@ function makeStage(host) {
   }
 }
 
-/// What the page is about, how much of it is here, and whose colours are whose.
+/// What the page is about, and how much of it is here.
 function describePage() {
-  const [run] = runs;
-  const many = runs.length > 1 ? `${runs.length} runs · ` : "";
-  const stride = run.stride > 1 ? `every ${run.stride}th of ${run.seen} rows` : `${run.rows} rows`;
-  at("subtitle").textContent = `${scene.subject} · ${many}${stride} · pendula ${scene.version}`;
+  const rows = (run) => (run.stride > 1 ? `every ${ordinal(run.stride)} of ${run.seen} rows` : `${run.rows} rows`);
+  const [first, second] = runs;
+  const parts = [scene.subject, ...(second ? [`${runs.length} runs`] : []), rows(first)];
+  if (second && rows(second) !== rows(first)) parts.push(`of the others ${rows(second)}`);
+  at("subtitle").textContent = [...parts, `pendula ${scene.version}`].join(" · ");
 }
 
+/// Whose colours are whose.
 function drawLegend() {
   if (runs.length < 2) return;
   const mark = (colour) => Object.assign(element("i"), { style: `background: ${colour}` });

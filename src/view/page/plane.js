@@ -3,7 +3,7 @@
 class Stage {
   constructor(host, motion) {
     this.motion = motion;
-    this.radii = motion.radii;
+    this.radii = motion.radii.map((radius) => (runs.length > 8 ? 0.5 * radius : radius));
     this.canvas = host.appendChild(element("canvas", { tabIndex: 0 }));
     this.pen = this.canvas.getContext("2d");
     this.places = runs.map(() => new Float64Array(motion.count * 2));

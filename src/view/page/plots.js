@@ -183,16 +183,16 @@ class TimePlot {
     return linearTicks(axes.y, axes.height / 40, wrapped);
   }
 
-  // Zeros are drawn at the bottom, a decade below the least.
+  // Zeros are drawn at the bottom, a tick below the least.
   #logAxis() {
     const arrays = this.curves.map((curve) => curve.numbers);
     const { low, high } = rangeOf(arrays, (x) => (x > 0 ? Math.log10(x) : NaN));
     const empty = !arrays.some((numbers) => numbers.some((x) => x > 0));
     const top = empty ? -15 : Math.ceil(high);
     const bottom = Math.min(empty ? -17 : Math.floor(low), top - 2);
-    this.floor = bottom - 1;
-    this.axes.y = { low: this.floor - 0.2, high: top + 0.2 };
-    const step = Math.max(1, Math.ceil((top - bottom) / Math.max(2, this.axes.height / 28)));
+    const step = Math.max(1, Math.ceil((top - bottom) / Math.max(2, this.axes.height / 32)));
+    this.floor = bottom - step;
+    this.axes.y = { low: this.floor - 0.15 * step, high: top + 0.15 * step };
     const ticks = [{ at: this.floor, text: "0" }];
     for (let k = bottom; k <= top; k += step) ticks.push({ at: k, text: powerOfTen(k) });
     return ticks;
@@ -205,6 +205,10 @@ class TimePlot {
 
   #draw(pen, curve) {
     const { axes } = this;
+    if (this.kind === "log") {
+      this.#drawLog(pen, curve);
+      return;
+    }
     pen.strokeStyle = rgba(curve.colour(), curve.alpha ?? 1);
     pen.beginPath();
     let before = NaN;
@@ -212,6 +216,23 @@ class TimePlot {
       const y = this.#height(curve.numbers[row]);
       const isBreak = !Number.isFinite(before) || (this.kind === "wrapped" && Math.abs(y - before) > Math.PI);
       if (Number.isFinite(y)) pen[isBreak ? "moveTo" : "lineTo"](axes.atX(curve.run.t[row]), axes.atY(y));
+      before = y;
+    }
+    pen.stroke();
+  }
+
+  // A point for each number, so that zeros among them tear no comb into the curve; lines where neighbours are near.
+  #drawLog(pen, curve) {
+    const { axes } = this;
+    const { t } = curve.run;
+    pen.strokeStyle = pen.fillStyle = rgba(curve.colour(), curve.alpha ?? 1);
+    pen.beginPath();
+    let before = NaN;
+    for (let row = 0; row < curve.run.rows; ++row) {
+      const y = this.#height(curve.numbers[row]);
+      const [px, py] = [axes.atX(t[row]), axes.atY(y)];
+      pen[Math.abs(y - before) < 0.5 && y > this.floor ? "lineTo" : "moveTo"](px, py);
+      if (Number.isFinite(y)) pen.fillRect(px - 0.75, py - 0.75, 1.5, 1.5);
       before = y;
     }
     pen.stroke();

@@ -20,7 +20,7 @@ const THREE = await loadThree().catch(() => null);
 
 /// Balls and rods of one run, and what they throw on the floor: one instanced mesh each.
 class Bodies {
-  constructor(motion, colours, radii, shadow) {
+  constructor(motion, radii, shadow) {
     this.motion = motion;
     this.radii = radii;
     this.rods = motion.hangs.map((on, i) => ({ on, i })).filter(({ on }) => on !== free);
@@ -29,8 +29,12 @@ class Bodies {
     const ball = new THREE.SphereBufferGeometry(1, around, along);
     const rod = new THREE.CylinderBufferGeometry(1, 1, 1, fine <= 300 ? 10 : 5, 1, true);
     rod.rotateX(Math.PI / 2); // along z, as a rod's matrix wants it
-    this.meshes = { balls: this.#mesh(ball, colours.ball, motion.count - 1), tip: this.#mesh(ball, colours.tip, 1) };
-    this.meshes.rods = this.#mesh(rod, colours.rod, this.rods.length);
+    // A geometry for each mesh: three.js r111 takes two instanced meshes of one geometry, one after the other, for one.
+    this.meshes = {
+      balls: this.#mesh(ball, motion.count - 1),
+      tip: this.#mesh(ball.clone(), 1),
+      rods: this.#mesh(rod, this.rods.length),
+    };
     this.shadows = shadow ? Object.values(this.meshes).map((mesh) => this.#shadowOf(mesh, shadow)) : [];
     this.rodRadius = Math.min(0.008 * motion.reach, 0.35 * Math.min(...radii));
   }
@@ -76,7 +80,7 @@ class Bodies {
     m[16 * k + 15] = 1;
   }
 
-  #mesh(geometry, colour, count) {
+  #mesh(geometry, count) {
     const material = new THREE.MeshPhongMaterial({ shininess: 40, specular: 0x2a2a2a });
     const mesh = new THREE.InstancedMesh(geometry, material, Math.max(count, 1));
     mesh.count = count;
@@ -98,39 +102,63 @@ class Bodies {
   }
 }
 
-/// The path of a point behind it, fading into the background.
+/// The path of a point behind it: a ribbon that faces the eye, and runs out thin and pale.
 class Trace {
-  constructor(path, most) {
+  constructor(path, most, width) {
     this.path = path;
     this.most = most;
+    this.width = width;
     this.geometry = new THREE.BufferGeometry();
-    const attribute = () => new THREE.BufferAttribute(new Float32Array(3 * most), 3).setUsage(THREE.DynamicDrawUsage);
+    const attribute = () => new THREE.BufferAttribute(new Float32Array(6 * most), 3).setUsage(THREE.DynamicDrawUsage);
     this.geometry.setAttribute("position", attribute());
     this.geometry.setAttribute("color", attribute());
-    this.line = new THREE.Line(this.geometry, new THREE.LineBasicMaterial({ vertexColors: THREE.VertexColors }));
-    this.line.frustumCulled = false;
+    const corners = Array.from({ length: most - 1 }, (_, k) => [0, 1, 2, 2, 1, 3].map((c) => 2 * k + c)).flat();
+    this.geometry.setIndex(corners);
+    const material = new THREE.MeshBasicMaterial({ vertexColors: THREE.VertexColors, side: THREE.DoubleSide });
+    this.mesh = new THREE.Mesh(this.geometry, material);
+    this.mesh.frustumCulled = false;
+    this.middle = new Float64Array(3 * most);
   }
 
-  move(since, time, tip, colour, background, fades) {
+  /// From one time to another, with `tip` as the last place; `eye` is where it is seen from.
+  move(since, time, tip, colour, background, eye, fades) {
+    const count = this.#gather(since, time, tip);
+    const { position, color } = this.geometry.attributes;
+    for (let k = 0; k < count; ++k) {
+      const fade = fades ? (k + 1) / count : 1;
+      this.#widen(position.array, k, count, eye, this.width * Math.sqrt(fade));
+      const strength = fades ? fade ** 1.4 : 0.75;
+      for (let c = 0; c < 3; ++c) {
+        color.array[6 * k + c] = color.array[6 * k + 3 + c] = background[c] + (colour[c] - background[c]) * strength;
+      }
+    }
+    this.geometry.setDrawRange(0, 6 * (count - 1));
+    position.needsUpdate = color.needsUpdate = true;
+  }
+
+  #gather(since, time, tip) {
     const { times, places } = this.path;
     const to = sampleAt(times, time);
     const from = Math.min(sampleAt(times, since), to);
     const stride = Math.max(1, Math.ceil((to - from + 2) / (this.most - 1)));
-    const position = this.geometry.attributes.position.array;
-    const colours = this.geometry.attributes.color.array;
     let count = 0;
-    for (let s = from; s <= to; s += stride) this.#add(count++, places, 3 * s, position);
-    this.#add(count++, tip, 0, position);
-    for (let k = 0; k < count; ++k) {
-      const fade = fades ? ((k + 1) / count) ** 1.4 : 0.7;
-      for (let c = 0; c < 3; ++c) colours[3 * k + c] = background[c] + (colour[c] - background[c]) * fade;
+    for (let s = from; s <= to; s += stride, ++count) {
+      for (let axis = 0; axis < 3; ++axis) this.middle[3 * count + axis] = places[3 * s + axis];
     }
-    this.geometry.setDrawRange(0, count);
-    this.geometry.attributes.position.needsUpdate = this.geometry.attributes.color.needsUpdate = true;
+    for (let axis = 0; axis < 3; ++axis) this.middle[3 * count + axis] = tip[axis];
+    return count + 1;
   }
 
-  #add(k, places, from, position) {
-    for (let axis = 0; axis < 3; ++axis) position[3 * k + axis] = places[from + axis];
+  // Two corners, across the path and the ray to the eye.
+  #widen(position, k, count, eye, width) {
+    const m = this.middle;
+    const [before, after] = [3 * Math.max(k - 1, 0), 3 * Math.min(k + 1, count - 1)];
+    const [tx, ty, tz] = [m[after] - m[before], m[after + 1] - m[before + 1], m[after + 2] - m[before + 2]];
+    const [rx, ry, rz] = [m[3 * k] - eye.x, m[3 * k + 1] - eye.y, m[3 * k + 2] - eye.z];
+    const [cx, cy, cz] = [ty * rz - tz * ry, tz * rx - tx * rz, tx * ry - ty * rx];
+    const factor = width / (Math.hypot(cx, cy, cz) || 1);
+    const [x, y, z] = [m[3 * k], m[3 * k + 1], m[3 * k + 2]];
+    position.set([x - cx * factor, y - cy * factor, z - cz * factor, x + cx * factor, y + cy * factor, z + cz * factor], 6 * k);
   }
 }
 
@@ -199,16 +227,18 @@ class Stage {
     this.floor = Math.min(low[2], -0.02 * reach) - 0.16 * reach;
     this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (this.floor + Math.max(high[2], 0)) / 2];
     const half = [0, 1, 2].map((axis) => Math.max(high[axis] - this.middle[axis], this.middle[axis] - low[axis]));
-    this.radius = Math.max(Math.hypot(Math.max(half[0], half[1]), half[2]), 0.6 * reach) * 1.08;
+    this.radius = Math.max(half[0], half[1], half[2], 0.5 * reach) * 1.12;
   }
 
   #light() {
-    const sun = new THREE.DirectionalLight(0xffffff, 0.75);
+    const sky = new THREE.HemisphereLight(0xffffff, 0x8a8a8a, 0.75);
+    sky.position.set(0, 0, 1);
+    const sun = new THREE.DirectionalLight(0xffffff, 0.6);
     this.sun = [0.35, -0.25, 1];
     sun.position.set(...this.sun);
     const side = new THREE.DirectionalLight(0xffffff, 0.2);
     side.position.set(-1, 0.6, 0.2);
-    this.scene.add(sun, side, new THREE.HemisphereLight(0xffffff, 0x777777, 0.45));
+    this.scene.add(sky, sun, side);
   }
 
   // A disc with a grid, which fades at its rim into what is behind.
@@ -223,7 +253,7 @@ class Stage {
     this.grid.position.copy(this.disc.position);
     const post = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(0, 0, 0), new THREE.Vector3(0, 0, this.floor)]);
     this.post = new THREE.Line(post, new THREE.LineBasicMaterial());
-    this.pivot = new THREE.Mesh(new THREE.SphereBufferGeometry(0.014 * this.motion.reach, 16, 12), new THREE.MeshBasicMaterial());
+    this.pivot = new THREE.Mesh(new THREE.SphereBufferGeometry(Math.min(0.014 * this.motion.reach, 1.4 * Math.max(...this.motion.radii)), 16, 12), new THREE.MeshBasicMaterial());
     this.post.visible = this.pivot.visible = this.motion.hangs.includes(origin);
     this.scene.add(this.disc, this.grid, this.post, this.pivot);
   }
@@ -262,11 +292,12 @@ class Stage {
     const { motion } = this;
     const radii = motion.radii.map((radius) => (runs.length > 8 ? 0.6 * radius : radius));
     this.shadow = this.#shadow();
-    this.bodies = runs.map((_, k) => new Bodies(motion, {}, radii, runs.length <= 8 || k === 0 ? this.shadow : null));
+    this.bodies = runs.map((_, k) => new Bodies(motion, radii, runs.length <= 8 || k === 0 ? this.shadow : null));
     const most = runs.length > 8 ? 400 : 2000;
-    this.traces = runs.map((run) => traced.map((point) => new Trace(motion.path(run, point), most)));
+    const width = (runs.length > 8 ? 0.0025 : 0.004) * this.radius;
+    this.traces = runs.map((run) => traced.map((point) => new Trace(motion.path(run, point), most, width)));
     for (const body of this.bodies) this.scene.add(...body.objects);
-    for (const trace of this.traces.flat()) this.scene.add(trace.line);
+    for (const trace of this.traces.flat()) this.scene.add(trace.mesh);
   }
 
   /// Takes the colours of the theme.
@@ -297,16 +328,16 @@ class Stage {
 
   draw(time, trace) {
     const since = time - trace * (runs[0].end - runs[0].start);
+    const eye = this.camera.camera.position;
     runs.forEach((run, k) => {
       const places = this.motion.at(run, time, this.places[k]);
       this.bodies[k].move(places);
       traced.forEach((point, n) => {
-        const { line } = this.traces[k][n];
-        line.visible = trace > 0;
+        this.traces[k][n].mesh.visible = trace > 0;
         if (trace === 0) return;
         const tip = places.subarray(3 * point, 3 * point + 3);
         const colour = palette.run(k).map((c) => c / 255);
-        this.traces[k][n].move(since, time, tip, colour, this.background, trace < 1);
+        this.traces[k][n].move(since, time, tip, colour, this.background, eye, trace < 1);
       });
     });
     this.scene.fog.near = this.camera.distance + 0.8 * this.radius;

@@ -1,0 +1,267 @@
+#include "view/page.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "io/input_error.hpp"
+#include "io/line_file.hpp"
+#include "view/encode.hpp"
+#include "view/kept_rows.hpp"
+#include "view/scene.hpp"
+#include "view/whole_file.hpp"
+
+namespace pendula::view {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for each test, gone when the test is over.
+class PageTest : public testing::Test {
+ protected:
+  PageTest() : folder_(fs::temp_directory_path() / ("pendula_page_" + std::to_string(std::random_device()()))) {
+    fs::create_directory(folder_);
+  }
+  ~PageTest() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  std::string file(const std::string& name = "out.html") const { return folder_ / name; }
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  static std::string text_of(const std::string& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+ private:
+  fs::path folder_;
+};
+
+template <class Space>
+Scene chain_scene(int links) {
+  ChainParameters<Space> parameters;
+  parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(links);
+  Scene scene = scene_of(ChainSubject<Space>(Chain<Space>(parameters)));
+  scene.title = "a chain";
+  return scene;
+}
+
+/// Adds rows 0, 1, …: the time, and numbers that differ.
+void add_rows(Page& page, const Scene& scene, int rows) {
+  std::vector<double> row(scene.columns.size());
+  for (int i = 0; i < rows; ++i) {
+    for (std::size_t k = 0; k < row.size(); ++k) row[k] = std::sin(0.1 * i + static_cast<double>(k));
+    row[0] = i;
+    page.add_row(row);
+  }
+}
+
+/// What the page says of itself.
+nlohmann::json description(const std::string& html) {
+  const std::string open = "<script type=\"application/json\" id=\"scene\">";
+  const std::size_t begin = html.find(open) + open.size();
+  return nlohmann::json::parse(html.substr(begin, html.find("</script>", begin) - begin));
+}
+
+std::string page_of(const std::string& file, const Scene& scene, int rows, int runs = 1) {
+  Page page(file, scene, static_cast<std::size_t>(runs));
+  for (int run = 0; run < runs; ++run) {
+    page.begin_run("run " + std::to_string(run));
+    add_rows(page, scene, rows);
+    page.end_run({0, 1, 0});
+  }
+  page.close();
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(KeptRows, FirstAndLastStayAndTheOthersAreEven) {
+  for (const int count : {1, 2, 3, 7, 8, 9, 10, 100, 1000, 1025}) {
+    KeptRows rows(2, 8);
+    for (int i = 0; i < count; ++i) rows.add(std::vector<double>{double(i), -double(i)});
+    ASSERT_LE(rows.size(), 8u);
+    EXPECT_EQ(rows.seen(), count);
+    EXPECT_EQ(rows[0][0], 0);
+    EXPECT_EQ(rows[rows.size() - 1][0], count - 1) << count;
+    EXPECT_EQ(rows[rows.size() - 1][1], 1 - count);
+    for (std::size_t i = 0; i + 1 < rows.size(); ++i) {
+      EXPECT_EQ(rows[i][0], static_cast<double>(i) * static_cast<double>(rows.stride()));
+    }
+  }
+}
+
+TEST(KeptRows, NothingIsThinnedBelowTheLimit) {
+  KeptRows rows(1, 100);
+  for (int i = 0; i < 99; ++i) rows.add(std::vector<double>{double(i)});
+  EXPECT_EQ(rows.size(), 99u);
+  EXPECT_EQ(rows.stride(), 1);
+}
+
+TEST(Encode, Base64IsThatOfTheStandard) {  // RFC 4648, section 10
+  const auto base64 = [](std::string_view bytes) {
+    std::string text;
+    append_base64(text, bytes);
+    return text;
+  };
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64("\xff\xfe\xfd"), "//79");
+}
+
+TEST(Encode, NumbersHaveTheirLowestByteFirst) {
+  Bytes bytes;
+  bytes.add(1.0);
+  bytes.add(-2.0F);
+  EXPECT_EQ(bytes.view(), std::string_view("\0\0\0\0\0\0\xf0\x3f\0\0\0\xc0", 12));
+}
+
+TEST(Encode, TextCannotLeaveItsPlace) {
+  EXPECT_EQ(html_text("a < b & \"c\" > \xff"), "a &lt; b &amp; &quot;c&quot; &gt; \xEF\xBF\xBD");
+  EXPECT_EQ(script_json("</script><!--\xff"), "\"\\u003c/script>\\u003c!--\xEF\xBF\xBD\"");
+}
+
+TEST_F(PageTest, HoldsTextsThatLookLikeTags) {
+  Scene scene = chain_scene<Planar>(1);
+  scene.title = scene.scenario = scene.version = "</script></title><b onclick=x>{{scene}}";
+  const std::string html = page_of(file(), scene, 3);
+  EXPECT_EQ(html.find("</script></title>"), std::string::npos);
+  EXPECT_EQ(html.find("<b onclick"), std::string::npos);
+  EXPECT_EQ(description(html)["scenario"], scene.scenario);
+}
+
+TEST_F(PageTest, KeepsAThousandRowsAsTheyAre) {
+  const std::string html = page_of(file(), chain_scene<Spatial>(4), 1001);
+  const nlohmann::json run = description(html)["runs"][0];
+  EXPECT_EQ(run["rows"], 1001);
+  EXPECT_EQ(run["stride"], 1);
+  EXPECT_EQ(run["exact"], true);
+  EXPECT_LE(html.size(), 1'500'000u);  // measured 636,900, most of it 320,000 of rows and 230,000 of three.js
+}
+
+TEST_F(PageTest, ThinsLongRuns) {
+  const Scene scene = chain_scene<Spatial>(4);
+  const std::string html = page_of(file(), scene, 100'000);
+  const nlohmann::json run = description(html)["runs"][0];
+  EXPECT_EQ(run["seen"], 100'000);
+  EXPECT_EQ(run["stride"], 32);
+  EXPECT_EQ(run["rows"], 3126);        // 0, 32, …, 99968, and 99999
+  EXPECT_LE(html.size(), 1'500'000u);  // measured 1,331,206
+}
+
+TEST_F(PageTest, LongRowsAreFloatsOfWhatIsDrawn) {
+  const std::string html = page_of(file(), chain_scene<Planar>(1000), 400);
+  const nlohmann::json run = description(html)["runs"][0];
+  EXPECT_EQ(run["rows"], 400);
+  EXPECT_EQ(run["exact"], false);
+  EXPECT_EQ(run["columns"].size(), 2000u);  // angles and rates: where the bobs are follows from them
+  EXPECT_LE(html.size(), 7'000'000u);       // measured 4,459,494
+}
+
+TEST_F(PageTest, FiftyRunsShareThePage) {
+  const std::string html = page_of(file(), chain_scene<Planar>(2), 1001, 50);
+  const nlohmann::json runs = description(html)["runs"];
+  ASSERT_EQ(runs.size(), 50u);
+  EXPECT_EQ(runs[0]["exact"], true);
+  EXPECT_EQ(runs[49]["label"], "run 49");
+  EXPECT_EQ(runs[49]["separation"], true);
+  EXPECT_LE(html.size(), 1'500'000u);  // measured 1,241,178
+}
+
+TEST_F(PageTest, ThreeIsInPagesOfSpaceOnly) {
+  const std::string licence = "Copyright © 2010-2019 three.js authors";
+  EXPECT_NE(page_of(file(), chain_scene<Spatial>(1), 3).find(licence), std::string::npos);
+  EXPECT_EQ(page_of(file(), chain_scene<Planar>(1), 3).find(licence), std::string::npos);
+}
+
+TEST_F(PageTest, RunsWithoutRowsAreLeftOut) {
+  const Scene scene = chain_scene<Planar>(1);
+  {
+    Page page(file(), scene, 2);
+    page.begin_run("empty");
+    page.begin_run("full");
+    add_rows(page, scene, 2);
+    page.close();
+  }
+  EXPECT_EQ(description(text_of(file()))["runs"].size(), 1u);
+  EXPECT_EQ(description(text_of(file()))["runs"][0]["energy"], false);  // nobody said what they are compared with
+}
+
+TEST_F(PageTest, WithoutRowsThereIsNoFile) {
+  {
+    Page page(file(), chain_scene<Planar>(1));
+    page.begin_run("empty");
+    page.close();
+  }
+  EXPECT_EQ(files(), 0u);
+}
+
+TEST_F(PageTest, ARowOfAnotherLengthIsAMistake) {
+  Page page(file(), chain_scene<Planar>(1));
+  page.begin_run("");
+  EXPECT_THROW(page.add_row(std::vector<double>(3)), std::invalid_argument);
+}
+
+TEST_F(PageTest, AnOldPageStaysUntilTheNewOneIsThere) {
+  const std::string old = page_of(file(), chain_scene<Planar>(1), 3);
+  {
+    Page page(file(), chain_scene<Planar>(2));
+    page.begin_run("");
+    add_rows(page, chain_scene<Planar>(2), 3);
+    EXPECT_EQ(text_of(file()), old);
+  }
+  EXPECT_EQ(text_of(file()), old);  // the run ended without a page
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(PageTest, LinksAreFollowed) {
+  fs::create_symlink(file(), file("link.html"));
+  page_of(file("link.html"), chain_scene<Planar>(1), 3);
+  EXPECT_TRUE(fs::is_symlink(file("link.html")));
+  EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(file())));
+}
+
+TEST_F(PageTest, AFileThatCannotBeOpenedIsAnInputError) {
+  const auto message = [](const std::string& name) -> std::string {
+    try {
+      WholeFile file(name);
+      return "no error";
+    } catch (const io::InputError& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(message("no/such/folder/out.html"),
+            "no/such/folder/out.html: expected a file that can be written, got: no/such/folder/ does not exist");
+  EXPECT_EQ(message(file("")), file("") + ": expected a file that can be written, got: Is a directory");
+}
+
+#ifdef __linux__
+TEST_F(PageTest, AFullDiskIsAnOutputError) {
+  Page page("/dev/full", chain_scene<Planar>(1));
+  page.begin_run("");
+  add_rows(page, chain_scene<Planar>(1), 3);
+  try {
+    page.close();
+    FAIL() << "no error";
+  } catch (const io::OutputError& error) {
+    EXPECT_STREQ(error.what(), "/dev/full: could not be written: No space left on device");
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace pendula::view
