@@ -39,7 +39,7 @@ embed(script_before ${files})
 scripts(files ${after})
 embed(script_after ${files})
 embed(script_plane "${FOLDER}/plane.js")
-embed(script_space "${FOLDER}/camera.js" "${FOLDER}/space.js")
+embed(script_space "${FOLDER}/camera.js" "${FOLDER}/impostors.js" "${FOLDER}/space.js")
 embed(script_lanes "${FOLDER}/lanes.js")
 file(ARCHIVE_CREATE OUTPUT "${OUTPUT}.gz" PATHS "${THREE}" FORMAT raw COMPRESSION GZip COMPRESSION_LEVEL 9
      MTIME "1970-01-01 00:00:00 UTC")

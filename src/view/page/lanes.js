@@ -20,6 +20,7 @@ class Stage {
   turn() {}
   move() {}
   themed() {}
+  pace() {}
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;

@@ -5,7 +5,7 @@ function emptyStage(host, error) {
   host.append(element("p", { className: "notice", textContent: `This browser cannot draw in space: ${error.message}` }));
   const nothing = () => {};
   const canvas = element("canvas");
-  return { canvas, description: "", onChange: nothing, reset: nothing, zoom: nothing, turn: nothing, move: nothing, resize: nothing, themed: nothing, draw: nothing };
+  return { canvas, description: "", onChange: nothing, reset: nothing, zoom: nothing, turn: nothing, move: nothing, resize: nothing, themed: nothing, pace: nothing, draw: nothing };
 }
 
 function makeStage(host) {
@@ -57,7 +57,10 @@ function start() {
     due();
   });
   stage.onChange = due;
-  player.listen(due);
+  player.listen((what) => {
+    due();
+    if (what === "state" && !player.playing) stage.pace();
+  });
   describePage();
   drawLegend();
   stage.resize();
@@ -65,7 +68,10 @@ function start() {
   for (const each of panels) new ResizeObserver(() => each.redraw()).observe(each.box.plot);
 
   for (const each of panels) each.refresh();
+  let before = null;
   const frame = (now) => {
+    if (player.playing && before !== null) stage.pace(now - before);
+    before = player.playing ? now : null;
     if (player.advance(now) || isDue) {
       isDue = false;
       stage.draw(player.time, controls.trace);

@@ -74,6 +74,7 @@ class Stage {
   }
 
   themed() {}
+  pace() {}
 
   draw(time, trace) {
     const { pen } = this;

@@ -1,6 +1,6 @@
 // Plots against time, and of a rate against its coordinate: what does not change is drawn once, what moves on top.
 
-const plotMargin = { left: 46, right: 10, top: 8, bottom: 22 };
+const plotMargin = { left: 50, right: 10, top: 8, bottom: 22 };
 
 /// Axes on two canvases, one for what stays and one for what moves.
 class Axes {

@@ -18,25 +18,41 @@ async function loadThree() {
 
 const THREE = await loadThree().catch(() => null);
 
+/// From so many balls on, they are drawn as impostors: without a GPU a triangle costs 2 µs.
+const manyBalls = 60;
+
 /// Balls and rods of one run, and what they throw on the floor: one instanced mesh each.
 class Bodies {
   constructor(motion, radii, shadow) {
     this.motion = motion;
     this.radii = radii;
     this.rods = motion.hangs.map((on, i) => ({ on, i })).filter(({ on }) => on !== free);
-    const fine = motion.count * runs.length;
-    const [around, along] = fine <= 40 ? [28, 18] : fine <= 300 ? [14, 9] : [8, 5];
-    const ball = new THREE.SphereBufferGeometry(1, around, along);
-    const rod = new THREE.CylinderBufferGeometry(1, 1, 1, fine <= 300 ? 10 : 5, 1, true);
-    rod.rotateX(Math.PI / 2); // along z, as a rod's matrix wants it
+    this.rodRadius = Math.min(0.008 * motion.reach, 0.35 * Math.min(...radii));
+    this.flat = motion.count * runs.length > manyBalls;
     // A geometry for each mesh: three.js r111 takes two instanced meshes of one geometry, one after the other, for one.
     this.meshes = {
-      balls: this.#mesh(ball, motion.count - 1),
-      tip: this.#mesh(ball.clone(), 1),
-      rods: this.#mesh(rod, this.rods.length),
+      balls: this.#mesh(this.#ball(), this.#ballMaterial(), motion.count - 1),
+      tip: this.#mesh(this.#ball(), this.#ballMaterial(), 1),
+      rods: this.#mesh(this.#rod(), this.flat ? rodMaterial() : this.#phong(), this.rods.length),
     };
-    this.shadows = shadow ? Object.values(this.meshes).map((mesh) => this.#shadowOf(mesh, shadow)) : [];
-    this.rodRadius = Math.min(0.008 * motion.reach, 0.35 * Math.min(...radii));
+    this.shadows = shadow ? Object.entries(this.meshes).map(([name, mesh]) => this.#shadowOf(name, mesh, shadow)) : [];
+  }
+
+  #ball() {
+    return this.flat ? square() : new THREE.SphereBufferGeometry(1, 28, 18);
+  }
+
+  // Along z, as its matrix wants it.
+  #rod() {
+    return this.flat ? square() : new THREE.CylinderBufferGeometry(1, 1, 1, 10, 1, true).rotateX(Math.PI / 2);
+  }
+
+  #ballMaterial() {
+    return this.flat ? ballMaterial() : this.#phong();
+  }
+
+  #phong() {
+    return new THREE.MeshPhongMaterial({ shininess: 40, specular: 0x2a2a2a });
   }
 
   get objects() {
@@ -44,9 +60,10 @@ class Bodies {
   }
 
   colour({ ball, tip, rod }) {
-    this.meshes.balls.material.color.setRGB(...ball);
-    this.meshes.tip.material.color.setRGB(...tip);
-    this.meshes.rods.material.color.setRGB(...rod);
+    const set = (mesh, rgb) => (mesh.material.color ?? mesh.material.uniforms.color.value).setRGB(...rgb);
+    set(this.meshes.balls, ball);
+    set(this.meshes.tip, tip);
+    set(this.meshes.rods, rod);
   }
 
   /// Puts all where `places` says.
@@ -80,8 +97,7 @@ class Bodies {
     m[16 * k + 15] = 1;
   }
 
-  #mesh(geometry, count) {
-    const material = new THREE.MeshPhongMaterial({ shininess: 40, specular: 0x2a2a2a });
+  #mesh(geometry, material, count) {
     const mesh = new THREE.InstancedMesh(geometry, material, Math.max(count, 1));
     mesh.count = count;
     mesh.visible = count > 0;
@@ -89,12 +105,12 @@ class Bodies {
     return mesh;
   }
 
-  #shadowOf(mesh, { matrix, material }) {
-    const shadow = new THREE.InstancedMesh(mesh.geometry, material, Math.max(mesh.count, 1));
+  // Of a ball a disc on the floor.
+  #shadowOf(name, mesh, { matrix, material, flatRod }) {
+    const isRod = name === "rods";
+    const geometry = isRod ? mesh.geometry : new THREE.CircleBufferGeometry(1, this.flat ? 6 : 28);
+    const shadow = this.#mesh(geometry, isRod && this.flat ? flatRod : material, mesh.count);
     shadow.instanceMatrix = mesh.instanceMatrix;
-    shadow.count = mesh.count;
-    shadow.visible = mesh.visible;
-    shadow.frustumCulled = false;
     shadow.matrixAutoUpdate = false;
     shadow.matrix.copy(matrix);
     shadow.renderOrder = 1;
@@ -162,6 +178,31 @@ class Trace {
   }
 }
 
+/// How much of the screen's resolution is used.
+class Fineness {
+  now = 1;
+  #playing = 1; // while frames come
+  #sum = 0;
+  #frames = 0;
+
+  /// Whether another resolution is due after a frame of so many milliseconds, or, without a number, a pause.
+  changes(interval) {
+    const before = this.now;
+    this.now = interval === undefined ? 1 : this.#playing;
+    if (interval === undefined) this.#sum = this.#frames = 0;
+    else this.#count(interval);
+    return this.now !== before;
+  }
+
+  // Ten frames at a time; below 35 a second they are drawn coarser.
+  #count(interval) {
+    this.#sum += interval;
+    if (++this.#frames < 10) return;
+    if (this.#sum / this.#frames > 28) this.now = this.#playing = Math.max(this.#playing * 0.7, 0.34);
+    this.#sum = this.#frames = 0;
+  }
+}
+
 class Stage {
   constructor(host, motion) {
     if (!THREE) throw new Error("three.js did not load");
@@ -212,10 +253,17 @@ class Stage {
     this.#change(() => this.camera.move(x * 0.05, y * 0.05));
   }
 
+  /// Told how long each frame took while playing [ms], nothing when paused: where no GPU helps, motion is drawn coarser
+  /// until frames come in time, and stills are drawn as fine as the screen.
+  pace(interval) {
+    this.fineness ??= new Fineness();
+    if (this.fineness.changes(interval)) this.resize();
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.height = Math.max(height, 1);
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2) * (this.fineness?.now ?? 1));
     this.renderer.setSize(width, height, false);
     this.camera.fit(width / this.height);
     this.onChange();
@@ -285,7 +333,9 @@ class Stage {
     const [x, y, z] = this.sun;
     const height = this.floor + 0.001 * this.radius;
     const matrix = new THREE.Matrix4().set(1, 0, -x / z, (x / z) * height, 0, 1, -y / z, (y / z) * height, 0, 0, 0, height, 0, 0, 0, 1);
-    return { matrix, material: new THREE.MeshBasicMaterial() };
+    const flatRod = rodMaterial();
+    flatRod.uniforms.shaded.value = 0;
+    return { matrix, material: new THREE.MeshBasicMaterial(), flatRod };
   }
 
   #addBodies() {
@@ -309,6 +359,7 @@ class Stage {
     this.scene.fog = new THREE.Fog(this.scene.background, 1, 2); // placed with each frame
     this.disc.material.color.setRGB(...unit(rgb.floor));
     this.shadow.material.color.setRGB(...unit(rgb.shade));
+    this.shadow.flatRod.uniforms.color.value.setRGB(...unit(rgb.shade));
     this.post.material.color.setRGB(...unit(rgb.edge));
     this.pivot.material.color.setRGB(...unit(rgb.ink));
     this.#colourGrid(unit(rgb.line), unit(rgb.floor));
