@@ -158,6 +158,17 @@ void model(Pages& pages) {
   pages.write(subject, bare, plan_of("no_points", 4, 2e-3, 12, 5), {start});
 }
 
+/// A point in space that hangs on nothing, and a run that is over where it begins.
+void odd_ones(Pages& pages) {
+  const ChainSubject<Spatial> in_space = chain_of<Spatial>(1, 1);
+  view::Scene point = view::scene_of(in_space);
+  point.rods = view::Rods::none;
+  point.lengths.clear();
+  pages.write(in_space, point, plan_of("free_point", 4, 1e-2, 10, 2), {from_angle<Spatial>(1, 1.2)});
+  const ChainSubject<Planar> chain = chain_of<Planar>(2, 2);
+  pages.write(chain, view::scene_of(chain), plan_of("one_row", 4, 1e-2, 0, 1), {from_angle<Planar>(2, 1.2)});
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -173,4 +184,5 @@ int main(int count, char** arguments) {
   long_chain<Planar>(pages, "thousand", 1000, 1e-3, 0.3, 2);
   long_chain<Spatial>(pages, "thousand_in_space", 1000, 1e-3, 0.2, 2);
   model(pages);
+  odd_ones(pages);
 }

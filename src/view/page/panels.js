@@ -129,7 +129,7 @@ function makePanels(player) {
     made.push(new LogPanel("Distance from the first run", player, (run) => run.separations,
       (largest) => `At most ${largest} ${scene.dimension ? scene.lengthUnit : ""}`));
   }
-  if (runs.some((run) => run.energyError)) {
+  if (runs.some((run) => run.energyError?.some(Number.isFinite))) {
     const title = scene.loaded ? "Change of energy" : "Energy error";
     made.push(new LogPanel(title, player, (run) => run.energyError, (largest) => `|H − H₀|, relative: at most ${largest}`));
   }

@@ -78,7 +78,7 @@ class Player {
   #pleasantSpeed() {
     const lasts = (speed) => this.duration / speed;
     const fits = (speed) => lasts(speed) >= 4 && lasts(speed) <= 120;
-    if (fits(1)) return 1;
+    if (fits(1) || this.duration === 0) return 1;
     return speeds.find((speed) => lasts(speed) <= (this.duration < 4 ? 12 : 60)) ?? speeds.at(-1);
   }
 
