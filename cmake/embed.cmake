@@ -3,6 +3,7 @@ cmake_minimum_required(VERSION 3.25)
 
 # Scripts of a page, in the order in which they stand in one module: each knows the names of those before it.
 set(before format data motion palette player gestures plots)
+set(space three camera bodies impostors trace space)
 set(after pickers panels controls main)
 
 # Appends a constant NAME with the bytes of the files that follow: as numbers, which any compiler takes in any amount.
@@ -39,7 +40,8 @@ embed(script_before ${files})
 scripts(files ${after})
 embed(script_after ${files})
 embed(script_plane "${FOLDER}/plane.js")
-embed(script_space "${FOLDER}/camera.js" "${FOLDER}/impostors.js" "${FOLDER}/space.js")
+scripts(files ${space})
+embed(script_space ${files})
 embed(script_lanes "${FOLDER}/lanes.js")
 file(ARCHIVE_CREATE OUTPUT "${OUTPUT}.gz" PATHS "${THREE}" FORMAT raw COMPRESSION GZip COMPRESSION_LEVEL 9
      MTIME "1970-01-01 00:00:00 UTC")
