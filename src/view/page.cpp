@@ -119,6 +119,7 @@ std::vector<float> Page::energy_errors(const Run& run) const {
   if (found == scene_.columns.end() || std::isnan(run.energy.initial)) return {};
   const auto column = static_cast<std::size_t>(found - scene_.columns.begin());
   std::vector<float> errors;
+  errors.reserve(run.rows.size());
   for (std::size_t i = 0; i < run.rows.size(); ++i) {
     errors.push_back(static_cast<float>(run.energy.of(run.rows[i][column])));
   }
@@ -130,6 +131,7 @@ std::vector<float> Page::separations(const Run& run) const {
   const KeptRows& first = runs_.front().rows;
   std::vector<float> separations;
   if (&run == runs_.data()) return separations;
+  separations.reserve(run.rows.size());
   std::size_t k = 0;
   for (std::size_t i = 0; i < run.rows.size(); ++i) {
     const std::span<const double> row = run.rows[i];

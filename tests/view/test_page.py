@@ -313,9 +313,9 @@ FRAMES = {"demo": 16, "hundred": 16, "hundred_in_space": 16, "thousand": 33, "th
 @pytest.mark.parametrize("name", FRAMES)
 def test_a_frame_costs_little(open_page, name):
     page = open_page(name, motion="no-preference")
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(2500)
     frames = page.evaluate("window.seenFrames")
-    later = [frame for frame in frames if frame[0] > frames[0][0] + 500]
+    later = [frame for frame in frames if frame[0] > frames[0][0] + 1500]  # it has found its resolution
     seconds = (later[-1][0] - later[0][0]) / 1000
     median = sorted(cost for _, cost in later)[len(later) // 2]
     print(f"{name}: {len(later) / seconds:.0f} frames/s, {median:.1f} ms of script each")

@@ -165,8 +165,8 @@ void odd_ones(Pages& pages) {
   point.rods = view::Rods::none;
   point.lengths.clear();
   pages.write(in_space, point, plan_of("free_point", 4, 1e-2, 10, 2), {from_angle<Spatial>(1, 1.2)});
-  const ChainSubject<Planar> chain = chain_of<Planar>(2, 2);
-  pages.write(chain, view::scene_of(chain), plan_of("one_row", 4, 1e-2, 0, 1), {from_angle<Planar>(2, 1.2)});
+  const ChainSubject<Planar> chain = chain_of<Planar>(1, 1);
+  pages.write(chain, view::scene_of(chain), plan_of("one_row", 4, 1e-2, 0, 1), {from_angle<Planar>(1, 1.2)});
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 // round, all in one mesh. Without a GPU a triangle costs 2 µs, and an instance as much as many triangles.
 
 /// Lit from above, a little from the right, in the directions of the screen.
-const lit = "mix(1.0, 0.45 + 0.62 * max(0.0, dot(normal, vec3(0.26, 0.86, 0.44))), shaded)";
+const lit = "mix(1.0, 0.55 + 0.55 * max(0.0, dot(normal, vec3(0.26, 0.86, 0.44))), shaded)";
 
 function impostorMaterial(vertex, fragment) {
   return new THREE.ShaderMaterial({

@@ -38,6 +38,14 @@ function drawLegend() {
   at("legend").replaceChildren(element("span", {}, `${runs[0].label} `, ramp, runs.at(-1).label));
 }
 
+/// Draws again what gets another size.
+function watchSizes(stage, host, panels) {
+  new ResizeObserver(() => stage.resize()).observe(host);
+  for (const each of panels) {
+    new ResizeObserver(() => each.plot.axes.isStale && each.redraw()).observe(each.box.plot);
+  }
+}
+
 function start() {
   const host = at("stage");
   const player = new Player();
@@ -64,10 +72,8 @@ function start() {
   describePage();
   drawLegend();
   stage.resize();
-  new ResizeObserver(() => stage.resize()).observe(host);
-  for (const each of panels) new ResizeObserver(() => each.redraw()).observe(each.box.plot);
-
   for (const each of panels) each.refresh();
+  watchSizes(stage, host, panels);
   let before = null;
   const frame = (now) => {
     if (player.playing && before !== null) stage.pace(now - before);

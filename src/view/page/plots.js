@@ -15,6 +15,11 @@ class Axes {
     this.y = { low: 0, high: 1 };
   }
 
+  /// Whether the host has another size than what was drawn.
+  get isStale() {
+    return this.width !== this.host.clientWidth || this.height !== this.host.clientHeight;
+  }
+
   describe(text) {
     this.still.setAttribute("aria-label", text);
   }

@@ -19,11 +19,11 @@ class Fineness {
     return this.now !== before;
   }
 
-  // Ten frames at a time; below 35 a second they are drawn coarser.
+  // Six frames at a time; below 40 a second they are drawn coarser.
   #count(interval) {
     this.#sum += interval;
-    if (++this.#frames < 10) return;
-    if (this.#sum / this.#frames > 28) this.now = this.#playing = Math.max(this.#playing * 0.7, 0.34);
+    if (++this.#frames < 6) return;
+    if (this.#sum / this.#frames > 25) this.now = this.#playing = Math.max(this.#playing * 0.7, 0.45);
     this.#sum = this.#frames = 0;
   }
 }
