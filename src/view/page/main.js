@@ -18,7 +18,7 @@ function makeStage(host) {
 
 /// What the page is about, and how much of it is here.
 function describePage() {
-  const rows = (run) => (run.stride > 1 ? `every ${ordinal(run.stride)} of ${run.seen} rows` : `${run.rows} rows`);
+  const rows = (run) => (run.stride > 1 ? `every ${ordinal(run.stride)} of ${run.seen} rows` : `${run.rows} ${run.rows === 1 ? "row" : "rows"}`);
   const [first, second] = runs;
   const parts = [scene.subject, ...(second ? [`${runs.length} runs`] : []), rows(first)];
   if (second && rows(second) !== rows(first)) parts.push(`of the others ${rows(second)}`);

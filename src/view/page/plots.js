@@ -123,7 +123,7 @@ function linearTicks(axis, count, wrapped) {
   return niceTicks(axis.low, axis.high, count).map((at) => ({ at, text: readable(at, 6) }));
 }
 
-/// Least and largest finite number of several arrays, a little apart even where all are one.
+/// Least and largest finite number of several arrays, and some room; apart even where all are one.
 function rangeOf(arrays, change = (x) => x) {
   let [low, high] = [Infinity, -Infinity];
   for (const numbers of arrays) {
@@ -134,7 +134,9 @@ function rangeOf(arrays, change = (x) => x) {
     }
   }
   if (!(low <= high)) return { low: 0, high: 1 };
-  const room = (high - low) * 0.04 || Math.max(Math.abs(high), 1e-12) * 0.1;
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  if (high - low <= 2e-5 * size) return { low: low - 0.1 * size, high: high + 0.1 * size }; // constant, but for rounding
+  const room = (high - low) * 0.04 || 1;
   return { low: low - room, high: high + room };
 }
 

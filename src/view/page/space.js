@@ -180,8 +180,7 @@ class Stage {
   themed() {
     const unit = (rgb) => rgb.map((c) => c / 255);
     const { rgb } = palette;
-    this.background = unit(rgb.ground);
-    this.scene.background = new THREE.Color(...this.background);
+    this.scene.background = new THREE.Color(...unit(rgb.ground));
     this.scene.fog = new THREE.Fog(this.scene.background, 1, 2); // placed with each frame
     this.disc.material.color.setRGB(...unit(rgb.floor));
     for (const material of [this.shadow.material, this.shadow.disc, this.shadow.rod]) paint(material, unit(rgb.shade));
@@ -190,6 +189,7 @@ class Stage {
     this.#colourGrid(unit(rgb.line), unit(rgb.floor));
     this.bodies.forEach((body, k) => {
       const own = unit(palette.run(k));
+      for (const trace of this.traces[k]) trace.colour(own);
       body.colour(runs.length > 1 ? { ball: own, tip: own, rod: own } : { ball: unit(rgb.bob), tip: own, rod: unit(rgb.rod) });
     });
   }
@@ -212,8 +212,7 @@ class Stage {
         this.traces[k][n].mesh.visible = trace > 0;
         if (trace === 0) return;
         const tip = places.subarray(3 * point, 3 * point + 3);
-        const colour = palette.run(k).map((c) => c / 255);
-        this.traces[k][n].move(since, time, tip, colour, this.background, eye, trace < 1);
+        this.traces[k][n].move(since, time, tip, eye, trace < 1);
       });
     });
     this.scene.fog.near = this.camera.distance + 0.8 * this.radius;

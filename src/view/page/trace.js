@@ -1,5 +1,19 @@
 // What a point leaves behind it.
 
+/// One colour, as strong as each corner says.
+function fadingMaterial() {
+  return new THREE.ShaderMaterial({
+    uniforms: { color: { value: new THREE.Color() } },
+    vertexShader: `attribute float strength; varying float seen;
+      void main() { seen = strength; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`,
+    fragmentShader: `uniform vec3 color; varying float seen;
+      void main() { gl_FragColor = vec4(color, seen); }`,
+    transparent: true,
+    depthWrite: false, // where it crosses itself the newer part lies on the older
+    side: THREE.DoubleSide,
+  });
+}
+
 /// The path of a point behind it: a ribbon that faces the eye, and runs out thin and pale.
 class Trace {
   constructor(path, most, width) {
@@ -7,31 +21,33 @@ class Trace {
     this.most = most;
     this.width = width;
     this.geometry = new THREE.BufferGeometry();
-    const attribute = () => new THREE.BufferAttribute(new Float32Array(6 * most), 3).setUsage(THREE.DynamicDrawUsage);
-    this.geometry.setAttribute("position", attribute());
-    this.geometry.setAttribute("color", attribute());
+    const attribute = (size) =>
+      new THREE.BufferAttribute(new Float32Array(2 * size * most), size).setUsage(THREE.DynamicDrawUsage);
+    this.geometry.setAttribute("position", attribute(3));
+    this.geometry.setAttribute("strength", attribute(1));
     const corners = Array.from({ length: most - 1 }, (_, k) => [0, 1, 2, 2, 1, 3].map((c) => 2 * k + c)).flat();
     this.geometry.setIndex(corners);
-    const material = new THREE.MeshBasicMaterial({ vertexColors: THREE.VertexColors, side: THREE.DoubleSide });
-    this.mesh = new THREE.Mesh(this.geometry, material);
+    this.mesh = new THREE.Mesh(this.geometry, fadingMaterial());
+    this.mesh.renderOrder = 2; // after the bodies: it lets through what is behind it
     this.mesh.frustumCulled = false;
     this.middle = new Float64Array(3 * most);
   }
 
   /// From one time to another, with `tip` as the last place; `eye` is where it is seen from.
-  move(since, time, tip, colour, background, eye, fades) {
+  move(since, time, tip, eye, fades) {
     const count = this.#gather(since, time, tip);
-    const { position, color } = this.geometry.attributes;
+    const { position, strength } = this.geometry.attributes;
     for (let k = 0; k < count; ++k) {
       const fade = fades ? (k + 1) / count : 1;
       this.#widen(position.array, k, count, eye, this.width * Math.sqrt(fade));
-      const strength = fades ? fade ** 1.4 : 0.75;
-      for (let c = 0; c < 3; ++c) {
-        color.array[6 * k + c] = color.array[6 * k + 3 + c] = background[c] + (colour[c] - background[c]) * strength;
-      }
+      strength.array[2 * k] = strength.array[2 * k + 1] = fades ? fade ** 1.4 : 0.75;
     }
     this.geometry.setDrawRange(0, 6 * (count - 1));
-    position.needsUpdate = color.needsUpdate = true;
+    position.needsUpdate = strength.needsUpdate = true;
+  }
+
+  colour(rgb) {
+    paint(this.mesh.material, rgb);
   }
 
   #gather(since, time, tip) {
