@@ -2,6 +2,8 @@
 
 import csv
 import io
+import itertools
+import math
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -248,6 +250,47 @@ def test_the_scenario_is_there_to_copy_and_does_not_break_out(open_page):
     page.click("#copy-scenario")
     assert "é" in page.evaluate("navigator.clipboard.readText()")
     assert page.evaluate("window.broken") is None
+
+
+def test_between_rows_rods_keep_their_length_and_motion_is_cubic(browser, pages):
+    """The page of every fourth row, asked for the places at the others, against a trajectory that has them."""
+    html = (pages.folder / "coarse.html").read_text()
+    probe = """window.placesAt = (times) => {
+      const motion = new Motion();
+      return times.map((time) => [...motion.at(runs[0], time, new Float64Array(12))]);
+    };"""
+    assert html.count("\nstart();\n") == 1
+    (pages.folder / "probe.html").write_text(html.replace("\nstart();\n", f"\n{probe}\n"))
+    rows = list(csv.DictReader(io.StringIO((pages.folder / "demo.csv").read_text())))
+    page = browser.new_page()
+    page.goto(f"file://{pages.folder}/probe.html")
+    until(page, "'placesAt' in window")
+    found = page.evaluate("(times) => window.placesAt(times)", [float(row["t"]) for row in rows])
+    page.close()
+    off, stretched = [], []
+    for places, row in zip(found, rows, strict=True):
+        truth = [float(row[f"{axis}_{link}"]) for link in range(1, 5) for axis in "xyz"]
+        off.append(max(abs(a - b) for a, b in zip(places, truth, strict=True)))
+        ends = [(0.0, 0.0, 0.0), *zip(*[iter(places)] * 3, strict=True)]
+        stretched += [abs(math.dist(a, b) - 1) for a, b in itertools.pairwise(ends)]
+    assert max(off[::4]) < 1e-14  # at its own rows; measured 0
+    assert max(stretched) < 1e-12  # measured 6e-16
+    assert max(off) < 0.1  # of 4 m; measured 0.026
+    assert sorted(off)[len(off) // 2] < 1e-3  # measured 2.4e-4
+
+
+def test_without_webgl_the_plots_still_work(browser, pages):
+    page = browser.new_page(reduced_motion="reduce")
+    page.add_init_script(
+        "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {"
+        "return kind === '2d' ? get.call(this, kind, ...more) : null;"
+        "})(HTMLCanvasElement.prototype.getContext)"
+    )
+    page.goto(f"file://{pages.folder}/demo.html")
+    until(page, "document.querySelector('#stage .notice') !== null")
+    page.keyboard.press("End")
+    until(page, "Number(document.getElementById('scrub').value) === 10")
+    page.close()
 
 
 def test_no_names_leak(open_page, pages):

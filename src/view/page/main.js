@@ -2,6 +2,7 @@
 
 /// A stage for browsers that cannot draw in space: the plots still work.
 function emptyStage(host, error) {
+  host.querySelector("canvas")?.remove();
   host.append(element("p", { className: "notice", textContent: `This browser cannot draw in space: ${error.message}` }));
   const nothing = () => {};
   const canvas = element("canvas");
