@@ -94,7 +94,7 @@ class Controls {
     at("which-run").hidden = runs.length < 2;
     at("run").addEventListener("change", () => this.#showHonesty());
     at("copy-csv").addEventListener("click", (event) => copy(this.#run().csv(), event.currentTarget));
-    at("save-csv").addEventListener("click", () => save(this.#run().csv(), `${scene.title || "run"}.csv`));
+    at("save-csv").addEventListener("click", () => save(this.#run().csv(), csvName()));
     at("copy-scenario").addEventListener("click", (event) => copy(scene.scenario, event.currentTarget));
     const three = scene.dimension === 3 ? ` Drawn by three.js r${scene.three} (MIT licence, in the source of this page).` : "";
     at("about").textContent = `Made by pendula ${scene.version}.${three} Between rows, motion is cubic in time; rods keep their length.`;
@@ -148,6 +148,12 @@ class Controls {
       "?": () => at("help").showModal(),
     };
   }
+}
+
+/// After the scenario, without its folder.
+function csvName() {
+  const stem = scene.title.replace(/^.*[\\/]/, "").replace(/\.toml$/, "");
+  return `${stem || "run"}.csv`;
 }
 
 /// To the clipboard, where the browser lets a file of the disk do so; otherwise by the old way.
