@@ -84,7 +84,7 @@ void Page::add_row(std::span<const double> row) {
   runs_.back().rows.add(row);
 }
 
-void Page::end_run(const io::EnergyError& energy) {
+void Page::end_run(const EnergyError& energy) {
   if (!runs_.empty()) runs_.back().energy = energy;
 }
 

@@ -2,11 +2,12 @@
 
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
+#include <pendula/run/observer.hpp>
+#include <pendula/run/run_record.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "io/run_record.hpp"
 #include "view/kept_rows.hpp"
 #include "view/scene.hpp"
 #include "view/whole_file.hpp"
@@ -25,7 +26,7 @@ struct PageLimits {
 /// Rows are thinned, evenly and in bounded memory, and the page says so. As long as 2048 of them can be kept with all
 /// their columns as doubles, they are, and the CSV that the page gives is the trajectory's own text; longer rows, and
 /// those of the second run and later ones, are floats of what is drawn.
-class Page {
+class Page : public Observer {
  public:
   /// Opens the file. `runs` is how many will follow: they share the page. Throws io::InputError.
   Page(const std::string& file, Scene scene, std::size_t runs = 1, const PageLimits& limits = {});
@@ -36,9 +37,12 @@ class Page {
   /// Takes a row, in the order of the columns.
   void add_row(std::span<const double> row);
 
-  /// Says what the energies of the run are compared with: RunRecord::energy_error, which is complete with the last row.
+  /// The same of a run whose observer the page is.
+  void take(const Row& row) override { add_row(row.numbers); }
+
+  /// Says what the energies of the run are compared with: RunReport::energy_error, which is complete with the last row.
   /// Without it the page has no energy errors of the run.
-  void end_run(const io::EnergyError& energy);
+  void end_run(const EnergyError& energy);
 
   /// Writes the page; does nothing, and leaves no file, where no row came. Throws io::OutputError.
   void close();
@@ -48,7 +52,7 @@ class Page {
     std::string label;
     KeptRows rows;
     std::size_t share;  // bytes for the rows, as text
-    io::EnergyError energy;
+    EnergyError energy;
   };
 
   std::size_t share_of(std::size_t run) const;

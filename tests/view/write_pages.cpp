@@ -12,7 +12,7 @@
 #include <pendula/chain/state.hpp>
 #include <pendula/kernels/cart_chain_2.hpp>
 #include <pendula/run/chain_subject.hpp>
-#include <pendula/run/simulation.hpp>
+#include <pendula/run/run.hpp>
 #include <pendula/run/system_entry.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/version.hpp>
@@ -20,7 +20,6 @@
 #include <utility>
 #include <vector>
 
-#include "io/run_record.hpp"
 #include "io/trajectory.hpp"
 #include "view/page.hpp"
 
@@ -50,17 +49,18 @@ class Pages {
   explicit Pages(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// One page of runs from several starts; the trajectory of the first beside it.
-  void write(const Subject& subject, view::Scene scene, const Plan& plan, const std::vector<Motion>& starts) {
+  void write(const std::shared_ptr<const Subject>& subject, view::Scene scene, const Plan& plan,
+             const std::vector<Motion>& starts) {
     scene.title = plan.name;
     scene.scenario = plan.scenario;
     scene.version = std::string(version);
     view::Page page(folder_ / (plan.name + ".html"), scene, starts.size());
-    io::TrajectoryFile trajectory(folder_ / (plan.name + ".csv"), subject.columns());
+    io::TrajectoryFile trajectory(folder_ / (plan.name + ".csv"), subject->columns());
     for (std::size_t k = 0; k < starts.size(); ++k) {
       page.begin_run(k == 0 ? "first" : "copy " + std::to_string(k));
-      run(subject, plan, starts[k], page, k == 0 ? &trajectory : nullptr);
+      run({subject, starts[k], plan.options, plan.duration, plan.every}, plan.name, page,
+          k == 0 ? &trajectory : nullptr);
     }
-    trajectory.close();
     const auto begin = std::chrono::steady_clock::now();
     page.close();
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
@@ -69,32 +69,23 @@ class Pages {
   }
 
  private:
-  static void run(const Subject& subject, const Plan& plan, const Motion& start, view::Page& page,
-                  io::TrajectoryFile* trajectory) {
-    const std::unique_ptr<Integrator> integrator = subject.make_integrator(plan.options);
-    io::RunRecord record(subject, plan.duration);
-    std::vector<double> row;
-    const RunResult result =
-        simulate(*integrator, start, {plan.options.step, plan.duration, plan.every}, [&](const Motion& motion) {
-          const Observation seen = subject.observe(motion);
-          row.clear();
-          subject.append_row(motion, seen, row);
-          record.add(motion, seen, row, integrator->statistics().load_work);
-          page.add_row(row);
-          if (trajectory) trajectory->write(row);
-        });
-    if (!result.outcome) std::cerr << plan.name << ": " << result.outcome << '\n';
-    page.end_run(record.energy_error());
+  static void run(const RunSetup& setup, const std::string& name, view::Page& page, io::TrajectoryFile* trajectory) {
+    Run run(setup);
+    run.add(page);
+    if (trajectory) run.add(*trajectory);
+    const RunReport report = run.go();
+    if (report.end != RunEnd::complete) std::cerr << name << ": " << report.step << '\n';
+    page.end_run(report.energy_error);
   }
 
   std::filesystem::path folder_;
 };
 
 template <class Space>
-ChainSubject<Space> chain_of(int links, double length) {
+std::shared_ptr<const ChainSubject<Space>> chain_of(int links, double length) {
   ChainParameters<Space> parameters;
   parameters.masses = parameters.lengths = Eigen::VectorXd::Constant(links, length / links);
-  return ChainSubject<Space>(Chain<Space>(parameters));
+  return std::make_shared<ChainSubject<Space>>(Chain<Space>(parameters));
 }
 
 template <class Space>
@@ -112,31 +103,31 @@ void demo(Pages& pages) {
   ChainParameters<Spatial> parameters;
   parameters.masses = Eigen::Vector4d(1.2, 0.6, 0.9, 1.6);
   parameters.lengths = Eigen::Vector4d(1, 1, 1, 1);
-  const ChainSubject<Spatial> subject{Chain<Spatial>(parameters)};
+  const auto subject = std::make_shared<ChainSubject<Spatial>>(Chain<Spatial>(parameters));
   Plan plan = plan_of("demo", 4, 1e-3, 10, 10);
   plan.scenario = "[chain]\nspace = \"spatial\"\n# </script><script>window.broken = 1</script> <!-- & \" é\n";
-  pages.write(subject, view::scene_of(subject), plan, {from_angle<Spatial>(4, 1.9)});
-  pages.write(subject, view::scene_of(subject), plan_of("coarse", 4, 1e-3, 10, 40), {from_angle<Spatial>(4, 1.9)});
+  pages.write(subject, view::scene_of(*subject), plan, {from_angle<Spatial>(4, 1.9)});
+  pages.write(subject, view::scene_of(*subject), plan_of("coarse", 4, 1e-3, 10, 40), {from_angle<Spatial>(4, 1.9)});
 }
 
 /// Fifty double pendulums that differ by 1e-9, and three.
 void chaos(Pages& pages) {
-  const ChainSubject<Planar> subject = chain_of<Planar>(2, 2);
+  const auto subject = chain_of<Planar>(2, 2);
   std::vector<Motion> starts(50, from_angle<Planar>(2, 2.2));
   for (std::size_t k = 0; k < starts.size(); ++k) starts[k].q[0] += 1e-9 * static_cast<double>(k);
   const Plan plan = plan_of("chaos", 6, 5e-3, 20, 4);
-  pages.write(subject, view::scene_of(subject), plan, starts);
-  const ChainSubject<Spatial> in_space = chain_of<Spatial>(3, 3);
+  pages.write(subject, view::scene_of(*subject), plan, starts);
+  const auto in_space = chain_of<Spatial>(3, 3);
   std::vector<Motion> three(3, from_angle<Spatial>(3, 2.2));
   for (std::size_t k = 0; k < three.size(); ++k) three[k].q[0] += 1e-9 * static_cast<double>(k);
-  pages.write(in_space, view::scene_of(in_space), plan_of("three_in_space", 4, 2e-3, 20, 10), three);
+  pages.write(in_space, view::scene_of(*in_space), plan_of("three_in_space", 4, 2e-3, 20, 10), three);
 }
 
 template <class Space>
 void long_chain(Pages& pages, const std::string& name, int links, double step, double duration, std::int64_t every) {
-  const ChainSubject<Space> subject = chain_of<Space>(links, 1);
+  const auto subject = chain_of<Space>(links, 1);
   const Plan plan = plan_of(name, 4, step, duration, every);
-  pages.write(subject, view::scene_of(subject), plan, {from_angle<Space>(links, 0.5 * std::numbers::pi)});
+  pages.write(subject, view::scene_of(*subject), plan, {from_angle<Space>(links, 0.5 * std::numbers::pi)});
 }
 
 /// Two links on a cart; and the same as if it had no points.
@@ -148,26 +139,27 @@ void model(Pages& pages) {
     const auto count = static_cast<std::size_t>(entry.info.parameter_sizes[k]);
     numbers.parameters.insert(numbers.parameters.end(), count, std::isnan(standard) ? 1 : standard);
   }
-  const SystemSubject subject(std::shared_ptr<const SystemEntry>(&entry, [](const SystemEntry*) {}), numbers);
+  const std::shared_ptr<const SystemEntry> unowned(&entry, [](const SystemEntry*) {});
+  const auto subject = std::make_shared<SystemSubject>(unowned, numbers);
   Motion start;
   start.q = Eigen::Vector3d(0, 1.2, 2.0);
   start.v = Eigen::Vector3d::Zero();
   const Plan plan = plan_of("cart", 4, 2e-3, 12, 5);
-  pages.write(subject, view::scene_of(subject), plan, {start});
-  view::Scene bare = view::scene_of(subject);
+  pages.write(subject, view::scene_of(*subject), plan, {start});
+  view::Scene bare = view::scene_of(*subject);
   bare.points.clear();
   pages.write(subject, bare, plan_of("no_points", 4, 2e-3, 12, 5), {start});
 }
 
 /// A point in space that hangs on nothing, and a run that is over where it begins.
 void odd_ones(Pages& pages) {
-  const ChainSubject<Spatial> in_space = chain_of<Spatial>(1, 1);
-  view::Scene point = view::scene_of(in_space);
+  const auto in_space = chain_of<Spatial>(1, 1);
+  view::Scene point = view::scene_of(*in_space);
   point.rods = view::Rods::none;
   point.lengths.clear();
   pages.write(in_space, point, plan_of("free_point", 4, 1e-2, 10, 2), {from_angle<Spatial>(1, 1.2)});
-  const ChainSubject<Planar> chain = chain_of<Planar>(1, 1);
-  pages.write(chain, view::scene_of(chain), plan_of("one_row", 4, 1e-2, 0, 1), {from_angle<Planar>(1, 1.2)});
+  const auto chain = chain_of<Planar>(1, 1);
+  pages.write(chain, view::scene_of(*chain), plan_of("one_row", 4, 1e-2, 0, 1), {from_angle<Planar>(1, 1.2)});
 }
 
 }  // namespace
