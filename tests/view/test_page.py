@@ -240,7 +240,7 @@ def test_the_csv_of_a_long_chain_says_what_it_is(open_page):
     with page.expect_download() as download:
         page.click("#save-csv")
     header, *rows = csv.reader(io.StringIO(download.value.path().read_text()))
-    assert len(header) == 2001 and len(rows) == 151
+    assert len(header) == 2001 and len(rows) == 101
 
 
 def test_the_scenario_is_there_to_copy_and_does_not_break_out(open_page):

@@ -172,10 +172,10 @@ int main(int count, char** arguments) {
   Pages pages(arguments[1]);
   demo(pages);
   chaos(pages);
-  long_chain<Planar>(pages, "hundred", 100, 1e-3, 2, 4);
+  long_chain<Planar>(pages, "hundred", 100, 1e-3, 1, 4);
   long_chain<Spatial>(pages, "hundred_in_space", 100, 1e-3, 1, 4);
-  long_chain<Planar>(pages, "thousand", 1000, 1e-3, 0.3, 2);
-  long_chain<Spatial>(pages, "thousand_in_space", 1000, 1e-3, 0.2, 2);
+  long_chain<Planar>(pages, "thousand", 1000, 1e-3, 0.2, 2);
+  long_chain<Spatial>(pages, "thousand_in_space", 1000, 1e-3, 0.1, 1);
   model(pages);
   odd_ones(pages);
 }
