@@ -17,6 +17,9 @@ struct SimulateOptions {
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::optional<std::string> output;   ///< trajectory file; "-" is standard output
+  std::optional<std::string> view;     ///< page to look at the run
+  int copies = 0;                      ///< further runs in the page, from starts that differ
+  double apart = 1e-9;                 ///< by this, in the first coordinate, from one to the next
   bool json = false;                   ///< summary as JSON
   bool quiet = false;                  ///< no summary, progress or warnings; JSON is still printed where asked for
 };

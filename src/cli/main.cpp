@@ -88,6 +88,17 @@ CommandLine::CommandLine() {
                    "summary")
       ->type_name("FILE")
       ->check(not_empty);
+  CLI::Option* view = simulate->add_option("--view", simulate_options.view,
+                                           "Write a page to look at the motion: one HTML file that needs nothing else");
+  view->type_name("FILE")->check(not_empty);
+  CLI::Option* copies = simulate->add_option("--copies", simulate_options.copies,
+                                             "Show so many further runs in the page, from starts a little apart");
+  copies->type_name("N")->needs(view)->check(CLI::Range(1, 1000));
+  simulate
+      ->add_option("--apart", simulate_options.apart,
+                   "How far one start is from the next, in the first coordinate (1e-9)")
+      ->type_name("SIZE")
+      ->needs(copies);
   simulate->add_flag("--json", simulate_options.json, "Print the summary as one JSON object");
   simulate->add_flag("--quiet", simulate_options.quiet, "Print errors only (and the JSON object, where asked for)");
   simulate->footer("Example: pendula simulate double.toml --set run.step=1e-4 -o out.csv");

@@ -428,11 +428,16 @@ AnyScenario parse_scenario(std::string_view text, std::string_view name, std::sp
   return read<Spatial>(sections);
 }
 
+ScenarioText read_scenario_text(const std::filesystem::path& file) {
+  const std::string standard_input = "standard input";
+  if (file == "-") return {standard_input, read_stream(std::cin, standard_input)};
+  return {file.string(), read_text(file)};
+}
+
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides,
                           const FindSystem& find) {
-  const std::string standard_input = "standard input";
-  if (file == "-") return parse_scenario(read_stream(std::cin, standard_input), standard_input, overrides, find);
-  return parse_scenario(read_text(file), file.string(), overrides, find);
+  const ScenarioText scenario = read_scenario_text(file);
+  return parse_scenario(scenario.text, scenario.name, overrides, find);
 }
 
 }  // namespace pendula::io

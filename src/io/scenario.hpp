@@ -74,6 +74,14 @@ std::shared_ptr<const SystemEntry> built_in_system(const std::string& model, std
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
                            const FindSystem& find = built_in_system);
 
+/// The text of a scenario, and what stands for its file in messages.
+struct ScenarioText {
+  std::string name, text;
+};
+
+/// Reads a file, "-" being standard input. Throws InputError where it cannot be read.
+ScenarioText read_scenario_text(const std::filesystem::path& file);
+
 /// The same from a file, "-" being standard input; a file that cannot be read is an InputError too.
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides = {},
                           const FindSystem& find = built_in_system);

@@ -253,6 +253,7 @@ std::string place(const Summary& summary) {
 std::string ending(const Summary& summary) {
   std::string text = place(summary);
   if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));
+  if (summary.view) text += line("page", *summary.view + ", to open in a browser");
   if (!summary.ending.ok()) text += line("ended early", summary.ending.message);
   return text;
 }
@@ -341,6 +342,7 @@ std::string to_json(const Summary& summary) {
                    {"newton_iterations", summary.statistics.newton_iterations},
                    {"rows", summary.trajectory ? summary.rows_written : summary.rows},
                    {"trajectory", or_null(summary.trajectory.value_or(""))},
+                   {"view", or_null(summary.view.value_or(""))},
                    {"energy_initial", summary.energy_error.initial},
                    {"energy_final", summary.energy_final},
                    {"energy_error_max", summary.energy_error.largest},

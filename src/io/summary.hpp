@@ -70,6 +70,7 @@ struct Summary : RunReport {
   SystemSnapshot system;                  ///< of any other system
   std::optional<std::string> trajectory;  ///< the file that rows were written to; "-" is standard output
   std::int64_t rows_written = 0;          ///< that are in this file: fewer, where the disk is full
+  std::optional<std::string> view;        ///< the page
 };
 
 /// How a run ended; `coordinates` as pendula::message takes them. What an observer threw is thrown again, but for

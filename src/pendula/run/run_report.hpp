@@ -20,6 +20,7 @@ struct RunSetup {
   RunOptions options;
   double duration = 10;     ///< s
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
+  bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
 };
 
 /// Why a run was over.

@@ -1,0 +1,62 @@
+"""Pages to look at a run: when they are written, and when not. What is in them: tests/view."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from conftest import settings
+
+
+def about(page: Path) -> dict:
+    """What a page says of itself."""
+    text = page.read_text()
+    [data] = re.findall(r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', text, re.DOTALL)
+    return json.loads(data)
+
+
+def test_a_page_shows_every_run(pendula, double, tmp_path):
+    result = pendula("simulate", double, "--view", "out.html", "--copies", 3, "--apart", "1e-6", "--json")
+    assert result.status == 0, result.err
+    assert result.json["view"] == "out.html"
+    labels = [run["label"] for run in about(tmp_path / "out.html")["runs"]]
+    assert labels == ["start", "start + 1e-06", "start + 2e-06", "start + 3e-06"]
+
+
+def test_a_page_tells_how_it_was_made(pendula, double, tmp_path):
+    assert pendula("simulate", double, "--view", "out.html", *settings("run.stages=3")).status == 0
+    scenario = about(tmp_path / "out.html")["scenario"]
+    assert scenario.startswith("[chain]")
+    assert scenario.endswith("# run with --set run.stages=3\n")
+
+
+def test_a_run_that_fails_leaves_its_page(pendula, double, tmp_path):
+    limits = settings("run.step=1e5", "run.duration=1e6", "output.every=1")
+    result = pendula("simulate", double, "--view", "out.html", *limits)
+    assert result.status == 1
+    assert len(about(tmp_path / "out.html")["runs"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--view", "-"], "pendula: -: expected a file of its own for the page"),
+        (["--view", "a.html", "-o", "a.html"], "pendula: a.html: expected a file of its own for the page"),
+        (["--view", "no/a.html"], "no/a.html: expected a file that can be written"),
+        (["--copies", "2"], "--copies requires --view"),
+        (["--view", "a.html", "--copies", "0"], "--copies"),
+    ],
+)
+def test_where_no_page_can_be(pendula, double, tmp_path, arguments, message):
+    result = pendula("simulate", double, *arguments)
+    assert result.status == 2
+    assert message in result.err
+    assert not list(tmp_path.glob("*.html*"))
+
+
+def test_the_scenario_is_not_overwritten(pendula, double):
+    before = double.read_text()
+    result = pendula("simulate", double, "--view", double)
+    assert result.status == 2
+    assert "expected a file for the page, got the scenario itself" in result.err
+    assert double.read_text() == before
