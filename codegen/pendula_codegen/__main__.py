@@ -47,6 +47,9 @@ def _parser() -> argparse.ArgumentParser:
     kernel = commands.add_parser("kernel", help="the dense kernel of a chain with a fixed number of links")
     kernel.add_argument("--space", required=True, help=f"model: {', '.join(LINKS)}")
     kernel.add_argument("--links", required=True, type=int, help="number of links, from 1")
+    kernel.add_argument(
+        "--paper-blocks", action="store_true", help="also the paper's A, B, C, S, h and g as functions"
+    )
     kernel.set_defaults(run=_run_kernel)
 
     link = commands.add_parser("link", help="direction of one link and its derivatives")
@@ -82,7 +85,7 @@ def _write(output: Path, name: str, header: Header) -> None:
 
 
 def _run_kernel(options: argparse.Namespace) -> None:
-    header = render_kernel(options.space, options.links)
+    header = render_kernel(options.space, options.links, options.paper_blocks)
     _write(options.output, f"{kernel_name(options.space, options.links)}.hpp", header)
 
 
@@ -109,9 +112,9 @@ def _run_counts(options: argparse.Namespace) -> None:
 
 
 def committed_headers() -> dict[str, Header]:
-    """File name and header of everything header that the repository keeps under generated/."""
+    """File name and header of every header that the repository keeps under generated/."""
     kernels = {
-        f"{kernel_name(space, links)}.hpp": render_kernel(space, links)
+        f"{kernel_name(space, links)}.hpp": render_kernel(space, links, paper_blocks=True)
         for space, numbers in COMMITTED.items()
         for links in numbers
     }

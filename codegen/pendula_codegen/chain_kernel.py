@@ -24,9 +24,11 @@ class ChainKernel(SystemKernel):
     momentum_unit = "N m s"
     mass_unit = "kg m²"
 
-    def __init__(self, chain: Chain):
+    def __init__(self, chain: Chain, paper_blocks: bool = False):
+        """paper_blocks: whether the kernel has the paper's A, B, C, S, h, g as functions, which no run needs."""
         super().__init__(chain.system)
         self.chain = chain
+        self.paper_blocks = paper_blocks
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -61,7 +63,7 @@ class ChainKernel(SystemKernel):
             *self.kinematics(),
             *self.energies(),
             self.mass_matrix(),
-            *self._block_functions(),
+            *(self._block_functions() if self.paper_blocks else []),
             *self._generalized_force(),
             self.power(),
             *self.residuals(),

@@ -126,9 +126,9 @@ class Words:
     has_hamiltonian: bool = False
 
 
-def render_kernel(space: str, links: int) -> Header:
+def render_kernel(space: str, links: int, paper_blocks: bool = False) -> Header:
     """<space>_<links>.hpp; raises GenerationError on an unknown space or links < 1."""
-    return render_chain(ChainKernel(Chain(find_link(space), links)))
+    return render_chain(ChainKernel(Chain(find_link(space), links), paper_blocks))
 
 
 def render_chain(kernel: ChainKernel) -> Header:
@@ -149,7 +149,8 @@ def render_chain(kernel: ChainKernel) -> Header:
             f"Kernel of the {model.name} chain with {n} link{plural}.",
             "kernel",
             model.name,
-            f"--space {model.name} --links {n} --output {name}.hpp",
+            f"--space {model.name} --links {n}{' --paper-blocks' if kernel.paper_blocks else ''} "
+            f"--output {name}.hpp",
         ),
         about=[
             f"Pure functions of the {model.name} chain with {n} link{plural}.",

@@ -22,10 +22,20 @@ def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess:
 
 
 def test_kernel_into_a_file_and_into_a_folder(tmp_path, fresh_headers):
-    assert main(["kernel", "--space", "planar", "--links", "1", "--output", str(tmp_path / "mine.hpp")]) == 0
-    assert main(["kernel", "--space", "planar", "--links", "1", "--output", str(tmp_path / "new")]) == 0
+    command = ["kernel", "--space", "planar", "--links", "1", "--paper-blocks", "--output"]
+    assert main([*command, str(tmp_path / "mine.hpp")]) == 0
+    assert main([*command, str(tmp_path / "new")]) == 0
     assert (tmp_path / "mine.hpp").read_text() == fresh_headers["planar_1.hpp"]
     assert (tmp_path / "new" / "planar_1.hpp").read_text() == fresh_headers["planar_1.hpp"]
+
+
+def test_the_blocks_of_the_paper_are_there_where_asked_for(tmp_path, fresh_headers):
+    assert main(["kernel", "--space", "spatial", "--links", "2", "--output", str(tmp_path)]) == 0
+    kernel = (tmp_path / "spatial_2.hpp").read_text()
+    blocks = ["block_A11", "block_B22", "block_C1", "block_g"]
+    assert not [block for block in blocks if block in kernel]
+    assert not [block for block in blocks if block not in fresh_headers["spatial_2.hpp"]]
+    assert "residual_with_jacobians" in kernel
 
 
 def test_link_and_tableaux(tmp_path, fresh_headers):
@@ -39,7 +49,8 @@ def test_link_and_tableaux(tmp_path, fresh_headers):
 @pytest.mark.parametrize(("space", "links"), [("planar", "2"), ("spatial", "2")])
 def test_same_bytes_whatever_the_hash_seed(space, links, tmp_path, fresh_headers):
     for seed in ("1", "20261121"):
-        done = run("kernel", "--space", space, "--links", links, "--output", str(tmp_path), seed=seed)
+        command = ["kernel", "--space", space, "--links", links, "--paper-blocks"]
+        done = run(*command, "--output", str(tmp_path), seed=seed)
         assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
         name = f"{space}_{links}.hpp"
         assert (tmp_path / name).read_bytes() == fresh_headers[name].encode()
