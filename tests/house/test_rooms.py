@@ -61,6 +61,20 @@ def test_every_room_has_its_arrows():
     assert rooms - {"pendula"} == set(KNOWS)
 
 
+def heights() -> dict[str, int]:
+    """How far from the top each room begins in the picture of CONTRIBUTING."""
+    picture = (SOURCE.parent / "docs/images/rooms.svg").read_text()
+    return {name: int(y) for y, name in re.findall(r'<text class="n" x="\d+" y="(\d+)">(\w+)<', picture)}
+
+
+def test_the_picture_shows_what_stands_on_what():
+    at = heights()
+    assert set(at) == {room.split("/")[-1] for room in KNOWS} | {"kernels"}
+    for room, known in KNOWS.items():
+        for below in known:
+            assert at[room.split("/")[-1]] <= at[below.split("/")[-1]], f"{room} -> {below}"
+
+
 def test_the_arrows_make_no_circle():
     done: set[str] = set()
     while len(done) < len(KNOWS):
