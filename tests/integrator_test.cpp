@@ -46,7 +46,7 @@ TEST(Factory, SaysWhatRuns) {
 }
 
 template <class Space>
-std::string_view chosen(int links, int stages, Iteration iteration = Iteration::automatic) {
+std::string chosen(int links, int stages, Iteration iteration = Iteration::automatic) {
   RunOptions options;
   options.stages = stages;
   options.iteration = iteration;
