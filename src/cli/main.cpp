@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cmath>
 #include <csignal>
 #include <exception>
 #include <iostream>
@@ -98,6 +99,12 @@ CommandLine::CommandLine() {
       ->add_option("--apart", simulate_options.apart,
                    "How far one start is from the next, in the first coordinate (1e-9)")
       ->type_name("SIZE")
+      ->check(expect("a number that is finite",
+                     [](const std::string& text) {
+                       double size = 0;
+                       const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), size);
+                       return error == std::errc() && end == text.data() + text.size() && std::isfinite(size);
+                     }))
       ->needs(copies);
   simulate->add_flag("--json", simulate_options.json, "Print the summary as one JSON object");
   simulate->add_flag("--quiet", simulate_options.quiet, "Print errors only (and the JSON object, where asked for)");

@@ -77,10 +77,17 @@ Run run_of(const RunSetup& setup, const io::RunPlan& plan, const std::string& fi
   }
 }
 
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code none_there;
+  const auto whole = [](const std::filesystem::path& path) {
+    return std::filesystem::absolute(path).lexically_normal();
+  };
+  return whole(a) == whole(b) || std::filesystem::equivalent(a, b, none_there);
+}
+
 /// Throws io::InputError where writing `file` would destroy the scenario.
 void spare_scenario(const std::string& file, const char* what, const SimulateOptions& options) {
-  std::error_code none_there;
-  if (!std::filesystem::equivalent(file, options.scenario, none_there)) return;
+  if (file == "-" || !is_same_file(file, options.scenario)) return;
   throw io::InputError(file + ": expected a file for the " + what + ", got the scenario itself");
 }
 
@@ -96,7 +103,7 @@ std::unique_ptr<io::TrajectoryFile> open_trajectory(const SimulateOptions& optio
 std::unique_ptr<view::Page> open_page(const SimulateOptions& options, const view::Scene& scene) {
   if (!options.view) return nullptr;
   spare_scenario(*options.view, "page", options);
-  if (*options.view == "-" || options.view == options.output) {
+  if (*options.view == "-" || (options.output && is_same_file(*options.view, *options.output))) {
     throw io::InputError(*options.view + ": expected a file of its own for the page");
   }
   return std::make_unique<view::Page>(*options.view, scene, 1 + static_cast<std::size_t>(options.copies));
@@ -125,7 +132,7 @@ class Session {
         run_(run_of(setup_, plan, options.scenario)),
         page_(open_page(options, scene)),
         file_(open_trajectory(options, setup_.subject->columns())),
-        progress_(setup_.duration, !options.quiet) {
+        progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_);
     run_.add(progress_);

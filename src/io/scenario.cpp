@@ -74,10 +74,6 @@ constexpr std::array<std::string_view, 36> all_keys = {"chain.space",
 
 constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
-constexpr std::array<std::string_view, 5> method_names = {"gauss", "radau", "rk4", "dopri5", "fehlberg78"};
-constexpr std::array<std::string_view, 2> form_names = {"momentum", "velocity"};
-constexpr std::array<std::string_view, 3> solver_names = {"auto", "chain", "dense"};
-constexpr std::array<std::string_view, 3> iteration_names = {"auto", "newton", "fixed-point"};
 
 /// The sections of a document that every scenario has, each with known keys only.
 struct RunSections {
@@ -102,11 +98,11 @@ double number(const Section& section, std::string_view key, double otherwise, Si
   return entry ? entry->number(sign) : otherwise;
 }
 
-/// An enumerator by its name; the names stand in the order of the enumerators.
-template <class Enum>
-Enum choice(const Section& section, std::string_view key, Enum otherwise, Names names) {
+/// An option's value by its name.
+template <class Option>
+Option choice(const Section& section, std::string_view key, Option otherwise) {
   const std::optional<Entry> entry = section.find(key);
-  return entry ? static_cast<Enum>(entry->choice(names)) : otherwise;
+  return entry ? static_cast<Option>(entry->choice(names_of<Option>)) : otherwise;
 }
 
 /// Whether an array has one element a link; in space a torque [x, y, z] is one vector for all.
@@ -311,12 +307,12 @@ void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
 
 RunOptions read_run(const Section& run) {
   RunOptions options;
-  options.method = choice(run, "method", options.method, method_names);
+  options.method = choice(run, "method", options.method);
   if (const auto stages = run.find("stages"))
     options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer(1, 8));
-  options.form = choice(run, "form", options.form, form_names);
-  options.solver = choice(run, "solver", options.solver, solver_names);
-  options.iteration = choice(run, "iteration", options.iteration, iteration_names);
+  options.form = choice(run, "form", options.form);
+  options.solver = choice(run, "solver", options.solver);
+  options.iteration = choice(run, "iteration", options.iteration);
   options.step = number(run, "step", options.step, Sign::positive);
   options.tolerance = number(run, "tolerance", options.tolerance, Sign::positive);
   return options;
@@ -337,8 +333,7 @@ std::vector<std::string> unused_keys(const Section& run, Method method) {
   const auto check = [&](std::string_view key, bool used) {
     const std::optional<Entry> entry = run.find(key);
     if (!entry || used) return;
-    warnings.push_back(entry->place() + ": has no effect with method " +
-                       std::string(method_names[static_cast<std::size_t>(method)]));
+    warnings.push_back(entry->place() + ": has no effect with method " + std::string(name_of(method)));
   };
   for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, !is_explicit(method));
   check("step", !is_adaptive(method));

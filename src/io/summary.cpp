@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/version.hpp>
-#include <sstream>
 #include <string_view>
 
 #include "io/line_file.hpp"
@@ -16,13 +15,6 @@ namespace pendula::io {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-template <class Value>
-std::string name_of(Value value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 bool has_stages(const Summary& summary) {
   return !is_explicit(summary.run.method);
@@ -163,11 +155,11 @@ std::string settings(const Summary& summary) {
   const ModelSummary& model = summary.model;
   const UnitNames unit = unit_names(model.natural);
   std::string text = what_was_moved(model);
-  std::string method = name_of(summary.run.method);
+  std::string method(name_of(summary.run.method));
   if (has_stages(summary)) {
     method += ", " + plural(summary.run.stages, "stage") + " (order " +
               std::to_string(2 * summary.run.stages - (summary.run.method == Method::radau ? 1 : 0)) + "), " +
-              name_of(summary.run.form) + " form";
+              std::string(name_of(summary.run.form)) + " form";
   }
   text += line("method", method);
   const Description& description = summary.description;
@@ -259,7 +251,7 @@ std::string ending(const Summary& summary) {
 }
 
 Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates) {
-  std::string status = name_of(outcome.status);
+  std::string status(name_of(outcome.status));
   std::ranges::replace(status, ' ', '_');
   const bool is_named = outcome.part >= 0 && !coordinates.empty();
   const auto part = static_cast<std::size_t>(outcome.part);

@@ -167,5 +167,7 @@ def test_progress_is_for_terminals(double):
     os.close(mine)
     assert run.returncode == 0
     assert "% " in seen and "of 4000" in seen
+    last = seen.split("\r\x1b[K")[-2]
+    assert re.fullmatch(r"\d+ %   t = \S+ of 4000   \S+ steps/s   \d+ s left   energy off by \S+", last), last
     assert seen.split("pendula: warning")[0].endswith("\r\x1b[K")
     assert out.count(b"\n") == 1

@@ -42,6 +42,11 @@ def test_a_run_that_fails_leaves_its_page(pendula, double, tmp_path):
     [
         (["--view", "-"], "pendula: -: expected a file of its own for the page"),
         (["--view", "a.html", "-o", "a.html"], "pendula: a.html: expected a file of its own for the page"),
+        (["--view", "a.html", "-o", "./a.html"], "pendula: a.html: expected a file of its own for the page"),
+        (
+            ["--view", "a.html", "--copies", "2", "--apart", "nan"],
+            "--apart: expected a number that is finite, got nan",
+        ),
         (["--view", "no/a.html"], "no/a.html: expected a file that can be written"),
         (["--copies", "2"], "--copies requires --view"),
         (["--view", "a.html", "--copies", "0"], "--copies"),

@@ -65,7 +65,8 @@ inline RunReport Run::go(const std::function<bool()>& stop) {
   report.energy_error = record_.energy_error();
   report.energy_final = record_.energy();
   report.table = record_.table();
-  if (report.end == RunEnd::complete && setup_.doubted) report.warnings = doubts(setup_, report, record_.balance(), stop);
+  if (report.end == RunEnd::complete && setup_.doubted)
+    report.warnings = doubts(setup_, report, record_.balance(), stop);
   return report;
 }
 

@@ -60,6 +60,6 @@ struct SystemEntry {
 };
 
 /// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
-inline constexpr int system_interface = 1;
+inline constexpr int system_interface = 2;
 
 }  // namespace pendula

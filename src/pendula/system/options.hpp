@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <ostream>
 #include <string_view>
 
@@ -26,52 +28,26 @@ constexpr bool is_adaptive(Method method) {
   return method == Method::dopri5 || method == Method::fehlberg78;
 }
 
-inline std::ostream& operator<<(std::ostream& out, Method method) {
-  switch (method) {
-    case Method::gauss:
-      return out << "gauss";
-    case Method::radau:
-      return out << "radau";
-    case Method::rk4:
-      return out << "rk4";
-    case Method::dopri5:
-      return out << "dopri5";
-    case Method::fehlberg78:
-      return out << "fehlberg78";
-  }
-  return out;
+/// What scenarios call the values of an option, in the order of its enumerators.
+template <class Option>
+inline constexpr std::array<std::string_view, 0> names_of{};
+template <>
+inline constexpr std::array<std::string_view, 5> names_of<Method>{"gauss", "radau", "rk4", "dopri5", "fehlberg78"};
+template <>
+inline constexpr std::array<std::string_view, 2> names_of<Form>{"momentum", "velocity"};
+template <>
+inline constexpr std::array<std::string_view, 3> names_of<Solver>{"auto", "chain", "dense"};
+template <>
+inline constexpr std::array<std::string_view, 3> names_of<Iteration>{"auto", "newton", "fixed-point"};
+
+template <class Option>
+requires(!names_of<Option>.empty()) constexpr std::string_view name_of(Option option) {
+  return names_of<Option>[static_cast<std::size_t>(option)];
 }
 
-inline std::ostream& operator<<(std::ostream& out, Form form) {
-  return out << (form == Form::momentum ? "momentum" : "velocity");
-}
-
-inline std::ostream& operator<<(std::ostream& out, Solver solver) {
-  switch (solver) {
-    case Solver::automatic:
-      return out << "auto";
-    case Solver::chain:
-      return out << "chain";
-    case Solver::dense:
-      return out << "dense";
-  }
-  return out;
-}
-
-constexpr std::string_view name_of(Iteration iteration) {
-  switch (iteration) {
-    case Iteration::automatic:
-      return "auto";
-    case Iteration::newton:
-      return "newton";
-    case Iteration::fixed_point:
-      return "fixed-point";
-  }
-  return "";
-}
-
-inline std::ostream& operator<<(std::ostream& out, Iteration iteration) {
-  return out << name_of(iteration);
+template <class Option>
+requires(!names_of<Option>.empty()) std::ostream& operator<<(std::ostream& out, Option option) {
+  return out << name_of(option);
 }
 
 /// What a run is asked to do.

@@ -19,22 +19,26 @@ enum class Status {
   singular_mass_matrix,  ///< a coordinate fails: φ in (θ, φ) where sin θ = 0
 };
 
-inline std::ostream& operator<<(std::ostream& out, Status status) {
+constexpr std::string_view name_of(Status status) {
   switch (status) {
     case Status::ok:
-      return out << "ok";
+      return "ok";
     case Status::not_converged:
-      return out << "not converged";
+      return "not converged";
     case Status::wrong_root:
-      return out << "wrong root";
+      return "wrong root";
     case Status::tolerance_not_met:
-      return out << "tolerance not met";
+      return "tolerance not met";
     case Status::not_finite:
-      return out << "not finite";
+      return "not finite";
     case Status::singular_mass_matrix:
-      return out << "singular mass matrix";
+      return "singular mass matrix";
   }
-  return out << "unknown status";
+  return "unknown status";
+}
+
+inline std::ostream& operator<<(std::ostream& out, Status status) {
+  return out << name_of(status);
 }
 
 /// What came of a step, with all that is needed to understand a failure.
