@@ -51,7 +51,8 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 /// `schedule.every` accepted steps, and at the last state, also where the run fails or is stopped: bool stop() is asked
 /// after every step. Throws std::invalid_argument on a schedule that makes no sense.
 template <class OnRow, class Stop>
-RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row, Stop stop) {
+RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
+                   const Stop& stop) {
   using Clock = std::chrono::steady_clock;
   detail::require(schedule);
   RunResult result{integrator.start(start)};
