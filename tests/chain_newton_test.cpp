@@ -17,20 +17,7 @@ class ChainStageEquations : public ::testing::Test {
   using Space = SpaceOf<Kernel>;
   static constexpr int links = Kernel::links;
 
-  ChainStageEquations() : chain(driven_chain()), start(random_state<Space>(random, links)) {}
-
-  Chain<Space> driven_chain() {
-    const Chain<Space> loaded = random_chain<Space>(random, links, true);
-    ChainParameters<Space> parameters{loaded.masses(),  loaded.lengths(),         9.81,
-                                      loaded.damping(), loaded.constant_torque(), {}};
-    Drive<Space> drive;
-    drive.link = links - 1;
-    drive.amplitude.setConstant(0.7);
-    drive.frequency = 5;
-    drive.phase = 0.3;
-    parameters.drives = {drive};
-    return Chain<Space>(parameters);
-  }
+  ChainStageEquations() : chain(driven_chain<Space>(random, links)), start(random_state<Space>(random, links)) {}
 
   Motion run(Solver solver, int stages, Iteration iteration, int steps, double h) {
     RunOptions options;

@@ -71,19 +71,6 @@ std::vector<RunOptions> every_method(double step) {
   return all;
 }
 
-template <class Space>
-Chain<Space> driven_chain(Random& random, int links) {
-  const Chain<Space> loaded = random_chain<Space>(random, links, true);
-  ChainParameters<Space> parameters{loaded.masses(),  loaded.lengths(),         9.81,
-                                    loaded.damping(), loaded.constant_torque(), {}};
-  Drive<Space> drive;
-  drive.link = links - 1;
-  drive.amplitude.setConstant(0.7);
-  drive.frequency = 5;
-  parameters.drives = {drive};
-  return Chain<Space>(parameters);
-}
-
 TEST(Member, OfEveryMethodGoesOnToTheLastBit) {
   Random random(3);
   for (const RunOptions& options : every_method(0.02)) {
@@ -122,7 +109,7 @@ TEST(Member, OfAWhipAndOfAPoleGoesOnToTheLastBit) {
   expect_the_same_end(equal_chain<Spatial>(3), swing, options, 300, random_cuts(random, 300));
 }
 
-TEST(Member, OfOtherOptionsIsRefused) {
+TEST(Member, OfAnotherSizeIsRefused) {
   RunOptions options;
   const auto integrator = make_integrator(equal_chain<Planar>(40), options);
   ASSERT_TRUE(integrator->start(State<Planar>::from_angles(Eigen::VectorXd::Constant(40, 1.0))));

@@ -16,10 +16,10 @@
 
 #include "io/input_error.hpp"
 #include "io/line_file.hpp"
+#include "io/whole_file.hpp"
 #include "view/encode.hpp"
 #include "view/kept_rows.hpp"
 #include "view/scene.hpp"
-#include "view/whole_file.hpp"
 
 namespace pendula::view {
 namespace {
@@ -238,7 +238,7 @@ TEST_F(PageTest, LinksAreFollowed) {
 TEST_F(PageTest, AFileThatCannotBeOpenedIsAnInputError) {
   const auto message = [](const std::string& name) -> std::string {
     try {
-      WholeFile file(name);
+      io::WholeFile file(name);
       return "no error";
     } catch (const io::InputError& error) {
       return error.what();

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import jinja2
-from sympy import Symbol, expand
+from sympy import Symbol, expand, pi
 
 from pendula_codegen import __version__
 from pendula_codegen.backends import cpp
@@ -23,6 +23,7 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.links import find_link
+from pendula_codegen.mechanics import LagrangianSystem
 from pendula_codegen.model import Coordinate, Input, Model, Parameter
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
@@ -244,13 +245,25 @@ def _constant_masses(kernel: SystemKernel) -> bool:
     return not any(entry.free_symbols & changing for entry in diagonal)
 
 
+def _is_periodic(system: LagrangianSystem, coordinate: Symbol) -> bool:
+    """Whether the motion is the same a full turn further: of an angle that nothing winds up."""
+    turned = {coordinate: coordinate + 2 * pi}
+    return all(expression.subs(turned) == expression for expression in (system.lagrangian, *system.forces))
+
+
 def _render(kernel: SystemKernel, words: Words) -> Header:
+    periodic = [c.is_angle and _is_periodic(kernel.system, c.symbol) for c in words.coordinates]
     functions = [cpp.render_function(kernel, function) for function in kernel.functions()]
     text = ENVIRONMENT.get_template("kernel.hpp.j2").render(
         words=words,
         struct=cpp.struct_name(words.name),
         constants=cpp.constants(
-            words.coordinates, words.parameters, words.inputs, words.points, _constant_masses(kernel)
+            words.coordinates,
+            words.parameters,
+            words.inputs,
+            words.points,
+            _constant_masses(kernel),
+            periodic,
         ),
         assignments=cpp.read_statements(words.parameters),
         casts=cpp.cast_statements(words.parameters, words.holds_time),

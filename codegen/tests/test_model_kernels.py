@@ -171,6 +171,10 @@ def test_a_header_says_what_its_model_says():
     assert "struct CartChain2 {" in text
     assert 'coordinate_names = {"x", "theta_1", "theta_2"};' in text
     assert "coordinate_is_angle = {false, true, true};" in text
+    assert "coordinate_is_periodic = {false, true, true};" in text
+    wound = render_model(read("joint_springs", 2), "joint_springs.py").text
+    assert "coordinate_is_angle = {true, true};" in wound
+    assert "coordinate_is_periodic = {false, false};" in wound
     assert 'input_names = {"push"};' in text
     assert "constant_masses = true;" in text
     assert "constant_masses = false;" in render_model(read("furuta", None), "furuta.py").text

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/library.hpp>
@@ -18,7 +19,6 @@
 #include <variant>
 #include <vector>
 
-#include <pendula/numeric/number_text.hpp>
 #include "cli/commands.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"

@@ -168,6 +168,9 @@ class Session {
   void finish_page(const std::function<bool()>& interrupted, io::Summary& summary) {
     page_->end_run(summary.energy_error);
     for (int copy = 1; copy <= options_.copies && !interrupted(); ++copy) run_copy(copy, interrupted);
+    if (summary.ending.ok() && options_.copies > 0 && interrupted()) {
+      summary.ending = {"interrupted", "interrupted before all copies were run", {}, {}};
+    }
     try {
       page_->close();
     } catch (const io::OutputError& error) {

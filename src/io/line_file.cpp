@@ -7,28 +7,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <utility>
-
-#include "io/input_error.hpp"
 
 namespace pendula::io {
 namespace {
-
-[[noreturn]] void reject(const std::string& name, const std::string& why) {
-  throw InputError(name + ": expected a file that can be written, got: " + why);
-}
-
-/// Why a file could not be opened; a missing folder is named.
-std::string reason(const std::string& name, int error) {
-  const std::filesystem::path folder = std::filesystem::path(name).parent_path();
-  std::error_code unknown;
-  if ((error == ENOENT || error == EISDIR) && !folder.empty() && !std::filesystem::exists(folder, unknown)) {
-    return folder.string() + "/ does not exist";
-  }
-  return std::strerror(error);
-}
 
 bool is_regular(int descriptor) {
   struct stat status {};
@@ -38,15 +20,16 @@ bool is_regular(int descriptor) {
 /// Empties a regular file, unless another run is writing it.
 void take_over(int descriptor, const std::string& name) {
   if (!is_regular(descriptor)) return;
-  if (flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) reject(name, "one that another run writes");
-  if (ftruncate(descriptor, 0) != 0) reject(name, std::strerror(errno));
+  if (flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    reject_output(name, "one that another run writes");
+  if (ftruncate(descriptor, 0) != 0) reject_output(name, name, errno);
 }
 
 }  // namespace
 
 LineFile::LineFile(const std::string& name) : name_(name == "-" ? "standard output" : name) {
   descriptor_ = name == "-" ? dup(STDOUT_FILENO) : open(name.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) reject(name_, reason(name, errno));
+  if (descriptor_ < 0) reject_output(name_, name, errno);
   if (name == "-") return;
   try {
     take_over(descriptor_, name_);
@@ -64,9 +47,7 @@ LineFile::~LineFile() {
 
 void LineFile::close() {
   flush();
-  if (::close(std::exchange(descriptor_, -1)) != 0) {
-    throw OutputError(name_ + ": could not be written: " + std::strerror(errno));
-  }
+  if (::close(std::exchange(descriptor_, -1)) != 0) throw OutputError(name_, errno);
 }
 
 void LineFile::flush() {
@@ -74,7 +55,7 @@ void LineFile::flush() {
   const std::size_t written = write_pending();
   const int error = errno;
   flushed_ = Clock::now();
-  if (written != wanted) throw OutputError(name_ + ": could not be written: " + std::strerror(error));
+  if (written != wanted) throw OutputError(name_, error);
 }
 
 /// Writes the pending lines, or as many of them as can be written, and forgets them. Returns the bytes written; errno

@@ -3,16 +3,11 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <stdexcept>
 #include <string>
 
-namespace pendula::io {
+#include "io/output_error.hpp"
 
-/// Lines could not be written, although the file could be opened: the disk is full, say.
-class OutputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+namespace pendula::io {
 
 /// A file that grows by whole lines, so that it can be read at any time. Lines are collected and written in large
 /// blocks, or once a second where they come slowly; `close` writes the rest and tells whether all went well, the

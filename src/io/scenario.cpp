@@ -10,10 +10,10 @@
 #include <limits>
 #include <numbers>
 #include <pendula/chain/momenta.hpp>
+#include <pendula/numeric/number_text.hpp>
 #include <stdexcept>
 #include <utility>
 
-#include <pendula/numeric/number_text.hpp>
 #include "io/system_reader.hpp"
 #include "io/toml_reader.hpp"
 

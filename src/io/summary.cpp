@@ -9,7 +9,7 @@
 #include <pendula/version.hpp>
 #include <string_view>
 
-#include "io/line_file.hpp"
+#include "io/output_error.hpp"
 
 namespace pendula::io {
 namespace {

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
 #include <set>
 
-#include <pendula/numeric/number_text.hpp>
 #include "io/nearest_name.hpp"
 
 namespace pendula::io {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <pendula/numeric/number_text.hpp>
 #include <system_error>
 
-#include <pendula/numeric/number_text.hpp>
 #include "io/nearest_name.hpp"
 #include "io/toml_nesting.hpp"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "io/whole_file.hpp"
 #include "view/kept_rows.hpp"
 #include "view/scene.hpp"
-#include "view/whole_file.hpp"
 
 namespace pendula::view {
 
@@ -72,7 +72,7 @@ class Page : public Observer {
   PageLimits limits_;
   std::size_t expected_;
   std::vector<std::size_t> all_columns_, drawn_columns_;  // besides the time
-  WholeFile file_;
+  io::WholeFile file_;
   std::vector<Run> runs_;
 };
 

@@ -2,10 +2,13 @@
 
 import json
 import re
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import pytest
-from conftest import settings
+from conftest import program, settings
 
 
 def about(page: Path) -> dict:
@@ -35,6 +38,24 @@ def test_a_run_that_fails_leaves_its_page(pendula, double, tmp_path):
     result = pendula("simulate", double, "--view", "out.html", *limits)
     assert result.status == 1
     assert len(about(tmp_path / "out.html")["runs"]) == 1
+
+
+def test_copies_that_are_interrupted_are_missed(double, tmp_path):
+    """A thousand copies take minutes: those that were run are in the page, and the rest is told."""
+    command = [program(), "simulate", str(double), "--view", "out.html", "--copies", "1000"]
+    run = subprocess.Popen(
+        [*command, *settings("run.duration=1000", "output.every=1000")],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(2)  # the run itself takes a tenth of one
+    run.send_signal(signal.SIGINT)
+    _, told = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert "pendula: interrupted before all copies were run\n" in told
+    assert 1 < len(about(tmp_path / "out.html")["runs"]) < 1001
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,21 @@ Chain<Space> random_chain(Random& random, int links, bool loaded = false) {
   return Chain<Space>(parameters);
 }
 
+/// A random chain with damping, constant torques, and a drive on its last link.
+template <class Space>
+Chain<Space> driven_chain(Random& random, int links) {
+  const Chain<Space> loaded = random_chain<Space>(random, links, true);
+  ChainParameters<Space> parameters{loaded.masses(),  loaded.lengths(),         9.81,
+                                    loaded.damping(), loaded.constant_torque(), {}};
+  Drive<Space> drive;
+  drive.link = links - 1;
+  drive.amplitude.setConstant(0.7);
+  drive.frequency = 5;
+  drive.phase = 0.3;
+  parameters.drives = {drive};
+  return Chain<Space>(parameters);
+}
+
 /// Angles away from the pole (|sin θ| > ½) and rates up to 1 rad/s.
 template <class Space>
 State<Space> random_state(Random& random, int links) {

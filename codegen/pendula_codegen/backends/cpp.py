@@ -375,12 +375,14 @@ def constants(
     inputs: Sequence[Input],
     points: Sequence[tuple[str, int]],
     constant_masses: bool,
+    periodic: Sequence[bool],
 ) -> list[str]:
     """Static members by which a kernel says what it is."""
     members = [
         ("std::string_view", "coordinate_names", [c.symbol.name for c in coordinates]),
         ("std::string_view", "coordinate_units", [c.unit for c in coordinates]),
         ("bool", "coordinate_is_angle", [c.is_angle for c in coordinates]),
+        ("bool", "coordinate_is_periodic", list(periodic)),
         ("std::string_view", "parameter_names", [p.name for p in parameters]),
         ("std::string_view", "parameter_units", [p.unit for p in parameters]),
         ("int", "parameter_sizes", [len(p.symbols) for p in parameters]),

@@ -88,7 +88,7 @@ class LagrangianSolver {
     stages_.accept();
   }
 
-  State state(double time) const { return {time, stages_.position(), stages_.velocity(time)}; }
+  State state(double time) const { return {time, stages_.position_with_turns(), stages_.velocity(time)}; }
   Vector momentum() const { return stages_.momentum(); }
   template <class Numbers>
   void member(Numbers& numbers) {

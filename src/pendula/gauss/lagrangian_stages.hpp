@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <pendula/gauss/stage_columns.hpp>
+#include <pendula/numeric/full_turns.hpp>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/system/mass_scale.hpp>
@@ -59,11 +60,20 @@ class LagrangianStages {
       q_[k] = {q[at(k)], 0};
       p_[k] = {p[at(k)], 0};
     }
+    turns_.fill(0);
+    count_turns();
     read_masses();
     return masses_.singular() < 0 ? Status::ok : Status::singular_mass_matrix;
   }
 
+  /// Coordinates, those that are periodic within a turn or so.
   Vector position() const { return values(q_); }
+  /// The same with all turns that were made.
+  Vector position_with_turns() const {
+    Vector q;
+    for (std::size_t k = 0; k < count; ++k) q[at(k)] = detail::with_turns(q_[k], turns_[k]);
+    return q;
+  }
   Vector momentum() const { return values(p_); }
   Vector velocity(double time) const {
     Vector v;
@@ -73,12 +83,13 @@ class LagrangianStages {
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, q_, p_, U_, last_h_, masses_, weight_, fastest_, most_kinetic_, steps_);
+    numbers(time_, q_, turns_, p_, U_, last_h_, masses_, weight_, fastest_, most_kinetic_, steps_);
   }
-  void save() { saved_ = {q_, p_, time_}; }
+  void save() { saved_ = {q_, p_, turns_, time_}; }
   void restore() {
     q_ = saved_.q;
     p_ = saved_.p;
+    turns_ = saved_.turns;
     time_ = saved_.time;
     read_masses();  // as they are here, not where the step failed
     forget();
@@ -209,6 +220,7 @@ class LagrangianStages {
       q_[k].add(sum(U_[k]));
       p_[k].add(sum(U_[count + k]));
     }
+    count_turns();
     last_h_ = step_;
     time_ += step_;
     if (!S::constant_masses || ++steps_ % 16 == 0) read_masses();
@@ -258,6 +270,12 @@ class LagrangianStages {
     return end;
   }
 
+  void count_turns() {
+    for (std::size_t k = 0; k < count; ++k) {
+      if (S::coordinate_is_periodic[k]) detail::take_out_turns(q_[k], turns_[k]);
+    }
+  }
+
   L inverse_hb() const {
     alignas(pack_alignment) Stored inverse;
     for (int j = 0; j < Width; ++j) {
@@ -302,8 +320,10 @@ class LagrangianStages {
   typename S::template Inputs<L> inputs_;
   alignas(pack_alignment) Stored U_[2 * count]{};
   State q_, p_;
+  std::array<double, count> turns_{};
   struct {
     State q, p;
+    std::array<double, count> turns;
     double time;
   } saved_{};
   MassScale<S> masses_;

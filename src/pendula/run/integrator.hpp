@@ -65,8 +65,9 @@ class Integrator {
     return member;
   }
 
-  /// Goes on where the integrator was that `member` is a copy of, to the last bit; instead of `start`. Throws
-  /// std::invalid_argument on a member of another system or of other options.
+  /// Goes on where the integrator was that `member` is a copy of, to the last bit; instead of `start`. That the system
+  /// and the options are the same is the caller's to know: refused, by std::invalid_argument, is only another number of
+  /// numbers.
   void resume(const Member& member) {
     MemberNumbers counted(MemberNumbers::Pass::count);
     integrator_->member(counted);

@@ -50,7 +50,7 @@ class MemberNumbers {
   requires std::is_arithmetic_v<Number> || std::is_enum_v<Number>
   void pass(Number& value) {
     if (pass_ == Pass::read) at_[count_] = static_cast<double>(value);
-    if (pass_ == Pass::write) value = static_cast<Number>(at_[count_]);
+    if (pass_ == Pass::write) value = static_cast<Number>(at_[count_]);  // which `read` has put there
     ++count_;
   }
   template <class Value, std::size_t size>

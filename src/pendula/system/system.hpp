@@ -19,6 +19,7 @@ concept System = requires(const typename S::template Parameters<double>& paramet
   { S::constant_masses } -> std::convertible_to<bool>;
   { S::coordinate_names[0] } -> std::convertible_to<std::string_view>;
   { S::coordinate_is_angle[0] } -> std::convertible_to<bool>;
+  { S::coordinate_is_periodic[0] } -> std::convertible_to<bool>;
   S::kinetic_energy(parameters, x, x, number);
   S::energy(parameters, x, x, number);
   S::power(parameters, x, x, inputs, number);

@@ -51,6 +51,15 @@ function watchGestures(canvas, { turn, move, zoom }) {
   }, { passive: false });
 }
 
+/// Takes the size of a stage's canvas: `width`, `height` in pixels of CSS, `fine` of the screen's to one of them.
+function fitStage(stage) {
+  const { clientWidth: width, clientHeight: height } = stage.canvas;
+  fitCanvas(stage.canvas, width, height);
+  stage.width = width;
+  stage.height = height;
+  stage.fine = stage.canvas.width / Math.max(width, 1);
+}
+
 /// Makes a canvas as fine as the screen, at most two pixels to one of CSS; says whether that changed anything.
 function fitCanvas(canvas, width, height) {
   const scale = Math.min(window.devicePixelRatio || 1, 2);

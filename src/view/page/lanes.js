@@ -23,11 +23,7 @@ class Stage {
   pace() {}
 
   resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    fitCanvas(this.canvas, width, height);
-    this.width = width;
-    this.height = height;
-    this.fine = this.canvas.width / Math.max(width, 1);
+    fitStage(this);
     this.onChange();
   }
 

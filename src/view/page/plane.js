@@ -37,11 +37,7 @@ class Stage {
   }
 
   resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    fitCanvas(this.canvas, width, height);
-    this.width = width;
-    this.height = height;
-    this.fine = this.canvas.width / Math.max(width, 1);
+    fitStage(this);
     this.onChange();
   }
 

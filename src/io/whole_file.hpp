@@ -3,19 +3,19 @@
 #include <string>
 #include <string_view>
 
-namespace pendula::view {
+namespace pendula::io {
 
 /// A file that is there whole or not at all: written under another name beside its own, and then renamed. What is no
 /// regular file, as /dev/stdout, is written as it is.
 class WholeFile {
  public:
-  /// Opens the file to write; one that is there stays until `write`. Throws io::InputError where it cannot be opened.
+  /// Opens the file to write; one that is there stays until `write`. Throws InputError where it cannot be opened.
   explicit WholeFile(const std::string& name);
   ~WholeFile();
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
 
-  /// Writes all there is to write, and gives the file its name. Throws io::OutputError, and leaves no piece behind.
+  /// Writes all there is to write, and gives the file its name. Throws OutputError, and leaves no piece behind.
   void write(std::string_view text);
 
  private:
@@ -26,4 +26,4 @@ class WholeFile {
   int descriptor_ = -1;
 };
 
-}  // namespace pendula::view
+}  // namespace pendula::io

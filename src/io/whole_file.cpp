@@ -1,4 +1,4 @@
-#include "view/whole_file.hpp"
+#include "io/whole_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -6,26 +6,16 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
-#include "io/input_error.hpp"
-#include "io/line_file.hpp"
+#include "io/output_error.hpp"
 
-namespace pendula::view {
+namespace pendula::io {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Why a file could not be opened; a missing folder is named.
-std::string reason(const fs::path& file, int error) {
-  std::error_code unknown;
-  const fs::path folder = file.parent_path();
-  if (error == ENOENT && !folder.empty() && !fs::exists(folder, unknown)) return folder.string() + "/ does not exist";
-  return std::strerror(error);
-}
 
 /// The file that a name leads to by links, whether it is there or not.
 std::string followed(const std::string& name) {
@@ -40,18 +30,15 @@ std::string followed(const std::string& name) {
 }  // namespace
 
 WholeFile::WholeFile(const std::string& name) : name_(name), target_(name) {
-  const auto reject = [&](const std::string& why) {
-    throw io::InputError(name_ + ": expected a file that can be written, got: " + why);
-  };
   std::error_code unknown;
-  if (name.empty() || fs::is_directory(name, unknown)) reject(std::strerror(name.empty() ? ENOENT : EISDIR));
+  if (name.empty() || fs::is_directory(name, unknown)) reject_output(name, name, name.empty() ? ENOENT : EISDIR);
   const bool is_special = fs::exists(name, unknown) && !fs::is_regular_file(name, unknown);
   if (!is_special) target_ = followed(name);
-  if (fs::exists(target_, unknown) && access(target_.c_str(), W_OK) != 0) reject(std::strerror(errno));
+  if (fs::exists(target_, unknown) && access(target_.c_str(), W_OK) != 0) reject_output(name, target_, errno);
   if (!is_special) part_ = target_ + ".part" + std::to_string(getpid());
   const std::string& opened = is_special ? target_ : part_;
   descriptor_ = open(opened.c_str(), O_WRONLY | O_CLOEXEC | (is_special ? 0 : O_CREAT | O_TRUNC), 0666);
-  if (descriptor_ < 0) reject(reason(target_, errno));
+  if (descriptor_ < 0) reject_output(name, target_, errno);
 }
 
 WholeFile::~WholeFile() {
@@ -77,7 +64,7 @@ void WholeFile::write_all(std::string_view text) const {
 
 void WholeFile::fail(int error) const {
   if (!part_.empty()) unlink(part_.c_str());
-  throw io::OutputError(name_ + ": could not be written: " + std::strerror(error));
+  throw OutputError(name_, error);
 }
 
-}  // namespace pendula::view
+}  // namespace pendula::io
