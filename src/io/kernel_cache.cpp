@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -201,6 +202,16 @@ std::shared_ptr<const SystemEntry> load(const fs::path& object) {
   return {entry, [handle](const SystemEntry*) { dlclose(handle); }};
 }
 
+/// Removes kernels that no run has taken for a quarter of a year: each version of a model and of pendula has its own.
+void remove_unused_kernels(const fs::path& cache) {
+  const auto oldest = fs::file_time_type::clock::now() - std::chrono::days(90);
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(cache, none)) {
+    const fs::file_time_type used = entry.last_write_time(none);
+    if (!none && entry.path().extension() == ".so" && used < oldest) fs::remove(entry.path(), none);
+  }
+}
+
 }  // namespace
 
 Toolchain Toolchain::of_this_program() {
@@ -254,13 +265,16 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   }
   const fs::path object = toolchain.cache / (name + "-" + key.text() + ".so");
   const bool was_there = fs::exists(object);
-  if (!was_there) {
+  if (was_there) {
+    fs::last_write_time(object, fs::file_time_type::clock::now(), none);  // used again
+  } else {
     const Workshop workshop(toolchain.cache);
     tell("deriving and compiling the kernel of " + name + ", once");
     derive(file, links, workshop.folder() / (name + ".hpp"), toolchain);
     compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
     fs::rename(workshop.folder() / "kernel.so", object);
   }
+  remove_unused_kernels(toolchain.cache);
   return {object, load(object), was_there};
 }
 

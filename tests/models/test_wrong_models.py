@@ -1,5 +1,9 @@
 """A model that is wrong gets one message with file and line, exit status 2, and nothing half-written."""
 
+import os
+import time
+from pathlib import Path
+
 import pytest
 
 HEAD = """from sympy import *
@@ -149,3 +153,15 @@ def test_a_second_run_starts_at_once(pendula, tmp_path):
     assert pendula("build", "spring_pendulum").returncode == 0
     kept = pendula("build", "spring_pendulum")
     assert kept.stderr == "" and "kept in" in kept.stdout
+
+
+def test_a_kernel_that_is_no_longer_used_goes(pendula, tmp_path):
+    assert pendula("build", "spring_pendulum").returncode == 0
+    kernel = Path(pendula("build", "spring_pendulum").stdout.split("kept in")[1].strip())
+    forgotten, recent = kernel.with_name("forgotten-0.so"), kernel.with_name("recent-0.so")
+    for file, days in {forgotten: 91, recent: 30, kernel: 91}.items():
+        file.touch()
+        os.utime(file, times=(time.time() - days * 24 * 3600,) * 2)
+    assert pendula("build", "spring_pendulum").returncode == 0
+    assert kernel.exists() and recent.exists() and not forgotten.exists()
+    recent.unlink()

@@ -75,12 +75,12 @@ class ExplicitIntegrator : public PlainIntegrator {
   Outcome accept(double h) {
     time_.add(h);
     ++statistics_.steps;
-    return {Status::ok, time(), h, 0, 0, -1};
+    return {.status = Status::ok, .time = time(), .step = h};
   }
 
   Outcome failure(Status status, double h, const Vector& at) {
     ++statistics_.rejected_steps;
-    return {status, time(), h, 0, 0, non_finite_part(at)};
+    return {.status = status, .time = time(), .step = h, .part = non_finite_part(at)};
   }
 
   static bool is_finite(const Vector& x) {
@@ -95,8 +95,8 @@ class ExplicitIntegrator : public PlainIntegrator {
   // At a pole the accelerations are infinite: better to say so than to start.
   Outcome require_finite_rate() {
     right_hand_side()(x_, rate_, time());
-    if (is_finite(rate_)) return {Status::ok, time(), 0, 0, 0, -1};
-    return {Status::singular_mass_matrix, time(), 0, 0, 0, non_finite_part(rate_)};
+    if (is_finite(rate_)) return {.status = Status::ok, .time = time()};
+    return {.status = Status::singular_mass_matrix, .time = time(), .part = non_finite_part(rate_)};
   }
 
   int non_finite_part(const Vector& x) const {

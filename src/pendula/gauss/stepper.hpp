@@ -32,7 +32,7 @@ class GaussStepper {
     time_.assign(state.time);
     statistics_ = {};
     const Status status = solver_.start(state);
-    return {status, time(), 0, 0, 0, status == Status::ok ? -1 : solver_.singular_part()};
+    return {.status = status, .time = time(), .part = status == Status::ok ? -1 : solver_.singular_part()};
   }
 
   /// Advances by `h`. Where the stage equations cannot be solved, the step is taken in halves, quarters … as far as
@@ -128,7 +128,7 @@ class GaussStepper {
     }
     time_ = start;
     time_.add(h);
-    return {Status::ok, time(), h, 0, 0, -1};
+    return {.status = Status::ok, .time = time(), .step = h};
   }
 
   Outcome accept(double h, int iterations, const Correction& correction) {
@@ -137,18 +137,24 @@ class GaussStepper {
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
     solver_.accept();
     time_.add(h);
-    return {Status::ok, time(), h, iterations, correction.relative, -1};
+    return {.status = Status::ok, .time = time(), .step = h, .iterations = iterations, .residual = correction.relative};
   }
 
   // A failure where coordinates are singular is theirs, whatever shape it took.
   Outcome failure(Status status, double h, int iterations, const Correction& correction) {
     ++statistics_.rejected_steps;
     const int singular = solver_.singular_part();
-    if (singular >= 0) return {Status::singular_mass_matrix, time(), h, iterations, correction.relative, singular};
-    const int part = status == Status::wrong_root ? solver_.turning_part()
-                     : correction.part >= 0       ? correction.part
-                                                  : solver_.worst_part();
-    return {status, time(), h, iterations, correction.relative, part};
+    if (singular >= 0) status = Status::singular_mass_matrix;
+    const int part = singular >= 0                  ? singular
+                     : status == Status::wrong_root ? solver_.turning_part()
+                     : correction.part >= 0         ? correction.part
+                                                    : solver_.worst_part();
+    return {.status = status,
+            .time = time(),
+            .step = h,
+            .iterations = iterations,
+            .residual = correction.relative,
+            .part = part};
   }
 
   Solver solver_;

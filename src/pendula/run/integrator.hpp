@@ -103,9 +103,9 @@ class NoKernel : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The integrator that `options` ask for, of the compiled library for this processor. Throws NoKernel, naming the
-/// PENDULA_KERNELS to configure, where a dense kernel is needed and not built in; std::invalid_argument for options
-/// that make no sense, and for a PENDULA_ARCH as library() does.
+/// The integrator of the method that `options` ask for (Integrator::step is told its size), of the compiled library for
+/// this processor. Throws NoKernel, naming the PENDULA_KERNELS to configure, where a dense kernel is needed and not
+/// built in; std::invalid_argument for options that make no sense, and for a PENDULA_ARCH as library() does.
 template <class Space>
 std::unique_ptr<Integrator> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
   const std::vector<PlainChain::Drive> drives = plain_drives(chain);
