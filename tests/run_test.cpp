@@ -1,8 +1,11 @@
 // A run as a program of one's own makes it: who is told its rows, how it ends, what is left of it then.
 
+#include <cstdint>
+#include <optional>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/run.hpp>
 #include <stdexcept>
+#include <vector>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"
@@ -88,6 +91,84 @@ TEST(Run, StopsWhereItIsTold) {
   EXPECT_EQ(report.end, RunEnd::stopped);
   EXPECT_NEAR(report.last.time, 0.25, 1e-15);
   EXPECT_EQ(report.rows, 4);
+}
+
+/// The rows of a run, and where it could go on.
+class Keeper : public Observer {
+ public:
+  void take(const Row& row) override { rows.emplace_back(row.numbers.begin(), row.numbers.end()); }
+  void keep(const Checkpoint& checkpoint) override { kept = checkpoint; }
+
+  std::vector<std::vector<double>> rows;
+  std::optional<Checkpoint> kept;
+};
+
+/// Runs on from what `keeper` has, or from the start, to `duration` or to the step of that number.
+RunReport run_on(RunSetup setup, double duration, int steps, Keeper& keeper) {
+  setup.duration = duration;
+  pendula::Run run(setup);
+  run.add(keeper);
+  const auto stop = [&] { return --steps == 0; };
+  if (!keeper.kept) return run.go(stop);
+  const Checkpoint from = *keeper.kept;
+  keeper.rows.resize(static_cast<std::size_t>(from.rows));
+  return run.go_on(from, stop);
+}
+
+// To ends that are no multiple of the step, by signals between rows and at rows: what ends a run leaves no trace.
+TEST(Run, GoesOnAsIfItHadNeverStopped) {
+  Random random(11);
+  for (const Method method : {Method::gauss, Method::radau, Method::rk4, Method::dopri5, Method::fehlberg78}) {
+    for (int trial = 0; trial < 10; ++trial) {
+      RunSetup setup = double_pendulum(5);
+      setup.options.method = method;
+      setup.options.stages = 3;
+      setup.options.step = random.uniform(0.004, 0.02);
+      setup.every = static_cast<std::int64_t>(random.uniform(1, 13));
+      setup.doubted = false;
+      Keeper whole, parts;
+      const RunReport expected = run_on(setup, 5, 0, whole);
+      for (const double duration : {0.0, 0.7, 0.7, random.uniform(0.7, 3), 4.0}) {
+        run_on(setup, duration, 0, parts);
+        run_on(setup, 5, static_cast<int>(random.uniform(1, 31)), parts);
+      }
+      const RunReport report = run_on(setup, 5, 0, parts);
+      EXPECT_EQ(report.rows, expected.rows) << method;
+      EXPECT_TRUE(parts.rows == whole.rows) << method;
+      EXPECT_TRUE(parts.kept->integrator == whole.kept->integrator) << method;
+      EXPECT_EQ(report.energy_error.largest, expected.energy_error.largest);
+      EXPECT_EQ(report.statistics.steps, expected.statistics.steps);
+      EXPECT_EQ(report.last.q, expected.last.q);
+      EXPECT_EQ(report.table.back().time, 5);
+      EXPECT_EQ(report.table.size(), expected.table.size()) << method;
+    }
+  }
+}
+
+TEST(Run, KeepsCheckpointsNowAndThen) {
+  RunSetup setup = double_pendulum(1);
+  setup.checkpoint = 0;
+  class Counter : public Observer {
+   public:
+    void take(const Row&) override { ++rows; }
+    void keep(const Checkpoint& checkpoint) override {
+      EXPECT_EQ(checkpoint.rows, rows);
+      ++kept;
+    }
+    int rows = 0, kept = 0;
+  } counter;
+  pendula::Run run(setup);
+  run.add(counter);
+  run.go();
+  EXPECT_EQ(counter.kept, 10);
+}
+
+TEST(Run, RefusesACheckpointOfAnotherMotion) {
+  Keeper keeper;
+  run_on(double_pendulum(1), 1, 0, keeper);
+  RunSetup other = double_pendulum(1);
+  other.options.stages = 3;
+  EXPECT_THROW(pendula::Run(other).go_on(*keeper.kept), std::invalid_argument);
 }
 
 TEST(Run, SaysHowAStepFailed) {

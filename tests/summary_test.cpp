@@ -208,7 +208,8 @@ void add(RunRecord& record, const Chain<Space>& chain, State<Space> state, doubl
 
 template <class Space>
 RunRecord record_of(const Chain<Space>& chain, double duration) {
-  return RunRecord(ChainSubject<Space>(chain), duration);
+  return RunRecord(ChainSubject<Space>(chain), Motion(0, Eigen::VectorXd::Zero(Space::dof * chain.links()), {}),
+                   duration);
 }
 
 TEST(RunRecord, EnergyErrorsAreRelativeToTheScaleOfTheChain) {

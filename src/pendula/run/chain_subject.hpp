@@ -49,23 +49,24 @@ class ChainSubject : public Subject {
   bool has_poles() const override { return Space::dof == 2; }
 
   /// `t`, per link `theta_i` (`phi_i`) `theta_dot_i` (`phi_dot_i`), bobs `x_i` `y_i` (`z_i`), `energy`.
-  std::vector<std::string> columns() const override {
+  std::vector<Quantity> quantities() const override {
     constexpr std::array<std::string_view, 2> angles = {"theta", "phi"};
-    constexpr std::array<std::string_view, 2> rates = {"theta_dot", "phi_dot"};
     constexpr std::array<std::string_view, 3> axes = {"x", "y", "z"};
-    std::vector<std::string> columns{"t"};
-    const auto add = [&](std::string_view name, int link) {
-      columns.push_back(std::string(name) + "_" + std::to_string(link + 1));
-    };
-    for (int link = 0; link < chain_.links(); ++link) {
-      for (std::size_t a = 0; a < Space::dof; ++a) add(angles[a], link);
-      for (std::size_t a = 0; a < Space::dof; ++a) add(rates[a], link);
+    const auto links = static_cast<std::size_t>(chain_.links());
+    std::vector<Quantity> quantities{{"t", "s"}};
+    std::size_t first = 1;
+    for (std::size_t a = 0; a < Space::dof; ++a) {
+      quantities.push_back({std::string(angles[a]), "rad", first++, links, 2 * Space::dof});
     }
-    for (int link = 0; link < chain_.links(); ++link) {
-      for (std::size_t axis = 0; axis < Space::dimension; ++axis) add(axes[axis], link);
+    for (std::size_t a = 0; a < Space::dof; ++a) {
+      quantities.push_back({std::string(angles[a]) + "_dot", "rad/s", first++, links, 2 * Space::dof});
     }
-    columns.emplace_back("energy");
-    return columns;
+    first = 1 + 2 * Space::dof * links;
+    for (std::size_t axis = 0; axis < Space::dimension; ++axis) {
+      quantities.push_back({std::string(axes[axis]), "m", first++, links, Space::dimension});
+    }
+    quantities.push_back({"energy", "J", 1 + (2 * Space::dof + Space::dimension) * links});
+    return quantities;
   }
 
   void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {

@@ -56,29 +56,12 @@ class Integrator {
   const Statistics& statistics() const { return integrator_->statistics(); }
 
   /// A copy of all that the next steps depend on.
-  Member member() const {
-    MemberNumbers counted(MemberNumbers::Pass::count);
-    integrator_->member(counted);
-    Member member{std::vector<double>(counted.count())};
-    MemberNumbers read(MemberNumbers::Pass::read, member.numbers.data());
-    integrator_->member(read);
-    return member;
-  }
+  Member member() const { return member_of(*integrator_); }
 
   /// Goes on where the integrator was that `member` is a copy of, to the last bit; instead of `start`. That the system
   /// and the options are the same is the caller's to know: refused, by std::invalid_argument, is only another number of
   /// numbers.
-  void resume(const Member& member) {
-    MemberNumbers counted(MemberNumbers::Pass::count);
-    integrator_->member(counted);
-    if (counted.count() != member.numbers.size()) {
-      throw std::invalid_argument("member: expected " + std::to_string(counted.count()) +
-                                  " numbers for these options, got " + std::to_string(member.numbers.size()));
-    }
-    std::vector<double> numbers = member.numbers;
-    MemberNumbers write(MemberNumbers::Pass::write, numbers.data());
-    integrator_->member(write);
-  }
+  void resume(const Member& member) { become(*integrator_, member); }
 
   Description describe() const {
     const auto [solver, iteration, kernel] = integrator_->describe();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pendula/run/checkpoint.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <span>
@@ -23,6 +24,9 @@ class Observer {
   virtual ~Observer() = default;
 
   virtual void take(const Row& row) = 0;
+
+  /// Where the run may go on from, once it is over: after the rows that it has come by.
+  virtual void keep(const Checkpoint&) {}
 
   /// After the last row, however the run ended.
   virtual void finish() {}

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <pendula/run/checkpoint.hpp>
 #include <pendula/run/doubts.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/observer.hpp>
@@ -33,12 +36,19 @@ class Run {
   /// which may take a second run with longer steps. A run that fails throws nothing: the report says so.
   RunReport go(const std::function<bool()>& stop = [] { return false; });
 
+  /// The same from where a run with this setup, but for its end, had come to: as if that had never stopped. Observers
+  /// get the rows that are new. Throws std::invalid_argument where a checkpoint is of something else.
+  RunReport go_on(
+      const Checkpoint& checkpoint, const std::function<bool()>& stop = [] { return false; });
+
  private:
   /// Ends a run at a state that is no row.
   struct NotFinite {};
 
-  void integrate(const std::function<bool()>& stop, RunReport& report);
+  RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
+  void integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report);
   void take(const Motion& motion);
+  void come_by(std::int64_t since_row, bool last);
   void finish(RunReport& report);
 
   RunSetup setup_;
@@ -46,19 +56,30 @@ class Run {
   std::vector<Observer*> observers_;
   RunRecord record_;
   std::vector<double> row_;
+  std::chrono::steady_clock::time_point kept_ = std::chrono::steady_clock::now();
 };
 
 inline Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
       integrator_(setup_.subject->make_integrator(setup_.options)),
-      record_(*setup_.subject, setup_.duration) {}
+      record_(*setup_.subject, setup_.start, setup_.duration) {}
 
 inline RunReport Run::go(const std::function<bool()>& stop) {
+  return go(nullptr, stop);
+}
+
+inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
+  integrator_->resume(checkpoint.integrator);
+  become(record_, checkpoint.record);
+  return go(&checkpoint, stop);
+}
+
+inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
   RunReport report;
   report.stepping_seconds = std::nan("");
-  integrate(stop, report);
+  integrate(from, stop, report);
   finish(report);
-  report.last = record_.rows() > 0 ? record_.last() : setup_.start;
+  report.last = record_.last();
   report.rows = record_.rows();
   report.description = integrator_->describe();
   report.statistics = integrator_->statistics();
@@ -70,13 +91,16 @@ inline RunReport Run::go(const std::function<bool()>& stop) {
   return report;
 }
 
-inline void Run::integrate(const std::function<bool()>& stop, RunReport& report) {
+inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
   const RunOptions& options = setup_.options;
   const double largest_step = is_adaptive(options.method) ? std::numeric_limits<double>::infinity() : options.step;
   const Schedule schedule{largest_step, setup_.duration, setup_.every};
+  const auto on_row = [&](const Motion& motion) { take(motion); };
+  const auto on_way = [&](std::int64_t since_row, bool last) { come_by(since_row, last); };
   try {
-    const RunResult result = simulate(
-        *integrator_, setup_.start, schedule, [&](const Motion& motion) { take(motion); }, stop);
+    const RunResult result = from == nullptr ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way)
+                                             : pendula::go_on(*integrator_, setup_.start.time, schedule,
+                                                              from->since_row, on_row, stop, on_way);
     report.stepping_seconds = result.stepping_seconds;
     report.step = result.outcome;
     report.end = !result.outcome ? RunEnd::step_failed : result.stopped ? RunEnd::stopped : RunEnd::complete;
@@ -97,6 +121,19 @@ inline void Run::take(const Motion& motion) {
   setup_.subject->append_row(motion, seen, row_);
   record_.add(motion, seen, row_, integrator_->statistics().load_work);
   for (Observer* observer : observers_) observer->take({motion, seen, row_});
+}
+
+inline void Run::come_by(std::int64_t since_row, bool last) {
+  using Clock = std::chrono::steady_clock;
+  if (!last) {
+    if (std::isinf(setup_.checkpoint)) return;
+    const Clock::time_point now = Clock::now();
+    if (std::chrono::duration<double>(now - kept_).count() < setup_.checkpoint) return;
+    kept_ = now;
+  }
+  const Checkpoint checkpoint{integrator_->time(), record_.rows(), since_row, integrator_->member(),
+                              member_of(record_)};
+  for (Observer* observer : observers_) observer->keep(checkpoint);
 }
 
 // The first failure is the one that is told.

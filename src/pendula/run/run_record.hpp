@@ -35,6 +35,12 @@ struct TableRow {
   double time = 0;
   std::vector<double> shown;  ///< Subject::shown_columns
   double energy_error = 0;    ///< relative
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(time, energy_error);
+    numbers.range(shown.data(), shown.size());
+  }
 };
 
 /// What is kept of the rows of a run besides the file: energy errors, a thinned table, the last state.
@@ -43,8 +49,12 @@ struct TableRow {
 class RunRecord {
  public:
   /// The table has about `table_rows` rows, evenly over `duration`.
-  RunRecord(const Subject& subject, double duration, int table_rows = 11)
-      : scale_(subject.energy_scale()), shown_(subject.shown_columns()), interval_(duration / (table_rows - 1)) {}
+  RunRecord(const Subject& subject, Motion start, double duration, int table_rows = 11)
+      : scale_(subject.energy_scale()),
+        shown_(subject.shown_columns()),
+        interval_(duration / (table_rows - 1)),
+        last_(std::move(start)),
+        last_row_(empty_row()) {}
 
   /// row  the numbers of the trajectory; work: what loads have brought since the first row  [J]
   void add(const Motion& motion, const Observation& seen, const std::vector<double>& row, double work) {
@@ -53,11 +63,7 @@ class RunRecord {
     last_ = motion;
     const auto first = row.begin() + static_cast<std::ptrdiff_t>(shown_.first);
     last_row_ = {motion.time, {first, first + static_cast<std::ptrdiff_t>(shown_.second)}, seen.energy - initial_};
-    // The slack lets a row in that comes at its time but for rounding.
-    const double place = interval_ > 0 ? std::floor(motion.time / interval_ + 1e-6) : 0;
-    if (place <= place_) return;
-    place_ = place;
-    table_.push_back(last_row_);
+    add_to_table(last_row_);
   }
 
   std::int64_t rows() const { return rows_; }
@@ -67,7 +73,7 @@ class RunRecord {
     return error;
   }
   double energy() const { return energy_; }     ///< of the last row
-  const Motion& last() const { return last_; }  ///< state of the last row
+  const Motion& last() const { return last_; }  ///< state of the last row, or the start
 
   EnergyBalance balance() const {
     if (scale_) return balance_;
@@ -84,7 +90,33 @@ class RunRecord {
     return table;
   }
 
+  /// What is kept of the rows so far. The table is thinned anew: this run may be longer than the one it was kept in.
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(rows_, initial_, energy_, brought_before_, largest_, largest_sum_, whole_, balance_.most, balance_.least);
+    numbers(last_.time, last_.q, last_.v, last_row_);
+    std::vector<TableRow> table = std::exchange(table_, {});
+    auto count = static_cast<double>(table.size());
+    numbers(count);
+    table.resize(most_table_rows, empty_row());
+    for (TableRow& row : table) numbers(row);
+    place_ = -1;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) add_to_table(table[k]);
+  }
+
  private:
+  static constexpr std::size_t most_table_rows = 16;
+
+  TableRow empty_row() const { return {0, std::vector<double>(shown_.second), 0}; }
+
+  // The slack lets a row in that comes at its time but for rounding.
+  void add_to_table(const TableRow& row) {
+    const double place = interval_ > 0 ? std::floor(row.time / interval_ + 1e-6) : 0;
+    if (place <= place_ || table_.size() == most_table_rows) return;
+    place_ = place;
+    table_.push_back(row);
+  }
+
   void start(const Observation& seen, double work) {
     initial_ = seen.energy;
     brought_before_ = work;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/subject.hpp>
@@ -21,6 +22,7 @@ struct RunSetup {
   double duration = 10;     ///< s
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
   bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
+  double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
 };
 
 /// Why a run was over.

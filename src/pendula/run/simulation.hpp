@@ -8,6 +8,7 @@
 #include <pendula/system/outcome.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace pendula {
 
@@ -40,6 +41,12 @@ inline double next_step(const Schedule& schedule, double elapsed) {
   return rest <= schedule.step * (1 + 1e-9) ? rest : schedule.step;
 }
 
+/// Whether the end may have a say in a step that is to be `h`, after one of the size `last`, 0 where that is unknown.
+/// An adaptive method's next step is never ten times as long.
+inline bool may_be_cut(const Schedule& schedule, double h, double last) {
+  return h != schedule.step && (last == 0 || h <= 10 * last);
+}
+
 inline bool at_end(const Schedule& schedule, double elapsed) {
   const double ulp = std::numeric_limits<double>::epsilon() * schedule.duration;
   return schedule.duration - elapsed <= 4 * ulp;
@@ -47,31 +54,60 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 
 }  // namespace detail
 
-/// Runs `integrator` from `start` over `schedule`, and calls on_row(const Motion&) at the start, every
-/// `schedule.every` accepted steps, and at the last state, also where the run fails or is stopped: bool stop() is asked
-/// after every step. Throws std::invalid_argument on a schedule that makes no sense.
-template <class OnRow, class Stop>
-RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
-                   const Stop& stop) {
+/// Runs `integrator`, which `since_row` steps ago was at a row, on to the end of a schedule that began at the time
+/// `begin`. Calls on_row(const Motion&) every `schedule.every` accepted steps, and at the last state, also where the
+/// run fails or is stopped: bool stop() is asked after every step. Calls on_way(since_row, last) where a longer run
+/// would come by as well: at every row, before a step that the end may cut short, and where the run fails or is stopped
+/// between rows; `last` tells that there may be none after it.
+template <class OnRow, class Stop, class OnWay>
+RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, std::int64_t since_row, OnRow on_row,
+                const Stop& stop, OnWay on_way) {
   using Clock = std::chrono::steady_clock;
   detail::require(schedule);
-  RunResult result{integrator.start(start)};
-  on_row(start);
-  std::int64_t since_row = 0;
-  while (result.outcome && !result.stopped && !detail::at_end(schedule, integrator.time() - start.time)) {
-    const auto begin = Clock::now();
+  const auto is_over = [&] { return detail::at_end(schedule, integrator.time() - begin); };
+  RunResult result;
+  bool near_end = false;
+  if (is_over()) on_way(since_row, true);
+  while (result.outcome && !result.stopped && !is_over()) {
+    const auto before = Clock::now();
     while (since_row < schedule.every && result.outcome && !result.stopped) {
-      const double elapsed = integrator.time() - start.time;
-      if (detail::at_end(schedule, elapsed)) break;
-      result.outcome = integrator.step(detail::next_step(schedule, elapsed));
+      if (is_over()) break;
+      const double h = detail::next_step(schedule, integrator.time() - begin);
+      const bool was_near = std::exchange(near_end, detail::may_be_cut(schedule, h, result.outcome.step));
+      if (near_end && !was_near) on_way(since_row, true);
+      result.outcome = integrator.step(h);
       if (result.outcome) ++since_row;
       result.stopped = stop();
     }
-    result.stepping_seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    result.stepping_seconds += std::chrono::duration<double>(Clock::now() - before).count();
+    const bool is_row = since_row == schedule.every;
+    if (!is_row && !near_end) on_way(since_row, true);
     if (since_row > 0) on_row(integrator.state());
     since_row = 0;
+    if (is_row && !near_end) {
+      on_way(since_row, !result.outcome || result.stopped || is_over());
+    }
   }
   return result;
+}
+
+/// Runs `integrator` from `start`, which is a row, over `schedule`. Throws std::invalid_argument on a schedule that
+/// makes no sense.
+template <class OnRow, class Stop, class OnWay>
+RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
+                   const Stop& stop, OnWay on_way) {
+  detail::require(schedule);
+  const Outcome started = integrator.start(start);
+  on_row(start);
+  if (!started) return {.outcome = started};
+  return go_on(integrator, start.time, schedule, 0, on_row, stop, on_way);
+}
+
+/// The same without a way.
+template <class OnRow, class Stop>
+RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
+                   const Stop& stop) {
+  return simulate(integrator, start, schedule, on_row, stop, [](std::int64_t, bool) {});
 }
 
 /// The same to the end of the schedule.

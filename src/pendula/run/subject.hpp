@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/quantity.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <span>
@@ -46,9 +47,12 @@ class Subject {
   /// Whether the dense solver's coordinates fail somewhere.
   virtual bool has_poles() const = 0;
 
-  /// Columns of a trajectory: time, coordinates, rates, points, energy; and the numbers of one row.
-  virtual std::vector<std::string> columns() const = 0;
+  /// What a trajectory has: time, coordinates, rates, points, energy; and the numbers of one row.
+  virtual std::vector<Quantity> quantities() const = 0;
   virtual void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
+
+  /// Names of the numbers of a row.
+  std::vector<std::string> columns() const { return columns_of(quantities()); }
 
   /// Coordinates by name; none of a chain, whose links are what messages name.
   virtual std::span<const std::string_view> coordinates() const = 0;

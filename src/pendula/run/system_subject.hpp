@@ -71,18 +71,26 @@ class SystemSubject : public Subject {
   bool has_poles() const override { return false; }
 
   /// `t`, coordinates, their rates, components of the points, `energy`.
-  std::vector<std::string> columns() const override {
+  std::vector<Quantity> quantities() const override {
     constexpr std::string_view axes = "xyz";
-    std::vector<std::string> columns{"t"};
-    for (const std::string_view name : info().coordinates) columns.emplace_back(name);
-    for (const std::string_view name : info().coordinates) columns.push_back(std::string(name) + "_dot");
+    std::vector<Quantity> quantities{{"t", "s"}};
+    const auto add = [&](std::string name, std::string unit) {
+      quantities.push_back({std::move(name), std::move(unit), quantities.size()});
+    };
+    const std::size_t count = info().coordinates.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      add(std::string(info().coordinates[k]), std::string(info().coordinate_units[k]));
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      add(std::string(info().coordinates[k]) + "_dot", std::string(info().coordinate_units[k]) + "/s");
+    }
     for (std::size_t k = 0; k < info().points.size(); ++k) {
       for (int axis = 0; axis < info().point_sizes[k]; ++axis) {
-        columns.push_back(std::string(info().points[k]) + "_" + axes[static_cast<std::size_t>(axis)]);
+        add(std::string(info().points[k]) + "_" + axes[static_cast<std::size_t>(axis)], "m");
       }
     }
-    columns.emplace_back("energy");
-    return columns;
+    add("energy", "J");
+    return quantities;
   }
 
   void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {

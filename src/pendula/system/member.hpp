@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <pendula/numeric/compensated.hpp>
+#include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -79,5 +81,30 @@ class MemberNumbers {
   double* at_;
   std::size_t count_ = 0;
 };
+
+/// A copy of the member of `part`, which lists its numbers.
+template <class Part>
+Member member_of(Part& part) {
+  MemberNumbers counted(MemberNumbers::Pass::count);
+  part.member(counted);
+  Member member{std::vector<double>(counted.count())};
+  MemberNumbers read(MemberNumbers::Pass::read, member.numbers.data());
+  part.member(read);
+  return member;
+}
+
+/// Makes `part` what `member` is a copy of. Throws std::invalid_argument on another number of numbers.
+template <class Part>
+void become(Part& part, const Member& member) {
+  MemberNumbers counted(MemberNumbers::Pass::count);
+  part.member(counted);
+  if (counted.count() != member.numbers.size()) {
+    throw std::invalid_argument("member: expected " + std::to_string(counted.count()) +
+                                " numbers for these options, got " + std::to_string(member.numbers.size()));
+  }
+  std::vector<double> numbers = member.numbers;
+  MemberNumbers write(MemberNumbers::Pass::write, numbers.data());
+  part.member(write);
+}
 
 }  // namespace pendula
