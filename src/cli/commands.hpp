@@ -14,9 +14,10 @@ enum ExitStatus {
 };
 
 struct SimulateOptions {
-  std::string scenario;                ///< the file
+  std::string scenario;                ///< the file; empty where a run goes on
+  std::optional<std::string> resume;   ///< run file that it goes on with
   std::vector<std::string> overrides;  ///< `key.path=value`
-  std::optional<std::string> output;   ///< trajectory file; "-" is standard output
+  std::optional<std::string> output;   ///< trajectory file, HDF5 where it ends in .h5; "-" is standard output
   std::optional<std::string> view;     ///< page to look at the run
   int copies = 0;                      ///< further runs in the page, from starts that differ
   double apart = 1e-9;                 ///< by this, in the first coordinate, from one to the next

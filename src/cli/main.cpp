@@ -73,9 +73,15 @@ CommandLine::CommandLine() {
       "PENDULA_ARCH in the environment asks for a lesser instruction set than the best that the processor has.");
 
   simulate = app.add_subcommand("simulate", "Run a scenario; write its trajectory, print a summary");
-  simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file; - is standard input")
-      ->required()
-      ->check(not_empty);
+  CLI::Option* scenario =
+      simulate->add_option("SCENARIO", simulate_options.scenario, "The scenario, a TOML file; - is standard input");
+  scenario->check(not_empty);
+  CLI::Option* resume = simulate->add_option("--resume", simulate_options.resume,
+                                             "Go on with the run of this file (.h5), as if it had never stopped");
+  resume->type_name("FILE")->check(not_empty)->excludes(scenario);
+  simulate->parse_complete_callback([this] {
+    if (simulate_options.scenario.empty() && !simulate_options.resume) throw CLI::RequiredError("SCENARIO");
+  });
   simulate
       ->add_option("--set", simulate_options.overrides,
                    "Replace a key of the scenario, as in --set run.step=1e-4 or --set run.method=rk4; repeatable")
@@ -85,13 +91,14 @@ CommandLine::CommandLine() {
       ->allow_extra_args(false);
   simulate
       ->add_option("-o,--output", simulate_options.output,
-                   "Write the trajectory to this file, as CSV; - is standard output, and standard error then has the "
+                   "Write the trajectory to this file, as HDF5 where it ends in .h5, else as CSV; - is standard "
+                   "output, and standard error then has the "
                    "summary")
       ->type_name("FILE")
       ->check(not_empty);
   CLI::Option* view = simulate->add_option("--view", simulate_options.view,
                                            "Write a page to look at the motion: one HTML file that needs nothing else");
-  view->type_name("FILE")->check(not_empty);
+  view->type_name("FILE")->check(not_empty)->excludes(resume);
   CLI::Option* copies = simulate->add_option("--copies", simulate_options.copies,
                                              "Show so many further runs in the page, from starts a little apart");
   copies->type_name("N")->needs(view)->check(CLI::Range(1, 1000));

@@ -21,9 +21,11 @@
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
+#include "cli/run_source.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/natural_units.hpp"
+#include "io/run_file.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"
 #include "io/trajectory.hpp"
@@ -87,16 +89,46 @@ bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b
 
 /// Throws io::InputError where writing `file` would destroy the scenario.
 void spare_scenario(const std::string& file, const char* what, const SimulateOptions& options) {
-  if (file == "-" || !is_same_file(file, options.scenario)) return;
+  if (file == "-" || options.resume || !is_same_file(file, options.scenario)) return;
   throw io::InputError(file + ": expected a file for the " + what + ", got the scenario itself");
 }
 
-/// Opens the trajectory file where one is asked for. Throws io::InputError.
-std::unique_ptr<io::TrajectoryFile> open_trajectory(const SimulateOptions& options,
-                                                    const std::vector<std::string>& columns) {
-  if (!options.output) return nullptr;
-  spare_scenario(*options.output, "trajectory", options);
-  return std::make_unique<io::TrajectoryFile>(*options.output, columns);
+bool is_run_file(const std::string& file) {
+  return file.ends_with(".h5") || file.ends_with(".hdf5");
+}
+
+/// The file for the rows: of a run that goes on the one that it goes on with, unless that has no rows. Throws
+/// io::InputError.
+std::optional<std::string> output_of(const RunSource& source, const SimulateOptions& options) {
+  const bool without_rows = source.saved && !source.saved->has_rows;
+  if (!options.output) return without_rows ? std::nullopt : options.resume;
+  if (without_rows && is_run_file(*options.output)) {
+    throw io::InputError(*options.output + ": expected a CSV file, got a run file, which begins with rows that " +
+                         *options.resume + " does not have");
+  }
+  return options.output;
+}
+
+/// Opens the file for the rows; a run file that goes on begins as a copy. Throws io::InputError.
+std::unique_ptr<io::RowsFile> open_rows(const std::string& file, const SimulateOptions& options,
+                                        const io::RunOrigin& origin, const std::optional<Checkpoint>& from,
+                                        const std::vector<Quantity>& quantities) {
+  if (!is_run_file(file)) return std::make_unique<io::TrajectoryFile>(file, columns_of(quantities));
+  if (!options.resume) return std::make_unique<io::RunFile>(file, origin, quantities);
+  return std::make_unique<io::RunFile>(file, *options.resume, from ? from->rows : 0, quantities);
+}
+
+/// The same where one is asked for, and says what it replaces.
+template <class... Rest>
+std::unique_ptr<io::RowsFile> open_rows(const std::optional<std::string>& file, const SimulateOptions& options,
+                                        const Rest&... rest) {
+  if (!file) return nullptr;
+  spare_scenario(*file, "trajectory", options);
+  std::error_code unknown;
+  const bool replaces = file != options.resume && std::filesystem::is_regular_file(*file, unknown);
+  auto opened = open_rows(*file, options, rest...);
+  if (replaces && !options.quiet) std::cerr << "pendula: replacing " << *file << '\n';
+  return opened;
 }
 
 /// Opens the page where one is asked for. Throws io::InputError.
@@ -111,30 +143,50 @@ std::unique_ptr<view::Page> open_page(const SimulateOptions& options, const view
 
 /// What a page shows of a scenario.
 template <class Scenario>
-view::Scene scene_of(const Scenario& scenario, const io::ScenarioText& text, const SimulateOptions& options) {
+view::Scene scene_of(const Scenario& scenario, const RunSource& source) {
   view::Scene scene = page_scene(scenario);
-  scene.title = std::filesystem::path(text.name).stem().string();
-  scene.scenario = text.text;
-  for (const std::string& change : options.overrides) scene.scenario += "# run with --set " + change + '\n';
+  scene.title = std::filesystem::path(source.text.name).stem().string();
+  scene.scenario = source.text.text;
+  for (const std::string& change : source.overrides) scene.scenario += "# run with --set " + change + '\n';
   scene.version = version;
-  const io::UnitNames units = io::unit_names(scenario.natural);
-  scene.time_unit = units.time.substr(1);  // they are to follow a number
-  scene.length_unit = units.length.substr(1);
+  scene.time_unit = io::in_units(scenario.natural, "s");
+  scene.length_unit = io::in_units(scenario.natural, "m");
   return scene;
 }
+
+/// Quantities in the units of the scenario.
+std::vector<Quantity> quantities_of(const Subject& subject, const std::optional<io::NaturalUnits>& natural) {
+  std::vector<Quantity> quantities = subject.quantities();
+  for (Quantity& quantity : quantities) quantity.unit = io::in_units(natural, quantity.unit);
+  return quantities;
+}
+
+/// The last place that a run may go on from.
+class LastCheckpoint : public Observer {
+ public:
+  void take(const Row&) override {}
+  void keep(const Checkpoint& checkpoint) override { kept = checkpoint; }
+
+  std::optional<Checkpoint> kept;
+};
 
 /// Runs a scenario and says what came out, but for what was moved.
 class Session {
  public:
-  Session(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const SimulateOptions& options)
+  Session(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const RunSource& source,
+          const std::string& model, const SimulateOptions& options)
       : setup_(std::move(setup)),
         options_(options),
-        run_(run_of(setup_, plan, options.scenario)),
+        from_(checkpoint_of(source, setup_.start.time + setup_.duration)),
+        run_(run_of(setup_, plan, source.text.name)),
+        origin_(origin_of(source, run_.description(), model)),
+        output_(output_of(source, options)),
         page_(open_page(options, scene)),
-        file_(open_trajectory(options, setup_.subject->columns())),
+        file_(open_rows(output_, options, origin_, from_, quantities_of(*setup_.subject, plan.natural))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_);
+    run_.add(last_);
     run_.add(progress_);
     warn(plan.warnings);
     warn(run_.expected_trouble());
@@ -145,19 +197,20 @@ class Session {
     const auto interrupted = [&] { return guard.interrupted(); };
     io::Summary summary;
     if (page_) page_->begin_run(options_.copies > 0 ? "start" : "");
-    static_cast<RunReport&>(summary) = run_.go(interrupted);
+    static_cast<RunReport&>(summary) = from_ ? run_.go_on(*from_, interrupted) : run_.go(interrupted);
     summary.run = setup_.options;
     summary.duration = setup_.duration;
     summary.every = setup_.every;
     summary.ending = io::ending_of(summary, setup_.subject->coordinates());
     if (page_) finish_page(interrupted, summary);
+    if (summary.end == RunEnd::stopped) tell_how_to_go_on(summary);
     warn(std::exchange(summary.warnings, {}));
     summary.warnings = warnings_;
     const std::vector<std::string> columns = setup_.subject->columns();
     const auto [first, count] = setup_.subject->shown_columns();
     const auto begin = columns.begin() + static_cast<std::ptrdiff_t>(first);
     summary.shown.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
-    summary.trajectory = options_.output;
+    summary.trajectory = output_;
     summary.view = options_.view;
     summary.rows_written = file_ ? file_->rows() : 0;
     return summary;
@@ -176,6 +229,24 @@ class Session {
     } catch (const io::OutputError& error) {
       if (summary.ending.ok()) summary.ending = {"output_failed", error.what(), {}, {}};
     }
+  }
+
+  /// In the run file, or in one that has nothing else.
+  void tell_how_to_go_on(io::Summary& summary) {
+    if (!last_.kept) return;
+    std::string file = output_ && is_run_file(*output_) ? *output_ : "";
+    if (file.empty()) {
+      const std::filesystem::path beside = output_ && output_ != "-" ? *output_ : origin_.scenario_name;
+      const std::filesystem::path folder = output_ && output_ != "-" ? beside.parent_path() : "";
+      file = (folder / beside.stem()).string() + ".resume.h5";
+      try {
+        io::write_saved_run(file, origin_, *last_.kept);
+      } catch (const std::exception& error) {
+        warn({std::string("the run cannot go on later: ") + error.what()});
+        return;
+      }
+    }
+    summary.ending.message += "; to go on: pendula simulate --resume " + file;
   }
 
   void run_copy(int copy, const std::function<bool()>& interrupted) {
@@ -203,9 +274,13 @@ class Session {
 
   RunSetup setup_;
   const SimulateOptions& options_;
+  std::optional<Checkpoint> from_;
   Run run_;
+  io::RunOrigin origin_;
+  std::optional<std::string> output_;
   std::unique_ptr<view::Page> page_;  // opened first: that leaves what is there as it is
-  std::unique_ptr<io::TrajectoryFile> file_;
+  std::unique_ptr<io::RowsFile> file_;
+  LastCheckpoint last_;
   Progress progress_;
   std::vector<std::string> warnings_;
 };
@@ -213,21 +288,30 @@ class Session {
 }  // namespace
 
 ExitStatus simulate(const SimulateOptions& options) {
-  const io::FindSystem find = [&](const std::string& model, std::optional<int> links,
+  const RunSource source = read_run_source(options);
+  std::string model;
+  const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
                                   const std::filesystem::path& folder) {
-    return io::find_kernel(model, links, folder, io::Toolchain::of_this_program(),
+    const io::Toolchain toolchain = io::Toolchain::of_this_program();
+    model = io::model_source(name, links, folder, toolchain);
+    require_same_model(source, model);
+    return io::find_kernel(name, links, folder, toolchain,
                            [&](const std::string& what) {
                              if (!options.quiet) std::cerr << "pendula: " << what << '\n';
                            })
         .entry;
   };
-  const io::ScenarioText text = io::read_scenario_text(options.scenario);
-  const io::AnyScenario any = io::parse_scenario(text.text, text.name, options.overrides, find);
+  const io::AnyScenario any = io::parse_scenario(source.text.text, source.text.name, source.overrides, find);
   return std::visit(
       [&](const auto& scenario) {
-        const RunSetup setup{subject_of(scenario), scenario.start, scenario.run, scenario.duration, scenario.every};
-        io::Summary summary = Session(setup, scene_of(scenario, text, options), scenario, options).run();
-        describe(scenario, options.scenario, summary.last, summary);
+        const RunSetup setup{.subject = subject_of(scenario),
+                             .start = scenario.start,
+                             .options = scenario.run,
+                             .duration = scenario.duration,
+                             .every = scenario.every,
+                             .checkpoint = scenario.checkpoint};
+        io::Summary summary = Session(setup, scene_of(scenario, source), scenario, source, model, options).run();
+        describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);
         std::ostream& out = options.output == "-" ? std::cerr : std::cout;
         if (options.json) {
           out << io::to_json(summary);

@@ -212,6 +212,20 @@ void remove_unused_kernels(const fs::path& cache) {
   }
 }
 
+std::string kernel_name(const std::string& model, std::optional<int> links) {
+  const std::string stem = fs::path(model).stem().string();
+  return links ? stem + "_" + std::to_string(*links) : stem;
+}
+
+/// The kernel of a built-in model, where this program has it.
+const SystemEntry* built_in_entry(const std::string& model, std::optional<int> links) {
+  if (model.ends_with(".py")) return nullptr;
+  for (const SystemEntry* entry : library().systems) {
+    if (entry->info.name == kernel_name(model, links)) return entry;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 Toolchain Toolchain::of_this_program() {
@@ -246,22 +260,22 @@ std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   return names;
 }
 
+std::string model_source(const std::string& model, std::optional<int> links, const fs::path& folder,
+                         const Toolchain& toolchain) {
+  return built_in_entry(model, links) ? "" : read_model(find_model(model, folder, toolchain));
+}
+
 ModelKernel find_kernel(const std::string& model, std::optional<int> links, const fs::path& folder,
                         const Toolchain& toolchain, const std::function<void(const std::string&)>& tell) {
-  const std::string stem = fs::path(model).stem().string();
-  const std::string name = links ? stem + "_" + std::to_string(*links) : stem;
-  if (!model.ends_with(".py")) {
-    for (const SystemEntry* entry : library().systems) {
-      if (entry->info.name == name) return {{}, {entry, [](const SystemEntry*) {}}};
-    }
-  }
+  if (const SystemEntry* entry = built_in_entry(model, links)) return {{}, {entry, [](const SystemEntry*) {}}};
+  const std::string name = kernel_name(model, links);
   const fs::path file = find_model(model, folder, toolchain);
   Key key;
   key.add(read_model(file)).add(name).add(version).add(library().instruction_set);
   key.add(toolchain.python).add(toolchain.compiler).add_file(this_program());
   std::error_code none;
-  for (const auto& source : fs::recursive_directory_iterator(toolchain.codegen / "pendula_codegen", none)) {
-    if (source.path().extension() == ".py" || source.path().extension() == ".j2") key.add_file(source.path());
+  for (const auto& part : fs::recursive_directory_iterator(toolchain.codegen / "pendula_codegen", none)) {
+    if (part.path().extension() == ".py" || part.path().extension() == ".j2") key.add_file(part.path());
   }
   const fs::path object = toolchain.cache / (name + "-" + key.text() + ".so");
   const bool was_there = fs::exists(object);

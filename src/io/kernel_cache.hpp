@@ -38,6 +38,10 @@ struct ModelKernel {
 ModelKernel find_kernel(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
                         const Toolchain& toolchain, const std::function<void(const std::string&)>& tell);
 
+/// The text of a model's file; empty where its kernel is part of this program. Throws as find_kernel.
+std::string model_source(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
+                         const Toolchain& toolchain);
+
 /// Names of the built-in models.
 std::vector<std::string> built_in_models(const Toolchain& toolchain);
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 #include <pendula/chain/chain.hpp>
+#include <string>
 #include <string_view>
 
 namespace pendula::io {
@@ -45,5 +46,8 @@ struct UnitNames {
 inline UnitNames unit_names(const std::optional<NaturalUnits>& natural) {
   return natural ? UnitNames{" l_1", " M_1", " sqrt(l_1/g)", " M_1 g l_1"} : UnitNames{" m", " kg", " s", " J"};
 }
+
+/// The unit, in SI as quantities have it, as the scenario's own.
+std::string in_units(const std::optional<NaturalUnits>& natural, const std::string& unit);
 
 }  // namespace pendula::io

@@ -9,8 +9,10 @@
 
 namespace pendula::io {
 
-OutputError::OutputError(const std::string& file, int error)
-    : std::runtime_error(file + ": could not be written: " + std::strerror(error)) {}
+OutputError::OutputError(const std::string& file, int error) : OutputError(file, std::strerror(error)) {}
+
+OutputError::OutputError(const std::string& file, const std::string& why)
+    : std::runtime_error(file + ": could not be written: " + why) {}
 
 void reject_output(const std::string& file, const std::string& why) {
   throw InputError(file + ": expected a file that can be written, got: " + why);

@@ -8,10 +8,10 @@ namespace pendula::io {
 /// What was to be written could not be, although the file could be opened: the disk is full, say.
 class OutputError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
-
   /// `error` is errno.
   OutputError(const std::string& file, int error);
+  /// `why` in words.
+  OutputError(const std::string& file, const std::string& why);
 };
 
 /// Throws InputError: the file cannot be written, `why`.

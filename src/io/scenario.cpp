@@ -32,10 +32,10 @@ constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
 constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "form",      "solver",
                                                       "iteration", "step",   "tolerance", "duration"};
-constexpr std::array<std::string_view, 1> output_keys = {"every"};
+constexpr std::array<std::string_view, 2> output_keys = {"every", "checkpoint"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 36> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 37> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -70,7 +70,8 @@ constexpr std::array<std::string_view, 36> all_keys = {"chain.space",
                                                        "run.step",
                                                        "run.tolerance",
                                                        "run.duration",
-                                                       "output.every"};
+                                                       "output.every",
+                                                       "output.checkpoint"};
 
 constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
@@ -359,6 +360,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   if (const auto every = sections.output.find("every")) {
     plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
   }
+  plan.checkpoint = number(sections.output, "checkpoint", plan.checkpoint, Sign::positive);
   for (const std::string_view key : run_keys) {
     if (const auto entry = sections.run.find(key)) plan.places[std::string(key)] = entry->place();
   }

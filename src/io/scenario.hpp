@@ -35,6 +35,7 @@ struct RunPlan {
   RunOptions run;
   double duration = 10;
   std::int64_t every = 10;              ///< steps from row to row
+  double checkpoint = 60;               ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
   std::vector<std::string> warnings;    ///< what is odd but no error, one sentence each
   /// `where: key` of what [run] sets, by key, and of what tells the number of links, by "links": for errors yet to

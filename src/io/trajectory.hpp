@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <pendula/run/observer.hpp>
 #include <span>
 #include <string>
 
 #include "io/line_file.hpp"
+#include "io/rows_file.hpp"
 
 namespace pendula::io {
 
@@ -17,7 +17,7 @@ void append_header(std::string& text, std::span<const std::string> columns);
 void append_row(std::string& text, std::span<const double> numbers);
 
 /// A trajectory as a CSV file of whole rows.
-class TrajectoryFile : public Observer {
+class TrajectoryFile : public RowsFile {
  public:
   /// Opens the file, as LineFile does, and begins it with the header. Throws InputError where it cannot be opened.
   TrajectoryFile(const std::string& file, std::span<const std::string> columns) : file_(file) {
@@ -35,7 +35,7 @@ class TrajectoryFile : public Observer {
   void finish() override { file_.close(); }
 
   /// Rows that are in the file.
-  std::int64_t rows() const { return std::max<std::int64_t>(file_.lines() - 1, 0); }
+  std::int64_t rows() const override { return std::max<std::int64_t>(file_.lines() - 1, 0); }
 
  private:
   LineFile file_;

@@ -16,9 +16,9 @@ def example(pendula, tmp_path):
 
     def run(name: str) -> tuple[dict, Trajectory]:
         file = next(file for file in EXAMPLES if file.stem == name)
-        result = pendula("simulate", file, "-o", "out.csv", "--json")
+        result = pendula("simulate", file, "-o", f"{name}.csv", "--json")
         assert (result.status, result.err) == (0, "")
-        return result.json, Trajectory.read(tmp_path / "out.csv")
+        return result.json, Trajectory.read(tmp_path / f"{name}.csv")
 
     return run
 

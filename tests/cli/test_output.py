@@ -114,7 +114,8 @@ def test_an_interrupted_run_stops_at_once_and_keeps_its_last_state(double, tmp_p
     assert run.returncode == 1
     start, last = Trajectory.read(tmp_path / "out.csv").rows
     assert last[0] > start[0] == 0
-    assert err == f"pendula: interrupted at t = {last[0]!r}\n"
+    go_on = "to go on: pendula simulate --resume out.resume.h5"
+    assert err == f"pendula: interrupted at t = {last[0]!r}; {go_on}\n"
     assert "out.csv, 2 rows" in out
 
 

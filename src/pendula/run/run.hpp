@@ -29,6 +29,9 @@ class Run {
   /// What is odd about it already: one sentence each.
   std::vector<std::string> expected_trouble() const { return setup_.subject->expected_trouble(setup_.options); }
 
+  /// What really runs.
+  Description description() const { return integrator_->describe(); }
+
   /// Hands every row to `observer`, which must outlive the run.
   void add(Observer& observer) { observers_.push_back(&observer); }
 

@@ -1,0 +1,83 @@
+#include "cli/run_source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/version.hpp>
+#include <string_view>
+#include <system_error>
+
+#include "io/input_error.hpp"
+
+namespace pendula::cli {
+namespace {
+
+/// What may be another than it was: everything else decides how the run has come to where it is.
+constexpr std::array<std::string_view, 2> free_keys = {"run.duration", "output.checkpoint"};
+
+void require_free(const std::vector<std::string>& overrides) {
+  for (const std::string& change : overrides) {
+    const std::string key = change.substr(0, change.find_first_of("= "));
+    if (std::ranges::find(free_keys, key) != free_keys.end()) continue;
+    throw io::InputError("--set " + change + ": expected run.duration or output.checkpoint, which a run that goes on " +
+                         "may have anew, got " + key);
+  }
+}
+
+void require_same(const std::string& file, const std::string& what, const std::string& here, const std::string& got) {
+  if (got == here) return;
+  throw io::InputError(file + ": expected a run of " + what + " " + here + ", got one of " + got);
+}
+
+}  // namespace
+
+RunSource read_run_source(const SimulateOptions& options) {
+  if (!options.resume) return {io::read_scenario_text(options.scenario), options.overrides, {}};
+  const std::string& file = *options.resume;
+  require_free(options.overrides);
+  RunSource source{{}, {}, io::read_saved_run(file)};
+  const io::RunOrigin& origin = source.saved->origin;
+  require_same(file, "pendula", std::string(version), origin.version);
+  const std::string instruction_set(library().instruction_set);
+  if (origin.instruction_set != instruction_set) {
+    throw io::InputError(file + ": expected a run on " + instruction_set + ", got one on " + origin.instruction_set +
+                         ", which others do not follow to the last bit; PENDULA_ARCH=" + origin.instruction_set +
+                         " in the environment asks for it");
+  }
+  source.text = {origin.scenario_name, origin.scenario};
+  source.overrides = origin.overrides;
+  source.overrides.insert(source.overrides.end(), options.overrides.begin(), options.overrides.end());
+  return source;
+}
+
+void require_same_model(const RunSource& source, const std::string& model) {
+  if (!source.saved || source.saved->origin.model == model) return;
+  throw io::ModelError("the model is no longer the one that the run began with");
+}
+
+io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model) {
+  io::RunOrigin origin;
+  origin.version = version;
+  origin.instruction_set = library().instruction_set;
+  origin.solver = description.solver;
+  origin.kernel = description.kernel;
+  std::error_code unknown;
+  const std::string& name = source.text.name;
+  origin.scenario_name = std::filesystem::exists(name, unknown) ? std::filesystem::absolute(name).string() : name;
+  origin.scenario = source.text.text;
+  origin.overrides = source.overrides;
+  origin.model = model;
+  return origin;
+}
+
+std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end) {
+  if (!source.saved || !source.saved->checkpoint) return std::nullopt;
+  const Checkpoint& checkpoint = *source.saved->checkpoint;
+  if (checkpoint.time <= end) return checkpoint;
+  throw io::InputError("run.duration: expected at least " + shortest(checkpoint.time) +
+                       ", where the run is already, got " + shortest(end));
+}
+
+}  // namespace pendula::cli

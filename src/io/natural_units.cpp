@@ -1,0 +1,16 @@
+#include "io/natural_units.hpp"
+
+namespace pendula::io {
+
+std::string in_units(const std::optional<NaturalUnits>& natural, const std::string& unit) {
+  if (!natural) return unit;
+  const UnitNames names = unit_names(natural);
+  const auto alone = [](std::string_view name) { return std::string(name.substr(1)); };
+  if (unit == "m") return alone(names.length);
+  if (unit == "s") return alone(names.time);
+  if (unit == "J") return alone(names.energy);
+  if (unit == "rad/s") return "rad / " + alone(names.time);
+  return unit;
+}
+
+}  // namespace pendula::io

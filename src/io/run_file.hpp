@@ -1,0 +1,109 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <pendula/run/checkpoint.hpp>
+#include <pendula/run/quantity.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/hdf5.hpp"
+#include "io/rows_file.hpp"
+
+namespace pendula::io {
+
+/// What a run file says of the run besides its numbers.
+struct RunOrigin {
+  std::string version;                 ///< of pendula
+  std::string instruction_set;         ///< of the library that ran it
+  std::string solver, kernel;          ///< as in a summary; may be empty
+  std::string scenario_name;           ///< its file, as messages call it, with the whole path
+  std::string scenario;                ///< its text
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  std::string model;                   ///< text of the model's file; empty where there is none
+
+  bool operator==(const RunOrigin&) const = default;
+};
+
+/// What a run goes on from.
+struct SavedRun {
+  RunOrigin origin;
+  std::optional<Checkpoint> checkpoint;  ///< none where it had just begun
+  bool has_rows = true;                  ///< whether the file keeps the trajectory, too
+};
+
+/// Reads all that a run needs to go on. Throws InputError where the file has none.
+SavedRun read_saved_run(const std::string& file);
+
+/// Writes a file that has only what a run needs to go on. Throws InputError where it cannot be opened, OutputError.
+void write_saved_run(const std::string& file, const RunOrigin& origin, const Checkpoint& checkpoint);
+
+/// A run as an HDF5 file: quantities with units, the scenario, and where to go on from. It can be read at any time, and
+/// whatever ends the program leaves rows but those of the last two seconds. docs/run-file.md.
+class RunFile : public RowsFile {
+ public:
+  /// Begins a file beside `name`, which takes its place when it can be read. Throws InputError where that cannot be
+  /// written or is just being written by somebody else.
+  RunFile(const std::string& name, const RunOrigin& origin, std::vector<Quantity> quantities);
+
+  /// Goes on with a copy of the file `from`, after the first `rows` rows.
+  RunFile(const std::string& name, const std::string& from, std::int64_t rows, std::vector<Quantity> quantities);
+
+  ~RunFile() override;
+
+  /// Throws OutputError where rows cannot be written.
+  void take(const Row& row) override;
+  void keep(const Checkpoint& checkpoint) override;
+  void finish() override;
+
+  std::int64_t rows() const override { return static_cast<std::int64_t>(in_file_); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// A file descriptor that holds a lock while it is there.
+  class Lock {
+   public:
+    ~Lock();
+    void take(const std::string& file, const std::string& name);
+
+   private:
+    int descriptor_ = -1;
+  };
+
+  void open_part(const std::string& name);
+  void create(const RunOrigin& origin);
+  void reopen(std::int64_t rows);
+  void put_in_place();
+  void write_rows();
+  void write_rest();
+  void abandon();
+  void flush();
+  void flush(std::size_t rows);
+  bool is_due() const { return Clock::now() - flushed_ >= std::chrono::seconds(1); }
+  std::size_t block_rows() const { return columns_ > 0 ? block_.size() / columns_ : 0; }
+  std::size_t written() const { return begun_ + (unpacked_ ? block_rows() : 0); }
+  template <class Action>
+  void guarded(Action action);
+
+  std::string name_, target_, path_;  // as messages call it; what it leads to; where it is now
+  std::vector<Quantity> quantities_;
+  std::size_t columns_ = 0, chunk_rows_ = 0;
+  Lock before_, lock_;  // of a file that is to be replaced, and of this one
+  hdf5::Handle file_, run_, checkpoint_;
+  std::vector<hdf5::Handle> datasets_;
+  std::vector<double> block_;    // rows of the chunk that is being filled
+  std::vector<double> numbers_;  // of one dataset
+  std::size_t begun_ = 0;        // row that the block begins with
+  std::size_t in_file_ = 0;      // rows that can be read
+  bool waits_ = false;           // the block began before the last flush
+  bool unpacked_ = false;        // it was written before it was full, and so stays: its place could not be used again
+  std::optional<Checkpoint> kept_;  // and not yet written
+  std::uint64_t serial_ = 0;        // of checkpoints
+  Clock::time_point flushed_ = Clock::now();
+};
+
+}  // namespace pendula::io

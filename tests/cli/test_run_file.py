@@ -1,0 +1,301 @@
+"""Run files: what is in them for others to read, and runs that go on from them as if they had never stopped."""
+
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from conftest import DOUBLE, SPHERICAL, Trajectory, program, settings
+
+WHIP = """\
+[chain]
+space   = "spatial"
+masses  = [1.0, 0.3, 0.1, 0.03, 0.01]
+lengths = 1.0
+gravity = 9.81
+
+[start]
+theta = [2.0, 2.1, 2.2, 3.0, 3.14159]
+phi   = 0.0
+
+[run]
+stages   = 4
+step     = 2e-3
+duration = 10.0
+"""
+
+THROUGH_THE_POLE = SPHERICAL.replace("phi_dot   = 0.9", "phi_dot   = 0.0").replace(
+    "theta_dot = 0.4", "theta_dot = 6"
+)
+
+ADAPTIVE = DOUBLE.replace("step     = 5e-3", 'method = "dopri5"')
+
+SCENARIOS = {
+    "double": DOUBLE,
+    "whip": WHIP,
+    "pole": THROUGH_THE_POLE,
+    "dopri5": ADAPTIVE,
+    "rk4": DOUBLE.replace("step     =", 'method = "rk4"\nstep ='),
+    "dense": DOUBLE.replace("step     =", 'solver = "dense"\nstages = 3\nstep ='),
+    "driven": DOUBLE + "\n[[chain.drive]]\nlink = 2\namplitude = 3.0\nfrequency = 5.0\n",
+}
+
+
+def bits(data: np.ndarray) -> np.ndarray:
+    return data.view(np.int64) if data.dtype == np.float64 else data
+
+
+def assert_same_rows(first: Path, second: Path) -> None:
+    with h5py.File(first) as one, h5py.File(second) as other:
+        assert set(one) == set(other)
+        for name in set(one) - {"run"}:
+            assert np.array_equal(bits(one[name][...]), bits(other[name][...])), name
+
+
+def rows_of(file: Path) -> int:
+    with h5py.File(file) as run:
+        return run["t"].shape[0]
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    def write(text: str) -> Path:
+        file = tmp_path / "run.toml"
+        file.write_text(text)
+        return file
+
+    return write
+
+
+@pytest.mark.parametrize("name", ["double", "whip"])
+def test_rows_are_those_of_the_csv_file_to_the_last_bit(name, pendula, scenario, tmp_path):
+    file = scenario(SCENARIOS[name])
+    assert pendula("simulate", file, "-o", "run.csv").status == 0
+    run = pendula("simulate", file, "-o", "run.h5", "--json")
+    rows = Trajectory.read(tmp_path / "run.csv")
+    assert (run.status, run.json["rows"], run.json["trajectory"]) == (0, len(rows.rows), "run.h5")
+    with h5py.File(tmp_path / "run.h5") as saved:
+        for column in rows.header:
+            quantity, _, link = column.rpartition("_")
+            data = saved[quantity][:, int(link) - 1] if link.isdigit() else saved[column][...]
+            assert np.array_equal(bits(data), bits(np.array(rows.column(column)))), column
+
+
+def test_quantities_have_names_units_and_axes(pendula, scenario, tmp_path):
+    file = scenario(WHIP)
+    pendula("simulate", file, "--set", "run.duration=0.1", "-o", "run.h5")
+    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as run:
+        assert run["theta"].dims == ("t", "link") and run["energy"].dims == ("t",)
+        assert list(run["link"].values) == [1, 2, 3, 4, 5]
+        units = {name: run[name].attrs["units"] for name in ["t", "theta", "phi_dot", "z", "energy"]}
+        assert units == {"t": "s", "theta": "rad", "phi_dot": "rad/s", "z": "m", "energy": "J"}
+        assert run.attrs["pendula"] == "0.1.0" and run.attrs["solver"] == "chain"
+        assert float(run["x"].sel(t=0.1, link=5, method="nearest")) == pytest.approx(
+            float(run["x"][-1, 4]), abs=0
+        )
+    with h5py.File(tmp_path / "run.h5") as run:
+        assert run["run/scenario"].asstr()[()] == WHIP
+        assert run["run"].attrs["scenario_file"] == str(file)
+        assert run["run/set"].asstr()[()] == '["run.duration=0.1"]'
+
+
+def test_units_of_a_nondimensional_run(pendula, scenario, tmp_path):
+    file = scenario(DOUBLE.replace("gravity = 9.81", 'gravity = 9.81\nunits = "natural"'))
+    assert pendula("simulate", file, "-o", "run.h5").status == 0
+    with h5py.File(tmp_path / "run.h5") as run:
+        assert [run[name].attrs["units"] for name in ["t", "x", "theta_dot", "energy"]] == [
+            "sqrt(l_1/g)",
+            "l_1",
+            "rad / sqrt(l_1/g)",
+            "M_1 g l_1",
+        ]
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_run_goes_on_as_if_it_had_never_stopped(name, pendula, scenario, tmp_path):
+    """Its ends fall between steps and rows: the last step of each part is cut, and its last row is extra."""
+    draw = random.Random(name)
+    file = scenario(SCENARIOS[name])
+    whole = pendula("simulate", file, "--set", "run.duration=8", "-o", "whole.h5", "--json")
+    assert whole.status == 0
+    ends = sorted(draw.uniform(0, 8) for _ in range(19))
+    assert pendula("simulate", file, "--set", f"run.duration={ends[0]}", "-o", "part.h5").status == 0
+    for end in [*ends[1:], 8]:
+        resumed = pendula("simulate", "--resume", "part.h5", "--set", f"run.duration={end}", "--json")
+        assert (resumed.status, resumed.err) == (0, ""), resumed.err
+    assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
+    different = {"scenario", "trajectory", "wall_seconds"}
+    assert {**resumed.json, **dict.fromkeys(different)} == {**whole.json, **dict.fromkeys(different)}
+
+
+def test_a_run_that_is_killed_leaves_a_file_that_opens_and_goes_on(scenario, tmp_path):
+    """By SIGKILL and by signals that it hears, at random times."""
+    draw = random.Random(11)
+    file = scenario(DOUBLE)
+    long = settings("run.step=1e-3", "run.duration=1500", "output.every=3", "output.checkpoint=0.1")
+    run = partial(subprocess.run, cwd=tmp_path, check=True, capture_output=True)
+    run([program(), "simulate", file, *long, "-o", "whole.h5"])
+    command = [program(), "simulate", file, *long, "-o", "part.h5"]
+    kills = opened = 0
+    while kills < 40:
+        part = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            part.wait(timeout=draw.choice([0.02, 0.1, 0.3]) * draw.random())
+            break
+        except subprocess.TimeoutExpired:
+            part.send_signal(draw.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
+            part.wait()
+            kills += 1
+        if (tmp_path / "part.h5").exists():
+            command = [program(), "simulate", "--resume", "part.h5"]
+            rows_of(tmp_path / "part.h5")
+            opened += 1
+    run([program(), "simulate", "--resume", "part.h5"])
+    assert opened > 3
+    assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
+    assert not list(tmp_path.glob("part.h5.*"))
+
+
+def test_a_file_is_read_while_it_is_written(scenario, tmp_path):
+    file = scenario(DOUBLE)
+    command = [
+        program(),
+        "simulate",
+        file,
+        *settings("run.duration=1e9", "output.every=20000"),
+        "-o",
+        "run.h5",
+    ]
+    part = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 60
+    rows = 0
+    while rows < 3 and time.monotonic() < deadline:
+        time.sleep(0.1)
+        if (tmp_path / "run.h5").exists():
+            rows = rows_of(tmp_path / "run.h5")
+    refused = subprocess.run(
+        [program(), "simulate", file, "-o", "run.h5"], cwd=tmp_path, capture_output=True, text=True
+    )
+    part.terminate()
+    _, told = part.communicate()
+    assert rows >= 3
+    assert refused.returncode == 2 and "got: one that another run writes" in refused.stderr
+    assert part.returncode == 1
+    assert told.endswith("; to go on: pendula simulate --resume run.h5\n")
+
+
+def test_a_full_disk_leaves_what_was_written(scenario, tmp_path):
+    """Here the limit of a file's size stands for it; the first rows are there, and the run goes on from them."""
+    file = scenario(DOUBLE)
+    long = settings("run.step=1e-3", "run.duration=300", "output.every=1")
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (4_000_000, 4_000_000))
+    full = subprocess.run(
+        [program(), "simulate", file, *long, "-o", "run.h5"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        preexec_fn=limit,
+    )
+    assert full.returncode == 1
+    assert full.stderr.endswith("pendula: run.h5: could not be written: File too large\n")
+    assert rows_of(tmp_path / "run.h5") > 40000  # 64 bytes a row, and a block of 4096 is lost
+    shutil.copy(tmp_path / "run.h5", tmp_path / "kept.h5")
+    subprocess.run(
+        [program(), "simulate", "--resume", "run.h5"], cwd=tmp_path, check=True, capture_output=True
+    )
+    subprocess.run(
+        [program(), "simulate", file, *long, "-o", "whole.h5"], cwd=tmp_path, check=True, capture_output=True
+    )
+    assert_same_rows(tmp_path / "whole.h5", tmp_path / "run.h5")
+
+
+def test_an_interrupted_run_without_a_run_file_leaves_one_to_go_on_from(scenario, tmp_path):
+    file = scenario(DOUBLE)
+    long = settings("run.step=1e-3", "run.duration=2000")
+    subprocess.run(
+        [program(), "simulate", file, *long, "-o", "whole.csv"], cwd=tmp_path, check=True, capture_output=True
+    )
+    part = subprocess.Popen(
+        [program(), "simulate", file, *long, "-o", "first.csv"], cwd=tmp_path, stderr=subprocess.PIPE
+    )
+    time.sleep(0.2)
+    part.send_signal(signal.SIGHUP)
+    _, told = part.communicate()
+    assert told.endswith(b"; to go on: pendula simulate --resume first.resume.h5\n")
+    rest = [program(), "simulate", "--resume", "first.resume.h5", "-o", "rest.csv"]
+    subprocess.run(rest, cwd=tmp_path, check=True, capture_output=True)
+    whole, first, rest = (
+        (tmp_path / name).read_text().splitlines() for name in ("whole.csv", "first.csv", "rest.csv")
+    )
+    new = rest[1:]
+    assert whole == first[: len(whole) - len(new)] + new
+
+
+def test_what_cannot_go_on_is_refused(pendula, scenario, tmp_path):
+    file = scenario(DOUBLE)
+    pendula("simulate", file, "-o", "run.h5")
+    (tmp_path / "text.h5").write_text("no HDF5 file")
+    with h5py.File(tmp_path / "other.h5", "w") as other:
+        other["t"] = [1.0, 2.0]
+    shutil.copy(tmp_path / "run.h5", tmp_path / "old.h5")
+    with h5py.File(tmp_path / "old.h5", "a") as old:
+        old.attrs["pendula"] = "0.0.9"
+    before = (tmp_path / "run.h5").read_bytes()
+    for arguments, expected in [
+        (["none.h5"], "none.h5: expected a run file to go on from, got a file that is not there"),
+        (["text.h5"], "text.h5: expected a run file to go on from, got one that HDF5 cannot read: "),
+        (["other.h5"], 'other.h5: expected a run file to go on from, got a file without the group "run"'),
+        (["old.h5"], "old.h5: expected a run of pendula 0.1.0, got one of 0.0.9"),
+        (
+            ["run.h5", *settings("run.duration=0.5")],
+            "run.duration: expected at least 0.995, where the run is already, got 0.5",
+        ),
+        (
+            ["run.h5", *settings("run.step=1e-4")],
+            "--set run.step=1e-4: expected run.duration or output.checkpoint",
+        ),
+        (["run.h5", "-o", str(tmp_path)], f"{tmp_path}: expected a file that can be written"),
+    ]:
+        run = pendula("simulate", "--resume", *arguments)
+        assert (run.status, run.out) == (2, "")
+        assert run.err.startswith(f"pendula: {expected}"), run.err
+    assert (tmp_path / "run.h5").read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "old.h5",
+        "other.h5",
+        "run.h5",
+        "run.toml",
+        "text.h5",
+    ]
+
+
+def test_another_instruction_set_is_refused(pendula, scenario):
+    available = pendula("--version").out
+    pendula("simulate", scenario(DOUBLE), "-o", "run.h5")
+    other = "sse2" if "sse2" not in available else "avx2"
+    run = pendula("simulate", "--resume", "run.h5", PENDULA_ARCH=other)
+    if "PENDULA_ARCH" in run.err and "got one on" not in run.err:
+        pytest.skip("this build or this processor has one instruction set only")
+    assert run.status == 2
+    assert f"run.h5: expected a run on {other}, got one on" in run.err
+
+
+def test_a_file_that_is_replaced_is_told(pendula, scenario, tmp_path):
+    file = scenario(DOUBLE)
+    for name in ["run.h5", "run.csv"]:
+        assert "replacing" not in pendula("simulate", file, "-o", name).err
+        assert pendula("simulate", file, "-o", name).err == f"pendula: replacing {name}\n"
+        assert pendula("simulate", file, "-o", name, "--quiet").err == ""
+    assert "replacing" not in pendula("simulate", "--resume", "run.h5").err
+    run = pendula("simulate", file, "-o", "run.toml")
+    assert run.status == 2 and file.read_text() == DOUBLE

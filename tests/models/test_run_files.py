@@ -1,0 +1,61 @@
+"""Runs of models that go on from their run files."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import EXAMPLES, ROOT
+
+
+def bits(file):
+    with h5py.File(file) as run:
+        return {name: run[name][...].tobytes() for name in run if name != "run"}
+
+
+@pytest.mark.parametrize("name", ["cart_chain", "driven_chain", "furuta", "swinging_atwood"])
+@pytest.mark.parametrize("method", ["gauss", "dopri5"])
+def test_a_run_goes_on_as_if_it_had_never_stopped(name, method, pendula, tmp_path):
+    method = ["--set", f"run.method={method}", "--quiet"]
+    assert (
+        pendula("simulate", EXAMPLES / f"{name}.toml", *method, "-o", "whole.h5", cwd=tmp_path).returncode
+        == 0
+    )
+    first = ["--set", "run.duration=0.777"]
+    assert (
+        pendula(
+            "simulate", EXAMPLES / f"{name}.toml", *method, *first, "-o", "part.h5", cwd=tmp_path
+        ).returncode
+        == 0
+    )
+    with h5py.File(tmp_path / "whole.h5") as whole:
+        end = whole["t"][-1]
+    for duration in [*np.random.default_rng(11).uniform(0.777, end, 5).cumsum(), end]:
+        if duration <= end:
+            resumed = pendula(
+                "simulate", "--resume", "part.h5", "--set", f"run.duration={duration}", cwd=tmp_path
+            )
+            assert resumed.returncode == 0, resumed.stderr
+    assert bits(tmp_path / "whole.h5") == bits(tmp_path / "part.h5")
+
+
+def test_units_are_those_of_the_model(pendula, tmp_path):
+    assert pendula("simulate", EXAMPLES / "cart_chain.toml", "-o", "run.h5", cwd=tmp_path).returncode == 0
+    with h5py.File(tmp_path / "run.h5") as run:
+        units = {name: run[name].attrs["units"] for name in run if name not in ("run", "link")}
+        assert units["x"] == "m" and units["x_dot"] == "m/s" and units["theta_1_dot"] == "rad/s"
+        assert "define(model, links)" in run["run/model"].asstr()[()]
+
+
+def test_a_model_that_has_changed_is_refused(pendula, tmp_path):
+    model, scenario = tmp_path / "cart_chain.py", tmp_path / "cart.toml"
+    text = (ROOT / "codegen/pendula_codegen/models/cart_chain.py").read_text()
+    model.write_text(text)
+    run = (EXAMPLES / "cart_chain.toml").read_text()
+    scenario.write_text(run.replace('"cart_chain"', '"cart_chain.py"'))
+    assert pendula("simulate", scenario, "-o", "run.h5", cwd=tmp_path).returncode == 0
+    model.write_text(text + "# not the same any more\n")
+    ended = pendula("simulate", "--resume", "run.h5", cwd=tmp_path)
+    assert ended.returncode == 2
+    assert ended.stderr.endswith("system.model: the model is no longer the one that the run began with\n")
+    model.unlink()
+    ended = pendula("simulate", "--resume", "run.h5", cwd=tmp_path)
+    assert ended.returncode == 2 and "cart_chain.py" in ended.stderr
