@@ -1,5 +1,5 @@
-# What an install holds: the library, its headers with the kernels of this build, the generator for more of them, and
-# the CMake package.
+# What an install holds: the library, its headers with the kernels of this build, the generator for more of them, the
+# program with its pictures and scenarios, and the CMake package.
 include(CMakePackageConfigHelpers)
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pendula")
@@ -8,7 +8,10 @@ set(codegen_dir "${CMAKE_INSTALL_DATADIR}/pendula/codegen")
 install(TARGETS pendula_kernels pendula EXPORT pendulaTargets FILE_SET HEADERS)
 install(EXPORT pendulaTargets NAMESPACE pendula:: DESTINATION "${package_dir}")
 if(PENDULA_BUILD_PROGRAM)
+  set(data_dir "${CMAKE_INSTALL_DATADIR}/pendula")
   install(TARGETS pendula_cli)
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/plotting" DESTINATION "${data_dir}" PATTERN "__pycache__" EXCLUDE)
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/examples" DESTINATION "${data_dir}" FILES_MATCHING PATTERN "*.toml")
 endif()
 
 install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codegen_dir}"

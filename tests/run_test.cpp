@@ -127,12 +127,12 @@ TEST(Run, GoesOnAsIfItHadNeverStopped) {
       setup.every = static_cast<std::int64_t>(random.uniform(1, 13));
       setup.doubted = false;
       Keeper whole, parts;
-      const RunReport expected = run_on(setup, 5, 0, whole);
+      const RunReport expected = run_on(setup, 5.0, 0, whole);
       for (const double duration : {0.0, 0.7, 0.7, random.uniform(0.7, 3), 4.0}) {
         run_on(setup, duration, 0, parts);
-        run_on(setup, 5, static_cast<int>(random.uniform(1, 31)), parts);
+        run_on(setup, 5.0, static_cast<int>(random.uniform(1, 31)), parts);
       }
-      const RunReport report = run_on(setup, 5, 0, parts);
+      const RunReport report = run_on(setup, 5.0, 0, parts);
       EXPECT_EQ(report.rows, expected.rows) << method;
       EXPECT_TRUE(parts.rows == whole.rows) << method;
       EXPECT_TRUE(parts.kept->integrator == whole.kept->integrator) << method;
@@ -165,7 +165,7 @@ TEST(Run, KeepsCheckpointsNowAndThen) {
 
 TEST(Run, RefusesACheckpointOfAnotherMotion) {
   Keeper keeper;
-  run_on(double_pendulum(1), 1, 0, keeper);
+  run_on(double_pendulum(1), 1.0, 0, keeper);
   RunSetup other = double_pendulum(1);
   other.options.stages = 3;
   EXPECT_THROW(pendula::Run(other).go_on(*keeper.kept), std::invalid_argument);

@@ -19,6 +19,7 @@ struct SimulateOptions {
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::optional<std::string> output;   ///< trajectory file, HDF5 where it ends in .h5; "-" is standard output
   std::optional<std::string> view;     ///< page to look at the run
+  std::optional<std::string> video;    ///< film of the run
   int copies = 0;                      ///< further runs in the page, from starts that differ
   double apart = 1e-9;                 ///< by this, in the first coordinate, from one to the next
   bool json = false;                   ///< summary as JSON
@@ -50,6 +51,27 @@ ExitStatus build(const BuildOptions& options);
 
 /// Writes NAME.py, a model to start from. Throws io::InputError where that cannot be.
 ExitStatus new_model(const std::string& name);
+
+struct PlotOptions {
+  std::vector<std::string> runs;  ///< trajectory files
+  std::string output;             ///< .svg, .png or .pdf
+  std::string show = "series,phase,energy,trace";
+  std::string coordinates;  ///< by name, with commas; empty for a few
+  std::optional<double> from, to;
+  bool wrapped = false;  ///< angles within one turn
+};
+
+/// Draws runs, by the Python package pendula_plot; its complaints go to standard error.
+ExitStatus plot(const PlotOptions& options);
+
+/// Whether a film of that name can be made here; says why not on standard error.
+ExitStatus check_film(const std::string& output);
+
+/// Makes a film of a run file.
+ExitStatus film(const std::string& run, const std::string& output);
+
+/// Makes a page of striking cases, with films, in a folder.
+ExitStatus gallery(const std::string& folder);
 
 /// Lists the fixed-n kernels of this build on standard output.
 ExitStatus kernels();

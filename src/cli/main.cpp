@@ -2,6 +2,8 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <csignal>
@@ -10,6 +12,7 @@
 #include <new>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -43,10 +46,14 @@ struct CommandLine {
   CLI::App* kernels;
   CLI::App* build;
   CLI::App* new_model;
+  CLI::App* plot;
+  CLI::App* gallery;
   SimulateOptions simulate_options;
   CheckOptions check_options;
   BuildOptions build_options;
   std::string model_name;
+  PlotOptions plot_options;
+  std::string gallery_folder;
 };
 
 /// A check of an option's text: what is expected where `accept` says no.
@@ -55,6 +62,14 @@ CLI::Validator expect(const std::string& expected, bool (*accept)(const std::str
             return accept(text) ? "" : "expected " + expected + ", got " + (text.empty() ? "an empty text" : text);
           },
           ""};
+}
+
+bool are_panels(const std::string& text) {
+  std::istringstream words(text);
+  const std::array<std::string_view, 4> panels = {"series", "phase", "energy", "trace"};
+  bool good = !text.empty() && text.back() != ',';
+  for (std::string word; std::getline(words, word, ',');) good &= std::ranges::find(panels, word) != panels.end();
+  return good;
 }
 
 CommandLine::CommandLine() {
@@ -99,6 +114,11 @@ CommandLine::CommandLine() {
   CLI::Option* view = simulate->add_option("--view", simulate_options.view,
                                            "Write a page to look at the motion: one HTML file that needs nothing else");
   view->type_name("FILE")->check(not_empty)->excludes(resume);
+  simulate
+      ->add_option("--video", simulate_options.video,
+                   "Write a film of the motion: .mp4 or .webm by ffmpeg, .gif or .webp without")
+      ->type_name("FILE")
+      ->check(not_empty);
   CLI::Option* copies = simulate->add_option("--copies", simulate_options.copies,
                                              "Show so many further runs in the page, from starts a little apart");
   copies->type_name("N")->needs(view)->check(CLI::Range(1, 1000));
@@ -140,6 +160,27 @@ CommandLine::CommandLine() {
 
   new_model = app.add_subcommand("new-model", "Write a model file to start from");
   new_model->add_option("NAME", model_name, "Its name: letters, digits, underscores")->required();
+
+  plot = app.add_subcommand("plot", "Draw runs: coordinates over time, phase portrait, energy error, traces");
+  plot->add_option("RUN", plot_options.runs, "Trajectories, CSV or HDF5; several are drawn over each other")
+      ->required()
+      ->check(not_empty);
+  plot->add_option("-o,--output", plot_options.output, "The picture: .svg, .png or .pdf")
+      ->required()
+      ->type_name("FILE")
+      ->check(not_empty);
+  plot->add_option("--show", plot_options.show, "Which of series, phase, energy, trace, with commas; else all")
+      ->type_name("LIST")
+      ->check(expect("some of series, phase, energy and trace, with commas", are_panels));
+  plot->add_option("--coordinates", plot_options.coordinates, "Which, with commas, as in theta_1,theta_3; else a few")
+      ->type_name("LIST");
+  plot->add_option("--from", plot_options.from, "First time to show")->type_name("TIME");
+  plot->add_option("--to", plot_options.to, "Last time to show")->type_name("TIME");
+  plot->add_flag("--wrapped", plot_options.wrapped, "Angles from -pi to pi");
+  plot->footer("Example: pendula plot run.h5 -o run.svg --show energy");
+
+  gallery = app.add_subcommand("gallery", "Make a page of striking motions, each with its scenario");
+  gallery->add_option("DIR", gallery_folder, "The folder for it")->required()->check(not_empty);
 }
 
 /// What an unknown word may have been meant for: an option of `app`, or a command.
@@ -178,7 +219,9 @@ ExitStatus dispatch(const CommandLine& line) {
   if (*line.kernels) return kernels();
   if (*line.build) return build(line.build_options);
   if (*line.new_model) return new_model(line.model_name);
-  std::cerr << complaint(line, "expected a command: simulate, check, kernels, build or new-model");
+  if (*line.plot) return plot(line.plot_options);
+  if (*line.gallery) return gallery(line.gallery_folder);
+  std::cerr << complaint(line, "expected a command: simulate, plot, gallery, check, kernels, build or new-model");
   return wrong_input;
 }
 

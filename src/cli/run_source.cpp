@@ -21,8 +21,9 @@ void require_free(const std::vector<std::string>& overrides) {
   for (const std::string& change : overrides) {
     const std::string key = change.substr(0, change.find_first_of("= "));
     if (std::ranges::find(free_keys, key) != free_keys.end()) continue;
-    throw io::InputError("--set " + change + ": expected run.duration or output.checkpoint, which a run that goes on " +
-                         "may have anew, got " + key);
+    std::string message = "--set " + change;
+    message += ": expected run.duration or output.checkpoint, which a run that goes on may have anew, got " + key;
+    throw io::InputError(message);
   }
 }
 

@@ -183,9 +183,11 @@ class Session {
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
         file_(open_rows(output_, options, origin_, from_, quantities_of(*setup_.subject, plan.natural))),
+        film_rows_(open_film_rows(quantities_of(*setup_.subject, plan.natural))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_);
+    if (film_rows_) run_.add(*film_rows_);
     run_.add(last_);
     run_.add(progress_);
     warn(plan.warnings);
@@ -203,6 +205,7 @@ class Session {
     summary.every = setup_.every;
     summary.ending = io::ending_of(summary, setup_.subject->coordinates());
     if (page_) finish_page(interrupted, summary);
+    if (options_.video) make_film(summary);
     if (summary.end == RunEnd::stopped) tell_how_to_go_on(summary);
     warn(std::exchange(summary.warnings, {}));
     summary.warnings = warnings_;
@@ -229,6 +232,21 @@ class Session {
     } catch (const io::OutputError& error) {
       if (summary.ending.ok()) summary.ending = {"output_failed", error.what(), {}, {}};
     }
+  }
+
+  /// A film is made of a run file: of the one that is asked for, or of one that goes again.
+  std::unique_ptr<io::RunFile> open_film_rows(const std::vector<Quantity>& quantities) const {
+    if (!options_.video || (output_ && is_run_file(*output_))) return nullptr;
+    return std::make_unique<io::RunFile>(*options_.video + ".h5", origin_, quantities);
+  }
+
+  void make_film(io::Summary& summary) {
+    const std::string rows = film_rows_ ? *options_.video + ".h5" : *output_;
+    if (film(rows, *options_.video) != done && summary.ending.ok()) {
+      summary.ending = {"output_failed", *options_.video + ": the film could not be made", {}, {}};
+    }
+    std::error_code unknown;
+    if (film_rows_) std::filesystem::remove(rows, unknown);
   }
 
   /// In the run file, or in one that has nothing else.
@@ -280,6 +298,7 @@ class Session {
   std::optional<std::string> output_;
   std::unique_ptr<view::Page> page_;  // opened first: that leaves what is there as it is
   std::unique_ptr<io::RowsFile> file_;
+  std::unique_ptr<io::RunFile> film_rows_;
   LastCheckpoint last_;
   Progress progress_;
   std::vector<std::string> warnings_;
@@ -289,6 +308,10 @@ class Session {
 
 ExitStatus simulate(const SimulateOptions& options) {
   const RunSource source = read_run_source(options);
+  if (options.video) {
+    spare_scenario(*options.video, "film", options);
+    if (check_film(*options.video) != done) return wrong_input;
+  }
   std::string model;
   const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
                                   const std::filesystem::path& folder) {

@@ -155,8 +155,10 @@ void begin() {
 }
 
 Handle create_file(const std::string& file) {
+  const Handle properties = property_list(H5P_FILE_CREATE);
+  require(H5Pset_link_creation_order(properties.get(), H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED));
   errno = 0;
-  return {H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, file_access().get()), H5Fclose};
+  return {H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), file_access().get()), H5Fclose};
 }
 
 Handle open_file(const std::string& file, bool writable) {

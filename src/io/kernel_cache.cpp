@@ -231,16 +231,20 @@ const SystemEntry* built_in_entry(const std::string& model, std::optional<int> l
 Toolchain Toolchain::of_this_program() {
   Toolchain toolchain;
   const fs::path folder = this_program().parent_path(), prefix = folder.parent_path();
-  // Of a program in its build folder: a Python, the generator, folders of headers, a line each.
+  // Of a program in its build folder: a Python, the generator, the plots, scenarios, folders of headers, a line each.
   std::ifstream beside(folder / "pendula.toolchain");
   if (beside) {
     std::string line;
     std::getline(beside, toolchain.python);
-    if (std::getline(beside, line)) toolchain.codegen = line;
+    for (fs::path* package : {&toolchain.codegen, &toolchain.plotting, &toolchain.examples}) {
+      if (std::getline(beside, line)) *package = line;
+    }
     while (std::getline(beside, line)) toolchain.includes.emplace_back(line);
   } else {
     toolchain.python = "python3";
     toolchain.codegen = prefix / configured::installed_codegen;
+    toolchain.plotting = prefix / configured::installed_plotting;
+    toolchain.examples = prefix / configured::installed_examples;
     toolchain.includes.push_back(prefix / configured::installed_include);
   }
   for (const char* include : configured::includes) toolchain.includes.emplace_back(include);

@@ -12,11 +12,13 @@
 
 namespace pendula::io {
 
-/// What it takes to make a kernel of a model, and where it is kept.
+/// What it takes to make a kernel of a model and where it is kept, and what else runs in Python.
 struct Toolchain {
   std::string python;                           ///< with the packages of the generator
   std::string compiler;                         ///< C++20
   std::filesystem::path codegen;                ///< folder of the Python package pendula_codegen
+  std::filesystem::path plotting;               ///< folder of the Python package pendula_plot
+  std::filesystem::path examples;               ///< folder of the scenarios that come with pendula
   std::vector<std::filesystem::path> includes;  ///< of pendula, its generated headers, Eigen and xsimd
   std::filesystem::path cache;                  ///< folder of compiled kernels
 

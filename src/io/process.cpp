@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 extern char** environ;  // NOLINT(readability-redundant-declaration)
 
@@ -38,11 +39,19 @@ int wait_for(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
+/// Starts a program; its process, and errno where it could not be started.
+std::pair<pid_t, int> spawn(std::vector<std::string> arguments, std::vector<std::string> variables,
+                            const posix_spawn_file_actions_t* actions) {
+  for (char** variable = environ; *variable != nullptr; ++variable) variables.emplace_back(*variable);
+  pid_t child = 0;
+  const int error = posix_spawnp(&child, arguments.front().c_str(), actions, nullptr, pointers(arguments).data(),
+                                 pointers(variables).data());
+  return {child, error};
+}
+
 }  // namespace
 
 Ended run_process(const std::vector<std::string>& command, const std::vector<std::string>& environment) {
-  std::vector<std::string> arguments = command, variables = environment;
-  for (char** variable = environ; *variable != nullptr; ++variable) variables.emplace_back(*variable);
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) return {127, std::strerror(errno)};
   posix_spawn_file_actions_t actions;
@@ -50,18 +59,21 @@ Ended run_process(const std::vector<std::string>& command, const std::vector<std
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
   posix_spawn_file_actions_addclose(&actions, ends[0]);
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, command.front().c_str(), &actions, nullptr, pointers(arguments).data(),
-                                  pointers(variables).data());
+  const auto [child, error] = spawn(command, environment, &actions);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
-  Ended ended{127, failed != 0 ? std::strerror(failed) : ""};
-  if (failed == 0) {
+  Ended ended{127, error != 0 ? std::strerror(error) : ""};
+  if (error == 0) {
     ended.output = read_all(ends[0]);
     ended.status = wait_for(child);
   }
   close(ends[0]);
   return ended;
+}
+
+int run_attached(const std::vector<std::string>& command, const std::vector<std::string>& environment) {
+  const auto [child, error] = spawn(command, environment, nullptr);
+  return error != 0 ? 127 : wait_for(child);
 }
 
 }  // namespace pendula::io

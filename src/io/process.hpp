@@ -14,4 +14,7 @@ struct Ended {
 /// Runs a program and waits for it; `environment` are NAME=VALUE beside the present ones.
 Ended run_process(const std::vector<std::string>& command, const std::vector<std::string>& environment = {});
 
+/// The same with this program's standard streams; its exit status.
+int run_attached(const std::vector<std::string>& command, const std::vector<std::string>& environment = {});
+
 }  // namespace pendula::io

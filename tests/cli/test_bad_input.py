@@ -162,7 +162,7 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
 @pytest.mark.parametrize(
     ("arguments", "command", "message"),
     [
-        ([], "", "expected a command: simulate, check, kernels, build or new-model"),
+        ([], "", "expected a command: simulate, plot, gallery, check, kernels, build or new-model"),
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),
         (["simulate"], " simulate", "SCENARIO is required"),

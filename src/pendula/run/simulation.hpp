@@ -57,8 +57,8 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 /// Runs `integrator`, which `since_row` steps ago was at a row, on to the end of a schedule that began at the time
 /// `begin`. Calls on_row(const Motion&) every `schedule.every` accepted steps, and at the last state, also where the
 /// run fails or is stopped: bool stop() is asked after every step. Calls on_way(since_row, last) where a longer run
-/// would come by as well: where it begins, at every row, before a step that the end may cut short, and where the run fails or is stopped
-/// between rows; `last` tells that there may be none after it.
+/// would come by as well: where it begins, at every row, before a step that the end may cut short, and where the run
+/// fails or is stopped between rows; `last` tells that there may be none after it.
 template <class OnRow, class Stop, class OnWay>
 RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, std::int64_t since_row, OnRow on_row,
                 const Stop& stop, OnWay on_way) {

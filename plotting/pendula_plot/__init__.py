@@ -1,0 +1,1 @@
+"""Pictures of runs: plots for papers, films, and a gallery."""

@@ -1,0 +1,103 @@
+"""python -m pendula_plot: what `pendula plot`, `pendula gallery` and `simulate --video` call."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+REQUIREMENTS = Path(__file__).resolve().parents[1] / "requirements.txt"
+
+try:
+    import h5py  # noqa: F401
+    import matplotlib as mpl
+    import PIL  # noqa: F401
+
+    from .run import PlotError, read_run
+except ImportError as missing:
+    print(
+        f"pendula: pictures take a Python with the packages of {REQUIREMENTS}; {sys.executable}: {missing} "
+        "(PENDULA_PYTHON names another one)",
+        file=sys.stderr,
+    )
+    sys.exit(2)
+
+
+def plot(arguments: argparse.Namespace) -> None:
+    from .figure import Choice, figure, write
+
+    output = Path(arguments.output)
+    paths = [Path(run) for run in arguments.runs]
+    if any(output.exists() and path.exists() and output.samefile(path) for path in paths):
+        raise PlotError(f"{output}: expected a file for the picture, got a run itself")
+    runs = [read_run(path).between(arguments.start, arguments.end) for path in paths]
+    choice = Choice(
+        tuple(arguments.show.split(",")),
+        tuple(filter(None, arguments.coordinates.split(","))),
+        arguments.wrapped,
+    )
+    write(figure(runs, choice), output)
+
+
+def film(arguments: argparse.Namespace) -> None:
+    from .film import check, write
+
+    check(Path(arguments.output))
+    if arguments.run is None:
+        return
+    write(
+        read_run(Path(arguments.run)),
+        Path(arguments.output),
+        arguments.fps,
+        arguments.size,
+        arguments.seconds,
+    )
+
+
+def gallery(arguments: argparse.Namespace) -> None:
+    from .gallery import write
+
+    write(Path(arguments.folder), Path(arguments.scenarios), arguments.program, arguments.only)
+
+
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="pendula_plot")
+    commands = parser.add_subparsers(required=True)
+    command = commands.add_parser("plot")
+    command.add_argument("runs", nargs="+")
+    command.add_argument("--output", required=True)
+    command.add_argument("--show", default="series,phase,energy,trace")
+    command.add_argument("--coordinates", default="")
+    command.add_argument("--from", dest="start", type=float, default=float("-inf"))
+    command.add_argument("--to", dest="end", type=float, default=float("inf"))
+    command.add_argument("--wrapped", action="store_true")
+    command.set_defaults(run_command=plot)
+    command = commands.add_parser("film")
+    command.add_argument("run", nargs="?", help="none: only look whether a film of that name can be made")
+    command.add_argument("--output", required=True)
+    command.add_argument("--fps", type=float, default=30)
+    command.add_argument("--size", type=int, default=640)
+    command.add_argument("--seconds", type=float, default=float("inf"))
+    command.set_defaults(run_command=film)
+    command = commands.add_parser("gallery")
+    command.add_argument("folder")
+    command.add_argument("--scenarios", required=True)
+    command.add_argument("--program", required=True)
+    command.add_argument("--only", default="")
+    command.set_defaults(run_command=gallery)
+    return parser.parse_args()
+
+
+def main() -> int:
+    arguments = parse()
+    mpl.use("agg")
+    try:
+        arguments.run_command(arguments)
+    except PlotError as error:
+        print(f"pendula: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""Plots of runs as a numerical analyst wants them: coordinates over time, phase portraits, energy errors, traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .run import PlotError, Run
+
+# Okabe and Ito's colours, told apart by the colour-blind; black first.
+COLOURS = ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"]
+GREEK = {"theta": "θ", "phi": "φ", "alpha": "α", "beta": "β", "psi": "ψ"}
+MOST_CURVES = 7
+ROUNDING = 2.0**-53
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What to show of the runs."""
+
+    panels: tuple[str, ...]
+    coordinates: tuple[str, ...] = ()  # by name; none: a few
+    wrapped: bool = False
+
+
+def symbol(name: str) -> str:
+    """A name as it is printed: theta_dot_1 and theta_1_dot become θ̇₁."""
+    parts = name.split("_")
+    is_rate = "dot" in parts
+    base, *rest = [part for part in parts if part != "dot"]
+    index = "".join(rest)
+    head = GREEK.get(base, base)
+    if is_rate:
+        head = rf"\dot{{{head}}}" if len(head) == 1 else rf"\dot{{\mathrm{{{head}}}}}"
+    elif len(head) > 1:
+        head = rf"\mathrm{{{head}}}"
+    return f"${head}_{{{index}}}$" if index else f"${head}$"
+
+
+def label(run: Run, column: str) -> str:
+    unit = run.unit(column)
+    return f"{symbol(column)} [{unit}]" if unit else symbol(column)
+
+
+def is_angle(run: Run, column: str) -> bool:
+    return run.unit(column) == "rad"
+
+
+def shown(run: Run, column: str, choice: Choice) -> np.ndarray:
+    """A column; a wrapped angle is cut where it jumps."""
+    values = run.columns[column]
+    if not (choice.wrapped and is_angle(run, column)):
+        return values
+    wrapped = np.mod(values + np.pi, 2 * np.pi) - np.pi
+    jumps = np.flatnonzero(np.abs(np.diff(wrapped)) > np.pi) + 1
+    wrapped[jumps] = np.nan
+    return wrapped
+
+
+def chosen(runs: list[Run], choice: Choice) -> list[str]:
+    """Coordinates to show: those asked for, else as many of the first run as are told apart."""
+    there = [coordinate.name for coordinate in runs[0].coordinates]
+    for name in choice.coordinates:
+        for run in runs:
+            if name not in [coordinate.name for coordinate in run.coordinates]:
+                raise PlotError(f"{run.name}: expected a coordinate, one of {', '.join(there)}, got {name}")
+    if choice.coordinates:
+        return list(choice.coordinates)
+    if len(runs) > 1:
+        return there[-1:]
+    return there if len(there) <= MOST_CURVES else [*there[: MOST_CURVES - 1], there[-1]]
+
+
+def legend(axes: Axes) -> None:
+    if len(axes.get_legend_handles_labels()[0]) > 1:
+        axes.legend(loc="best", fontsize="small")
+
+
+def curves(runs: list[Run], names: list[str]) -> list[tuple[Run, str, str, str]]:
+    """Run, column, colour and name of each curve: runs by colour where there are several."""
+    if len(runs) == 1:
+        return [(runs[0], name, COLOURS[k % len(COLOURS)], symbol(name)) for k, name in enumerate(names)]
+    several = len(names) > 1
+    return [
+        (run, name, COLOURS[k % len(COLOURS)], run.name + (f", {symbol(name)}" if several else ""))
+        for k, run in enumerate(runs)
+        for name in names
+    ]
+
+
+def draw_series(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    names = chosen(runs, choice)
+    for run, name, colour, text in curves(runs, names):
+        axes.plot(run.time, shown(run, name, choice), color=colour, label=text)
+    units = {runs[0].unit(name) for name in names}
+    axes.set_xlabel(label(runs[0], "t"))
+    axes.set_ylabel(label(runs[0], names[0]) if len(names) == 1 else ", ".join(sorted(units)))
+    legend(axes)
+
+
+def draw_phase(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    name = (choice.coordinates or [runs[0].coordinates[-1].name])[-1]
+    rates = {coordinate.name: coordinate.rate for coordinate in runs[0].coordinates}
+    for run, column, colour, text in curves(runs, [name]):
+        axes.plot(
+            shown(run, column, choice), run.columns[rates[name]], color=colour, label=text, linewidth=0.7
+        )
+    axes.set_xlabel(label(runs[0], name))
+    axes.set_ylabel(label(runs[0], rates[name]))
+    if len(runs) > 1:
+        legend(axes)
+
+
+def draw_energy(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    """|E − E₀| against what rounding alone would give: a last bit of the largest energy a row, added up by chance."""
+    for k, run in enumerate(runs):
+        energy = run.columns["energy"]
+        error = np.abs(energy - energy[0])
+        size = max(np.max(np.abs(energy)), np.ptp(energy), np.max(kinetic_size(run)))
+        rows = np.arange(1, len(energy))
+        colour = COLOURS[k % len(COLOURS)]
+        axes.plot(run.time[1:], np.where(error[1:] > 0, error[1:], np.nan), color=colour, label=run.name)
+        if k == 0 and len(rows):
+            axes.plot(
+                run.time[1:],
+                ROUNDING * size * np.sqrt(rows),
+                color="#888888",
+                linestyle=":",
+                label="rounding",
+            )
+    axes.set_yscale("log")
+    axes.set_xlabel(label(runs[0], "t"))
+    axes.set_ylabel(f"$|E - E_0|$ [{runs[0].unit('energy')}]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def kinetic_size(run: Run) -> np.ndarray:
+    """What kinetic and potential energies amount to where the total is near zero: half of m v² of the last point, with
+    the mass 1 where it is not known."""
+    if not run.points or len(run.time) < 2:
+        return np.zeros(1)
+    masses = run.masses
+    steps = np.diff(run.positions()[:, -1], axis=0) / np.diff(run.time)[:, None]
+    return 0.5 * (1 if masses is None else masses[-1]) * np.sum(steps**2, axis=1)
+
+
+def draw_trace(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    space = runs[0].dimension == 3
+    for k, run in enumerate(runs):
+        places = run.positions()
+        path = places[:, -1]
+        axes.plot(*path.T, color=COLOURS[(k + 1) % len(COLOURS)], linewidth=0.7, label=run.name)
+        if run.is_chain:
+            chain = np.vstack([np.zeros(run.dimension), places[-1]])
+            axes.plot(*chain.T, color=COLOURS[0], marker="o", markersize=3, linewidth=1)
+    columns = runs[0].points[-1].columns
+    axes.set_xlabel(label(runs[0], columns[0]))
+    axes.set_ylabel(label(runs[0], columns[1]))
+    if space:
+        axes.set_zlabel(label(runs[0], columns[2]))
+    axes.set_aspect("equal", **({} if space else {"adjustable": "datalim"}))
+    if len(runs) > 1:
+        legend(axes)
+
+
+PANELS: dict[str, Callable[[Axes, list[Run], Choice], None]] = {
+    "series": draw_series,
+    "phase": draw_phase,
+    "energy": draw_energy,
+    "trace": draw_trace,
+}
+
+
+def possible(run: Run, panel: str) -> bool:
+    return panel != "trace" or run.dimension >= 2
+
+
+def figure(runs: list[Run], choice: Choice) -> Figure:
+    """All panels in one figure, two to a row."""
+    panels = [panel for panel in choice.panels if all(possible(run, panel) for run in runs)]
+    if not panels:
+        raise PlotError(f"{runs[0].name}: expected points to trace, got a run without any")
+    width = min(len(panels), 2)
+    height = (len(panels) + 1) // 2
+    with mpl.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0}):
+        drawn = Figure(figsize=(4.2 * width, 3.2 * height), layout="constrained")
+        for k, panel in enumerate(panels):
+            space = panel == "trace" and runs[0].dimension == 3
+            axes = drawn.add_subplot(height, width, k + 1, **({"projection": "3d"} if space else {}))
+            PANELS[panel](axes, runs, choice)
+    return drawn
+
+
+def write(drawn: Figure, path: Path) -> None:
+    """Writes a figure in the format that its name ends in; the same run gives the same file."""
+    formats = ("svg", "png", "pdf")
+    if path.suffix[1:].lower() not in formats:
+        raise PlotError(f"{path}: expected a name that ends in .svg, .png or .pdf")
+    unchanging = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    try:
+        with mpl.rc_context({"svg.hashsalt": "pendula"}):
+            drawn.savefig(path, dpi=200, metadata=unchanging.get(path.suffix[1:].lower()))
+    except OSError as error:
+        raise PlotError(
+            f"{path}: expected a file that can be written, got: {error.strerror or error}"
+        ) from None

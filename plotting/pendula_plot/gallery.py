@@ -1,0 +1,161 @@
+"""A page of striking motions: each with a small film, a page to look at it closely, and its scenario to copy."""
+
+from __future__ import annotations
+
+import html
+import shlex
+import subprocess
+import sys
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL import Image
+
+from .film import frames, save_frames
+from .run import PlotError, Run, read_run
+
+FPS, SIZE = 20, 320
+
+
+@dataclass(frozen=True)
+class Case:
+    """One motion; `scenario` is its file among the examples without its ending."""
+
+    scenario: str
+    title: str
+    text: str
+    seconds: float = 6
+    copies: int = 0  # further runs, each with a start that is 1e-9 away from the last
+
+    @property
+    def name(self) -> str:
+        """Of its files."""
+        return self.title.lower().replace(" ", "_").replace("'", "")
+
+
+CASES = (
+    Case("triple_pendulum", "Triple pendulum", "Three links let go from above: chaos that never settles."),
+    Case(
+        "triple_pendulum",
+        "Fifty copies",
+        "Each starts 10⁻⁹ rad from the next: they are one until chaos parts them.",
+        12,
+        49,
+    ),
+    Case("whip", "Whip in space", "Thirty links that get lighter: the end outruns everything before it."),
+    Case("rope", "Rope of 200 links", "Let go almost level, it curls, cracks and swings back."),
+    Case("conical", "Conical motion", "Three links turn around the vertical as one, nearly."),
+    Case("spherical_pendulum", "Precession", "A spherical pendulum: its ellipse turns."),
+    Case("driven_chain", "Kapitza's pendulum", "Shaken fast enough, it stands on its head."),
+    Case(
+        "swinging_atwood",
+        "Swinging Atwood machine",
+        "A counterweight of three times the bob: the ratio without chaos.",
+    ),
+    Case("spring_pendulum", "Spring pendulum", "Energy goes to and fro between bouncing and swinging.", 8),
+    Case("furuta", "Furuta pendulum", "A motor at the arm swings the rod up.", 10),
+    Case(
+        "driven_damped",
+        "Driven and damped",
+        "Friction in every joint, a push in rhythm: energy comes and goes.",
+    ),
+    Case("cart_chain", "Cart", "Two links on a cart that a force pushes to and fro."),
+)
+
+
+def settings(scenario: Path, seconds: float) -> list[str]:
+    """Rows close enough for a film, no longer than it."""
+    run = tomllib.loads(scenario.read_text(encoding="utf-8"))["run"]
+    every = max(1, int(0.02 / run.get("step", 1e-3)))
+    duration = min(seconds, run.get("duration", 10.0))
+    return ["--set", f"output.every={every}", "--set", f"run.duration={duration}"]
+
+
+def starts(scenario: Path, copies: int) -> list[list[str]]:
+    """Settings for the first angle of each run."""
+    if copies == 0:
+        return [[]]
+    first, *others = tomllib.loads(scenario.read_text(encoding="utf-8"))["start"]["theta"]
+    return [["--set", f"start.theta={[first + k * 1e-9, *others]}"] for k in range(copies + 1)]
+
+
+def simulate(program: str, scenario: Path, arguments: list[str]) -> None:
+    command = [program, "simulate", str(scenario), "--quiet", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise PlotError(f"{shlex.join(command)}: {done.stderr.strip()}")
+
+
+def runs_of(program: str, scenario: Path, case: Case) -> list[Run]:
+    with tempfile.TemporaryDirectory() as folder:
+        rows = Path(folder) / "rows.h5"
+        runs = []
+        for start in starts(scenario, case.copies):
+            simulate(program, scenario, [*settings(scenario, case.seconds), *start, "-o", str(rows)])
+            runs.append(read_run(rows))
+    return runs
+
+
+def make(program: str, scenario: Path, case: Case, folder: Path) -> list[Image.Image]:
+    """The film, a still of it, and the page of one case; gives the film's frames."""
+    images = list(frames(runs_of(program, scenario, case), FPS, SIZE))
+    images[len(images) // 2].save(folder / f"{case.name}.png", optimize=True)
+    save_frames(images, folder / f"{case.name}.webp", FPS)
+    copies = ["--copies", str(case.copies)] if case.copies else []
+    simulate(program, scenario, ["--view", str(folder / f"{case.name}.html"), *copies])
+    return images
+
+
+def strip(films: list[list[Image.Image]]) -> list[Image.Image]:
+    """Films side by side, as long as the longest; the others wait at their ends."""
+    return [
+        join([film[min(k, len(film) - 1)] for film in films]) for k in range(max(len(film) for film in films))
+    ]
+
+
+def join(images: list[Image.Image]) -> Image.Image:
+    joined = Image.new("RGB", (sum(image.width for image in images), images[0].height))
+    for k, image in enumerate(images):
+        joined.paste(image, (sum(other.width for other in images[:k]), 0))
+    return joined
+
+
+def card(case: Case, scenario: str) -> str:
+    name, title, text = case.name, html.escape(case.title), html.escape(case.text)
+    return f"""<article>
+<a href="{name}.html"><picture><source srcset="{name}.png" media="(prefers-reduced-motion: reduce)">
+<img src="{name}.webp" width="{SIZE}" height="{SIZE}" loading="lazy" alt="{title}, moving"></picture></a>
+<h2><a href="{name}.html">{title}</a></h2>
+<p>{text}</p>
+<details><summary>{case.scenario}.toml</summary>
+<button type="button">Copy</button>
+<pre tabindex="0" aria-label="{case.scenario}.toml">{html.escape(scenario)}</pre></details>
+</article>
+"""
+
+
+def write(folder: Path, scenarios: Path, program: str, only: str = "") -> None:
+    """Writes the gallery into a folder, which is made where it is not there. Raises PlotError.
+
+    index.html has a card for each case; strip.webp shows the first ones side by side.
+    """
+    cases = [case for case in CASES if not only or case.name in only.split(",")]
+    cards, films = [], []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for case in cases:
+            print(f"{case.title} …", file=sys.stderr, flush=True)
+            scenario = scenarios / f"{case.scenario}.toml"
+            films.append(make(program, scenario, case, folder))
+            cards.append(card(case, scenario.read_text(encoding="utf-8")))
+        shown = [[image.resize((240, 240), Image.Resampling.LANCZOS) for image in film] for film in films[:4]]
+        save_frames(strip(shown), folder / "strip.webp", FPS)
+        page = (Path(__file__).parent / "gallery.html").read_text(encoding="utf-8")
+        (folder / "index.html").write_text(page.replace("<!-- cards -->", "".join(cards)), encoding="utf-8")
+    except OSError as error:
+        raise PlotError(
+            f"{error.filename or folder}: expected a file that can be written, got: {error.strerror}"
+        ) from None
+    print(f"{folder / 'index.html'} is the gallery; open it in a browser")

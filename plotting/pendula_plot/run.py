@@ -1,0 +1,199 @@
+"""A run as its file has it: columns by name, as in the CSV file, whichever file it is."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+FIRST_UNITS = {"t": "s", "energy": "J"}
+
+
+class PlotError(Exception):
+    """A message for people: what was expected, and what there is."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One coordinate: the columns of its value and its rate."""
+
+    name: str
+    rate: str
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point: the columns of its components, two or three."""
+
+    name: str
+    columns: tuple[str, ...]
+
+
+@dataclass
+class Run:
+    """Rows of one run."""
+
+    name: str
+    columns: dict[str, np.ndarray]
+    units: dict[str, str] = field(default_factory=dict)
+    scenario: str = ""
+    settings: list[str] = field(default_factory=list)
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.columns["t"]
+
+    def unit(self, column: str) -> str:
+        """Of a column; of a CSV file, which names none, what SI has for it. Empty where that is unknown."""
+        if column in self.units:
+            return self.units[column]
+        return FIRST_UNITS.get(column) or self.guessed_units.get(column, "")
+
+    @cached_property
+    def coordinates(self) -> list[Coordinate]:
+        """Of a chain by link: `theta_1` with `theta_dot_1`; of a model `x` with `x_dot`."""
+        found = []
+        for name in self.columns:
+            base, _, link = name.rpartition("_")
+            rates = [f"{base}_dot_{link}"] if link.isdigit() else []
+            for rate in [*rates, f"{name}_dot"]:
+                if rate in self.columns and not (rate.startswith(base) and base.endswith("_dot")):
+                    found.append(Coordinate(name, rate))
+                    break
+        return found
+
+    @cached_property
+    def points(self) -> list[Point]:
+        """Of a chain `x_1`, `y_1`, …; of a model `bob_x`, `bob_y`, …"""
+        found = []
+        for name in self.columns:
+            if match := re.fullmatch(r"x_(\d+)", name):
+                link = match[1]
+                columns = [f"{axis}_{link}" for axis in "xyz"]
+            elif name.endswith("_x"):
+                columns = [f"{name[:-1]}{axis}" for axis in "xyz"]
+            else:
+                continue
+            there = tuple(column for column in columns if column in self.columns)
+            if len(there) >= 2:
+                found.append(Point(f"bob {link}" if match else name[:-2], there))
+        return found
+
+    @property
+    def is_chain(self) -> bool:
+        return "x_1" in self.columns
+
+    @property
+    def dimension(self) -> int:
+        """Of the space that the points are in; 0 without points."""
+        return max((len(point.columns) for point in self.points), default=0)
+
+    @cached_property
+    def guessed_units(self) -> dict[str, str]:
+        if not self.is_chain:
+            return {}
+        units = {}
+        for coordinate in self.coordinates:
+            units[coordinate.name], units[coordinate.rate] = "rad", "rad/s"
+        for point in self.points:
+            units.update(dict.fromkeys(point.columns, "m"))
+        return units
+
+    def positions(self) -> np.ndarray:
+        """All points at all times, (rows, points, dimension); planar ones among spatial ones at z = 0."""
+        places = np.zeros((len(self.time), len(self.points), self.dimension))
+        for k, point in enumerate(self.points):
+            for axis, column in enumerate(point.columns):
+                places[:, k, axis] = self.columns[column]
+        return places
+
+    @cached_property
+    def masses(self) -> np.ndarray | None:
+        """Of a chain's bobs, as far as its scenario tells them."""
+        try:
+            chain = tomllib.loads(self.scenario).get("chain", {})
+        except tomllib.TOMLDecodeError:
+            return None
+        masses = chain.get("masses")
+        if masses is None or not self.is_chain:
+            return None
+        masses = np.ravel(np.asarray(masses, dtype=float))
+        return np.full(len(self.points), masses[0]) if len(masses) == 1 else masses
+
+    def between(self, start: float, end: float) -> Run:
+        """The rows from one time to another."""
+        wanted = (self.time >= start) & (self.time <= end)
+        if not wanted.any():
+            got = f"rows from t = {self.time[0]:g} to {self.time[-1]:g}"
+            raise PlotError(f"{self.name}: expected rows between --from and --to, got {got}")
+        columns = {name: values[wanted] for name, values in self.columns.items()}
+        return Run(self.name, columns, self.units, self.scenario, self.settings)
+
+
+def read_run(path: Path) -> Run:
+    """Reads a trajectory, CSV or HDF5, also one that is still growing. Raises PlotError."""
+    try:
+        with path.open("rb") as stream:
+            is_hdf5 = stream.read(8) == b"\x89HDF\r\n\x1a\n"
+        run = read_hdf5(path) if is_hdf5 else read_csv(path)
+    except OSError as error:
+        raise PlotError(
+            f"{path}: expected a trajectory that can be read, got: {error.strerror or error}"
+        ) from None
+    if len(run.time) == 0:
+        raise PlotError(f"{path}: expected rows, got none")
+    return run
+
+
+def read_hdf5(path: Path) -> Run:
+    import h5py
+
+    columns, units = {}, {}
+    with h5py.File(path, "r") as file:
+        if "t" not in file or "run" not in file:
+            raise PlotError(f"{path}: expected a trajectory, got an HDF5 file without t and run")
+        rows = min(file[name].shape[0] for name in file if name not in ("run", "link"))
+        for name in file:
+            if name in ("run", "link"):
+                continue
+            data, unit = file[name][:rows], str(file[name].attrs.get("units", ""))
+            links = [""] if data.ndim == 1 else [f"_{k + 1}" for k in range(data.shape[1])]
+            for k, link in enumerate(links):
+                columns[name + link] = data if data.ndim == 1 else data[:, k]
+                units[name + link] = unit
+        scenario, settings = (file["run"][name].asstr()[()] for name in ("scenario", "set"))
+    return Run(str(path), columns, units, scenario, json.loads(settings))
+
+
+def read_csv(path: Path) -> Run:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise PlotError(f"{path}: expected a trajectory, CSV or HDF5, got a file that is no text") from None
+    # A run that is still going may just be writing the last line.
+    lines = text[: text.rfind("\n") + 1].splitlines()
+    header = lines[0].split(",") if lines else []
+    if header[:1] != ["t"]:
+        got = "an empty file" if not header else lines[0] if len(lines[0]) <= 60 else lines[0][:60] + "…"
+        raise PlotError(f"{path}: expected a trajectory with columns t, …, got {got}")
+    try:
+        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+        columns = dict(zip(header, rows.reshape(-1, len(header)).T, strict=True))
+    except ValueError:
+        number = next(k for k, line in enumerate(lines[1:], start=2) if not is_row(line, len(header)))
+        raise PlotError(f"{path}:{number}: expected a number in each of the {len(header)} columns") from None
+    return Run(str(path), columns)
+
+
+def is_row(line: str, columns: int) -> bool:
+    try:
+        numbers = [float(cell) for cell in line.split(",")]
+    except ValueError:
+        return False
+    return len(numbers) == columns and all(map(math.isfinite, numbers))

@@ -1,0 +1,55 @@
+#include <filesystem>
+#include <pendula/numeric/number_text.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "io/input_error.hpp"
+#include "io/kernel_cache.hpp"
+#include "io/process.hpp"
+
+namespace pendula::cli {
+namespace {
+
+/// Runs the Python package pendula_plot, which says itself what is wrong.
+ExitStatus draw(const std::vector<std::string>& arguments) {
+  const io::Toolchain toolchain = io::Toolchain::of_this_program();
+  std::vector<std::string> command{toolchain.python, "-m", "pendula_plot"};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  const int status =
+      io::run_attached(command, {"PYTHONPATH=" + toolchain.plotting.string(), "PYTHONDONTWRITEBYTECODE=1"});
+  if (status == 127) {
+    throw io::InputError("pictures take a Python, and " + toolchain.python +
+                         " could not be started (PENDULA_PYTHON names another one)");
+  }
+  return status == 0 ? done : status == 2 ? wrong_input : failed;
+}
+
+}  // namespace
+
+ExitStatus plot(const PlotOptions& options) {
+  std::vector<std::string> arguments{"plot", "--output=" + options.output, "--show=" + options.show,
+                                     "--coordinates=" + options.coordinates};
+  if (options.from) arguments.push_back("--from=" + shortest(*options.from));
+  if (options.to) arguments.push_back("--to=" + shortest(*options.to));
+  if (options.wrapped) arguments.emplace_back("--wrapped");
+  arguments.emplace_back("--");
+  arguments.insert(arguments.end(), options.runs.begin(), options.runs.end());
+  return draw(arguments);
+}
+
+ExitStatus check_film(const std::string& output) {
+  return draw({"film", "--output=" + output});
+}
+
+ExitStatus film(const std::string& run, const std::string& output) {
+  return draw({"film", "--output=" + output, "--", run});
+}
+
+ExitStatus gallery(const std::string& folder) {
+  const io::Toolchain toolchain = io::Toolchain::of_this_program();
+  return draw({"gallery", "--scenarios=" + toolchain.examples.string(),
+               "--program=" + std::filesystem::read_symlink("/proc/self/exe").string(), "--", folder});
+}
+
+}  // namespace pendula::cli

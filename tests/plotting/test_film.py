@@ -1,0 +1,96 @@
+"""`simulate --video` and `pendula gallery`."""
+
+import os
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+FAKE_FFMPEG = """#!/bin/sh
+for last; do :; done
+echo "$@" > arguments.txt
+cat > "$last"
+"""
+
+
+def frames_of(file: Path) -> list[np.ndarray]:
+    frames = []
+    with Image.open(file) as film:
+        for k in range(film.n_frames):
+            film.seek(k)
+            frames.append(np.asarray(film.convert("RGB"), dtype=int))
+    return frames
+
+
+@pytest.mark.parametrize("ending", ["webp", "gif"])
+@pytest.mark.parametrize("scenario", ["double", "space"])
+def test_a_film_moves_in_real_time(scenario, ending, runs, pendula):
+    film = pendula(
+        "simulate", f"{scenario}.toml", "--set", "run.duration=1.0", "--video", f"film.{ending}", "--quiet"
+    )
+    assert (film.returncode, film.stdout, film.stderr) == (0, "", "")
+    frames = frames_of(runs / f"film.{ending}")
+    assert len(frames) == 31 and frames[0].shape == (640, 640, 3)
+    assert all(np.abs(a - b).max() > 30 for a, b in pairwise(frames))
+    assert not list(runs.glob("film.*.h5"))
+
+
+def test_a_film_of_a_run_file_leaves_the_file(runs, pendula):
+    film = pendula(
+        "simulate", "double.toml", "--set", "run.duration=0.2", "--video", "film.gif", "-o", "kept.h5"
+    )
+    assert film.returncode == 0 and (runs / "kept.h5").exists() and len(frames_of(runs / "film.gif")) == 7
+
+
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
+def test_ffmpeg_gets_every_frame(ending, runs, pendula):
+    tools = runs / "tools"
+    tools.mkdir()
+    (tools / "ffmpeg").write_text(FAKE_FFMPEG)
+    (tools / "ffmpeg").chmod(0o755)
+    path = f"{tools}:{os.environ['PATH']}"
+    film = pendula(
+        "simulate", "double.toml", "--set", "run.duration=0.5", "--video", f"film.{ending}", PATH=path
+    )
+    assert film.returncode == 0, film.stderr
+    assert (runs / f"film.{ending}").stat().st_size == 16 * 640 * 640 * 3
+    assert re.search(r"-s 640x640 -r 30 -i - .*-pix_fmt yuv420p", (runs / "arguments.txt").read_text())
+
+
+def test_what_cannot_be_filmed_is_told_before_the_run(runs, pendula):
+    for name, expected in [
+        ("film.avi", "film.avi: expected a name that ends in .mp4, .webm (by ffmpeg), .gif or .webp"),
+        ("film.mp4", "film.mp4: expected ffmpeg on this machine, got none; .gif and .webp take no ffmpeg"),
+        ("no/film.gif", "no/film.gif: expected a file that can be written, got: no/ does not exist"),
+    ]:
+        film = pendula("simulate", "double.toml", "--video", name, "-o", "out.csv", PATH=str(runs))
+        assert (film.returncode, film.stdout, film.stderr) == (2, "", f"pendula: {expected}\n")
+    assert not (runs / "out.csv").exists()
+
+
+def test_a_gallery_has_what_its_page_shows(runs, pendula):
+    from pendula_plot import gallery
+
+    only = "conical_motion,fifty_copies"
+    gallery.write(
+        runs / "gallery", Path(__file__).parents[2] / "examples", os.environ["PENDULA_PROGRAM"], only
+    )
+    page = (runs / "gallery/index.html").read_text()
+    assert page.count("<article>") == 2
+    for name in re.findall(r'(?:src|srcset|href)="([^"]+)"', page):
+        assert (runs / "gallery" / name).stat().st_size > 1000, name
+    scenario = (Path(__file__).parents[2] / "examples/conical.toml").read_text()
+    assert scenario.splitlines()[5] in page
+    assert len(frames_of(runs / "gallery/strip.webp")) == 241  # twelve seconds of the copies
+
+
+def test_every_case_of_the_gallery_is_an_example():
+    from pendula_plot.gallery import CASES
+
+    names = {file.stem for file in (Path(__file__).parents[2] / "examples").glob("*.toml")}
+    assert {case.scenario for case in CASES} <= names and len({case.name for case in CASES}) == len(
+        CASES
+    ) == 12

@@ -1,0 +1,129 @@
+"""`pendula plot`: what the pictures show, and what is said where there is nothing to show."""
+
+import numpy as np
+import pytest
+from pendula_plot.figure import Choice, figure, symbol
+from pendula_plot.run import read_run
+
+ALL = ("series", "phase", "energy", "trace")
+
+
+def test_both_kinds_of_file_are_the_same_run(runs):
+    text, binary = read_run(runs / "double.csv"), read_run(runs / "double.h5")
+    assert set(text.columns) == set(binary.columns)
+    for name, values in text.columns.items():
+        assert np.array_equal(values, binary.columns[name]), name
+        assert text.unit(name) == binary.unit(name), name
+    assert list(binary.masses) == [1.0, 0.5] and text.masses is None
+
+
+def test_panels_show_the_columns_of_the_run(runs):
+    run = read_run(runs / "double.h5")
+    series, phase, energy, trace = figure([run], Choice(ALL)).axes
+    first, second = series.lines
+    assert np.array_equal(first.get_ydata(), run.columns["theta_1"])
+    assert np.array_equal(second.get_ydata(), run.columns["theta_2"])
+    assert [text.get_text() for text in series.get_legend().get_texts()] == ["$θ_{1}$", "$θ_{2}$"]
+    assert np.array_equal(phase.lines[0].get_xdata(), run.columns["theta_2"])
+    assert np.array_equal(phase.lines[0].get_ydata(), run.columns["theta_dot_2"])
+    assert phase.get_xlabel() == "$θ_{2}$ [rad]" and phase.get_ylabel() == r"$\dot{θ}_{2}$ [rad/s]"
+    error = np.abs(run.columns["energy"] - run.columns["energy"][0])[1:]
+    assert np.array_equal(np.nan_to_num(energy.lines[0].get_ydata()), error)
+    rounding = energy.lines[1].get_ydata()
+    assert rounding[-1] == pytest.approx(rounding[0] * np.sqrt(len(rounding)))
+    assert energy.get_yscale() == "log" and energy.get_ylabel() == "$|E - E_0|$ [J]"
+    assert np.array_equal(trace.lines[0].get_ydata(), run.columns["y_2"])
+
+
+def test_space_is_traced_in_space(runs):
+    (trace,) = figure([read_run(runs / "space.h5")], Choice(("trace",))).axes
+    assert trace.name == "3d" and trace.get_zlabel() == "$z_{2}$ [m]"
+
+
+def test_several_runs_lie_over_each_other(runs):
+    series, *_ = figure(
+        [read_run(runs / name) for name in ("double.h5", "space.h5")], Choice(("series",))
+    ).axes
+    assert [line.get_label().rpartition("/")[2] for line in series.lines] == ["double.h5", "space.h5"]
+
+
+def test_wrapped_angles_are_cut_where_they_jump(runs):
+    run = read_run(runs / "double.h5")
+    (series,) = figure([run], Choice(("series",), ("theta_2",), wrapped=True)).axes
+    shown, whole = series.lines[0].get_ydata(), run.columns["theta_2"]
+    assert np.max(np.abs(whole)) > np.pi and np.isnan(shown).any()
+    there = ~np.isnan(shown)
+    assert np.max(np.abs(shown[there])) <= np.pi
+    assert np.allclose(np.sin(shown[there]), np.sin(whole[there]), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "printed"),
+    [
+        ("theta_1", "$θ_{1}$"),
+        ("theta_dot_12", r"$\dot{θ}_{12}$"),
+        ("theta_1_dot", r"$\dot{θ}_{1}$"),
+        ("x", "$x$"),
+    ],
+)
+def test_names_are_printed_as_in_books(name, printed):
+    assert symbol(name) == printed
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_pictures_are_written_alike_each_time(ending, runs, pendula):
+    begin = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}[ending]
+    for name in ("a", "b"):
+        plot = pendula("plot", "double.h5", "space.h5", "-o", f"{name}.{ending}", "--from", "1", "--to", "2")
+        assert (plot.returncode, plot.stdout, plot.stderr) == (0, "", "")
+    assert (runs / f"a.{ending}").read_bytes().startswith(begin)
+    assert (runs / f"a.{ending}").read_bytes() == (runs / f"b.{ending}").read_bytes()
+
+
+def test_what_is_wrong_is_told(runs, pendula):
+    (runs / "text.csv").write_text("a,b\n1,2\n")
+    (runs / "torn.csv").write_text("t,x_1,y_1,energy\n0,1,2,3\n0.1,1,oops,3\n")
+    (runs / "bytes.csv").write_bytes(b"\xff\xfe\x00")
+    (runs / "header.csv").write_text("t,x_1,y_1,energy\n")
+    before = (runs / "double.h5").read_bytes()
+    for arguments, expected in [
+        (["none.csv"], "none.csv: expected a trajectory that can be read, got: No such file or directory"),
+        (["text.csv"], "text.csv: expected a trajectory with columns t, …, got a,b"),
+        (["torn.csv"], "torn.csv:3: expected a number in each of the 4 columns"),
+        (["bytes.csv"], "bytes.csv: expected a trajectory, CSV or HDF5, got a file that is no text"),
+        (["header.csv"], "header.csv: expected rows, got none"),
+        (
+            ["double.h5", "--from", "5"],
+            "double.h5: expected rows between --from and --to, got rows from t = 0 to 3",
+        ),
+        (
+            ["double.h5", "--coordinates", "theta_3"],
+            "double.h5: expected a coordinate, one of theta_1, theta_2, got theta_3",
+        ),
+        (["double.h5", "-o", "a.bmp"], "a.bmp: expected a name that ends in .svg, .png or .pdf"),
+        (
+            ["double.h5", "-o", "no/a.svg"],
+            "no/a.svg: expected a file that can be written, got: No such file or directory",
+        ),
+        (["double.h5", "-o", "double.h5"], "double.h5: expected a file for the picture, got a run itself"),
+    ]:
+        output = [] if "-o" in arguments else ["-o", "a.svg"]
+        plot = pendula("plot", *arguments, *output)
+        assert (plot.returncode, plot.stderr) == (2, f"pendula: {expected}\n")
+    assert (runs / "double.h5").read_bytes() == before
+    assert not (runs / "a.svg").exists()
+
+
+def test_a_row_that_is_just_being_written_is_left_out(runs):
+    whole = (runs / "double.csv").read_text()
+    (runs / "double.csv").write_text(whole[:-20])
+    assert len(read_run(runs / "double.csv").time) == whole.count("\n") - 2
+
+
+def test_a_missing_python_is_told(runs, pendula):
+    plot = pendula("plot", "double.h5", "-o", "a.svg", PENDULA_PYTHON="/none/python")
+    assert plot.returncode == 2
+    expected = (
+        "pictures take a Python, and /none/python could not be started (PENDULA_PYTHON names another one)"
+    )
+    assert plot.stderr == f"pendula: {expected}\n"
