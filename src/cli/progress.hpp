@@ -23,13 +23,14 @@ class Progress : public Observer {
   Progress(const RunSetup& setup, bool wanted)
       : start_time_(setup.start.time),
         duration_(setup.duration),
-        every_(setup.every),
+        every_(setup.rows.any() ? 0 : setup.every),
         scale_(setup.subject->energy_scale().value_or(0)),
         conserves_(!setup.subject->loaded()),
         shown_(wanted && isatty(STDERR_FILENO) != 0) {}
 
   void take(const Row& row) override {
     if (!shown_) return;
+    if (rows_ == 0) first_share_ = share_at(row.motion.time);
     follow(row.seen);
     const auto now = Clock::now();
     if (now - drawn_at_ < std::chrono::milliseconds(100)) return;
@@ -51,14 +52,17 @@ class Progress : public Observer {
     if (!(scale_ > 0)) largest_ = std::max(largest_, std::abs(seen.kinetic) + std::abs(seen.potential()));
   }
 
+  double share_at(double time) const { return duration_ > 0 ? std::min(1.0, (time - start_time_) / duration_) : 1; }
+
   std::string line(const Row& row, double seconds) const {
-    const double elapsed = row.motion.time - start_time_;
-    const double share = duration_ > 0 ? std::min(1.0, elapsed / duration_) : 1;
+    const double share = share_at(row.motion.time);
     std::string text = rounded(std::floor(100 * share), 3) + " %   t = " + rounded(row.motion.time) + " of " +
                        rounded(start_time_ + duration_);
     if (seconds > 0) {
-      text += "   " + rounded(static_cast<double>((rows_ - 1) * every_) / seconds, 3) + " steps/s";
-      if (share > 0) text += "   " + rest_text(seconds / share * (1 - share)) + " left";
+      const auto rows = static_cast<double>(rows_ - 1);
+      text += "   " + (every_ > 0 ? rounded(rows * static_cast<double>(every_) / seconds, 3) + " steps/s"
+                                  : rounded(rows / seconds, 3) + " rows/s");
+      if (share > first_share_) text += "   " + rest_text(seconds / (share - first_share_) * (1 - share)) + " left";
     }
     const double scale = scale_ > 0 ? scale_ : largest_;
     if (conserves_ && scale > 0) {
@@ -75,11 +79,12 @@ class Progress : public Observer {
   }
 
   double start_time_, duration_;
-  std::int64_t every_;
+  std::int64_t every_;  // steps from row to row; 0: rows are wanted at times
   double scale_;
   bool conserves_, shown_;
   bool is_drawn_ = false;
   std::int64_t rows_ = 0;
+  double first_share_ = 0;                 // of a run that goes on, what was there already
   double first_energy_ = 0, largest_ = 0;  // J
   Clock::time_point began_ = Clock::now(), drawn_at_ = began_;
 };

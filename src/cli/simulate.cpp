@@ -203,6 +203,7 @@ class Session {
     summary.run = setup_.options;
     summary.duration = setup_.duration;
     summary.every = setup_.every;
+    summary.at = setup_.rows;
     summary.ending = io::ending_of(summary, setup_.subject->coordinates());
     if (page_) finish_page(interrupted, summary);
     if (options_.video) make_film(summary);
@@ -332,6 +333,7 @@ ExitStatus simulate(const SimulateOptions& options) {
                              .options = scenario.run,
                              .duration = scenario.duration,
                              .every = scenario.every,
+                             .rows = scenario.rows,
                              .checkpoint = scenario.checkpoint};
         io::Summary summary = Session(setup, scene_of(scenario, source), scenario, source, model, options).run();
         describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);

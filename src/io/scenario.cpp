@@ -32,10 +32,10 @@ constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
 constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "form",      "solver",
                                                       "iteration", "step",   "tolerance", "duration"};
-constexpr std::array<std::string_view, 2> output_keys = {"every", "checkpoint"};
+constexpr std::array<std::string_view, 4> output_keys = {"every", "interval", "times", "checkpoint"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 37> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 39> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -71,6 +71,8 @@ constexpr std::array<std::string_view, 37> all_keys = {"chain.space",
                                                        "run.tolerance",
                                                        "run.duration",
                                                        "output.every",
+                                                       "output.interval",
+                                                       "output.times",
                                                        "output.checkpoint"};
 
 constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
@@ -351,6 +353,34 @@ Chain<Space> build_chain(const Section& section, ChainParameters<Space> paramete
   }
 }
 
+/// Times of [output], which say in one way when rows are wanted.
+RowTimes read_row_times(const Section& section, double duration) {
+  constexpr std::array<std::string_view, 3> ways = {"every", "interval", "times"};
+  std::optional<Entry> first;
+  for (const std::string_view way : ways) {
+    const auto entry = section.find(way);
+    if (entry && first) entry->fail("nothing beside output." + first->key().substr(first->key().rfind('.') + 1));
+    if (entry) first = entry;
+  }
+  RowTimes rows;
+  rows.interval = number(section, "interval", 0, Sign::positive);
+  if (rows.interval > 0 && duration / rows.interval > max_steps) {
+    section.find("interval")->fail("an interval that time can tell, at least " + shortest(duration / max_steps));
+  }
+  const auto times = section.find("times");
+  if (!times) return rows;
+  if (times->size() == 0) times->fail("times in s, one at least");
+  for (std::size_t k = 0; k < times->size(); ++k) {
+    const double time = times->element(k).number();
+    const double least = k == 0 ? 0 : rows.times.back();
+    if (!(time >= least) || time > duration || (k > 0 && time == least)) {
+      times->element(k).fail("a time after the one before it, from 0 to run.duration");
+    }
+    rows.times.push_back(time);
+  }
+  return rows;
+}
+
 /// What [run] and [output] say.
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
@@ -360,6 +390,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   if (const auto every = sections.output.find("every")) {
     plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
   }
+  plan.rows = read_row_times(sections.output, plan.duration);
   plan.checkpoint = number(sections.output, "checkpoint", plan.checkpoint, Sign::positive);
   for (const std::string_view key : run_keys) {
     if (const auto entry = sections.run.find(key)) plan.places[std::string(key)] = entry->place();

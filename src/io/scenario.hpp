@@ -8,6 +8,7 @@
 #include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/state.hpp>
+#include <pendula/run/row_times.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/motion.hpp>
@@ -35,6 +36,7 @@ struct RunPlan {
   RunOptions run;
   double duration = 10;
   std::int64_t every = 10;              ///< steps from row to row
+  RowTimes rows;                        ///< where there are any, in place of that
   double checkpoint = 60;               ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
   std::vector<std::string> warnings;    ///< what is odd but no error, one sentence each

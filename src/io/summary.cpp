@@ -123,6 +123,12 @@ std::string plural(std::int64_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
+std::string rows_text(const Summary& summary, const std::string& unit) {
+  if (summary.at.interval > 0) return "a row every " + shortest(summary.at.interval) + unit;
+  if (summary.at.any()) return "rows at " + plural(static_cast<std::int64_t>(summary.at.times.size()), "time");
+  return "a row every " + plural(summary.every, "step");
+}
+
 std::string shown_or_dash(double value, int digits) {
   return std::isfinite(value) ? rounded(value, digits) : "-";
 }
@@ -169,7 +175,7 @@ std::string settings(const Summary& summary) {
   const std::string time(unit.time);
   text += is_adaptive(summary.run.method) ? line("tolerance", shortest(summary.run.tolerance))
                                           : line("step", shortest(summary.run.step) + time);
-  text += line("duration", shortest(summary.duration) + time + ", a row every " + plural(summary.every, "step"));
+  text += line("duration", shortest(summary.duration) + time + ", " + rows_text(summary, time));
   if (model.natural) {
     text += line("units", "l_1 = " + rounded(model.natural->length) + " m, M_1 = " + rounded(model.natural->mass) +
                               " kg, sqrt(l_1/g) = " + rounded(model.natural->time) + " s");
@@ -328,7 +334,8 @@ std::string to_json(const Summary& summary) {
                    {"step", where(!adaptive, summary.run.step)},
                    {"tolerance", where(adaptive, summary.run.tolerance)},
                    {"duration", summary.duration},
-                   {"every", summary.every},
+                   {"every", where(!summary.at.any(), summary.every)},
+                   {"interval", where(summary.at.interval > 0, summary.at.interval)},
                    {"steps", summary.statistics.steps},
                    {"rejected_steps", summary.statistics.rejected_steps},
                    {"newton_iterations", summary.statistics.newton_iterations},

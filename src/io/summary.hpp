@@ -6,6 +6,7 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/state.hpp>
+#include <pendula/run/row_times.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/system/options.hpp>
@@ -64,6 +65,7 @@ struct Summary : RunReport {
   RunOptions run;       ///< as asked for
   double duration = 0;  ///< as asked for
   std::int64_t every = 0;
+  RowTimes at;  ///< rows are there, where there are any
   Ending ending;
   std::vector<std::string> shown;         ///< columns of the table
   Snapshot final;                         ///< the last state reached, of a chain

@@ -51,13 +51,15 @@ class Run {
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
   void integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report);
   void take(const Motion& motion);
-  void come_by(std::int64_t since_row, bool last);
+  Observation look_at(const Motion& motion);
+  void come_by(const RowPlace& place, bool last);
   void finish(RunReport& report);
 
   RunSetup setup_;
   std::unique_ptr<Integrator> integrator_;
   std::vector<Observer*> observers_;
-  RunRecord record_;
+  RunRecord record_;       // of the rows; where those are wanted at times, of the first and the last state, too
+  std::int64_t rows_ = 0;  // that there were
   std::vector<double> row_;
   std::chrono::steady_clock::time_point kept_ = std::chrono::steady_clock::now();
 };
@@ -83,7 +85,7 @@ inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& st
   integrate(from, stop, report);
   finish(report);
   report.last = record_.last();
-  report.rows = record_.rows();
+  report.rows = rows_;
   report.description = integrator_->describe();
   report.statistics = integrator_->statistics();
   report.energy_error = record_.energy_error();
@@ -97,13 +99,16 @@ inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& st
 inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
   const RunOptions& options = setup_.options;
   const double largest_step = is_adaptive(options.method) ? std::numeric_limits<double>::infinity() : options.step;
-  const Schedule schedule{largest_step, setup_.duration, setup_.every};
+  const Schedule schedule{largest_step, setup_.duration, setup_.every, setup_.rows};
   const auto on_row = [&](const Motion& motion) { take(motion); };
-  const auto on_way = [&](std::int64_t since_row, bool last) { come_by(since_row, last); };
+  const auto on_way = [&](const RowPlace& place, bool last) { come_by(place, last); };
+  rows_ = from == nullptr ? 0 : from->rows;
   try {
+    if (from == nullptr && setup_.rows.any() && setup_.rows.at(0) != 0) look_at(setup_.start);
     const RunResult result = from == nullptr ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way)
                                              : pendula::go_on(*integrator_, setup_.start.time, schedule,
-                                                              from->since_row, on_row, stop, on_way);
+                                                              {from->rows, from->since_row}, on_row, stop, on_way);
+    if (setup_.rows.any() && integrator_->time() != record_.last().time) look_at(integrator_->state());
     report.stepping_seconds = result.stepping_seconds;
     report.step = result.outcome;
     report.end = !result.outcome ? RunEnd::step_failed : result.stopped ? RunEnd::stopped : RunEnd::complete;
@@ -116,17 +121,23 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
   }
 }
 
-// The energy is not finite wherever anything else is not.
 inline void Run::take(const Motion& motion) {
-  const Observation seen = setup_.subject->observe(motion);
+  const Observation seen = look_at(motion);
+  ++rows_;
+  for (Observer* observer : observers_) observer->take({motion, seen, row_});
+}
+
+// The energy is not finite wherever anything else is not.
+inline Observation Run::look_at(const Motion& motion) {
+  Observation seen = setup_.subject->observe(motion);
   if (!std::isfinite(seen.energy)) throw NotFinite();
   row_.clear();
   setup_.subject->append_row(motion, seen, row_);
   record_.add(motion, seen, row_, integrator_->statistics().load_work);
-  for (Observer* observer : observers_) observer->take({motion, seen, row_});
+  return seen;
 }
 
-inline void Run::come_by(std::int64_t since_row, bool last) {
+inline void Run::come_by(const RowPlace& place, bool last) {
   using Clock = std::chrono::steady_clock;
   if (!last) {
     if (std::isinf(setup_.checkpoint)) return;
@@ -134,7 +145,7 @@ inline void Run::come_by(std::int64_t since_row, bool last) {
     if (std::chrono::duration<double>(now - kept_).count() < setup_.checkpoint) return;
     kept_ = now;
   }
-  const Checkpoint checkpoint{integrator_->time(), record_.rows(), since_row, integrator_->member(),
+  const Checkpoint checkpoint{integrator_->time(), place.rows, place.since_row, integrator_->member(),
                               member_of(record_)};
   for (Observer* observer : observers_) observer->keep(checkpoint);
 }

@@ -4,6 +4,7 @@
 #include <exception>
 #include <limits>
 #include <memory>
+#include <pendula/run/row_times.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
@@ -21,6 +22,7 @@ struct RunSetup {
   RunOptions options;
   double duration = 10;     ///< s
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
+  RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
   bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
   double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
 };

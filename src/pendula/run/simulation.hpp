@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/row_times.hpp>
 #include <pendula/system/outcome.hpp>
 #include <stdexcept>
 #include <string>
@@ -17,6 +19,7 @@ struct Schedule {
   double step = 1e-3;       ///< s; for adaptive methods the largest step, may be infinite
   double duration = 10;     ///< s; the last step is cut so that the run ends there
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
+  RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
 };
 
 /// What came of a run.
@@ -33,6 +36,8 @@ inline void require(const Schedule& schedule) {
   if (!(schedule.step > 0)) reject("step: expected a positive number");
   if (!(schedule.duration >= 0) || std::isinf(schedule.duration)) reject("duration: expected a number, not negative");
   if (schedule.every < 1) reject("every: expected at least 1");
+  if (!(schedule.rows.interval >= 0)) reject("rows: expected an interval that is not negative");
+  if (!std::ranges::is_sorted(schedule.rows.times)) reject("rows: expected times that ascend");
 }
 
 /// Size of the next step. A rest that is one step but for rounding is taken as one step, not as a step and a sliver.
@@ -54,60 +59,148 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 
 }  // namespace detail
 
-/// Runs `integrator`, which `since_row` steps ago was at a row, on to the end of a schedule that began at the time
-/// `begin`. Calls on_row(const Motion&) every `schedule.every` accepted steps, and at the last state, also where the
-/// run fails or is stopped: bool stop() is asked after every step. Calls on_way(since_row, last) where a longer run
-/// would come by as well: where it begins, at every row, before a step that the end may cut short, and where the run
-/// fails or is stopped between rows; `last` tells that there may be none after it.
+/// Where a run is among its rows.
+struct RowPlace {
+  std::int64_t rows = 0;       ///< that there were
+  std::int64_t since_row = 0;  ///< steps since the last of them; 0 where rows are wanted at times
+};
+
+namespace detail {
+
+/// What a run goes by, and who is told: see go_on.
 template <class OnRow, class Stop, class OnWay>
-RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, std::int64_t since_row, OnRow on_row,
+struct Course {
+  Integrator& integrator;
+  double begin;
+  const Schedule& schedule;
+  RowPlace place;
+  OnRow on_row;
+  const Stop& stop;
+  OnWay on_way;
+  RunResult result = {};
+  bool near_end = false;  // the end may have had a say in a step since: a longer run would not come by here
+
+  double elapsed() const { return integrator.time() - begin; }
+  bool is_over() const { return at_end(schedule, elapsed()); }
+  bool goes_on() const { return result.outcome && !result.stopped; }
+
+  void step() {
+    const double h = next_step(schedule, elapsed());
+    const bool was_near = std::exchange(near_end, may_be_cut(schedule, h, result.outcome.step));
+    if (near_end && !was_near) on_way(place, true);
+    result.outcome = integrator.step(h);
+    result.stopped = stop();
+  }
+
+  void row(const Motion& motion) {
+    on_row(motion);
+    ++place.rows;
+    place.since_row = 0;
+  }
+
+  void come_by() {
+    if (!near_end) on_way(place, !goes_on() || is_over());
+  }
+
+  /// A row every so many steps, and at the last state.
+  void to_next_row() {
+    while (place.since_row < schedule.every && goes_on() && !is_over()) {
+      step();
+      if (result.outcome) ++place.since_row;
+    }
+  }
+  void take_row() {
+    const bool is_row = place.since_row == schedule.every;
+    if (!is_row) come_by();
+    if (place.since_row > 0) row(integrator.state());
+    if (is_row) come_by();
+  }
+
+  /// Rows at times: steps to the first one that comes by some; then again from where that began, to each time exactly,
+  /// and on from where it ended.
+  void to_next_times() {
+    while (goes_on() && !is_over()) {
+      const double reach = std::isinf(schedule.step) ? 10 * result.outcome.step : schedule.step;
+      if (reach == 0 || schedule.rows.at(place.rows) <= (elapsed() + reach) * (1 + 1e-9)) before = integrator.member();
+      step();
+      if (result.outcome && schedule.rows.at(place.rows) <= elapsed() + slack()) return;
+    }
+  }
+  void take_times() {
+    const double reached = elapsed();
+    if (!result.outcome || schedule.rows.at(place.rows) > reached + slack()) return come_by();
+    const Member after = integrator.member();
+    for (double time = 0; (time = schedule.rows.at(place.rows)) <= reached + slack();) {
+      if (std::abs(time - reached) <= slack()) {
+        row(at(time));
+        continue;
+      }
+      integrator.resume(before);
+      Outcome part;
+      while (part && time - elapsed() > slack()) part = integrator.step(time - elapsed());
+      if (!part) {
+        result.outcome = part;
+        return;
+      }
+      row(at(time));
+      integrator.resume(after);
+    }
+    come_by();
+  }
+
+  double slack() const { return 4 * std::numeric_limits<double>::epsilon() * schedule.duration; }
+  Motion at(double time) const {
+    Motion motion = integrator.state();
+    motion.time = begin + time;
+    return motion;
+  }
+
+  Member before = {};  // of a step that comes by rows
+};
+
+}  // namespace detail
+
+/// Runs `integrator`, which is at `place`, on to the end of a schedule that began at the time `begin`. Calls
+/// on_row(const Motion&) every `schedule.every` accepted steps, and at the last state, also where the run fails or is
+/// stopped; or at the times of `schedule.rows`, which the steps do not depend on. bool stop() is asked after every
+/// step. Calls on_way(place, last) where a longer run would come by as well: where it begins, where rows are, before a
+/// step that the end may cut short, and where the run fails or is stopped; `last` tells that there may be none after
+/// it.
+template <class OnRow, class Stop, class OnWay>
+RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, const RowPlace& place, OnRow on_row,
                 const Stop& stop, OnWay on_way) {
   using Clock = std::chrono::steady_clock;
   detail::require(schedule);
-  const auto is_over = [&] { return detail::at_end(schedule, integrator.time() - begin); };
-  RunResult result;
-  bool near_end = false;
-  on_way(since_row, true);
-  while (result.outcome && !result.stopped && !is_over()) {
+  detail::Course<OnRow, Stop, OnWay> course{integrator, begin, schedule, place, on_row, stop, on_way};
+  const bool at_times = schedule.rows.any();
+  on_way(place, true);
+  while (course.goes_on() && !course.is_over()) {
     const auto before = Clock::now();
-    while (since_row < schedule.every && result.outcome && !result.stopped) {
-      if (is_over()) break;
-      const double h = detail::next_step(schedule, integrator.time() - begin);
-      const bool was_near = std::exchange(near_end, detail::may_be_cut(schedule, h, result.outcome.step));
-      if (near_end && !was_near) on_way(since_row, true);
-      result.outcome = integrator.step(h);
-      if (result.outcome) ++since_row;
-      result.stopped = stop();
-    }
-    result.stepping_seconds += std::chrono::duration<double>(Clock::now() - before).count();
-    const bool is_row = since_row == schedule.every;
-    if (!is_row && !near_end) on_way(since_row, true);
-    if (since_row > 0) on_row(integrator.state());
-    since_row = 0;
-    if (is_row && !near_end) {
-      on_way(since_row, !result.outcome || result.stopped || is_over());
-    }
+    at_times ? course.to_next_times() : course.to_next_row();
+    course.result.stepping_seconds += std::chrono::duration<double>(Clock::now() - before).count();
+    at_times ? course.take_times() : course.take_row();
   }
-  return result;
+  return course.result;
 }
 
-/// Runs `integrator` from `start`, which is a row, over `schedule`. Throws std::invalid_argument on a schedule that
-/// makes no sense.
+/// Runs `integrator` from `start`, which is a row unless rows are wanted at other times, over `schedule`. Throws
+/// std::invalid_argument on a schedule that makes no sense.
 template <class OnRow, class Stop, class OnWay>
 RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
                    const Stop& stop, OnWay on_way) {
   detail::require(schedule);
   const Outcome started = integrator.start(start);
-  on_row(start);
+  const bool is_row = !schedule.rows.any() || schedule.rows.at(0) == 0;
+  if (is_row) on_row(start);
   if (!started) return {.outcome = started};
-  return go_on(integrator, start.time, schedule, 0, on_row, stop, on_way);
+  return go_on(integrator, start.time, schedule, {is_row ? 1 : 0, 0}, on_row, stop, on_way);
 }
 
 /// The same without a way.
 template <class OnRow, class Stop>
 RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
                    const Stop& stop) {
-  return simulate(integrator, start, schedule, on_row, stop, [](std::int64_t, bool) {});
+  return simulate(integrator, start, schedule, on_row, stop, [](const RowPlace&, bool) {});
 }
 
 /// The same to the end of the schedule.
