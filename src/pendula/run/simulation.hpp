@@ -123,21 +123,20 @@ struct Course {
       const double reach = std::isinf(schedule.step) ? 10 * result.outcome.step : schedule.step;
       if (reach == 0 || schedule.rows.at(place.rows) <= (elapsed() + reach) * (1 + 1e-9)) before = integrator.member();
       step();
-      if (result.outcome && schedule.rows.at(place.rows) <= elapsed() + slack()) return;
+      if (result.outcome && is_reached(schedule.rows.at(place.rows))) return;
     }
   }
   void take_times() {
-    const double reached = elapsed();
-    if (!result.outcome || schedule.rows.at(place.rows) > reached + slack()) return come_by();
+    if (!result.outcome || !is_reached(schedule.rows.at(place.rows))) return come_by();
     const Member after = integrator.member();
-    for (double time = 0; (time = schedule.rows.at(place.rows)) <= reached + slack();) {
-      if (std::abs(time - reached) <= slack()) {
+    for (double time = 0; is_reached(time = schedule.rows.at(place.rows));) {
+      if (elapsed() - time <= slack()) {
         row(at(time));
         continue;
       }
       integrator.resume(before);
       Outcome part;
-      while (part && time - elapsed() > slack()) part = integrator.step(time - elapsed());
+      while (part && !is_reached(time)) part = integrator.step(time - elapsed());
       if (!part) {
         result.outcome = part;
         return;
@@ -148,7 +147,9 @@ struct Course {
     come_by();
   }
 
-  double slack() const { return 4 * std::numeric_limits<double>::epsilon() * schedule.duration; }
+  // But for rounding, whatever the end of the run is.
+  double slack() const { return 8 * std::numeric_limits<double>::epsilon() * elapsed(); }
+  bool is_reached(double time) const { return time <= elapsed() + slack(); }
   Motion at(double time) const {
     Motion motion = integrator.state();
     motion.time = begin + time;
