@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "io/input_error.hpp"
+#include "io/link_target.hpp"
 #include "io/output_error.hpp"
 
 namespace pendula::io {
@@ -176,8 +177,8 @@ RunFile::~RunFile() {
 void RunFile::open_part(const std::string& name) {
   name_ = name;
   std::error_code unknown;
-  target_ = fs::weakly_canonical(name, unknown).string();
-  if (name.empty() || target_.empty()) reject_output(name, name, ENOENT);
+  target_ = link_target(name);
+  if (name.empty()) reject_output(name, name, ENOENT);
   if (fs::is_directory(target_, unknown)) reject_output(name, name, EISDIR);
   if (fs::exists(target_, unknown)) {
     if (!fs::is_regular_file(target_, unknown)) reject_output(name, "no regular file; HDF5 files are");

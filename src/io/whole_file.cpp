@@ -10,30 +10,18 @@
 #include <system_error>
 #include <utility>
 
+#include "io/link_target.hpp"
 #include "io/output_error.hpp"
 
 namespace pendula::io {
-namespace {
 
 namespace fs = std::filesystem;
-
-/// The file that a name leads to by links, whether it is there or not.
-std::string followed(const std::string& name) {
-  std::error_code unknown;
-  fs::path file = name;
-  for (int links = 0; links < 40 && fs::is_symlink(file, unknown); ++links) {
-    file = file.parent_path() / fs::read_symlink(file, unknown);
-  }
-  return file.string();
-}
-
-}  // namespace
 
 WholeFile::WholeFile(const std::string& name) : name_(name), target_(name) {
   std::error_code unknown;
   if (name.empty() || fs::is_directory(name, unknown)) reject_output(name, name, name.empty() ? ENOENT : EISDIR);
   const bool is_special = fs::exists(name, unknown) && !fs::is_regular_file(name, unknown);
-  if (!is_special) target_ = followed(name);
+  if (!is_special) target_ = link_target(name);
   if (fs::exists(target_, unknown) && access(target_.c_str(), W_OK) != 0) reject_output(name, target_, errno);
   if (!is_special) part_ = target_ + ".part" + std::to_string(getpid());
   const std::string& opened = is_special ? target_ : part_;

@@ -241,6 +241,15 @@ def test_an_interrupted_run_without_a_run_file_leaves_one_to_go_on_from(scenario
     assert whole == first[: len(whole) - len(new)] + new
 
 
+def test_a_link_leads_to_the_file(pendula, scenario, tmp_path):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "run.h5").symlink_to("there/real.h5")
+    file = scenario(DOUBLE)
+    assert pendula("simulate", file, "-o", "run.h5").status == 0
+    assert pendula("simulate", "--resume", "run.h5", "--set", "run.duration=2").status == 0
+    assert (tmp_path / "run.h5").is_symlink() and rows_of(tmp_path / "there/real.h5") == 41
+
+
 def test_what_cannot_go_on_is_refused(pendula, scenario, tmp_path):
     file = scenario(DOUBLE)
     pendula("simulate", file, "-o", "run.h5")
