@@ -1,6 +1,7 @@
 #include "io/run_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -273,6 +274,11 @@ void RunFile::keep(const Checkpoint& checkpoint) {
     });
     put_in_place();
   }
+  if (full_ != 0) {
+    waits_ = true;
+    guarded([&] { flush(); });
+    throw OutputError(name_, full_);
+  }
   if (is_due()) guarded([&] { flush(); });
 }
 
@@ -316,6 +322,17 @@ void RunFile::flush(std::size_t rows) {
   hdf5::flush(file_, path_);
   in_file_ = rows;
   flushed_ = Clock::now();
+  reserve();
+}
+
+/// Takes room on the disk for one more block, packed and not, and what leads to it: where there is none, this run can
+/// still write its last rows and where to go on from.
+void RunFile::reserve() {
+  const std::size_t wanted = 2 * sizeof(double) * chunk_rows_ * columns_ + (std::size_t{1} << 18);
+  struct stat status {};
+  if (fstat(lock_.descriptor(), &status) != 0) return;
+  if (fallocate(lock_.descriptor(), FALLOC_FL_KEEP_SIZE, status.st_size, static_cast<off_t>(wanted)) == 0) return;
+  if (errno == ENOSPC || errno == EDQUOT) full_ = errno;  // other files cannot be asked
 }
 
 void RunFile::put_in_place() {
@@ -332,7 +349,9 @@ void RunFile::finish() {
   run_.close();
   const bool closed = file_.close();
   hdf5::mark_as_closed(path_);
-  if (!closed) throw OutputError(name_, "HDF5 could not close it");
+  struct stat status {};
+  const bool released = fstat(lock_.descriptor(), &status) == 0 && ftruncate(lock_.descriptor(), status.st_size) == 0;
+  if (!closed || !released) throw OutputError(name_, "HDF5 could not close it");
   put_in_place();
 }
 

@@ -57,6 +57,7 @@ class RunFile : public RowsFile {
   /// Throws OutputError where rows cannot be written.
   void take(const Row& row) override;
   void keep(const Checkpoint& checkpoint) override;
+  bool wants_checkpoint() const override { return full_ != 0; }
   void finish() override;
 
   std::int64_t rows() const override { return static_cast<std::int64_t>(in_file_); }
@@ -69,6 +70,7 @@ class RunFile : public RowsFile {
    public:
     ~Lock();
     void take(const std::string& file, const std::string& name);
+    int descriptor() const { return descriptor_; }
 
    private:
     int descriptor_ = -1;
@@ -80,6 +82,7 @@ class RunFile : public RowsFile {
   void put_in_place();
   void write_rows();
   void write_rest();
+  void reserve();
   void abandon();
   void flush();
   void flush(std::size_t rows);
@@ -101,6 +104,7 @@ class RunFile : public RowsFile {
   std::size_t in_file_ = 0;      // rows that can be read
   bool waits_ = false;           // the block began before the last flush
   bool unpacked_ = false;        // it was written before it was full, and so stays: its place could not be used again
+  int full_ = 0;                 // errno: the disk has room only for what is to be written last
   std::optional<Checkpoint> kept_;  // and not yet written
   std::uint64_t serial_ = 0;        // of checkpoints
   Clock::time_point flushed_ = Clock::now();

@@ -2,6 +2,7 @@
 
 import random
 import resource
+import shlex
 import shutil
 import signal
 import subprocess
@@ -210,6 +211,37 @@ def test_a_full_disk_leaves_what_was_written(scenario, tmp_path):
     assert full.stderr.endswith("pendula: run.h5: could not be written: File too large\n")
     assert rows_of(tmp_path / "run.h5") > 40000  # 64 bytes a row, and a block of 4096 is lost
     shutil.copy(tmp_path / "run.h5", tmp_path / "kept.h5")
+    subprocess.run(
+        [program(), "simulate", "--resume", "run.h5"], cwd=tmp_path, check=True, capture_output=True
+    )
+    subprocess.run(
+        [program(), "simulate", file, *long, "-o", "whole.h5"], cwd=tmp_path, check=True, capture_output=True
+    )
+    assert_same_rows(tmp_path / "whole.h5", tmp_path / "run.h5")
+
+
+def test_a_full_disk_has_the_last_row_and_where_to_go_on_from(scenario, tmp_path):
+    """A disk of four megabytes, in a name space of its own: room for the end is taken beforehand."""
+    file = scenario(DOUBLE)
+    long = settings("run.step=1e-3", "run.duration=300", "output.every=1")
+    (tmp_path / "disk").mkdir()
+    mount = "mount -t tmpfs -o size=4m tmpfs disk"
+    if (
+        subprocess.run(["unshare", "-rm", "sh", "-c", mount], cwd=tmp_path, capture_output=True).returncode
+        != 0
+    ):
+        pytest.skip("no file system can be mounted here")
+    command = shlex.join([program(), "simulate", str(file), *long, "-o", "disk/run.h5"])
+    inside = f"{mount} && {command}; status=$?; cp disk/run.h5 . && exit $status"
+    full = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", inside], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert full.returncode == 1
+    assert full.stderr.endswith("pendula: disk/run.h5: could not be written: No space left on device\n")
+    with h5py.File(tmp_path / "run.h5") as run:
+        rows, kept = run["t"].shape[0], run["run/checkpoint"][:, 3].max()
+        assert f"disk/run.h5, {rows} rows\n" in full.stdout
+    assert rows == kept > 40000
     subprocess.run(
         [program(), "simulate", "--resume", "run.h5"], cwd=tmp_path, check=True, capture_output=True
     )

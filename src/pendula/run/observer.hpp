@@ -27,6 +27,8 @@ class Observer {
 
   /// Where the run may go on from, once it is over: after the rows that it has come by.
   virtual void keep(const Checkpoint&) {}
+  /// Whether the next place to go on from is wanted, whatever the time.
+  virtual bool wants_checkpoint() const { return false; }
 
   /// After the last row, however the run ended.
   virtual void finish() {}

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -139,7 +140,8 @@ inline Observation Run::look_at(const Motion& motion) {
 
 inline void Run::come_by(const RowPlace& place, bool last) {
   using Clock = std::chrono::steady_clock;
-  if (!last) {
+  const auto wants = [](const Observer* observer) { return observer->wants_checkpoint(); };
+  if (!last && std::ranges::none_of(observers_, wants)) {
     if (std::isinf(setup_.checkpoint)) return;
     const Clock::time_point now = Clock::now();
     if (std::chrono::duration<double>(now - kept_).count() < setup_.checkpoint) return;
