@@ -2,6 +2,7 @@
 
 import os
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -29,11 +30,11 @@ def frames_of(file: Path) -> list[np.ndarray]:
 @pytest.mark.parametrize("scenario", ["double", "space"])
 def test_a_film_moves_in_real_time(scenario, ending, runs, pendula):
     film = pendula(
-        "simulate", f"{scenario}.toml", "--set", "run.duration=1.0", "--video", f"film.{ending}", "--quiet"
+        "simulate", f"{scenario}.toml", "--set", "run.duration=0.3", "--video", f"film.{ending}", "--quiet"
     )
     assert (film.returncode, film.stdout, film.stderr) == (0, "", "")
     frames = frames_of(runs / f"film.{ending}")
-    assert len(frames) == 31 and frames[0].shape == (640, 640, 3)
+    assert len(frames) == 10 and frames[0].shape == (640, 640, 3)
     assert all(np.abs(a - b).max() > 30 for a, b in pairwise(frames))
     assert not list(runs.glob("film.*.h5"))
 
@@ -53,10 +54,10 @@ def test_ffmpeg_gets_every_frame(ending, runs, pendula):
     (tools / "ffmpeg").chmod(0o755)
     path = f"{tools}:{os.environ['PATH']}"
     film = pendula(
-        "simulate", "double.toml", "--set", "run.duration=0.5", "--video", f"film.{ending}", PATH=path
+        "simulate", "double.toml", "--set", "run.duration=0.2", "--video", f"film.{ending}", PATH=path
     )
     assert film.returncode == 0, film.stderr
-    assert (runs / f"film.{ending}").stat().st_size == 16 * 640 * 640 * 3
+    assert (runs / f"film.{ending}").stat().st_size == 7 * 640 * 640 * 3
     assert re.search(r"-s 640x640 -r 30 -i - .*-pix_fmt yuv420p", (runs / "arguments.txt").read_text())
 
 
@@ -74,17 +75,27 @@ def test_what_cannot_be_filmed_is_told_before_the_run(runs, pendula):
 def test_a_gallery_has_what_its_page_shows(runs, pendula):
     from pendula_plot import gallery
 
-    only = "conical_motion,fifty_copies"
-    gallery.write(
-        runs / "gallery", Path(__file__).parents[2] / "examples", os.environ["PENDULA_PROGRAM"], only
-    )
+    examples = Path(__file__).parents[2] / "examples"
+    gallery.write(runs / "gallery", examples, os.environ["PENDULA_PROGRAM"], "conical_motion")
     page = (runs / "gallery/index.html").read_text()
-    assert page.count("<article>") == 2
+    assert page.count("<article>") == 1
     for name in re.findall(r'(?:src|srcset|href)="([^"]+)"', page):
         assert (runs / "gallery" / name).stat().st_size > 1000, name
-    scenario = (Path(__file__).parents[2] / "examples/conical.toml").read_text()
-    assert scenario.splitlines()[5] in page
-    assert len(frames_of(runs / "gallery/strip.webp")) == 241  # twelve seconds of the copies
+    assert (examples / "conical.toml").read_text().splitlines()[5] in page
+    assert len(frames_of(runs / "gallery/strip.webp")) == 121
+
+
+def test_copies_start_apart_and_share_a_picture(runs):
+    from pendula_plot.film import frames
+    from pendula_plot.gallery import CASES, runs_of
+
+    (case,) = (case for case in CASES if case.copies)
+    case = replace(case, copies=2, seconds=0.2)
+    scenario = Path(__file__).parents[2] / f"examples/{case.scenario}.toml"
+    copies = runs_of(os.environ["PENDULA_PROGRAM"], scenario, case)
+    starts = [run.columns["theta_1"][0] for run in copies]
+    assert np.allclose(np.diff(starts), 1e-9, atol=1e-15)
+    assert len(list(frames(copies, 20, 100))) == 5
 
 
 def test_every_case_of_the_gallery_is_an_example():

@@ -1,7 +1,10 @@
 """`pendula plot`: what the pictures show, and what is said where there is nothing to show."""
 
+import sys
+
 import numpy as np
 import pytest
+from pendula_plot.__main__ import main
 from pendula_plot.figure import Choice, figure, symbol
 from pendula_plot.run import read_run
 
@@ -80,7 +83,8 @@ def test_pictures_are_written_alike_each_time(ending, runs, pendula):
     assert (runs / f"a.{ending}").read_bytes() == (runs / f"b.{ending}").read_bytes()
 
 
-def test_what_is_wrong_is_told(runs, pendula):
+def test_what_is_wrong_is_told(runs, pendula, monkeypatch, capsys):
+    monkeypatch.chdir(runs)
     (runs / "text.csv").write_text("a,b\n1,2\n")
     (runs / "torn.csv").write_text("t,x_1,y_1,energy\n0,1,2,3\n0.1,1,oops,3\n")
     (runs / "bytes.csv").write_bytes(b"\xff\xfe\x00")
@@ -100,16 +104,22 @@ def test_what_is_wrong_is_told(runs, pendula):
             ["double.h5", "--coordinates", "theta_3"],
             "double.h5: expected a coordinate, one of theta_1, theta_2, got theta_3",
         ),
-        (["double.h5", "-o", "a.bmp"], "a.bmp: expected a name that ends in .svg, .png or .pdf"),
+        (["double.h5", "--output", "a.bmp"], "a.bmp: expected a name that ends in .svg, .png or .pdf"),
         (
-            ["double.h5", "-o", "no/a.svg"],
+            ["double.h5", "--output", "no/a.svg"],
             "no/a.svg: expected a file that can be written, got: No such file or directory",
         ),
-        (["double.h5", "-o", "double.h5"], "double.h5: expected a file for the picture, got a run itself"),
+        (
+            ["double.h5", "--output", "double.h5"],
+            "double.h5: expected a file for the picture, got a run itself",
+        ),
     ]:
-        output = [] if "-o" in arguments else ["-o", "a.svg"]
-        plot = pendula("plot", *arguments, *output)
-        assert (plot.returncode, plot.stderr) == (2, f"pendula: {expected}\n")
+        output = [] if "--output" in arguments else ["--output", "a.svg"]
+        monkeypatch.setattr(sys, "argv", ["pendula_plot", "plot", *arguments, *output])
+        assert main() == 2
+        assert capsys.readouterr().err == f"pendula: {expected}\n"
+    plot = pendula("plot", "none.csv", "-o", "a.svg")  # so through the program
+    assert (plot.returncode, plot.stderr.count("\n")) == (2, 1)
     assert (runs / "double.h5").read_bytes() == before
     assert not (runs / "a.svg").exists()
 

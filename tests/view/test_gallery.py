@@ -16,7 +16,7 @@ def index(tmp_path_factory) -> str:
     from pendula_plot import gallery
 
     folder = tmp_path_factory.mktemp("gallery")
-    gallery.write(folder, ROOT / "examples", os.environ["PENDULA_PROGRAM"], "conical_motion,precession")
+    gallery.write(folder, ROOT / "examples", os.environ["PENDULA_PROGRAM"], "conical_motion")
     return f"file://{folder}/index.html"
 
 
