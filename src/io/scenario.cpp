@@ -353,28 +353,22 @@ Chain<Space> build_chain(const Section& section, ChainParameters<Space> paramete
   }
 }
 
-/// Times of [output], which say in one way when rows are wanted.
+/// Times of [output].
 RowTimes read_row_times(const Section& section, double duration) {
-  constexpr std::array<std::string_view, 3> ways = {"every", "interval", "times"};
-  std::optional<Entry> first;
-  for (const std::string_view way : ways) {
-    const auto entry = section.find(way);
-    if (entry && first) entry->fail("nothing beside output." + first->key().substr(first->key().rfind('.') + 1));
-    if (entry) first = entry;
-  }
+  const auto interval = section.find("interval"), listed = section.find("times");
+  if (interval && listed) listed->fail("nothing beside output.interval");
   RowTimes rows;
   rows.interval = number(section, "interval", 0, Sign::positive);
   if (rows.interval > 0 && duration / rows.interval > max_steps) {
-    section.find("interval")->fail("an interval that time can tell, at least " + shortest(duration / max_steps));
+    interval->fail("an interval that time can tell, at least " + shortest(duration / max_steps));
   }
-  const auto times = section.find("times");
-  if (!times) return rows;
-  if (times->size() == 0) times->fail("times in s, one at least");
-  for (std::size_t k = 0; k < times->size(); ++k) {
-    const double time = times->element(k).number();
+  if (!listed) return rows;
+  if (listed->size() == 0) listed->fail("times in s, one at least");
+  for (std::size_t k = 0; k < listed->size(); ++k) {
+    const double time = listed->element(k).number();
     const double least = k == 0 ? 0 : rows.times.back();
     if (!(time >= least) || time > duration || (k > 0 && time == least)) {
-      times->element(k).fail("a time after the one before it, from 0 to run.duration");
+      listed->element(k).fail("a time after the one before it, from 0 to run.duration");
     }
     rows.times.push_back(time);
   }
@@ -387,10 +381,10 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.duration = read_duration(sections.run, plan.run);
   const std::vector<std::string> unused = unused_keys(sections.run, plan.run.method);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
-  if (const auto every = sections.output.find("every")) {
-    plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
-  }
+  const auto every = sections.output.find("every");
+  if (every) plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
   plan.rows = read_row_times(sections.output, plan.duration);
+  if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
   plan.checkpoint = number(sections.output, "checkpoint", plan.checkpoint, Sign::positive);
   for (const std::string_view key : run_keys) {
     if (const auto entry = sections.run.find(key)) plan.places[std::string(key)] = entry->place();
