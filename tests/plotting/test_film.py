@@ -105,3 +105,9 @@ def test_every_case_of_the_gallery_is_an_example():
     assert {case.scenario for case in CASES} <= names and len({case.name for case in CASES}) == len(
         CASES
     ) == 12
+    listed = (Path(__file__).parents[2] / "docs/gallery.md").read_text()
+    for case in CASES:
+        assert (
+            f"| {case.title} | {case.text} | [{case.scenario}.toml](../examples/{case.scenario}.toml) |"
+            in listed
+        )
