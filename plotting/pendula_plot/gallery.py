@@ -17,6 +17,7 @@ from .film import frames, save_frames
 from .run import PlotError, Run, read_run
 
 FPS, SIZE = 20, 320
+TITLE = "<title>pendula: a gallery</title>"
 
 
 @dataclass(frozen=True)
@@ -142,9 +143,15 @@ def write(folder: Path, scenarios: Path, program: str, only: str = "") -> None:
     index.html has a card for each case; strip.webp shows the first ones side by side.
     """
     cases = [case for case in CASES if not only or case.name in only.split(",")]
+    template = (Path(__file__).parent / "gallery.html").read_text(encoding="utf-8")
+    index = folder / "index.html"
     cards, films = [], []
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        if index.exists() and TITLE not in index.read_text(encoding="utf-8", errors="replace"):
+            raise PlotError(
+                f"{index}: expected a folder for the gallery, got one with a page of another kind"
+            )
         for case in cases:
             print(f"{case.title} …", file=sys.stderr, flush=True)
             scenario = scenarios / f"{case.scenario}.toml"
@@ -152,10 +159,9 @@ def write(folder: Path, scenarios: Path, program: str, only: str = "") -> None:
             cards.append(card(case, scenario.read_text(encoding="utf-8")))
         shown = [[image.resize((240, 240), Image.Resampling.LANCZOS) for image in film] for film in films[:4]]
         save_frames(strip(shown), folder / "strip.webp", FPS)
-        page = (Path(__file__).parent / "gallery.html").read_text(encoding="utf-8")
-        (folder / "index.html").write_text(page.replace("<!-- cards -->", "".join(cards)), encoding="utf-8")
+        index.write_text(template.replace("<!-- cards -->", "".join(cards)), encoding="utf-8")
     except OSError as error:
         raise PlotError(
             f"{error.filename or folder}: expected a file that can be written, got: {error.strerror}"
         ) from None
-    print(f"{folder / 'index.html'} is the gallery; open it in a browser")
+    print(f"{index} is the gallery; open it in a browser")

@@ -32,6 +32,16 @@ void require_same(const std::string& file, const std::string& what, const std::s
   throw io::InputError(file + ": expected a run of " + what + " " + here + ", got one of " + got);
 }
 
+/// Whose numbers a checkpoint has: which of them runs may hang on the kernels of a build.
+void require_same_solver(const io::RunOrigin& began, const io::RunOrigin& here) {
+  if (began.solver == here.solver && began.kernel == here.kernel) return;
+  const auto told = [](const io::RunOrigin& origin) {
+    return "solver \"" + origin.solver + "\"" + (origin.kernel.empty() ? "" : " on the kernel " + origin.kernel);
+  };
+  throw io::InputError(began.scenario_name + ": the run began by " + told(began) + ", and this build would go on by " +
+                       told(here) + ": go on with a build that has the same kernels");
+}
+
 }  // namespace
 
 RunSource read_run_source(const SimulateOptions& options) {
@@ -70,6 +80,7 @@ io::RunOrigin origin_of(const RunSource& source, const Description& description,
   origin.scenario = source.text.text;
   origin.overrides = source.overrides;
   origin.model = model;
+  if (source.saved) require_same_solver(source.saved->origin, origin);
   return origin;
 }
 

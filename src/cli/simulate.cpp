@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
@@ -238,11 +240,13 @@ class Session {
   /// A film is made of a run file: of the one that is asked for, or of one that goes again.
   std::unique_ptr<io::RunFile> open_film_rows(const std::vector<Quantity>& quantities) const {
     if (!options_.video || (output_ && is_run_file(*output_))) return nullptr;
-    return std::make_unique<io::RunFile>(*options_.video + ".h5", origin_, quantities);
+    return std::make_unique<io::RunFile>(film_rows_name(), origin_, quantities);
   }
 
+  std::string film_rows_name() const { return *options_.video + ".rows" + std::to_string(getpid()) + ".h5"; }
+
   void make_film(io::Summary& summary) {
-    const std::string rows = film_rows_ ? *options_.video + ".h5" : *output_;
+    const std::string rows = film_rows_ ? film_rows_name() : *output_;
     if (film(rows, *options_.video) != done && summary.ending.ok()) {
       summary.ending = {"output_failed", *options_.video + ": the film could not be made", {}, {}};
     }

@@ -169,10 +169,10 @@ RunFile::RunFile(const std::string& name, const std::string& from, std::int64_t 
 
 RunFile::~RunFile() {
   try {
-    finish();
+    close();
   } catch (...) {  // said where somebody listens: in finish
   }
-  if (path_ != target_) unlink(path_.c_str());
+  if (path_ != target_) unlink(path_.c_str());  // nobody has asked for it: what was there before stays
 }
 
 void RunFile::open_part(const std::string& name) {
@@ -343,6 +343,12 @@ void RunFile::put_in_place() {
 
 void RunFile::finish() {
   if (file_.get() < 0) return;
+  close();
+  put_in_place();
+}
+
+void RunFile::close() {
+  if (file_.get() < 0) return;
   guarded([&] { write_rest(); });
   checkpoint_.close();
   for (hdf5::Handle& dataset : datasets_) dataset.close();
@@ -352,7 +358,6 @@ void RunFile::finish() {
   struct stat status {};
   const bool released = fstat(lock_.descriptor(), &status) == 0 && ftruncate(lock_.descriptor(), status.st_size) == 0;
   if (!closed || !released) throw OutputError(name_, "HDF5 could not close it");
-  put_in_place();
 }
 
 /// Leaves the file as it was flushed last.

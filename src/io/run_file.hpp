@@ -24,8 +24,6 @@ struct RunOrigin {
   std::string scenario;                ///< its text
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::string model;                   ///< text of the model's file; empty where there is none
-
-  bool operator==(const RunOrigin&) const = default;
 };
 
 /// What a run goes on from.
@@ -80,6 +78,7 @@ class RunFile : public RowsFile {
   void create(const RunOrigin& origin);
   void reopen(std::int64_t rows);
   void put_in_place();
+  void close();
   void write_rows();
   void write_rest();
   void reserve();

@@ -1,6 +1,7 @@
 """Run files: what is in them for others to read, and runs that go on from them as if they had never stopped."""
 
 import random
+import re
 import resource
 import shlex
 import shutil
@@ -195,6 +196,14 @@ def test_a_file_is_read_while_it_is_written(scenario, tmp_path):
     assert told.endswith("; to go on: pendula simulate --resume run.h5\n")
 
 
+def assert_goes_on_to_the_whole(scenario: Path, arguments: list[str]) -> None:
+    """run.h5 beside the scenario, resumed, ends as the run that nothing has stopped."""
+    run = partial(subprocess.run, cwd=scenario.parent, check=True, capture_output=True)
+    run([program(), "simulate", "--resume", "run.h5"])
+    run([program(), "simulate", scenario, *arguments, "-o", "whole.h5"])
+    assert_same_rows(scenario.parent / "whole.h5", scenario.parent / "run.h5")
+
+
 def test_a_full_disk_leaves_what_was_written(scenario, tmp_path):
     """Here the limit of a file's size stands for it; the first rows are there, and the run goes on from them."""
     file = scenario(DOUBLE)
@@ -210,14 +219,7 @@ def test_a_full_disk_leaves_what_was_written(scenario, tmp_path):
     assert full.returncode == 1
     assert full.stderr.endswith("pendula: run.h5: could not be written: File too large\n")
     assert rows_of(tmp_path / "run.h5") > 40000  # 64 bytes a row, and a block of 4096 is lost
-    shutil.copy(tmp_path / "run.h5", tmp_path / "kept.h5")
-    subprocess.run(
-        [program(), "simulate", "--resume", "run.h5"], cwd=tmp_path, check=True, capture_output=True
-    )
-    subprocess.run(
-        [program(), "simulate", file, *long, "-o", "whole.h5"], cwd=tmp_path, check=True, capture_output=True
-    )
-    assert_same_rows(tmp_path / "whole.h5", tmp_path / "run.h5")
+    assert_goes_on_to_the_whole(file, long)
 
 
 def test_a_full_disk_has_the_last_row_and_where_to_go_on_from(scenario, tmp_path):
@@ -242,13 +244,7 @@ def test_a_full_disk_has_the_last_row_and_where_to_go_on_from(scenario, tmp_path
         rows, kept = run["t"].shape[0], run["run/checkpoint"][:, 3].max()
         assert f"disk/run.h5, {rows} rows\n" in full.stdout
     assert rows == kept > 40000
-    subprocess.run(
-        [program(), "simulate", "--resume", "run.h5"], cwd=tmp_path, check=True, capture_output=True
-    )
-    subprocess.run(
-        [program(), "simulate", file, *long, "-o", "whole.h5"], cwd=tmp_path, check=True, capture_output=True
-    )
-    assert_same_rows(tmp_path / "whole.h5", tmp_path / "run.h5")
+    assert_goes_on_to_the_whole(file, long)
 
 
 def test_an_interrupted_run_without_a_run_file_leaves_one_to_go_on_from(scenario, tmp_path):
@@ -291,11 +287,15 @@ def test_what_cannot_go_on_is_refused(pendula, scenario, tmp_path):
     shutil.copy(tmp_path / "run.h5", tmp_path / "old.h5")
     with h5py.File(tmp_path / "old.h5", "a") as old:
         old.attrs["pendula"] = "0.0.9"
+    shutil.copy(tmp_path / "run.h5", tmp_path / "kernel.h5")
+    with h5py.File(tmp_path / "kernel.h5", "a") as other:
+        other.attrs["kernel"] = "planar_9"
     before = (tmp_path / "run.h5").read_bytes()
     for arguments, expected in [
         (["none.h5"], "none.h5: expected a run file to go on from, got a file that is not there"),
         (["text.h5"], "text.h5: expected a run file to go on from, got one that HDF5 cannot read: "),
         (["other.h5"], 'other.h5: expected a run file to go on from, got a file without the group "run"'),
+        (["kernel.h5"], f"{file}: the run began by "),
         (["old.h5"], "old.h5: expected a run of pendula 0.1.0, got one of 0.0.9"),
         (
             ["run.h5", *settings("run.duration=0.5")],
@@ -312,6 +312,7 @@ def test_what_cannot_go_on_is_refused(pendula, scenario, tmp_path):
         assert run.err.startswith(f"pendula: {expected}"), run.err
     assert (tmp_path / "run.h5").read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "kernel.h5",
         "old.h5",
         "other.h5",
         "run.h5",
@@ -340,3 +341,27 @@ def test_a_file_that_is_replaced_is_told(pendula, scenario, tmp_path):
     assert "replacing" not in pendula("simulate", "--resume", "run.h5").err
     run = pendula("simulate", file, "-o", "run.toml")
     assert run.status == 2 and file.read_text() == DOUBLE
+
+
+def test_a_file_that_cannot_be_gone_on_with_stays_as_it_is(pendula, scenario, tmp_path):
+    """A member that does not fit is found when the new file is begun already."""
+    text = DOUBLE.replace("step     =", 'solver = "chain"\nstages = 2\nstep =')
+    assert pendula("simulate", scenario(text), "-o", "run.h5").status == 0
+    with h5py.File(tmp_path / "run.h5", "a") as run:
+        run["run/scenario"][()] = text.replace("stages = 2", "stages = 5")
+    before = (tmp_path / "run.h5").read_bytes()
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=2")
+    assert resumed.status != 0 and "member: expected" in resumed.err, resumed.err
+    assert (tmp_path / "run.h5").read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.toml"]
+
+
+def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monkeypatch):
+    page = Path(__file__).parents[2] / "docs/run-file.md"
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    assert len(blocks) == 2
+    assert pendula("simulate", scenario(DOUBLE), "-o", "run.h5").status == 0
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    for block in blocks:
+        exec(compile(block, page, "exec"), {})

@@ -85,6 +85,14 @@ def test_a_gallery_has_what_its_page_shows(runs, pendula):
     assert len(frames_of(runs / "gallery/strip.webp")) == 121
 
 
+def test_a_page_of_another_kind_is_not_replaced(runs, pendula):
+    (runs / "index.html").write_text("<title>mine</title>")
+    ended = pendula("gallery", ".")
+    expected = "index.html: expected a folder for the gallery, got one with a page of another kind"
+    assert (ended.returncode, ended.stderr) == (2, f"pendula: {expected}\n")
+    assert (runs / "index.html").read_text() == "<title>mine</title>"
+
+
 def test_copies_start_apart_and_share_a_picture(runs):
     from pendula_plot.film import frames
     from pendula_plot.gallery import CASES, runs_of

@@ -68,11 +68,12 @@ def shell(lines: list[str], folder: Path, check: bool = True, **environment: str
     return done.stdout.rstrip("\n").split("\n")
 
 
-def run_pendula(commands: list[str]) -> list[str]:
-    """The program is on the path; one of its calls shows an error."""
+def run_pendula(commands: list[str], check: bool = False) -> list[str]:
+    """The program is on the path; one of its calls shows an error. Kernels of models are kept between tests."""
     with fresh_checkout() as folder:
         path = f"{Path(program()).parent}:{os.environ['PATH']}"
-        return shell(commands, folder, check=False, PATH=path)
+        kept = os.environ.get("PENDULA_MODEL_CACHE", f"{folder}/kernels")
+        return shell(commands, folder, check, PATH=path, XDG_CACHE_HOME=kept)
 
 
 def run_demo(commands: list[str]) -> list[str]:

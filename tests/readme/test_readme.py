@@ -18,7 +18,8 @@ def test_console_blocks_show_what_is_printed(session: readme.Session) -> None:
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", readme.README.read_text(), re.DOTALL)
+    fences = re.finditer(r"^```(\w*)\n(.*?)^```$", readme.README.read_text(), re.DOTALL | re.MULTILINE)
+    return [fence[2] for fence in fences if fence[1] == language]
 
 
 def test_the_scenario_runs(tmp_path) -> None:
@@ -26,6 +27,12 @@ def test_the_scenario_runs(tmp_path) -> None:
     file = tmp_path / "scenario.toml"
     file.write_text(scenario)
     subprocess.run([readme.program(), "simulate", file, "--quiet"], check=True)
+
+
+def test_commands_without_their_output_run() -> None:
+    commands = [line for block in blocks("") for line in block.splitlines() if line.startswith("pendula ")]
+    assert len(commands) > 3
+    readme.run_pendula(commands, check=True)
 
 
 def test_the_program_is_the_example_that_is_compiled() -> None:
