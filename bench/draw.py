@@ -157,7 +157,7 @@ def draw_scaling(benchmarks: dict, folder: Path) -> bool:
 
 def draw_drift(before: dict, now: dict, folder: Path) -> None:
     """Energy error along runs in space, of the solver in angles that was and of the one that is."""
-    names = [name for name in now if name != "steps"]
+    names = [name for name in now if name in before and name != "steps"]
     figure, panels = plt.subplots(1, len(names), figsize=(9.6, 3.2), sharey=True, layout="constrained")
     for axes, name in zip(panels, names, strict=True):
         for label, runs, color in (("angles", before, "#e5484d"), ("rods", now, "#1f9d55")):
@@ -169,6 +169,19 @@ def draw_drift(before: dict, now: dict, folder: Path) -> None:
     panels[0].set_ylabel("|ΔH| / Σ M g l")
     panels[0].legend()
     save(figure, folder / "drift.svg")
+
+
+def draw_steering(now: dict, folder: Path) -> None:
+    """Energy error along a chaotic run in space, by steps of each kind."""
+    figure, axes = plt.subplots(figsize=(6, 3.4), layout="constrained")
+    for label, color in (("by the last error", "#e5484d"), ("symmetric", "#1f9d55"), ("constant", "#3b82f6")):
+        errors = now[f"steps {label}"]
+        steps = [now["steps"] * (part + 1) / len(errors) for part in range(len(errors))]
+        axes.loglog(steps, errors, color=color, label=label)
+    axes.set(xlabel="steps", ylabel="|ΔH| / Σ M g l", title="Three links in space, chaotic, four stages")
+    axes.grid(True)
+    axes.legend()
+    save(figure, folder / "steering.svg")
 
 
 def save(figure: plt.Figure, file: Path) -> None:
@@ -189,6 +202,7 @@ def main() -> None:
         for folder, file in ((BENCH, "drift_in_angles.json"), (figures, "drift.json"))
     ]
     draw_drift(*drifts, images)
+    draw_steering(drifts[-1], images)
     if not draw_scaling(kept["benchmarks"], images):
         print("no chain solver was measured: scaling.svg is left as it is")
 

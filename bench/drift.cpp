@@ -1,9 +1,11 @@
 // How energy drifts in space:  pendula_drift [STEPS [PARTS]]  prints one JSON object, the largest |ΔH| / Σ M g l of
-// each part of the run. Two stages; looked at every ten steps.
+// each part of the run, looked at every ten steps: of constant steps of two stages; and of the chaotic chain with four
+// stages by steps of each kind, as many of them over about the same time.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <limits>
 #include <pendula/pendula.hpp>
 #include <string>
 #include <vector>
@@ -35,22 +37,42 @@ std::vector<Case> cases() {
           {"three links, chaotic, h = 0.001 s", equal_chain(3), chaotic, 0.001}};
 }
 
-std::vector<double> drift(const Case& run, long steps, long parts) {
-  const auto integrator = pendula::make_integrator(run.chain, {.stages = 2, .solver = pendula::Solver::chain});
-  pendula::Outcome outcome = integrator->start(run.start);
+template <class Integrator>
+std::vector<double> drift(const Case& run, Integrator& integrator, long steps, long parts) {
+  pendula::Outcome outcome = integrator.start(run.start);
   const double energy = pendula::energy(run.chain, run.start), scale = pendula::energy_scale(run.chain);
   std::vector<double> largest(static_cast<std::size_t>(parts));
   for (long k = 0; k < steps && outcome; ++k) {
-    outcome = integrator->step(run.step);
+    outcome = integrator.step(run.step);
     if (k % 10 != 9) continue;
     double& worst = largest[static_cast<std::size_t>(k * parts / steps)];
-    worst = std::max(worst, std::abs(pendula::energy(run.chain, integrator->state()) - energy) / scale);
+    worst = std::max(worst, std::abs(pendula::energy(run.chain, integrator.state()) - energy) / scale);
   }
   if (!outcome) {
     std::cerr << "pendula_drift: " << run.name << ": " << outcome << '\n';
     std::exit(1);
   }
   return largest;
+}
+
+void print(const std::string& name, const std::vector<double>& errors) {
+  std::cout << ",\n \"" << name << "\": [";
+  const char* separator = "";
+  for (const double error : errors) {
+    std::cout << separator << error;
+    separator = ", ";
+  }
+  std::cout << ']' << std::flush;
+}
+
+/// Of four stages, by the tolerance or of one size.
+void print_steering(const std::string& name, Case run, const pendula::StepperOptions& options, double step, long steps,
+                    long parts) {
+  pendula::GaussStepper<pendula::ChainSolver<Spatial, 4>> stepper(run.chain, 4, options);
+  run.step = step;
+  const std::vector<double> errors = drift(run, stepper, steps, parts);
+  print("steps " + name, errors);
+  std::cerr << name << ": mean step " << stepper.time() / static_cast<double>(steps) << " s\n";
 }
 
 }  // namespace
@@ -60,13 +82,14 @@ int main(int argc, char** argv) {
   const long parts = argc > 2 ? std::atol(argv[2]) : 100;
   std::cout << "{\"steps\": " << steps;
   for (const Case& run : cases()) {
-    std::cout << ",\n \"" << run.name << "\": [";
-    const char* separator = "";
-    for (double error : drift(run, steps, parts)) {
-      std::cout << separator << error;
-      separator = ", ";
-    }
-    std::cout << ']' << std::flush;
+    const auto integrator = pendula::make_integrator(run.chain, {.stages = 2, .solver = pendula::Solver::chain});
+    print(run.name, drift(run, *integrator, steps, parts));
   }
+  const Case chaotic = cases().back();
+  const double any = std::numeric_limits<double>::infinity();
+  print_steering("by the last error", chaotic, {.tolerance = 1e-7, .steering = pendula::Steering::greedy}, any, steps,
+                 parts);
+  print_steering("symmetric", chaotic, {.tolerance = 1e-5}, any, steps, parts);
+  print_steering("constant", chaotic, {}, 0.02, steps, parts);
   std::cout << "}\n";
 }

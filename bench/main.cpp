@@ -1,9 +1,10 @@
-// pendula_bench [--races FILE | --kernels FILE] [--longest SECONDS] [flags of Google Benchmark]
+// pendula_bench [--races FILE [--contestants REGEX] | --kernels FILE] [--longest SECONDS] [flags of Google Benchmark]
 #include <benchmark/benchmark.h>
 
 #include <cstdlib>
 #include <functions.hpp>
 #include <iostream>
+#include <lyapunov.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
 #include <race.hpp>
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
   const std::string races = take(arguments, "--races", "");
   const std::string kernels = take(arguments, "--kernels", "");
+  const std::string contestants = take(arguments, "--contestants", "");
   const double longest = std::stod(take(arguments, "--longest", "2"));
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
@@ -44,11 +46,12 @@ int main(int argc, char** argv) {
     bench::register_few_links();
     bench::register_chain_costs();
     bench::register_against_rk4imp();
+    bench::register_lyapunov();
   } else {  // generated kernels: a run, and figures, of their own
     bench::register_functions();
     bench::register_kernel_races(kernels, longest);
   }
-  if (!races.empty()) bench::register_races(races, longest);
+  if (!races.empty()) bench::register_races(races, longest, contestants);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
 }

@@ -10,6 +10,7 @@
 #include <optional>
 #include <race.hpp>
 #include <references.hpp>
+#include <regex>
 #include <span>
 #include <sstream>
 #include <systems.hpp>
@@ -175,8 +176,11 @@ void register_field(std::span<const Problem> problems, const std::vector<Contest
 
 }  // namespace
 
-void register_races(const std::string& file, double longest) {
-  register_field(problems, everybody(), file, longest);
+void register_races(const std::string& file, double longest, const std::string& who) {
+  std::vector<Contestant> contestants = everybody();
+  const std::regex wanted(who);
+  std::erase_if(contestants, [&](const Contestant& each) { return !std::regex_search(each.name, wanted); });
+  register_field(problems, contestants, file, longest);
 }
 
 void register_kernel_races(const std::string& file, double longest) {

@@ -18,6 +18,14 @@ KERNEL_CHAINS = ("D", "P2", "P4")
 KERNEL_SYSTEMS = ("cart chain", "spring pendulum", "furuta", "swinging atwood")
 OVER_BASELINE = (7, 6, 5, 5, 6, 12, 40)
 OVER_HEYOKA = (2.5, 2.8, 4, 5, 6.5, 14, 12)
+BY_TOLERANCE = {
+    "D": 2.5,
+    "P5": 5,
+    "P10": 6,
+    "P20": 8,
+    "P50": 20,
+    "P100": 18,
+}  # by tolerance alone, over heyoka
 STEPS = {2: 15, 10: 30, 100: 700}
 KERNELS_OVER_HEYOKA = {KERNEL_CHAINS: 2.5, KERNEL_SYSTEMS: 1.5}
 OVER_CASADI = {
@@ -50,8 +58,8 @@ class Figures:
     """The kept figures, by what the tables ask of them."""
 
     def __init__(self, folder: Path) -> None:
-        """Reads benchmarks.json, races.json, memory.json and iterations.json, and of kernels kernels.json and
-        kernel_races.json."""
+        """Reads benchmarks.json, races.json, memory.json and iterations.json, of steps by tolerance by_tolerance.json
+        and tolerance_races.json, of kernels kernels.json and kernel_races.json."""
         kept = json.loads((folder / "benchmarks.json").read_text(encoding="utf-8"))
         self.context = kept["context"]
         self.benchmarks = succeeded(kept)
@@ -62,6 +70,10 @@ class Figures:
             for name, entry in succeeded(kernels).items()
         }
         self.kernel_races = json.loads((folder / "kernel_races.json").read_text(encoding="utf-8"))
+        chosen = json.loads((folder / "by_tolerance.json").read_text(encoding="utf-8"))
+        self.tolerance_context = chosen["context"]
+        self.by_tolerance = succeeded(chosen)
+        self.tolerance_races = json.loads((folder / "tolerance_races.json").read_text(encoding="utf-8"))
         self.races = json.loads((folder / "races.json").read_text(encoding="utf-8"))
         memory = (folder / "memory.json").read_text(encoding="utf-8").strip()
         self.memory = json.loads(memory) if memory else None
@@ -86,6 +98,11 @@ class Figures:
         """Who ran a race of kernels, by name."""
         prefix = f"race/{problem}/"
         return {n.removeprefix(prefix): e for n, e in self.kernels.items() if n.startswith(prefix)}
+
+    def tolerance_field(self, problem: str) -> dict[str, dict]:
+        """Who ran a race by tolerance alone, by name."""
+        prefix = f"race/{problem}/"
+        return {n.removeprefix(prefix): e for n, e in self.by_tolerance.items() if n.startswith(prefix)}
 
     def nanoseconds(self, name: str) -> float | None:
         """Of one call of a function."""
@@ -190,6 +207,64 @@ def race_row(figures: Figures, peer: str, wanted: Iterable[float]) -> Iterable[l
         ]
 
 
+def tolerance_lead(figures: Figures, problem: str) -> float | None:
+    """heyoka's time over ours, where both are within 10 floors by a tolerance alone."""
+    field = figures.tolerance_field(problem)
+    ours, theirs = field.get("pendula by tolerance"), field.get("heyoka")
+    return theirs["time"] / ours["time"] if ours and theirs and is_good(ours) else None
+
+
+def tolerance_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of races by tolerance alone."""
+    leads = [tolerance_lead(figures, problem) for problem in BY_TOLERANCE]
+    if any(leads):
+        found = ", ".join(f"{number(lead)}×" if lead else "–" for lead in leads)
+        wanted = ", ".join(f"{want:g}×" for want in BY_TOLERANCE.values())
+        yield ["by tolerance alone, " + ", ".join(BY_TOLERANCE) + ", against heyoka", f"≥ {wanted}", found]
+
+
+def tolerance_machine(figures: Figures) -> str:
+    """What the races by tolerance were measured with."""
+    return told(figures.tolerance_context, figures.by_tolerance, "medians")
+
+
+def tolerance_races(figures: Figures) -> str:
+    """Races by tolerance alone: milliseconds within 10 floors, the tolerance that it took, and steps."""
+    rows = []
+    for problem in (p for p in PROBLEMS if p in figures.tolerance_races):
+        race = figures.tolerance_races[problem]
+        cells = [problem, f"{race['floor']:.1e}"]
+        for name in ("pendula by tolerance", "heyoka"):
+            entry = figures.tolerance_field(problem).get(name)
+            if entry is None:
+                cells += ["", ""]
+                continue
+            time = number(entry["time"])
+            floors = entry["error"] / entry["floor"]
+            cells += [time if is_good(entry) else f"*{time} ({floors:.0e})*", f"{entry['setting']:.0e}"]
+        lead = tolerance_lead(figures, problem)
+        rows.append([*cells, f"{number(lead)}×" if lead else "–"])
+    return table(
+        ["", "floor", "pendula, ms", "tolerance", "heyoka, ms", "tolerance", "heyoka over pendula"], rows
+    )
+
+
+def lyapunov_lead(figures: Figures, digits: int) -> float | None:
+    """heyoka's time over ours for a leading Lyapunov exponent."""
+    ours, theirs = (
+        figures.by_tolerance.get(f"lyapunov/{who}/{digits} digits") for who in ("pendula", "heyoka")
+    )
+    return theirs["time"] / ours["time"] if ours and theirs else None
+
+
+def lyapunov_row(figures: Figures) -> Iterable[list[str]]:
+    """The row of Lyapunov exponents."""
+    leads = [lyapunov_lead(figures, digits) for digits in (9, 12)]
+    if all(leads):
+        found = ", ".join(f"{number(lead)}×" for lead in leads)
+        yield ["leading Lyapunov exponent, tolerance 1e-9, 1e-12, against heyoka", "≥ 2×", found]
+
+
 def memory_row(figures: Figures) -> Iterable[list[str]]:
     """The row of peak memory."""
     if figures.memory:
@@ -269,6 +344,8 @@ def goals(figures: Figures) -> str:
         *step_row(figures),
         *race_row(figures, BASELINE, OVER_BASELINE),
         *race_row(figures, "heyoka", OVER_HEYOKA),
+        *tolerance_row(figures),
+        *lyapunov_row(figures),
         *memory_row(figures),
         *kernel_race_rows(figures),
         *casadi_rows(figures),
@@ -442,6 +519,8 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "chain": chain,
     "simplified": simplified,
     "few links": few,
+    "tolerance machine": tolerance_machine,
+    "tolerance races": tolerance_races,
     "kernel machine": kernel_machine,
     "kernel races": kernel_races,
     "functions": functions,

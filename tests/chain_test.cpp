@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
+#include <new>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/state.hpp>
 
@@ -62,6 +64,16 @@ TEST(Chain, NamesWhatIsWrong) {
   parameters.drives.push_back({2, Eigen::Matrix<double, 1, 1>(2.0), 3.0, 0.4});
   EXPECT_EQ(error_of(parameters), "chain: drive: expected a link from 1 to 2, got 3");
   EXPECT_EQ(error_of({}), "chain: masses: expected at least one link, got none");
+}
+
+TEST(Chain, OfAFixedSizeHasNoLoadsWhereNothingIsSaidOfThem) {
+  using Parameters = ChainParameters<Spatial, 2>;
+  alignas(Parameters) std::array<unsigned char, sizeof(Parameters)> memory;
+  memory.fill(0xff);  // what was there before
+  auto* const parameters = new (memory.data()) Parameters;
+  parameters->masses = parameters->lengths = Eigen::Vector2d(1, 2);
+  EXPECT_FALSE((Chain<Spatial, 2>(*parameters).loaded()));
+  parameters->~Parameters();
 }
 
 TEST(Chain, IsOneTemplateForFixedAndRunTimeSize) {

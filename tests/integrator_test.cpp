@@ -101,6 +101,24 @@ TEST(ExplicitMethods, MeetGaussLegendre) {
   EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 1e-9);  // measured 1.4e-10
   options.method = Method::fehlberg78;
   EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);  // measured 4e-10
+  options.method = Method::bulirsch_stoer;
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);  // measured 4.5e-10
+}
+
+// Extrapolation needs few steps, the fewer the more digits are wanted: it raises its order.
+TEST(ExplicitMethods, ExtrapolationTakesFewStepsWhateverTheTolerance) {
+  const Chain<Planar> chain = equal_chain<Planar>(2);
+  const State<Planar> reference = final_state(chain, swinging(2), gauss(8), 0.01, 4);
+  RunOptions options;
+  options.method = Method::bulirsch_stoer;
+  for (const double tolerance : {1e-5, 1e-7, 1e-9, 1e-11, 1e-13}) {
+    options.tolerance = tolerance;
+    const auto integrator = make_integrator(chain, options);
+    ASSERT_TRUE(integrator->start(swinging(2)));
+    while (integrator->time() < 4) ASSERT_TRUE(integrator->step(4 - integrator->time()));
+    EXPECT_LT(integrator->statistics().steps, 60) << tolerance;            // measured 16 to 33
+    EXPECT_LT(distance(integrator->state(), reference), 100 * tolerance);  // measured 5.8 to 12.4
+  }
 }
 
 template <class Space>

@@ -64,7 +64,7 @@ std::vector<RunOptions> every_method(double step) {
   options.form = Form::velocity;
   with_stages({2, 5});
   options.form = Form::momentum;
-  for (const Method method : {Method::rk4, Method::dopri5, Method::fehlberg78}) {
+  for (const Method method : {Method::rk4, Method::dopri5, Method::fehlberg78, Method::bulirsch_stoer}) {
     options.method = method;
     all.push_back(options);
   }

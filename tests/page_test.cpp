@@ -135,6 +135,42 @@ TEST(Encode, TextCannotLeaveItsPlace) {
   EXPECT_EQ(script_json("</script><!--\xff"), "\"\\u003c/script>\\u003c!--\xEF\xBF\xBD\"");
 }
 
+TEST_F(PageTest, EventsAreCountedAndTheirMarksThinned) {
+  const Scene scene = chain_scene<Planar>(1);
+  const std::string html = file();
+  Page page(html, scene);
+  EXPECT_THROW(page.add_event("early", 0, true), std::logic_error);
+  page.begin_run("");
+  add_rows(page, scene, 3);
+  for (int k = 0; k < 2500; ++k) page.add_event("often", 1e-3 * k, k % 2 == 0);
+  page.add_event("once", 0.5, false);
+  page.close();
+  const nlohmann::json events = description(text_of(html))["runs"][0]["events"];
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[1],
+            (nlohmann::json{{"name", "once"}, {"count", 1}, {"stride", 1}, {"times", {0.5}}, {"up", {false}}}));
+  EXPECT_EQ(events[0]["count"], 2500);
+  EXPECT_EQ(events[0]["stride"], 4);
+  EXPECT_EQ(events[0]["times"].size(), 626u);
+  EXPECT_EQ(events[0]["times"][1], 4e-3);
+  EXPECT_EQ(events[0]["times"].back(), 2.499);
+}
+
+TEST_F(PageTest, StepsAreThereWhereTheyDiffer) {
+  const Scene scene = chain_scene<Planar>(1);
+  for (const bool differ : {false, true}) {
+    const std::string html = file();
+    Page page(html, scene);
+    page.begin_run("");
+    const std::vector<double> row(scene.columns.size());
+    page.add_row(row);
+    for (int k = 0; k < 5; ++k) page.add_row(row, differ ? 0.1 + 0.01 * k : 0.1);
+    page.add_row(row, 0.05);  // the last one is cut short
+    page.close();
+    EXPECT_EQ(description(text_of(html))["runs"][0]["steps"], differ);
+  }
+}
+
 TEST_F(PageTest, HoldsTextsThatLookLikeTags) {
   Scene scene = chain_scene<Planar>(1);
   scene.title = scene.scenario = scene.version = "</script></title><b onclick=x>{{scene}}";

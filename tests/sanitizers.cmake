@@ -7,7 +7,7 @@ execute_process(COMMAND "${CMAKE_COMMAND}" --preset asan -B "${BUILD}" -D "CMAKE
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" --target cpp_tests --parallel 2
                 COMMAND_ERROR_IS_FATAL ANY)
 # The long runs repeat what the others do, millions of times: without sanitizers they take seconds, here many minutes.
-set(long_runs "EnergyAndAngularMomentumAreKept")
+set(long_runs "EnergyAndAngularMomentumAreKept|RandomCrossings|OfAPublishedDoublePendulum|ComeInPairs")
 execute_process(COMMAND "${CTEST}" --test-dir "${BUILD}" --label-regex cpp --exclude-regex "${long_runs}"
                         --output-on-failure --parallel 2
                 COMMAND_ERROR_IS_FATAL ANY)

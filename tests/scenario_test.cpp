@@ -98,14 +98,14 @@ TEST(Scenario, DefaultsAreThoseOfTheReference) {
   EXPECT_EQ(scenario.start.v, numbers({0, 0}));
   EXPECT_EQ(scenario.start.time, 0);
   EXPECT_EQ(scenario.run.method, Method::gauss);
-  EXPECT_EQ(scenario.run.stages, 2);
+  EXPECT_EQ(scenario.run.stages, 8);
   EXPECT_EQ(scenario.run.form, Form::momentum);
   EXPECT_EQ(scenario.run.solver, Solver::automatic);
   EXPECT_EQ(scenario.run.iteration, Iteration::automatic);
-  EXPECT_EQ(scenario.run.step, 1e-3);
+  EXPECT_EQ(scenario.run.step, 0);
   EXPECT_EQ(scenario.run.tolerance, 1e-9);
   EXPECT_EQ(scenario.duration, 10);
-  EXPECT_EQ(scenario.every, 10);
+  EXPECT_EQ(scenario.every, 1);
   EXPECT_FALSE(scenario.natural);
   EXPECT_TRUE(scenario.warnings.empty());
 }
@@ -142,6 +142,7 @@ TEST(Scenario, NamesOfSettingsMeanTheirEnumerators) {
   EXPECT_EQ(run("method=rk4").method, Method::rk4);
   EXPECT_EQ(run("method=dopri5").method, Method::dopri5);
   EXPECT_EQ(run("method=fehlberg78").method, Method::fehlberg78);
+  EXPECT_EQ(run("method=bulirsch-stoer").method, Method::bulirsch_stoer);
   EXPECT_EQ(run("form=momentum").form, Form::momentum);
   EXPECT_EQ(run("solver=auto").solver, Solver::automatic);
   EXPECT_EQ(run("solver=chain").solver, Solver::chain);
@@ -209,7 +210,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
        "got "
        "the unknown key \"output\""},
       {"[output]", "[outputs]",
-       "file.toml:32: outputs: expected one of chain, system, start, run, output, got the unknown key "
+       "file.toml:32: outputs: expected one of chain, system, start, run, output, event, ensemble, got the unknown key "
        "\"outputs\" (did you mean output?)"},
       {"[[chain.drive]]", "[chain.drive]", "file.toml:11: chain.drive: expected [[chain.drive]] tables, got a table"},
       // unknown keys, with the one that may be meant
@@ -247,7 +248,8 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
        "you mean spatial?)"},
       {"\"spatial\"", "3", "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got 3"},
       {"\"gauss\"", "\"euler\"",
-       "file.toml:24: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or \"fehlberg78\", "
+       "file.toml:24: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or \"fehlberg78\" or "
+       "\"bulirsch-stoer\", "
        "got \"euler\""},
       {"\"SI\"", "\"imperial\"", "file.toml:9: chain.units: expected \"SI\" or \"natural\", got \"imperial\""},
       // wrong lengths
@@ -471,7 +473,9 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
        "--set run.stpe=1: run.stpe: expected one of method, stages, form, solver, iteration, step, "
        "tolerance, duration, got the unknown key \"stpe\" (did you mean step?)"},
       {"step=1",
-       "--set step=1: step: expected one of chain, system, start, run, output, got the unknown key \"step\" (did you "
+       "--set step=1: step: expected one of chain, system, start, run, output, event, ensemble, got the unknown key "
+       "\"step\" "
+       "(did you "
        "mean run.step?)"},
       {"run.step", "--set run.step: expected KEY=VALUE such as run.step=1e-4, got \"run.step\""},
       {"=1", "--set =1: expected KEY=VALUE such as run.step=1e-4, got \"=1\""},
@@ -481,7 +485,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
        "--set run.method=eulr: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or "
-       "\"fehlberg78\", got \"eulr\""},
+       "\"fehlberg78\" or \"bulirsch-stoer\", got \"eulr\""},
       {"run=3", "--set run=3: run: expected a table, got 3"},
       {"chain.masses.first=3",
        "--set chain.masses.first=3: chain.masses.first: expected a table before the last dot (an "
@@ -491,10 +495,23 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
   for (const auto& [override, message] : inputs) EXPECT_EQ(error_of(planar_text, {override}), message);
 }
 
+TEST(Scenario, WithoutAStepThereAreAsManyStagesAsTheToleranceWants) {
+  const auto run = [](const Overrides& overrides) { return parsed<Planar>(planar_text, overrides).run; };
+  EXPECT_EQ(run({"run.tolerance=1e-4"}).stages, 4);
+  EXPECT_EQ(run({"run.tolerance=1e-7"}).stages, 6);
+  EXPECT_EQ(run({"run.tolerance=1e-4", "run.stages=5"}).stages, 5);
+  EXPECT_EQ(run({"run.method=radau"}).stages, 3);
+  EXPECT_EQ(run({"run.step=0.01"}).stages, 2);
+  EXPECT_EQ(run({"run.step=0.01"}).step, 0.01);
+  EXPECT_EQ(run({"run.method=rk4"}).step, 1e-3);
+  EXPECT_TRUE(is_adaptive(run({"run.stages=3"})));
+}
+
 TEST(Scenario, SettingsWithoutEffectAreWarnedOf) {
   const auto warnings = [](const Overrides& overrides) { return parsed<Planar>(planar_text, overrides).warnings; };
-  EXPECT_EQ(warnings({"run.tolerance=1e-8"}),
-            Overrides{"--set run.tolerance=1e-8: run.tolerance: has no effect with method gauss"});
+  EXPECT_TRUE(warnings({"run.tolerance=1e-8"}).empty());
+  EXPECT_EQ(warnings({"run.tolerance=1e-8", "run.step=0.1"}),
+            Overrides{"--set run.tolerance=1e-8: run.tolerance: has no effect with run.step"});
   EXPECT_EQ(warnings({"run.method=dopri5", "run.step=0.1", "run.form=velocity"}),
             (Overrides{"--set run.form=velocity: run.form: has no effect with method dopri5",
                        "--set run.step=0.1: run.step: has no effect with method dopri5"}));

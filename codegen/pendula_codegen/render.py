@@ -266,6 +266,7 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
             periodic,
         ),
         assignments=cpp.read_statements(words.parameters),
+        places=cpp.place_statements(words.parameters),
         casts=cpp.cast_statements(words.parameters, words.holds_time),
         functions=functions,
         size=len(kernel.system.coordinates),

@@ -24,19 +24,29 @@ except ImportError as missing:
 
 
 def plot(arguments: argparse.Namespace) -> None:
-    from .figure import Choice, figure, write
+    from .drawing import draw, read
+    from .figure import Choice, write
 
     output = Path(arguments.output)
     paths = [Path(run) for run in arguments.runs]
     if any(output.exists() and path.exists() and output.samefile(path) for path in paths):
         raise PlotError(f"{output}: expected a file for the picture, got a run itself")
-    runs = [read_run(path).between(arguments.start, arguments.end) for path in paths]
+    files = [read(path).between(arguments.start, arguments.end) for path in paths]
     choice = Choice(
-        tuple(arguments.show.split(",")),
+        tuple(filter(None, arguments.show.split(","))),
         tuple(filter(None, arguments.coordinates.split(","))),
         arguments.wrapped,
     )
-    write(figure(runs, choice), output)
+    write(draw(files, choice), output)
+
+
+def draw_map(arguments: argparse.Namespace) -> None:
+    from .figure import write
+    from .map import MapChoice, figure, read
+
+    contour, _, level = arguments.contour.rpartition("=")
+    choice = MapChoice(arguments.scale, float(level) if contour else None)
+    write(figure(read(Path(arguments.file), arguments.key, contour), choice), Path(arguments.output))
 
 
 def film(arguments: argparse.Namespace) -> None:
@@ -66,12 +76,19 @@ def parse() -> argparse.Namespace:
     command = commands.add_parser("plot")
     command.add_argument("runs", nargs="+")
     command.add_argument("--output", required=True)
-    command.add_argument("--show", default="series,phase,energy,trace")
+    command.add_argument("--show", default="")
     command.add_argument("--coordinates", default="")
     command.add_argument("--from", dest="start", type=float, default=float("-inf"))
     command.add_argument("--to", dest="end", type=float, default=float("inf"))
     command.add_argument("--wrapped", action="store_true")
     command.set_defaults(run_command=plot)
+    command = commands.add_parser("map")
+    command.add_argument("file")
+    command.add_argument("key")
+    command.add_argument("--output", required=True)
+    command.add_argument("--scale", default="", choices=("", "log", "linear"))
+    command.add_argument("--contour", default="")
+    command.set_defaults(run_command=draw_map)
     command = commands.add_parser("film")
     command.add_argument("run", nargs="?", help="none: only look whether a film of that name can be made")
     command.add_argument("--output", required=True)

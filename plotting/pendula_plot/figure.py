@@ -1,8 +1,9 @@
-"""Plots of runs as a numerical analyst wants them: coordinates over time, phase portraits, energy errors, traces."""
+"""Plots of runs as a numerical analyst wants them: coordinates, phase portraits, energy errors, traces, steps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,16 +16,17 @@ from .run import PlotError, Run
 
 # Okabe and Ito's colours, told apart by the colour-blind; black first.
 COLOURS = ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"]
-GREEK = {"theta": "θ", "phi": "φ", "alpha": "α", "beta": "β", "psi": "ψ"}
+GREEK = {"theta": "θ", "phi": "φ", "alpha": "α", "beta": "β", "psi": "ψ", "lambda": "λ"}
 MOST_CURVES = 7
 ROUNDING = 2.0**-53
+WIDE_RANGE = 100  # steps that differ by more are on a logarithmic scale
 
 
 @dataclass(frozen=True)
 class Choice:
     """What to show of the runs."""
 
-    panels: tuple[str, ...]
+    panels: tuple[str, ...] = ()  # of trajectories, names of PANELS; none: what there is
     coordinates: tuple[str, ...] = ()  # by name; none: a few
     wrapped: bool = False
 
@@ -52,12 +54,18 @@ def is_angle(run: Run, column: str) -> bool:
     return run.unit(column) == "rad"
 
 
+def within_turn(run: Run, column: str) -> np.ndarray:
+    """A column, angles from −π to π."""
+    values = run.columns[column]
+    return np.mod(values + np.pi, 2 * np.pi) - np.pi if is_angle(run, column) else values
+
+
 def shown(run: Run, column: str, choice: Choice) -> np.ndarray:
     """A column; a wrapped angle is cut where it jumps."""
     values = run.columns[column]
     if not (choice.wrapped and is_angle(run, column)):
         return values
-    wrapped = np.mod(values + np.pi, 2 * np.pi) - np.pi
+    wrapped = within_turn(run, column)
     jumps = np.flatnonzero(np.abs(np.diff(wrapped)) > np.pi) + 1
     wrapped[jumps] = np.nan
     return wrapped
@@ -169,11 +177,29 @@ def draw_trace(axes: Axes, runs: list[Run], choice: Choice) -> None:
         legend(axes)
 
 
+def draw_steps(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    """How far apart rows are, which is how long steps were where each has its row."""
+    for k, run in enumerate(runs):
+        axes.stairs(
+            np.diff(run.time), run.time, baseline=None, color=COLOURS[k % len(COLOURS)], label=run.name
+        )
+    steps = np.concatenate([np.diff(run.time) for run in runs])
+    if np.max(steps) > WIDE_RANGE * np.min(steps):
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0)
+    axes.set_xlabel(label(runs[0], "t"))
+    axes.set_ylabel(f"$t_{{k+1}} - t_k$ [{runs[0].unit('t')}]")
+    if len(runs) > 1:
+        legend(axes)
+
+
 PANELS: dict[str, Callable[[Axes, list[Run], Choice], None]] = {
     "series": draw_series,
     "phase": draw_phase,
     "energy": draw_energy,
     "trace": draw_trace,
+    "steps": draw_steps,
 }
 
 
@@ -181,14 +207,45 @@ def possible(run: Run, panel: str) -> bool:
     return panel != "trace" or run.dimension >= 2
 
 
+def steps_differ(run: Run) -> bool:
+    """Whether a row is a step, as far as is known, and steps are not all alike; the last one may be cut short."""
+    steps = np.diff(run.time)[:-1]
+    return run.steps_a_row == 1 and len(steps) > 1 and bool(np.ptp(steps) > 1e-6 * np.max(steps))
+
+
+def panels_of(runs: list[Run], choice: Choice) -> list[str]:
+    """Panels to draw: those asked for; else all, steps only where they say something."""
+    wanted = choice.panels or [name for name in PANELS if name != "steps" or all(map(steps_differ, runs))]
+    if "steps" in wanted:
+        for run in runs:
+            check_steps(run)
+    return [panel for panel in wanted if all(possible(run, panel) for run in runs)]
+
+
+def check_steps(run: Run) -> None:
+    """A run file tells what its rows are; of a CSV file, whoever asks for steps knows."""
+    if run.steps_a_row not in (None, 1):
+        every = f"every {run.steps_a_row} steps" if run.steps_a_row else "at times"
+        raise PlotError(
+            f"{run.name}: expected a row a step (output.every = 1) to show steps, got rows {every}"
+        )
+    if len(run.time) < 2:
+        raise PlotError(f"{run.name}: expected two rows or more to show steps, got one")
+
+
+def style() -> AbstractContextManager:
+    """Of all figures: to be in force while they are drawn."""
+    return mpl.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0})
+
+
 def figure(runs: list[Run], choice: Choice) -> Figure:
     """All panels in one figure, two to a row."""
-    panels = [panel for panel in choice.panels if all(possible(run, panel) for run in runs)]
+    panels = panels_of(runs, choice)
     if not panels:
         raise PlotError(f"{runs[0].name}: expected points to trace, got a run without any")
     width = min(len(panels), 2)
     height = (len(panels) + 1) // 2
-    with mpl.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0}):
+    with style():
         drawn = Figure(figsize=(4.2 * width, 3.2 * height), layout="constrained")
         for k, panel in enumerate(panels):
             space = panel == "trace" and runs[0].dimension == 3

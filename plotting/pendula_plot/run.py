@@ -6,13 +6,14 @@ import json
 import math
 import re
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 FIRST_UNITS = {"t": "s", "energy": "J"}
+STEPS_A_ROW = 10  # what output.every is where the step is constant and a scenario does not say; else 1
 
 
 class PlotError(Exception):
@@ -114,6 +115,26 @@ class Run:
         return places
 
     @cached_property
+    def steps_a_row(self) -> int | None:
+        """Accepted steps from row to row, 0 where rows are at times; None where no scenario tells."""
+        if not self.scenario:
+            return None
+        document = tomllib.loads(self.scenario)
+        keys = {
+            f"{table}.{key}": value
+            for table in ("run", "output")
+            for key, value in document.get(table, {}).items()
+        }
+        keys |= {
+            key.strip(): value.strip()
+            for key, _, value in (setting.partition("=") for setting in self.settings)
+        }
+        if {"output.interval", "output.times"} & keys.keys():
+            return 0
+        is_constant = "run.step" in keys or str(keys.get("run.method")).strip("\"'") == "rk4"
+        return int(keys.get("output.every", STEPS_A_ROW if is_constant else 1))
+
+    @cached_property
     def masses(self) -> np.ndarray | None:
         """Of a chain's bobs, as far as its scenario tells them."""
         try:
@@ -132,8 +153,11 @@ class Run:
         if not wanted.any():
             got = f"rows from t = {self.time[0]:g} to {self.time[-1]:g}"
             raise PlotError(f"{self.name}: expected rows between --from and --to, got {got}")
-        columns = {name: values[wanted] for name, values in self.columns.items()}
-        return Run(self.name, columns, self.units, self.scenario, self.settings)
+        return self.only(wanted)
+
+    def only(self, wanted: np.ndarray) -> Run:
+        """Some of the rows, by a mask."""
+        return replace(self, columns={name: values[wanted] for name, values in self.columns.items()})
 
 
 def read_run(path: Path) -> Run:
@@ -172,23 +196,33 @@ def read_hdf5(path: Path) -> Run:
 
 
 def read_csv(path: Path) -> Run:
+    header, rows = read_lines(path)
+    if header[:1] != ["t"]:
+        text = ",".join(header)
+        got = "an empty file" if not text else text if len(text) <= 60 else text[:60] + "…"
+        raise PlotError(f"{path}: expected a trajectory with columns t, …, got {got}")
+    return Run(str(path), numbers(path, header, rows))
+
+
+def read_lines(path: Path) -> tuple[list[str], list[str]]:
+    """Names of the columns, and lines of rows, of a CSV file; the first are none where the file is empty."""
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise PlotError(f"{path}: expected a trajectory, CSV or HDF5, got a file that is no text") from None
     # A run that is still going may just be writing the last line.
     lines = text[: text.rfind("\n") + 1].splitlines()
-    header = lines[0].split(",") if lines else []
-    if header[:1] != ["t"]:
-        got = "an empty file" if not header else lines[0] if len(lines[0]) <= 60 else lines[0][:60] + "…"
-        raise PlotError(f"{path}: expected a trajectory with columns t, …, got {got}")
+    return (lines[0].split(",") if lines else []), lines[1:]
+
+
+def numbers(path: Path, header: list[str], lines: list[str]) -> dict[str, np.ndarray]:
+    """Columns by name, of lines that follow the header at once."""
     try:
-        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-        columns = dict(zip(header, rows.reshape(-1, len(header)).T, strict=True))
+        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+        return dict(zip(header, rows.reshape(-1, len(header)).T, strict=True))
     except ValueError:
-        number = next(k for k, line in enumerate(lines[1:], start=2) if not is_row(line, len(header)))
+        number = next(k for k, line in enumerate(lines, start=2) if not is_row(line, len(header)))
         raise PlotError(f"{path}:{number}: expected a number in each of the {len(header)} columns") from None
-    return Run(str(path), columns)
 
 
 def is_row(line: str, columns: int) -> bool:

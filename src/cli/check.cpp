@@ -11,6 +11,7 @@
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/run/run.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <span>
 #include <string>
@@ -89,7 +90,13 @@ class IntegrationCheck {
     lines.push_back(line(label("way back", 4, Form::momentum), time_reversal(), 1e-11));  // measured 2.4e-15
     lines.push_back(line("newton = fixed point, 6 stages",
                          distance(end(Solver::dense, Iteration::newton), end(Solver::dense, Iteration::fixed_point)),
-                         1e-11));  // measured 1.3e-15
+                         1e-11));                                                        // measured 1.3e-15
+    lines.push_back(line("looks into a step, 6 stages", farthest_look(), 1e-11));        // measured 2.6e-12, else 2e-15
+    lines.push_back(line("glances into a step, 6 stages", farthest_glance(), 1e-4));     // measured 3.9e-6
+    lines.push_back(line("an event's time, relative, 6 stages", event_error(), 1e-10));  // measured 2.3e-15
+    if (!subject_.loaded()) {
+      lines.push_back(line("tangents: D'JD = J, 4 stages", symplectic_defect(), 1e-13));  // measured 2.7e-17
+    }
     return lines;
   }
 
@@ -176,6 +183,68 @@ class IntegrationCheck {
   double time_reversal() const {
     const Motion end = run(options(4, Form::momentum), start_, 16, time_).motion;
     return distance(run(options(4, Form::momentum), end, 16, start_.time - end.time).motion, start_);
+  }
+
+  /// Of states within one step of a quarter of the time, by `find`, from those where shorter steps end.
+  template <class Find>
+  double farthest_within(Find find) const {
+    const double step = time_ / 4;
+    double farthest = 0;
+    for (const double part : {0.0, 0.19, 0.5, 0.83, 1.0}) {
+      const auto integrator = subject_.make_integrator(options(6, Form::momentum));
+      integrator->start(start_);
+      integrator->remember_steps(true);
+      if (!integrator->step(step)) return std::numeric_limits<double>::quiet_NaN();
+      const Motion found = find(*integrator, start_.time + part * step);
+      const Motion there = part == 0 ? start_ : run(options(8, Form::momentum), start_, 8, part * step).motion;
+      farthest = std::max(farthest, distance(found, there));
+    }
+    return farthest;
+  }
+  double farthest_look() const {
+    return farthest_within([](Integrator& integrator, double time) {
+      Motion there;
+      integrator.look(time, there);
+      return there;
+    });
+  }
+  double farthest_glance() const {
+    return farthest_within([](Integrator& integrator, double time) { return integrator.glance(time); });
+  }
+
+  /// The event is that the fastest coordinate comes by where it is after 0.37 of the time.
+  double event_error() const {
+    const double when = 0.37 * time_;
+    const Motion there = run(options(8, Form::momentum), start_, 16, when).motion;
+    Eigen::Index fastest = 0;
+    there.v.cwiseAbs().maxCoeff(&fastest);
+    RunSetup setup;
+    setup.subject = {std::shared_ptr<void>(), &subject_};
+    setup.start = start_;
+    setup.options = options(6, Form::momentum);
+    setup.duration = time_;
+    setup.doubted = false;
+    setup.options.step = time_ / 8;
+    setup.events = {{"there", [&](const Motion& motion) { return motion.q[fastest] - there.q[fastest]; }}};
+    const RunReport report = Run(setup).go();
+    const EventTally& tally = report.events.front();
+    const double first = std::abs(tally.first - start_.time - when), last = std::abs(tally.last - start_.time - when);
+    return std::min(first, last) / when;
+  }
+
+  /// Of the derivative of a step, in coordinates and momenta.
+  double symplectic_defect() const {
+    const auto integrator = subject_.make_integrator(options(4, Form::momentum));
+    const Eigen::Index rows = integrator->linearize(), half = rows / 2;
+    integrator->start(start_);
+    if (!integrator->step(time_ / 4)) return std::numeric_limits<double>::quiet_NaN();
+    Directions<> derivative = Eigen::MatrixXd::Identity(rows, rows);
+    integrator->push(derivative);
+    Eigen::MatrixXd form = Eigen::MatrixXd::Zero(rows, rows);
+    form.topRightCorner(half, half).setIdentity();
+    form.bottomLeftCorner(half, half) = -form.topRightCorner(half, half);
+    const Eigen::MatrixXd D = derivative;
+    return (D.transpose() * form * D - form).cwiseAbs().maxCoeff() / D.squaredNorm();
   }
 
   std::string_view kernel_;

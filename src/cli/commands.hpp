@@ -11,6 +11,7 @@ enum ExitStatus {
   done = 0,
   failed = 1,       ///< the computation failed; what was computed is kept
   wrong_input = 2,  ///< file, key, value, command or option
+  unfinished = 3,   ///< members of an ensemble are missing; what is there is kept, and --resume goes on
 };
 
 struct SimulateOptions {
@@ -18,6 +19,7 @@ struct SimulateOptions {
   std::optional<std::string> resume;   ///< run file that it goes on with
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::optional<std::string> output;   ///< trajectory file, HDF5 where it ends in .h5; "-" is standard output
+  std::optional<std::string> events;   ///< file for its events
   std::optional<std::string> view;     ///< page to look at the run
   std::optional<std::string> video;    ///< film of the run
   int copies = 0;                      ///< further runs in the page, from starts that differ
@@ -53,16 +55,27 @@ ExitStatus build(const BuildOptions& options);
 ExitStatus new_model(const std::string& name);
 
 struct PlotOptions {
-  std::vector<std::string> runs;  ///< trajectory files
+  std::vector<std::string> runs;  ///< files of trajectories, of events, or of Lyapunov exponents
   std::string output;             ///< .svg, .png or .pdf
-  std::string show = "series,phase,energy,trace";
-  std::string coordinates;  ///< by name, with commas; empty for a few
+  std::string show;               ///< panels of trajectories, with commas; empty for what there is
+  std::string coordinates;        ///< by name, with commas; empty for a few
   std::optional<double> from, to;
   bool wrapped = false;  ///< angles within one turn
 };
 
 /// Draws runs, by the Python package pendula_plot; its complaints go to standard error.
 ExitStatus plot(const PlotOptions& options);
+
+struct MapOptions {
+  std::string file;     ///< of an ensemble
+  std::string key;      ///< what is kept of every member
+  std::string output;   ///< .svg, .png or .pdf
+  std::string scale;    ///< "log" or "linear"; empty for what the numbers ask for
+  std::string contour;  ///< `key=value`, a line where what is kept has that value; empty for none
+};
+
+/// Draws an ensemble over its axes, as plot does.
+ExitStatus map(const MapOptions& options);
 
 /// Whether a film of that name can be made here; says why not on standard error.
 ExitStatus check_film(const std::string& output);
@@ -72,6 +85,35 @@ ExitStatus film(const std::string& run, const std::string& output);
 
 /// Makes a page of striking cases, with films, in a folder.
 ExitStatus gallery(const std::string& folder);
+
+struct LyapunovOptions {
+  std::string scenario;                ///< the file
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  int count = 0;                       ///< leading exponents; 0 for all
+  std::optional<std::string> output;   ///< CSV of how they converge
+  bool json = false;
+};
+
+/// Runs a scenario and tells its Lyapunov exponents on standard output. Throws io::InputError.
+ExitStatus lyapunov(const LyapunovOptions& options);
+
+/// One of several parts of an ensemble that run by themselves.
+struct Shard {
+  int number = 1, of = 1;
+};
+
+struct EnsembleOptions {
+  std::string scenario;                ///< the file
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  std::string output;                  ///< HDF5 file
+  int threads = 0;                     ///< of each process; 0 for as many as there are cores, of several ranks for one
+  std::optional<Shard> shard;
+  bool resume = false;  ///< goes on with what is beside the output
+  bool json = false;
+};
+
+/// Moves the members of a scenario with [ensemble]; a summary to standard output. Throws io::InputError.
+ExitStatus ensemble(const EnsembleOptions& options);
 
 /// Lists the fixed-n kernels of this build on standard output.
 ExitStatus kernels();

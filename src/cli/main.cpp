@@ -10,6 +10,7 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <optional>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
 #include <sstream>
@@ -48,12 +49,19 @@ struct CommandLine {
   CLI::App* new_model;
   CLI::App* plot;
   CLI::App* gallery;
+  CLI::App* lyapunov;
+  CLI::App* ensemble;
+  CLI::App* map;
   SimulateOptions simulate_options;
   CheckOptions check_options;
   BuildOptions build_options;
   std::string model_name;
   PlotOptions plot_options;
   std::string gallery_folder;
+  LyapunovOptions lyapunov_options;
+  EnsembleOptions ensemble_options;
+  MapOptions map_options;
+  std::string shard;
 };
 
 /// A check of an option's text: what is expected where `accept` says no.
@@ -64,9 +72,33 @@ CLI::Validator expect(const std::string& expected, bool (*accept)(const std::str
           ""};
 }
 
+/// I/N with 1 ≤ I ≤ N; none for any other text.
+std::optional<Shard> shard_of(const std::string& text) {
+  Shard shard;
+  const char* const end = text.data() + text.size();
+  const auto number = std::from_chars(text.data(), end, shard.number);
+  if (number.ec != std::errc() || number.ptr == end || *number.ptr != '/') return std::nullopt;
+  const auto of = std::from_chars(number.ptr + 1, end, shard.of);
+  if (of.ec != std::errc() || of.ptr != end || shard.number < 1 || shard.number > shard.of) return std::nullopt;
+  return shard;
+}
+
+bool is_shard(const std::string& text) {
+  return shard_of(text).has_value();
+}
+
+bool is_level(const std::string& text) {
+  const std::size_t equals = text.rfind('=');
+  if (equals == std::string::npos || equals == 0) return false;
+  double level = 0;
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data() + equals + 1, end, level);
+  return read.ec == std::errc() && read.ptr == end;
+}
+
 bool are_panels(const std::string& text) {
   std::istringstream words(text);
-  const std::array<std::string_view, 4> panels = {"series", "phase", "energy", "trace"};
+  const std::array<std::string_view, 5> panels = {"series", "phase", "energy", "trace", "steps"};
   bool good = !text.empty() && text.back() != ',';
   for (std::string word; std::getline(words, word, ',');) good &= std::ranges::find(panels, word) != panels.end();
   return good;
@@ -109,6 +141,9 @@ CommandLine::CommandLine() {
                    "Write the trajectory to this file, as HDF5 where it ends in .h5, else as CSV; - is standard "
                    "output, and standard error then has the "
                    "summary")
+      ->type_name("FILE")
+      ->check(not_empty);
+  simulate->add_option("--events", simulate_options.events, "Write what the scenario's [[event]] find to this CSV file")
       ->type_name("FILE")
       ->check(not_empty);
   CLI::Option* view = simulate->add_option("--view", simulate_options.view,
@@ -161,23 +196,88 @@ CommandLine::CommandLine() {
   new_model = app.add_subcommand("new-model", "Write a model file to start from");
   new_model->add_option("NAME", model_name, "Its name: letters, digits, underscores")->required();
 
-  plot = app.add_subcommand("plot", "Draw runs: coordinates over time, phase portrait, energy error, traces");
-  plot->add_option("RUN", plot_options.runs, "Trajectories, CSV or HDF5; several are drawn over each other")
+  plot = app.add_subcommand("plot", "Draw runs, Poincare sections, Lyapunov exponents as they converge");
+  plot->add_option("RUN", plot_options.runs,
+                   "Trajectories, CSV or HDF5, files of simulate --events, or of lyapunov -o; several over each other")
       ->required()
       ->check(not_empty);
   plot->add_option("-o,--output", plot_options.output, "The picture: .svg, .png or .pdf")
       ->required()
       ->type_name("FILE")
       ->check(not_empty);
-  plot->add_option("--show", plot_options.show, "Which of series, phase, energy, trace, with commas; else all")
+  plot->add_option("--show", plot_options.show,
+                   "Of trajectories: which of series, phase, energy, trace, steps, with commas; else what there is")
       ->type_name("LIST")
-      ->check(expect("some of series, phase, energy and trace, with commas", are_panels));
-  plot->add_option("--coordinates", plot_options.coordinates, "Which, with commas, as in theta_1,theta_3; else a few")
+      ->check(expect("some of series, phase, energy, trace and steps, with commas", are_panels));
+  plot->add_option(
+          "--coordinates", plot_options.coordinates,
+          "Which, with commas, as in theta_1,theta_3, else a few; of events one, against its rate, or two columns; "
+          "of exponents lambda_1,...")
       ->type_name("LIST");
   plot->add_option("--from", plot_options.from, "First time to show")->type_name("TIME");
   plot->add_option("--to", plot_options.to, "Last time to show")->type_name("TIME");
   plot->add_flag("--wrapped", plot_options.wrapped, "Angles from -pi to pi");
   plot->footer("Example: pendula plot run.h5 -o run.svg --show energy");
+
+  lyapunov = app.add_subcommand("lyapunov", "Find the Lyapunov exponents of a scenario's motion");
+  lyapunov->add_option("SCENARIO", lyapunov_options.scenario, "The scenario, a TOML file; - is standard input")
+      ->required()
+      ->check(not_empty);
+  lyapunov->add_option("--count", lyapunov_options.count, "The leading ones only, so many; else all")
+      ->type_name("K")
+      ->check(CLI::Range(1, 1000000));
+  lyapunov
+      ->add_option("--set", lyapunov_options.overrides, "Replace a key of the scenario, as in --set run.duration=1e3")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
+  lyapunov->add_option("-o,--output", lyapunov_options.output, "Write how they converge to this file, as CSV")
+      ->type_name("FILE")
+      ->check(not_empty);
+  lyapunov->add_flag("--json", lyapunov_options.json, "Print them as one JSON object");
+  lyapunov->footer("Example: pendula lyapunov double.toml --set run.duration=1000 -o convergence.csv");
+
+  ensemble = app.add_subcommand("ensemble", "Move the many members of a scenario with [ensemble]");
+  ensemble->add_option("SCENARIO", ensemble_options.scenario, "The scenario, a TOML file")
+      ->required()
+      ->check(not_empty);
+  ensemble->add_option("-o,--output", ensemble_options.output, "The file for what came of them, HDF5")
+      ->required()
+      ->type_name("FILE")
+      ->check(not_empty);
+  ensemble
+      ->add_option("--set", ensemble_options.overrides, "Replace a key of the scenario, as in --set run.duration=20")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
+  ensemble->add_option("--threads", ensemble_options.threads, "Of each process; else all cores, of mpirun's ranks one")
+      ->type_name("N")
+      ->check(one_or_more);
+  ensemble->add_option("--shard", shard, "Only the I-th of N parts, which share the file: for job arrays")
+      ->type_name("I/N")
+      ->check(expect("I/N with 1 <= I <= N, such as 2/8", is_shard));
+  ensemble->add_flag("--resume", ensemble_options.resume, "Go on with what an interrupted one has left");
+  ensemble->add_flag("--json", ensemble_options.json, "Print the summary as one JSON object, and no progress");
+  ensemble->footer("Example: pendula ensemble examples/flip_map.toml -o flips.h5");
+
+  map = app.add_subcommand("map", "Draw what is kept of an ensemble over its axes");
+  map->add_option("FILE", map_options.file, "The file of an ensemble")->required()->check(not_empty);
+  map->add_option("KEY", map_options.key, "A kept number, such as event:flip or energy_error")
+      ->required()
+      ->check(not_empty);
+  map->add_option("-o,--output", map_options.output, "The picture: .svg, .png or .pdf")
+      ->required()
+      ->type_name("FILE")
+      ->check(not_empty);
+  map->add_option("--scale", map_options.scale, "log or linear; else what the numbers ask for")
+      ->type_name("SCALE")
+      ->check(CLI::IsMember({"log", "linear"}));
+  map->add_option("--contour", map_options.contour, "A line where another kept number has a value")
+      ->type_name("KEY=VALUE")
+      ->check(expect("KEY=VALUE such as energy_start=-9.81", is_level));
+  map->footer("Example: pendula map flips.h5 event:flip -o flips.png");
 
   gallery = app.add_subcommand("gallery", "Make a page of striking motions, each with its scenario");
   gallery->add_option("DIR", gallery_folder, "The folder for it")->required()->check(not_empty);
@@ -220,8 +320,16 @@ ExitStatus dispatch(const CommandLine& line) {
   if (*line.build) return build(line.build_options);
   if (*line.new_model) return new_model(line.model_name);
   if (*line.plot) return plot(line.plot_options);
+  if (*line.lyapunov) return lyapunov(line.lyapunov_options);
+  if (*line.ensemble) {
+    EnsembleOptions options = line.ensemble_options;
+    options.shard = shard_of(line.shard);
+    return ensemble(options);
+  }
+  if (*line.map) return map(line.map_options);
   if (*line.gallery) return gallery(line.gallery_folder);
-  std::cerr << complaint(line, "expected a command: simulate, plot, gallery, check, kernels, build or new-model");
+  std::cerr << complaint(
+      line, "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, check, kernels, build or new-model");
   return wrong_input;
 }
 

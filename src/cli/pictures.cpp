@@ -38,6 +38,11 @@ ExitStatus plot(const PlotOptions& options) {
   return draw(arguments);
 }
 
+ExitStatus map(const MapOptions& options) {
+  return draw({"map", "--output=" + options.output, "--scale=" + options.scale, "--contour=" + options.contour, "--",
+               options.file, options.key});
+}
+
 ExitStatus check_film(const std::string& output) {
   return draw({"film", "--output=" + output});
 }

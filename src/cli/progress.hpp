@@ -14,6 +14,14 @@
 
 namespace pendula::cli {
 
+/// How long a rest will take, as people say it.
+inline std::string rest_text(double seconds) {
+  const auto whole = static_cast<std::int64_t>(std::min(std::ceil(seconds), 1e15));
+  if (whole < 60) return std::to_string(whole) + " s";
+  if (whole < 3600) return std::to_string(whole / 60) + " min " + std::to_string(whole % 60) + " s";
+  return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
+}
+
 /// A line on standard error that shows how far a run is, how fast, how long it will take and how far its energy is off;
 /// nothing at all where that is no terminal.
 class Progress : public Observer {
@@ -69,13 +77,6 @@ class Progress : public Observer {
       text += "   energy off by " + rounded(std::abs(row.seen.energy - first_energy_) / scale, 2);
     }
     return text;
-  }
-
-  static std::string rest_text(double seconds) {
-    const auto whole = static_cast<std::int64_t>(std::min(std::ceil(seconds), 1e15));
-    if (whole < 60) return std::to_string(whole) + " s";
-    if (whole < 3600) return std::to_string(whole / 60) + " min " + std::to_string(whole % 60) + " s";
-    return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
   }
 
   double start_time_, duration_;

@@ -24,6 +24,9 @@
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
 #include "cli/run_source.hpp"
+#include "cli/scenario_subject.hpp"
+#include "io/event_file.hpp"
+#include "io/event_reader.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/natural_units.hpp"
@@ -36,15 +39,6 @@
 
 namespace pendula::cli {
 namespace {
-
-/// What a scenario moves.
-template <class Space>
-std::shared_ptr<const Subject> subject_of(const io::Scenario<Space>& scenario) {
-  return std::make_shared<ChainSubject<Space>>(scenario.chain);
-}
-std::shared_ptr<const Subject> subject_of(const io::SystemScenario& scenario) {
-  return scenario.system;
-}
 
 /// What a page shows of it.
 template <class Space>
@@ -64,21 +58,6 @@ void describe(const io::Scenario<Space>& scenario, const std::string& file, cons
 void describe(const io::SystemScenario& scenario, const std::string& file, const Motion& last, io::Summary& summary) {
   summary.model = io::model_summary(file, *scenario.system);
   summary.system = io::snapshot(*scenario.system, last);
-}
-
-/// The run that a scenario asks for. What the runtime says of an option, `key: …`, is said at the place of that key.
-/// Throws io::InputError.
-Run run_of(const RunSetup& setup, const io::RunPlan& plan, const std::string& file) {
-  try {
-    return Run(setup);
-  } catch (const NoKernel& error) {
-    throw io::InputError(plan.places.at("links") + ": " + error.what());
-  } catch (const std::invalid_argument& error) {
-    const std::string what = error.what();
-    const std::size_t colon = std::min(what.find(':'), what.size());
-    const auto place = plan.places.find(what.substr(0, colon));
-    throw io::InputError(place == plan.places.end() ? file + ": " + what : place->second + what.substr(colon));
-  }
 }
 
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
@@ -143,6 +122,32 @@ std::unique_ptr<view::Page> open_page(const SimulateOptions& options, const view
   return std::make_unique<view::Page>(*options.view, scene, 1 + static_cast<std::size_t>(options.copies));
 }
 
+std::vector<std::string> event_names(const RunSetup& setup) {
+  std::vector<std::string> names;
+  names.reserve(setup.events.size());
+  for (const Event& event : setup.events) names.push_back(event.name);
+  return names;
+}
+
+/// Throws io::InputError where there can be no file for events.
+void check_events(const SimulateOptions& options, const RunSetup& setup) {
+  if (!options.events) return;
+  spare_scenario(*options.events, "events", options);
+  const auto is_taken = [&](const std::optional<std::string>& file) {
+    return file && is_same_file(*options.events, *file);
+  };
+  if (*options.events == "-" || is_taken(options.output) || is_taken(options.view) || is_taken(options.resume)) {
+    throw io::InputError(*options.events + ": expected a file of its own for the events");
+  }
+  if (!setup.events.empty()) return;
+  throw io::InputError("--events " + *options.events + ": expected a scenario with [[event]], got one without");
+}
+
+std::unique_ptr<io::EventFile> open_events(const SimulateOptions& options, const RunSetup& setup) {
+  if (!options.events) return nullptr;
+  return std::make_unique<io::EventFile>(*options.events, setup.subject->columns());
+}
+
 /// What a page shows of a scenario.
 template <class Scenario>
 view::Scene scene_of(const Scenario& scenario, const RunSource& source) {
@@ -180,15 +185,17 @@ class Session {
       : setup_(std::move(setup)),
         options_(options),
         from_(checkpoint_of(source, setup_.start.time + setup_.duration)),
-        run_(run_of(setup_, plan, source.text.name)),
+        run_(told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
         origin_(origin_of(source, run_.description(), model)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
         file_(open_rows(output_, options, origin_, from_, quantities_of(*setup_.subject, plan.natural))),
+        events_(open_events(options, setup_)),
         film_rows_(open_film_rows(quantities_of(*setup_.subject, plan.natural))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_);
+    if (events_) run_.add(*events_);
     if (film_rows_) run_.add(*film_rows_);
     run_.add(last_);
     run_.add(progress_);
@@ -206,7 +213,9 @@ class Session {
     summary.duration = setup_.duration;
     summary.every = setup_.every;
     summary.at = setup_.rows;
-    summary.ending = io::ending_of(summary, setup_.subject->coordinates());
+    summary.event_names = event_names(setup_);
+    summary.event_file = options_.events;
+    summary.ending = io::ending_of(summary, setup_.subject->coordinates(), summary.event_names);
     if (page_) finish_page(interrupted, summary);
     if (options_.video) make_film(summary);
     if (summary.end == RunEnd::stopped) tell_how_to_go_on(summary);
@@ -281,7 +290,7 @@ class Session {
     run.add(*page_);
     const RunReport report = run.go(interrupted);
     page_->end_run(report.energy_error);
-    const io::Ending ending = io::ending_of(report, setup.subject->coordinates());
+    const io::Ending ending = io::ending_of(report, setup.subject->coordinates(), event_names(setup));
     if (!ending.ok() && report.end != RunEnd::stopped) {
       warn({"copy " + std::to_string(copy) + " ends early: " + ending.message});
     }
@@ -303,6 +312,7 @@ class Session {
   std::optional<std::string> output_;
   std::unique_ptr<view::Page> page_;  // opened first: that leaves what is there as it is
   std::unique_ptr<io::RowsFile> file_;
+  std::unique_ptr<io::EventFile> events_;
   std::unique_ptr<io::RunFile> film_rows_;
   LastCheckpoint last_;
   Progress progress_;
@@ -332,13 +342,16 @@ ExitStatus simulate(const SimulateOptions& options) {
   const io::AnyScenario any = io::parse_scenario(source.text.text, source.text.name, source.overrides, find);
   return std::visit(
       [&](const auto& scenario) {
-        const RunSetup setup{.subject = subject_of(scenario),
+        const std::shared_ptr<const Subject> subject = subject_of(scenario);
+        const RunSetup setup{.subject = subject,
                              .start = scenario.start,
                              .options = scenario.run,
                              .duration = scenario.duration,
                              .every = scenario.every,
                              .rows = scenario.rows,
-                             .checkpoint = scenario.checkpoint};
+                             .checkpoint = scenario.checkpoint,
+                             .events = io::events_of(scenario.events, subject, scenario.start)};
+        check_events(options, setup);
         io::Summary summary = Session(setup, scene_of(scenario, source), scenario, source, model, options).run();
         describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);
         std::ostream& out = options.output == "-" ? std::cerr : std::cout;

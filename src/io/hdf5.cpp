@@ -210,11 +210,33 @@ void write_attribute(const Handle& object, const std::string& name, const std::s
   require(H5Awrite(attribute.get(), type.get(), &begin));
 }
 
+void write_attribute(const Handle& object, const std::string& name, std::int64_t number) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(H5Acreate2(object.get(), name.c_str(), H5T_STD_I64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose);
+  require(H5Awrite(attribute.get(), H5T_NATIVE_INT64, &number));
+}
+
+void write_attribute(const Handle& object, const std::string& name, std::span<const double> numbers) {
+  const std::array<hsize_t, 1> extent{numbers.size()};
+  const Handle space = space_of(extent);
+  const Handle attribute(H5Acreate2(object.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose);
+  require(H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, numbers.data()));
+}
+
 std::string read_attribute(const Handle& object, const std::string& name) {
   const Handle attribute(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
   char* text = nullptr;
   require(H5Aread(attribute.get(), text_type().get(), &text));
   return taken(text);
+}
+
+std::int64_t read_number(const Handle& object, const std::string& name) {
+  const Handle attribute(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
+  std::int64_t number = 0;
+  require(H5Aread(attribute.get(), H5T_NATIVE_INT64, &number));
+  return number;
 }
 
 void write_text(const Handle& where, const std::string& name, const std::string& text) {
@@ -242,6 +264,47 @@ Handle create_numbering(const Handle& where, const std::string& name, std::size_
   std::iota(numbers.begin(), numbers.end(), 1);
   require(H5Dwrite(dataset.get(), H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data()));
   return dataset;
+}
+
+Handle create_vector(const Handle& where, const std::string& name, std::span<const double> numbers) {
+  const std::array<hsize_t, 1> extent{numbers.size()};
+  const Handle space = space_of(extent);
+  Handle dataset(
+      H5Dcreate2(where.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+      H5Dclose);
+  require(H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data()));
+  return dataset;
+}
+
+Handle create_texts(const Handle& where, const std::string& name, std::span<const std::string> texts) {
+  const std::array<hsize_t, 1> extent{texts.size()};
+  const Handle space = space_of(extent), type = text_type();
+  Handle dataset(H5Dcreate2(where.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                 H5Dclose);
+  std::vector<const char*> begins;
+  for (const std::string& text : texts) begins.push_back(text.c_str());
+  require(H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, begins.data()));
+  return dataset;
+}
+
+Handle create_array(const Handle& where, const std::string& name, std::span<const std::int64_t> extent, Type type) {
+  const std::vector<hsize_t> sizes(extent.begin(), extent.end());
+  const Handle space = space_of(sizes), properties = property_list(H5P_DATASET_CREATE);
+  const double none = std::nan("");
+  const std::int64_t no_count = -1;
+  require(H5Pset_alloc_time(properties.get(), H5D_ALLOC_TIME_EARLY));
+  require(type == Type::real ? H5Pset_fill_value(properties.get(), H5T_NATIVE_DOUBLE, &none)
+                             : H5Pset_fill_value(properties.get(), H5T_NATIVE_INT64, &no_count));
+  const hid_t stored = type == Type::real ? H5T_IEEE_F64LE : type == Type::whole ? H5T_STD_I64LE : H5T_STD_I8LE;
+  errno = 0;
+  return {H5Dcreate2(where.get(), name.c_str(), stored, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+          H5Dclose};
+}
+
+std::uint64_t offset_of(const Handle& array) {
+  const haddr_t offset = H5Dget_offset(array.get());
+  if (offset == HADDR_UNDEF) throw Error();
+  return offset;
 }
 
 Handle create_rows(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows) {

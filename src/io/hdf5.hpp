@@ -75,13 +75,26 @@ Handle open_group(const Handle& where, const std::string& name);
 bool has(const Handle& where, const std::string& name);
 
 void write_attribute(const Handle& object, const std::string& name, const std::string& text);
+void write_attribute(const Handle& object, const std::string& name, std::int64_t number);
+void write_attribute(const Handle& object, const std::string& name, std::span<const double> numbers);
 std::string read_attribute(const Handle& object, const std::string& name);
+std::int64_t read_number(const Handle& object, const std::string& name);
 
 void write_text(const Handle& where, const std::string& name, const std::string& text);
 std::string read_text(const Handle& where, const std::string& name);
 
 /// Whole numbers 1, 2, … that count the links.
 Handle create_numbering(const Handle& where, const std::string& name, std::size_t count);
+
+/// A vector of numbers, or of texts.
+Handle create_vector(const Handle& where, const std::string& name, std::span<const double> numbers);
+Handle create_texts(const Handle& where, const std::string& name, std::span<const std::string> texts);
+
+/// What an array holds: doubles, integers of 64 bits or of 8.
+enum class Type { real, whole, byte };
+/// An array that lies in one piece in its file, filled with NaN, or −1; and the byte of the file that it begins at.
+Handle create_array(const Handle& where, const std::string& name, std::span<const std::int64_t> extent, Type type);
+std::uint64_t offset_of(const Handle& array);
 
 /// A table of rows of `size` numbers each (a vector where `size` is 0) that grows by chunks of `chunk_rows`.
 Handle create_rows(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows);

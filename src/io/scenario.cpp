@@ -22,7 +22,8 @@ namespace {
 
 using Names = std::span<const std::string_view>;
 
-constexpr std::array<std::string_view, 5> section_names = {"chain", "system", "start", "run", "output"};
+constexpr std::array<std::string_view, 7> section_names = {"chain",  "system", "start",   "run",
+                                                           "output", "event",  "ensemble"};
 constexpr std::array<std::string_view, 9> chain_keys = {"space",   "links",  "masses", "lengths", "gravity",
                                                         "damping", "torque", "units",  "drive"};
 constexpr std::array<std::string_view, 4> drive_keys = {"link", "amplitude", "frequency", "phase"};
@@ -35,7 +36,7 @@ constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "fo
 constexpr std::array<std::string_view, 4> output_keys = {"every", "interval", "times", "checkpoint"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 39> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 48> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -73,7 +74,16 @@ constexpr std::array<std::string_view, 39> all_keys = {"chain.space",
                                                        "output.every",
                                                        "output.interval",
                                                        "output.times",
-                                                       "output.checkpoint"};
+                                                       "output.checkpoint",
+                                                       "event.name",
+                                                       "event.when",
+                                                       "event.direction",
+                                                       "event.stop",
+                                                       "ensemble.axis",
+                                                       "ensemble.random",
+                                                       "ensemble.count",
+                                                       "ensemble.seed",
+                                                       "ensemble.keep"};
 
 constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
@@ -311,19 +321,25 @@ void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
 RunOptions read_run(const Section& run) {
   RunOptions options;
   options.method = choice(run, "method", options.method);
-  if (const auto stages = run.find("stages"))
+  const auto stages = run.find("stages");
+  if (stages) {
     options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer(1, 8));
+  }
   options.form = choice(run, "form", options.form);
   options.solver = choice(run, "solver", options.solver);
   options.iteration = choice(run, "iteration", options.iteration);
   options.step = number(run, "step", options.step, Sign::positive);
   options.tolerance = number(run, "tolerance", options.tolerance, Sign::positive);
+  if (!is_explicit(options.method) && !run.find("step")) {
+    options.step = 0;
+    if (!stages) options.stages = stages_for(options.method, options.tolerance);
+  }
   return options;
 }
 
 double read_duration(const Section& run, const RunOptions& options) {
   const double duration = number(run, "duration", 10, Sign::not_negative);
-  if (is_adaptive(options.method) || duration / options.step <= max_steps) return duration;
+  if (is_adaptive(options) || duration / options.step <= max_steps) return duration;
   const std::string expected = "a step of at least " + shortest(duration / max_steps) + " for this duration";
   const std::optional<Entry> step = run.find("step");
   (step ? *step : *run.find("duration")).fail(expected);
@@ -331,16 +347,19 @@ double read_duration(const Section& run, const RunOptions& options) {
 
 /// Keys of [run] that are there and mean nothing to the method: a warning, since a scenario may keep the settings of
 /// several methods side by side.
-std::vector<std::string> unused_keys(const Section& run, Method method) {
+std::vector<std::string> unused_keys(const Section& run, const RunOptions& options) {
+  const Method method = options.method;
   std::vector<std::string> warnings;
   const auto check = [&](std::string_view key, bool used) {
     const std::optional<Entry> entry = run.find(key);
     if (!entry || used) return;
-    warnings.push_back(entry->place() + ": has no effect with method " + std::string(name_of(method)));
+    const bool steps_are_given = key == "tolerance" && !is_explicit(method);
+    warnings.push_back(entry->place() + ": has no effect with " +
+                       (steps_are_given ? "run.step" : "method " + std::string(name_of(method))));
   };
   for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, !is_explicit(method));
   check("step", !is_adaptive(method));
-  check("tolerance", is_adaptive(method));
+  check("tolerance", is_adaptive(options));
   return warnings;
 }
 
@@ -379,12 +398,14 @@ RowTimes read_row_times(const Section& section, double duration) {
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
   plan.duration = read_duration(sections.run, plan.run);
-  const std::vector<std::string> unused = unused_keys(sections.run, plan.run.method);
+  const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
   const auto every = sections.output.find("every");
+  if (is_adaptive(plan.run)) plan.every = 1;
   if (every) plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
   plan.rows = read_row_times(sections.output, plan.duration);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
+  plan.events = read_events(sections.root);
   plan.checkpoint = number(sections.output, "checkpoint", plan.checkpoint, Sign::positive);
   for (const std::string_view key : run_keys) {
     if (const auto entry = sections.run.find(key)) plan.places[std::string(key)] = entry->place();

@@ -20,6 +20,7 @@
 #include <variant>
 #include <vector>
 
+#include "io/event_reader.hpp"
 #include "io/input_error.hpp"
 #include "io/natural_units.hpp"
 
@@ -35,7 +36,8 @@ inline constexpr double max_steps = 9e15;
 struct RunPlan {
   RunOptions run;
   double duration = 10;
-  std::int64_t every = 10;              ///< steps from row to row
+  std::int64_t every = 10;  ///< steps from row to row
+  std::vector<EventPlan> events;
   RowTimes rows;                        ///< where there are any, in place of that
   double checkpoint = 60;               ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI

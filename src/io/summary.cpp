@@ -83,6 +83,7 @@ Json to_json(const ModelSummary& model) {
 
 Json to_json(const Ending& ending) {
   Json json{{"status", ending.status}};
+  if (!ending.event.empty()) json["event"] = ending.event;
   if (!ending.ok()) json["message"] = ending.message;
   if (ending.step) return json;
   json["t"] = ending.step.time;
@@ -93,6 +94,17 @@ Json to_json(const Ending& ending) {
     json["link"] = where(ending.step.part >= 0, ending.step.part + 1);
   } else {
     json["coordinate"] = ending.coordinate;
+  }
+  return json;
+}
+
+/// NaN, of what never happened, becomes null.
+Json events_json(const Summary& summary) {
+  Json json = Json::array();
+  for (std::size_t k = 0; k < summary.events.size(); ++k) {
+    const EventTally& tally = summary.events[k];
+    json.push_back(
+        {{"name", summary.event_names[k]}, {"count", tally.count}, {"first", tally.first}, {"last", tally.last}});
   }
   return json;
 }
@@ -173,8 +185,8 @@ std::string settings(const Summary& summary) {
   if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
-  text += is_adaptive(summary.run.method) ? line("tolerance", shortest(summary.run.tolerance))
-                                          : line("step", shortest(summary.run.step) + time);
+  text += is_adaptive(summary.run) ? line("tolerance", shortest(summary.run.tolerance))
+                                   : line("step", shortest(summary.run.step) + time);
   text += line("duration", shortest(summary.duration) + time + ", " + rows_text(summary, time));
   if (model.natural) {
     text += line("units", "l_1 = " + rounded(model.natural->length) + " m, M_1 = " + rounded(model.natural->mass) +
@@ -206,7 +218,9 @@ std::string statistics(const Summary& summary) {
   const auto a_step = [&](double total) {
     return total / static_cast<double>(std::max<std::int64_t>(counts.steps, 1));
   };
-  std::string text = line("steps", std::to_string(counts.steps));
+  const std::string sizes = "of " + rounded(counts.smallest_step, 2) + " to " + rounded(counts.largest_step, 2) +
+                            std::string(unit_names(summary.model.natural).time);
+  std::string text = line("steps", std::to_string(counts.steps), counts.largest_step > 0 ? sizes : "");
   text += line("rejected steps", std::to_string(counts.rejected_steps));
   if (has_stages(summary)) {
     text += line("iterations", std::to_string(counts.newton_iterations),
@@ -248,8 +262,27 @@ std::string place(const Summary& summary) {
                               std::string(unit.time));
 }
 
+/// A line for each.
+std::string events_text(const Summary& summary) {
+  const std::string unit(unit_names(summary.model.natural).time);
+  std::string text;
+  for (std::size_t k = 0; k < summary.events.size(); ++k) {
+    const EventTally& tally = summary.events[k];
+    std::string when = tally.count > 1 ? "first " : "";
+    if (tally.count > 0) when.append("at t = ").append(rounded(tally.first, 12)).append(unit);
+    if (tally.count > 1) when.append(", last at t = ").append(rounded(tally.last, 12)).append(unit);
+    text += line("event " + summary.event_names[k] + " ", plural(tally.count, "time"), when);
+  }
+  return text;
+}
+
 std::string ending(const Summary& summary) {
-  std::string text = place(summary);
+  std::string text = place(summary) + events_text(summary);
+  if (summary.event_file) text += line("events", *summary.event_file);
+  if (!summary.ending.event.empty()) {
+    text += line("stopped by", "event " + summary.ending.event + ", before the end at " + shortest(summary.duration) +
+                                   std::string(unit_names(summary.model.natural).time));
+  }
   if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));
   if (summary.view) text += line("page", *summary.view + ", to open in a browser");
   if (!summary.ending.ok()) text += line("ended early", summary.ending.message);
@@ -266,10 +299,13 @@ Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coord
 
 }  // namespace
 
-Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates) {
+Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates,
+                 std::span<const std::string> events) {
   switch (report.end) {
     case RunEnd::complete:
       return {};
+    case RunEnd::event:
+      return {"stopped_by_event", "", {}, "", events[report.ended_by]};
     case RunEnd::stopped:
       return {"interrupted", "interrupted at t = " + shortest(report.last.time), {}, {}};
     case RunEnd::step_failed:
@@ -322,7 +358,7 @@ SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion) {
 
 std::string to_json(const Summary& summary) {
   const bool staged = has_stages(summary);
-  const bool adaptive = is_adaptive(summary.run.method);
+  const bool adaptive = is_adaptive(summary.run);
   Json json{{"pendula", version}, {"scenario", summary.model.scenario}};
   json.update(to_json(summary.model));
   json.update(Json{{"method", name_of(summary.run.method)},
@@ -337,6 +373,8 @@ std::string to_json(const Summary& summary) {
                    {"every", where(!summary.at.any(), summary.every)},
                    {"interval", where(summary.at.interval > 0, summary.at.interval)},
                    {"steps", summary.statistics.steps},
+                   {"smallest_step", where(adaptive, summary.statistics.smallest_step)},
+                   {"largest_step", where(adaptive, summary.statistics.largest_step)},
                    {"rejected_steps", summary.statistics.rejected_steps},
                    {"newton_iterations", summary.statistics.newton_iterations},
                    {"rows", summary.trajectory ? summary.rows_written : summary.rows},
@@ -347,6 +385,7 @@ std::string to_json(const Summary& summary) {
                    {"energy_error_max", summary.energy_error.largest},
                    {"wall_seconds", summary.stepping_seconds},
                    {"outcome", to_json(summary.ending)},
+                   {"events", events_json(summary)},
                    {"warnings", summary.warnings},
                    {"final", summary.model.space.empty() ? to_json(summary.system) : to_json(summary.final)}});
   constexpr int one_line = -1;

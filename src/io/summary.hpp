@@ -55,6 +55,8 @@ struct Ending {
   std::string message;        ///< a sentence for people; empty for "ok"
   Outcome step;               ///< the step that failed, where one did
   std::string coordinate;     ///< that it failed in, of a system that is no chain
+  /// That ended it, where one did.
+  std::string event = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
 
   bool ok() const { return message.empty(); }
 };
@@ -73,11 +75,14 @@ struct Summary : RunReport {
   std::optional<std::string> trajectory;  ///< the file that rows were written to; "-" is standard output
   std::int64_t rows_written = 0;          ///< that are in this file: fewer, where the disk is full
   std::optional<std::string> view;        ///< the page
+  std::vector<std::string> event_names;   ///< of the events that were looked for
+  std::optional<std::string> event_file;
 };
 
 /// How a run ended; `coordinates` as pendula::message takes them. What an observer threw is thrown again, but for
-/// OutputError.
-Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates = {});
+/// OutputError. `events` are their names.
+Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates = {},
+                 std::span<const std::string> events = {});
 
 template <class Space>
 ModelSummary model_summary(const std::string& scenario, const Chain<Space>& chain,

@@ -165,11 +165,35 @@ toml::table parse_value(std::string_view value, const std::string& where) {
                    (number.empty() ? "a TOML value after '=', got " + quoted(value) : "a number, got " + number));
 }
 
+/// A key that ends in the number of an element, `masses[2]`: its name, and the element from 1; 0 for none.
+std::pair<std::string_view, std::size_t> split_element(std::string_view key) {
+  const std::size_t open = key.find('[');
+  if (open == std::string_view::npos || !key.ends_with(']')) return {key, 0};
+  const std::string_view digits = key.substr(open + 1, key.size() - open - 2);
+  std::size_t element = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), element);
+  const bool is_whole = error == std::errc() && end == digits.data() + digits.size();
+  return is_whole && element > 0 ? std::pair(key.substr(0, open), element) : std::pair(key, std::size_t{0});
+}
+
+/// Puts a value in the place of an element of an array that is there.
+void set_element(toml::table& table, std::string_view name, std::size_t element, toml::node& value,
+                 const std::string& where, std::string_view key) {
+  toml::node* const node = table.get(name);
+  const toml::array* const array = node == nullptr ? nullptr : node->as_array();
+  if (array == nullptr || array->size() < element) {
+    throw InputError(where, printable(key), "an array of at least " + std::to_string(element) + " elements",
+                     node == nullptr ? "none" : shown(*node));
+  }
+  node->as_array()->replace(array->cbegin() + static_cast<std::ptrdiff_t>(element - 1), std::move(value));
+}
+
 void apply_override(toml::table& root, const std::string& text) {
   const std::string where = std::string(override_prefix) + printable(text);
   require_shallow(text, where);
   const std::size_t equals = text.find('=');
-  const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
+  const std::string_view whole_key = trimmed(std::string_view(text).substr(0, equals));
+  const auto [key, element] = split_element(whole_key);
   const std::vector<std::string_view> path = key_path(key);
   if (equals == std::string::npos || path.empty()) {
     throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
@@ -186,6 +210,7 @@ void apply_override(toml::table& root, const std::string& text) {
     }
     table = next->as_table();
   }
+  if (element > 0) return set_element(*table, path.back(), element, *value.get("value"), where, whole_key);
   table->insert_or_assign(path.back(), std::move(*value.get("value")));
 }
 
@@ -281,6 +306,12 @@ double Entry::number(Sign sign, Units units) const {
   return *value;
 }
 
+bool Entry::truth() const {
+  const auto* value = node_->as_boolean();
+  if (value == nullptr) fail("true or false");
+  return value->get();
+}
+
 std::int64_t Entry::integer(std::int64_t least, std::int64_t most) const {
   const auto* value = node_->as_integer();
   if (value == nullptr || value->get() < least || value->get() > most) {
@@ -299,7 +330,7 @@ std::size_t Entry::choice(std::span<const std::string_view> choices) const {
   const auto* value = node_->as_string();
   const auto found = value == nullptr ? choices.end() : std::ranges::find(choices, std::string_view(value->get()));
   if (found != choices.end()) return static_cast<std::size_t>(found - choices.begin());
-  const std::string expected = quoted(joined(choices, "\" or \""));
+  const std::string expected = '"' + joined(choices, "\" or \"") + '"';
   if (value == nullptr) fail(expected);
   throw InputError(where(), key_, expected, shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
 }

@@ -59,6 +59,7 @@ class Entry {
 
   /// A number; where there are `units`, also a string of a number and one of them.
   double number(Sign sign = Sign::any, Units units = {}) const;
+  bool truth() const;
   std::int64_t integer(std::int64_t least, std::int64_t most) const;
   /// Any string but an empty one.
   std::string text() const;

@@ -1,6 +1,7 @@
 #include "view/page.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -19,10 +20,12 @@ using nlohmann::json;
 
 constexpr std::size_t enough_rows = 2048;  // of exact ones
 constexpr std::size_t fewest_rows = 512;   // before a page may grow
+constexpr std::size_t most_marks = 1000;   // of an event in a run
+constexpr double alike = 1e-6;             // steps that differ by less are of one size
 
-/// Bytes of a row in base64: the time, the numbers, and two floats that tell its energy error and its distance.
+/// Bytes of a row in base64: the time, the numbers, and floats that tell its energy error, its distance and its step.
 std::size_t row_bytes(std::size_t numbers, std::size_t size) {
-  return (8 + numbers * size + 8) * 4 / 3 + 1;
+  return (8 + numbers * size + 12) * 4 / 3 + 1;
 }
 
 /// All but the time.
@@ -72,16 +75,31 @@ Page::Page(const std::string& file, Scene scene, std::size_t runs, const PageLim
 void Page::begin_run(const std::string& label) {
   if (!runs_.empty() && runs_.back().rows.size() == 0) runs_.pop_back();
   const std::size_t run = runs_.size();
-  runs_.push_back({label, KeptRows(scene_.columns.size(), most_rows(run)), share_of(run), {}});
+  runs_.push_back({label, KeptRows(scene_.columns.size() + 1, most_rows(run)), share_of(run), {}, {}});
 }
 
-void Page::add_row(std::span<const double> row) {
+void Page::take(const Row& row) {
+  add_row(row.numbers, row.step > 0 ? row.step : std::numeric_limits<double>::quiet_NaN());
+}
+
+void Page::happen(const EventRow& happened) {
+  add_event(happened.event.name, happened.row.motion.time, happened.up);
+}
+
+void Page::add_event(const std::string& name, double time, bool up) {
+  if (runs_.empty()) throw std::logic_error("page: expected begin_run before an event");
+  runs_.back().events.try_emplace(name, 2, most_marks).first->second.add(std::array{time, up ? 1.0 : 0.0});
+}
+
+void Page::add_row(std::span<const double> row, double step) {
   if (runs_.empty()) throw std::logic_error("page: expected begin_run before a row");
   if (row.size() != scene_.columns.size()) {
     throw std::invalid_argument("page: expected a row of " + std::to_string(scene_.columns.size()) + " numbers, got " +
                                 std::to_string(row.size()));
   }
-  runs_.back().rows.add(row);
+  row_.assign(row.begin(), row.end());
+  row_.push_back(step);
+  runs_.back().rows.add(row_);
 }
 
 void Page::end_run(const EnergyError& energy) {
@@ -143,6 +161,22 @@ std::vector<float> Page::separations(const Run& run) const {
   return separations;
 }
 
+// Empty where they are all alike; the last one may be cut short.
+std::vector<float> Page::steps(const Run& run) const {
+  std::vector<float> steps;
+  steps.reserve(run.rows.size());
+  double least = std::numeric_limits<double>::infinity(), largest = 0;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    const double step = run.rows[i].back();
+    steps.push_back(static_cast<float>(step));
+    if (std::isnan(step) || i + 1 == run.rows.size()) continue;
+    least = std::min(least, step);
+    largest = std::max(largest, step);
+  }
+  if (largest <= least * (1 + alike)) steps.clear();
+  return steps;
+}
+
 // The largest of any point, or of any coordinate where there are none.
 double Page::distance(std::span<const double> a, std::span<const double> b) const {
   double largest = 0;
@@ -160,7 +194,7 @@ double Page::distance(std::span<const double> a, std::span<const double> b) cons
   return largest;
 }
 
-// Times, columns one after the other, errors of the energy, distances.
+// Times, columns one after the other, errors of the energy, distances, sizes of steps.
 std::string Page::encoded(const Run& run) const {
   Bytes bytes;
   const std::size_t rows = run.rows.size();
@@ -178,12 +212,23 @@ std::string Page::encoded(const Run& run) const {
   }
   for (const float error : energy_errors(run)) bytes.add(error);
   for (const float distance : separations(run)) bytes.add(distance);
+  for (const float step : steps(run)) bytes.add(step);
   std::string text;
   append_base64(text, bytes.view());
   return text;
 }
 
 json Page::described(const Run& run) const {
+  json events = json::array();
+  for (const auto& [name, marks] : run.events) {
+    json times = json::array(), up = json::array();
+    for (std::size_t i = 0; i < marks.size(); ++i) {
+      times.push_back(marks[i][0]);
+      up.push_back(marks[i][1] != 0);
+    }
+    events.push_back(
+        {{"name", name}, {"count", marks.seen()}, {"stride", marks.stride()}, {"times", times}, {"up", up}});
+  }
   return {{"label", run.label},
           {"rows", run.rows.size()},
           {"seen", run.rows.seen()},
@@ -191,7 +236,9 @@ json Page::described(const Run& run) const {
           {"exact", is_exact(run)},
           {"columns", columns_of(run)},
           {"energy", !energy_errors(run).empty()},
-          {"separation", &run != runs_.data()}};
+          {"separation", &run != runs_.data()},
+          {"steps", !steps(run).empty()},
+          {"events", events}};
 }
 
 json Page::described() const {

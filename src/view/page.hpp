@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <pendula/run/observer.hpp>
 #include <pendula/run/run_record.hpp>
@@ -25,7 +27,8 @@ struct PageLimits {
 ///
 /// Rows are thinned, evenly and in bounded memory, and the page says so. As long as 2048 of them can be kept with all
 /// their columns as doubles, they are, and the CSV that the page gives is the trajectory's own text; longer rows, and
-/// those of the second run and later ones, are floats of what is drawn.
+/// those of the second run and later ones, are floats of what is drawn. Events are marks on the line of time, thinned
+/// in the same way; the sizes of steps are shown where the method chooses them.
 class Page : public Observer {
  public:
   /// Opens the file. `runs` is how many will follow: they share the page. Throws io::InputError.
@@ -34,11 +37,15 @@ class Page : public Observer {
   /// Rows that follow are those of a run that the page calls `label`.
   void begin_run(const std::string& label);
 
-  /// Takes a row, in the order of the columns.
-  void add_row(std::span<const double> row);
+  /// Takes a row, in the order of the columns, and the size of the step that it lies in, NaN where there is none  [s].
+  void add_row(std::span<const double> row, double step = std::numeric_limits<double>::quiet_NaN());
+
+  /// Takes an event of the run.
+  void add_event(const std::string& name, double time, bool up);
 
   /// The same of a run whose observer the page is.
-  void take(const Row& row) override { add_row(row.numbers); }
+  void take(const Row& row) override;
+  void happen(const EventRow& happened) override;
 
   /// Says what the energies of the run are compared with: RunReport::energy_error, which is complete with the last row.
   /// Without it the page has no energy errors of the run.
@@ -50,9 +57,10 @@ class Page : public Observer {
  private:
   struct Run {
     std::string label;
-    KeptRows rows;
+    KeptRows rows;      // and the size of the step as the last number
     std::size_t share;  // bytes for the rows, as text
     EnergyError energy;
+    std::map<std::string, KeptRows> events;  // by name: when, and whether from − to +
   };
 
   std::size_t share_of(std::size_t run) const;
@@ -61,6 +69,7 @@ class Page : public Observer {
   const std::vector<std::size_t>& columns_of(const Run& run) const;
   std::vector<float> energy_errors(const Run& run) const;
   std::vector<float> separations(const Run& run) const;
+  std::vector<float> steps(const Run& run) const;
   double distance(std::span<const double> a, std::span<const double> b) const;
   std::string encoded(const Run& run) const;
   nlohmann::json described(const Run& run) const;
@@ -74,6 +83,7 @@ class Page : public Observer {
   std::vector<std::size_t> all_columns_, drawn_columns_;  // besides the time
   io::WholeFile file_;
   std::vector<Run> runs_;
+  std::vector<double> row_;  // with its step
 };
 
 }  // namespace pendula::view

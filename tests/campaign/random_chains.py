@@ -2,7 +2,7 @@
 
 usage: python tests/campaign/random_chains.py --seed 1 --count 2000 --program build/release/bin/pendula
 
-Each chain is run with three sets of options. A run is
+Each chain is run with four sets of options, the last one the program's own choice. A run is
   right          bobs and velocities at the end within 1e-3 (of the chain's length, of the largest speed met)
   false alarm    right, but with a warning
   warned         wrong, and a warning says so
@@ -35,6 +35,7 @@ OPTIONS = {
     "2 stages, 1 ms": {"stages": 2, "step": 1e-3},
     "6 stages, 1 ms": {"stages": 6, "step": 1e-3},
     "8 stages, 0.1 ms": {"stages": 8, "step": 1e-4},
+    "default": {},
 }
 CLASSES = ("right", "false alarm", "warned", "refused", "SILENT")
 RIGHT = 1e-3
@@ -212,13 +213,18 @@ class Verdict:
     words: str
 
 
+def tag(options: str) -> str:
+    """What files of a run with these options are called by."""
+    return options.split(",")[0].replace(" ", "_")
+
+
 def judge(case: Case, options: str, program: Path, folder: Path) -> Verdict:
     scenario = {
         **case.scenario,
         "run": {**case.scenario["run"], **OPTIONS[options]},
         "output": {"every": 1000000000},
     }
-    file = folder / f"{case.number}_{OPTIONS[options]['stages']}.toml"
+    file = folder / f"{case.number}_{tag(options)}.toml"
     file.write_text(toml(scenario))
     verdict = compare(case, options, [program, "simulate", file, "--json"])
     if verdict.kind == "SILENT":
@@ -330,7 +336,7 @@ def main() -> None:
     print("\n".join([*table(verdicts), "", *by_kind(verdicts)]))
     silent = [v for v in verdicts if v.kind == "SILENT"]
     for v in silent:
-        file = given.folder / "silent" / f"{v.case.number}_{OPTIONS[v.options]['stages']}.toml"
+        file = given.folder / "silent" / f"{v.case.number}_{tag(v.options)}.toml"
         print(
             f"{file}  off by {v.error:.1e}, growth {v.case.end.growth:.0e}: {', '.join(sorted(v.case.kinds))}"
         )

@@ -84,12 +84,12 @@ def test_text_that_is_no_toml_is_told_with_its_line(pendula, double):
         ),
         (
             "run.method=euler",
-            'run.method: expected "gauss" or "radau" or "rk4" or "dopri5" or "fehlberg78"',
+            'run.method: expected "gauss" or "radau" or "rk4" or "dopri5" or "fehlberg78" or "bulirsch-stoer"',
             '"euler"',
         ),
         (
             "step=1",
-            "step: expected one of chain, system, start, run, output",
+            "step: expected one of chain, system, start, run, output, event, ensemble",
             'the unknown key "step" (did you mean run.step?)',
         ),
         ("run.step", "expected KEY=VALUE such as run.step=1e-4", '"run.step"'),
@@ -162,7 +162,11 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
 @pytest.mark.parametrize(
     ("arguments", "command", "message"),
     [
-        ([], "", "expected a command: simulate, plot, gallery, check, kernels, build or new-model"),
+        (
+            [],
+            "",
+            "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, check, kernels, build or new-model",
+        ),
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),
         (["simulate"], " simulate", "SCENARIO is required"),

@@ -30,11 +30,24 @@ def test_examples_run_without_a_warning(example, file):
     assert len(trajectory.rows) == summary["rows"] > 20
 
 
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_examples_run_without_naming_a_step(file, pendula, tmp_path):
+    """Of chaos that outlives every tolerance a warning says so."""
+    lines = [line for line in file.read_text().splitlines() if not line.startswith(("step ", "stages "))]
+    (tmp_path / file.name).write_text("\n".join(lines))
+    summary = pendula("simulate", tmp_path / file.name, "--json").json
+    assert summary["outcome"] == {"status": "ok"}
+    assert summary["step"] is None and summary["smallest_step"] > 0
+    assert all("the last state cannot be trusted" in warning for warning in summary["warnings"])
+
+
 def test_double_pendulum_keeps_its_energy(example):
     summary, _ = example("double_pendulum")
-    assert summary["energy_error_max"] < 1e-14  # measured 7.3e-16
+    assert summary["energy_error_max"] < 1e-9  # measured 3.1e-11
     bob = summary["final"]["bobs"][1]
-    assert math.dist(bob, (-1.0407657832461712, -1.7073476624693271)) < 1e-12  # measured 1.6e-15
+    assert math.dist(bob, (-1.0407657832461712, -1.7073476624693271)) < 1e-7  # measured 1.0e-9
+    assert summary["step"] is None and summary["tolerance"] == 1e-9 and summary["stages"] == 8
+    assert 0 < summary["smallest_step"] < summary["largest_step"]
 
 
 def test_spherical_pendulum_keeps_energy_and_vertical_angular_momentum(example):
@@ -44,7 +57,7 @@ def test_spherical_pendulum_keeps_energy_and_vertical_angular_momentum(example):
         for theta, phi_dot in zip(trajectory.column("theta_1"), trajectory.column("phi_dot_1"), strict=True)
     ]
     assert max(abs(momentum - momenta[0]) for momentum in momenta) < 1e-13  # measured 5.6e-15
-    assert summary["energy_error_max"] < 1e-13  # measured 1.1e-15
+    assert summary["energy_error_max"] < 1e-10  # measured 1.3e-12
 
 
 def test_small_oscillation_returns_after_one_period(example):
@@ -55,11 +68,19 @@ def test_small_oscillation_returns_after_one_period(example):
     assert end["theta_dot"] == pytest.approx([0, 0, 0], abs=1e-7)  # measured 2.0e-9
 
 
+def test_poincare_section_is_one(example):
+    summary, _ = example("poincare")
+    section, flip = summary["events"]
+    assert (section["name"], flip["name"]) == ("section", "flip")
+    assert section["count"] > 40  # a swing of the inner rod takes about two seconds
+    assert 0 < section["first"] < section["last"] < 100
+    assert flip["count"] > 10
+
+
 def test_adaptive_method_agrees_with_gauss(example):
     adaptive, _ = example("adaptive_method")
     gauss, _ = example("double_pendulum")
-    assert math.dist(adaptive["final"]["bobs"][1], gauss["final"]["bobs"][1]) < 1e-9  # measured 5.5e-12
-    assert adaptive["energy_error_max"] > gauss["energy_error_max"]
+    assert math.dist(adaptive["final"]["bobs"][1], gauss["final"]["bobs"][1]) < 1e-7  # measured 1.0e-9
 
 
 def test_natural_units_tell_their_scale(example):

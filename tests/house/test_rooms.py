@@ -21,6 +21,13 @@ KNOWS = {
         "pendula/system",
         "pendula/numeric",
     },
+    "pendula/ensemble": {
+        "pendula/run",
+        "pendula/chain",
+        "pendula/gauss",
+        "pendula/system",
+        "pendula/numeric",
+    },
     "library": {
         "pendula/run",
         "pendula/chain",
@@ -29,9 +36,17 @@ KNOWS = {
         "pendula/system",
         "pendula/numeric",
     },
-    "io": {"pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
+    "io": {"pendula/ensemble", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
     "view": {"io", "pendula/run", "pendula/chain", "pendula/system"},
-    "cli": {"view", "io", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
+    "cli": {
+        "view",
+        "io",
+        "pendula/ensemble",
+        "pendula/run",
+        "pendula/chain",
+        "pendula/system",
+        "pendula/numeric",
+    },
 }
 GENERATED = {"pendula/kernels"}
 

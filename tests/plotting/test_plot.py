@@ -4,9 +4,10 @@ import sys
 
 import numpy as np
 import pytest
+from conftest import DOUBLE
 from pendula_plot.__main__ import main
 from pendula_plot.figure import Choice, figure, symbol
-from pendula_plot.run import read_run
+from pendula_plot.run import PlotError, Run, read_run
 
 ALL = ("series", "phase", "energy", "trace")
 
@@ -60,6 +61,39 @@ def test_wrapped_angles_are_cut_where_they_jump(runs):
     assert np.allclose(np.sin(shown[there]), np.sin(whole[there]), atol=1e-12)
 
 
+def test_steps_are_shown_where_rows_are_steps(pendula, tmp_path):
+    (tmp_path / "chosen.toml").write_text(DOUBLE.replace("step     = 5e-3", "tolerance = 1e-8"))
+    for every, name in [(1, "steps.h5"), (1, "steps.csv"), (3, "thinned.h5")]:
+        simulate = pendula("simulate", "chosen.toml", "--set", f"output.every={every}", "-o", name)
+        assert simulate.returncode == 0
+    run, text, thinned = (read_run(tmp_path / name) for name in ("steps.h5", "steps.csv", "thinned.h5"))
+    assert (run.steps_a_row, text.steps_a_row, thinned.steps_a_row) == (1, None, 3)
+    *_, steps = figure([run], Choice()).axes
+    values, edges, _ = steps.patches[0].get_data()
+    assert np.array_equal(edges, run.time) and np.array_equal(values, np.diff(run.time))
+    assert np.max(values) > 2 * np.min(values[:-1])  # measured: 7.7, so that the steps do differ
+    assert steps.get_ylabel() == "$t_{k+1} - t_k$ [s]"
+    assert len(figure([text], Choice()).axes) == len(figure([thinned], Choice()).axes) == len(ALL)
+    assert len(figure([text], Choice(("steps",))).axes) == 1  # asked for
+    with pytest.raises(PlotError, match=r"expected a row a step .* to show steps, got rows every 3 steps"):
+        figure([thinned], Choice(("steps",)))
+
+
+def test_steps_that_are_alike_are_shown_when_asked_for(pendula, runs):
+    assert pendula("simulate", "double.toml", "--set", "output.every=1", "-o", "each.h5").returncode == 0
+    run = read_run(runs / "each.h5")
+    assert run.steps_a_row == 1 and len(figure([run], Choice()).axes) == len(ALL)
+    (steps,) = figure([run], Choice(("steps",))).axes
+    lengths = steps.patches[0].get_data().values
+    assert np.allclose(lengths, 5e-3, rtol=1e-12)  # measured: 7e-14, the rounding of t
+    plot = pendula("plot", "each.h5", "-o", "steps.svg", "--show", "steps,energy")  # the program passes it on
+    assert (plot.returncode, plot.stderr) == (0, "")
+    assert (runs / "steps.svg").read_text().count('<g id="axes_') == 2
+    at_times = Run("at.h5", {"t": run.time}, scenario="[output]\ninterval = 0.1\n")
+    with pytest.raises(PlotError, match="got rows at times"):
+        figure([at_times], Choice(("steps",)))
+
+
 @pytest.mark.parametrize(
     ("name", "printed"),
     [
@@ -67,6 +101,7 @@ def test_wrapped_angles_are_cut_where_they_jump(runs):
         ("theta_dot_12", r"$\dot{θ}_{12}$"),
         ("theta_1_dot", r"$\dot{θ}_{1}$"),
         ("x", "$x$"),
+        ("lambda_2", "$λ_{2}$"),
     ],
 )
 def test_names_are_printed_as_in_books(name, printed):

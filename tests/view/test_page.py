@@ -10,7 +10,7 @@ from axe_playwright_python.sync_playwright import Axe
 from conftest import NARROW, WIDE, until
 from playwright.sync_api import Page
 
-PLANAR = ["chaos", "hundred", "thousand", "cart", "no_points", "one_row"]
+PLANAR = ["chaos", "hundred", "thousand", "cart", "no_points", "one_row", "events"]
 SPATIAL = ["demo", "three_in_space", "hundred_in_space", "thousand_in_space", "free_point"]
 STAGE = "#stage canvas"
 
@@ -54,7 +54,7 @@ def test_a_run_of_one_row_is_a_still(open_page):
 
 
 @pytest.mark.parametrize("size", [WIDE, NARROW])
-@pytest.mark.parametrize("name", ["demo", "chaos", "cart", "no_points"])
+@pytest.mark.parametrize("name", ["demo", "chaos", "cart", "no_points", "events"])
 def test_nothing_is_wider_than_the_screen(open_page, name, size):
     page = open_page(name, size)
     wide = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
@@ -187,6 +187,62 @@ def test_a_plot_moves_the_time(open_page):
     assert 4 < time_of(page) < 8
 
 
+def events_of(page: Page) -> dict[str, dict]:
+    """The events of the first run that a page holds, by name."""
+    events = page.evaluate("() => JSON.parse(document.getElementById('scene').textContent).runs[0].events")
+    return {event["name"]: event for event in events}
+
+
+def test_keys_and_buttons_lead_to_events(open_page):
+    page = open_page("events")
+    events = events_of(page)
+    times = sorted(time for event in events.values() for time in event["times"])
+    for expected in times[:3]:
+        page.keyboard.press("n")
+        assert time_of(page) == pytest.approx(expected, rel=1e-14)  # which has 15 digits
+    page.keyboard.press("p")
+    assert time_of(page) == pytest.approx(times[1], rel=1e-14)
+    page.click("#events button:has-text('turn')")
+    following = next(time for time in events["turn"]["times"] if time > times[1])
+    assert time_of(page) == pytest.approx(following, rel=1e-14)
+    scrub(page, 1)
+    page.keyboard.press("n")
+    assert time_of(page) == pytest.approx(times[0], rel=1e-14)  # round over the end
+
+
+def test_events_are_named_and_counted(open_page):
+    page = open_page("events")
+    events = events_of(page)
+    texts = page.locator("#events button").all_inner_texts()
+    assert texts == [f"{event['name']} {event['count']}" for event in events.values()]
+    ticks = events["tick"]  # a whole turn of sin(200 t) every 31.4 ms: 636 in 20 s
+    assert ticks["count"] == 636
+    assert all(ticks["up"])
+    assert ticks["times"][10] == pytest.approx(11 * math.pi / 100, abs=1e-9)
+    assert {*events["down"]["up"]} == {True, False}
+    assert set(events) == {"down", "turn", "tick"}
+
+
+def test_marks_are_drawn_and_follow_the_theme(open_page):
+    page = open_page("events")
+    before = picture(page, "#marks")
+    page.click("#theme")
+    assert picture(page, "#marks") != before
+    assert open_page("cart").locator("#marks").is_hidden()
+
+
+def test_the_size_of_steps_is_shown_where_they_differ(open_page, pages):
+    page = open_page("events")
+    with (pages.folder / "events.csv").open() as stream:
+        t = [float(row["t"]) for row in csv.DictReader(stream)]
+    steps = [after - before for before, after in itertools.pairwise(t)]
+    text = page.locator(".panel", has_text="Step size").locator(".keys").inner_text()
+    least, largest = (float(word) for word in text.replace("−", "-").split() if word[0].isdigit())
+    assert least == pytest.approx(min(steps), rel=6e-3)  # three digits are shown
+    assert largest == pytest.approx(max(steps), rel=6e-3)
+    assert open_page("cart").locator(".panel", has_text="Step size").count() == 0
+
+
 def test_angles_are_wrapped_or_not(open_page):
     page = open_page("chaos")
     before = picture(page, ".panel:nth-of-type(3)")
@@ -317,7 +373,7 @@ def test_light_and_dark(open_page):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("name", ["demo", "chaos", "no_points"])
+@pytest.mark.parametrize("name", ["demo", "chaos", "no_points", "events"])
 def test_axe_finds_nothing_serious(open_page, name, scheme):
     page = open_page(name, NARROW if name == "chaos" else WIDE, scheme)
     for opened in (None, "#open-data", "#open-help"):

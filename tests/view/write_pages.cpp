@@ -34,6 +34,7 @@ struct Plan {
   double duration = 10;
   std::int64_t every = 10;
   std::string scenario = "# made by the tests\n";
+  std::vector<Event> events = {};
 };
 
 Plan plan_of(const std::string& name, int stages, double step, double duration, std::int64_t every) {
@@ -58,8 +59,9 @@ class Pages {
     io::TrajectoryFile trajectory(folder_ / (plan.name + ".csv"), subject->columns());
     for (std::size_t k = 0; k < starts.size(); ++k) {
       page.begin_run(k == 0 ? "first" : "copy " + std::to_string(k));
-      run({subject, starts[k], plan.options, plan.duration, plan.every}, plan.name, page,
-          k == 0 ? &trajectory : nullptr);
+      RunSetup setup{subject, starts[k], plan.options, plan.duration, plan.every};
+      setup.events = plan.events;
+      run(setup, plan.name, page, k == 0 ? &trajectory : nullptr);
     }
     const auto begin = std::chrono::steady_clock::now();
     page.close();
@@ -151,6 +153,18 @@ void model(Pages& pages) {
   pages.write(subject, bare, plan_of("no_points", 4, 2e-3, 12, 5), {start});
 }
 
+/// Steps of the method's own choice, and things that happen; one of them too often for its marks.
+void events(Pages& pages) {
+  const auto subject = chain_of<Planar>(3, 3);
+  Plan plan = plan_of("events", 6, 0, 20, 1);
+  plan.options.tolerance = 1e-9;
+  plan.events.push_back({"down", [](const Motion& motion) { return std::sin(motion.q[0]); }, Direction::both, false});
+  plan.events.push_back({"turn", [](const Motion& motion) { return motion.v[0]; }, Direction::up, false});
+  plan.events.push_back(
+      {"tick", [](const Motion& motion) { return std::sin(200 * motion.time); }, Direction::up, false});
+  pages.write(subject, view::scene_of(*subject), plan, {from_angle<Planar>(3, 2.2)});
+}
+
 /// A point in space that hangs on nothing, and a run that is over where it begins.
 void odd_ones(Pages& pages) {
   const auto in_space = chain_of<Spatial>(1, 1);
@@ -178,4 +192,5 @@ int main(int count, char** arguments) {
   long_chain<Spatial>(pages, "thousand_in_space", 1000, 1e-3, 0.1, 1);
   model(pages);
   odd_ones(pages);
+  events(pages);
 }

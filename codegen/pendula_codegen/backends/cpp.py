@@ -402,17 +402,27 @@ def constants(
     return [f"static constexpr bool constant_masses = {literal(constant_masses)};", *lines]
 
 
-def read_statements(parameters: Sequence[Parameter]) -> list[str]:
-    """Statements that read parameters out of numbers one after the other."""
+def statements_of_numbers(parameters: Sequence[Parameter], statement: Callable[[str, str], str]) -> list[str]:
+    """statement(place of a number, name of what it belongs to) for all numbers, one after the other."""
     lines, at = [], 0
     for parameter in parameters:
         name, size = parameter.name, len(parameter.symbols)
         if parameter.per_link:
-            lines.append(f"for (int i = 0; i < {size}; ++i) to.{name}[i] = Real(from[{at} + i]);")
+            lines.append(f"for (int i = 0; i < {size}; ++i) {statement(f'{at} + i', f'{name}[i]')}")
         else:
-            lines.append(f"to.{name} = Real(from[{at}]);")
+            lines.append(statement(str(at), name))
         at += size
     return lines
+
+
+def read_statements(parameters: Sequence[Parameter]) -> list[str]:
+    """Statements that read parameters out of numbers."""
+    return statements_of_numbers(parameters, lambda place, name: f"to.{name} = Real(from[{place}]);")
+
+
+def place_statements(parameters: Sequence[Parameter]) -> list[str]:
+    """Statements that tell where each of those numbers is kept."""
+    return statements_of_numbers(parameters, lambda place, name: f"places[{place}] = &of.{name};")
 
 
 def cast_statements(parameters: Sequence[Parameter], holds_time: bool) -> list[str]:

@@ -22,12 +22,17 @@ struct Drive {
 /// What a chain is made of; `Chain` checks it.
 template <class Space, int N = Eigen::Dynamic>
 struct ChainParameters {
-  LinkVector<N> masses;              ///< bobs, (n)  kg
-  LinkVector<N> lengths;             ///< rods, (n)  m
-  double gravity = 9.81;             ///< m/s²
-  LinkVector<N> damping = {};        ///< λ, (n) or empty for none  N m s
-  Torque<Space, N> torque = {};      ///< constant torque, or empty for none  N m
+  LinkVector<N> masses;   ///< bobs, (n)  kg
+  LinkVector<N> lengths;  ///< rods, (n)  m
+  double gravity = 9.81;  ///< m/s²
+  /// λ, (n) or empty for none  N m s
+  LinkVector<N> damping = LinkVector<N>::Zero(at_first);
+  /// Constant torque, or empty for none  N m
+  Torque<Space, N> torque = Torque<Space, N>::Zero(Space::torque_components, at_first);
   std::vector<Drive<Space>> drives;  ///< sinusoidal torques
+
+ private:
+  static constexpr Eigen::Index at_first = N == Eigen::Dynamic ? 0 : N;
 };
 
 /// A chain of pendulums: immutable, and valid once built.

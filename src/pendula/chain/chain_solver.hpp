@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <pendula/chain/chain_fixed_point.hpp>
 #include <pendula/chain/chain_newton.hpp>
 #include <pendula/chain/chain_stages.hpp>
+#include <pendula/chain/chain_tangent.hpp>
 #include <pendula/gauss/iteration_choice.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/system/options.hpp>
@@ -55,18 +57,26 @@ class ChainSolver {
     count_ = 0;
   }
 
+  void prepare_again(double time, double h) {
+    stages_.prepare_again(time, h);
+    count_ = 0;
+  }
+
   Correction correct() {
     ++count_;
     choice_.count_iteration();
     if (choice_.active() == Iteration::newton) return last_ = newton_.correct(stages_);
     const Correction correction = fixed_point_.correct(stages_);
     if (choice_.is_automatic() && diverges(correction.relative, last_.relative, count_, epsilon)) {
+      if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN(), -1};
       stages_.start_cold();
       choice_.give_up_fixed_point();
       return last_ = newton_.correct(stages_);
     }
     return last_ = correction;
   }
+
+  void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
 
   Convergence convergence() const {
     return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
@@ -83,6 +93,8 @@ class ChainSolver {
   static constexpr int turning_part() { return -1; }
   double defect() { return stages_.defect(); }
   double predictor_gain() const { return stages_.predictor_gain(); }
+  Tempo tempo() const { return stages_.tempo(); }
+  StepShape shape() const { return stages_.shape(); }
   bool loaded() const { return stages_.loaded(); }
   bool damped() const { return stages_.chain().damped(); }
   bool dissipates() const { return family_ == Family::radau; }
@@ -102,11 +114,23 @@ class ChainSolver {
     stages_.accept();
   }
 
+  /// The derivative of the step that was solved and not yet accepted.
+  using Tangent = ChainTangent<Space, S, N, Real, Arch>;
+  Tangent make_tangent() const { return Tangent(stages_.links()); }
+  void linearize(Tangent& tangent) {
+    if (choice_.active() == Iteration::newton) newton_.find_multipliers(stages_);
+    tangent.linearize(stages_);
+  }
+
   State state(double time) const { return stages_.state(time); }
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(stages_, choice_);
   }
+  void forget() { stages_.forget(); }
+  State glance(double time, double x) const { return stages_.glance(time, x); }
+  void remember() { stages_.remember(); }
+  void return_to_start() { stages_.return_to_start(); }
   void save() { stages_.save(); }
   void restore() { stages_.restore(); }
 

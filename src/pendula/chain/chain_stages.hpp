@@ -11,6 +11,7 @@
 #include <pendula/chain/rod_state.hpp>
 #include <pendula/chain/state.hpp>
 #include <pendula/gauss/stage_columns.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <xsimd/xsimd.hpp>
 
@@ -173,6 +174,26 @@ class ChainStages {
     step_ = h;
   }
 
+  /// Predicts the stages of another step from where the last one began that was solved, not accepted: from that one's.
+  void prepare_again(double time, double h) {
+    columns_.predict_at(Real(0), Real(h / step_));
+    columns_.prepare(Real(h), Real(0));
+    if (loaded()) set_torques(time);
+    const bool hung = hangs_;
+    hangs_ = columns_.h() * columns_.h() * constants_.fastest_swing() > unresolved_swing;
+    is_predicted_ = hangs_ == hung;
+    if (is_predicted_) {
+      for (int i = 0; i < links(); ++i) {
+        for (std::size_t k = 0; k < D; ++k)
+          columns_.extrapolated_increments(stages_[i] + k * Z).store(stages_[i] + k * Z);
+        columns_.extrapolated(stages_[i] + multiplier_at).store(stages_[i] + multiplier_at);
+      }
+    } else {
+      start_cold();
+    }
+    step_ = h;
+  }
+
   /// Stages of a motion that goes on as at the start of the step: with the multipliers there taken into the free rates,
   /// they are the rates.
   void start_cold() {
@@ -221,6 +242,45 @@ class ChainStages {
   }
   double predictor_gain() const { return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1; }
 
+  /// Of the state: R² = κ + (Σ ω_i⁸)^(1/4), ω_i what rod i turns with and κ what gravity moves a long chain by. Loads
+  /// have no part in how R grows: only steps that are symmetric ask for that.
+  Tempo tempo() const {
+    Real sum(0), growth(0);
+    state_.for_each_acceleration(constants_, Real(chain_.gravity()),
+                                 [&](int i, const Numbers& rate, const Numbers& acceleration) {
+                                   const Real squared = dot(rate, rate) * constants_[i].inverse_square;
+                                   const Real sixth = squared * squared * squared;
+                                   sum += sixth * squared;
+                                   growth += sixth * dot(rate, acceleration) * constants_[i].inverse_square;
+                                 });
+    const auto total = static_cast<double>(sum);
+    const double squared = slowest_pace() + std::pow(total, 0.25);
+    return {std::sqrt(squared), total > 0 ? std::pow(total, -0.75) * static_cast<double>(growth) / squared : 0};
+  }
+
+  /// Of the stages as they were solved.
+  PENDULA_IN_REGISTERS StepShape shape() const {
+    L quartic(Real(0)), decay(Real(0));
+    alignas(pack_alignment) Real inverse[Z] = {};
+    for (std::size_t j = 0; j < S; ++j) inverse[j] = columns_.h() == 0 ? Real(0) : Real(1 / columns_.hb(j));
+    const L inverse_hb = L::load(inverse), inverse_squared = inverse_hb * inverse_hb;
+    for (int i = 0; i < links(); ++i) {
+      const L inverse_square(constants_[i].inverse_square);
+      const Vector advanced = advance(i);
+      const L squared = inverse_squared * inverse_square * dot(advanced, advanced);
+      quartic = fma(squared * squared, squared * squared, quartic);
+      L coefficients(Real(0));
+      for (std::size_t k = 0; k < D; ++k) {
+        alignas(pack_alignment) Real stored[Z];
+        advanced[k].store(stored);
+        const L a = columns_.legendre(stored);
+        coefficients = fma(a, a, coefficients);
+      }
+      decay = max(decay, coefficients * inverse_square);
+    }
+    return shape_of(quartic, decay);
+  }
+
   /// Energy that torque and damping bring in the step  [J].
   Real work() const {
     Real work(0);
@@ -260,21 +320,44 @@ class ChainStages {
   void forget() { last_h_ = 0; }
 
   State<Space, N, Real> state(double time) const {
-    State<Space, N, Real> state;
-    state.time = time;
-    state.q.resize(Space::dof * links());
-    state.v.resize(Space::dof * links());
+    State<Space, N, Real> state = empty_state(time);
     state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
-      const auto heading = state_.heading(i, rate);
-      using Wide = typename decltype(heading.u)::value_type;
-      std::array<Wide, Space::dof> near;
-      for (std::size_t a = 0; a < near.size(); ++a) near[a] = Wide(anchors_[i].angles()[a]);
-      const auto angles = user_angles(heading, near);
-      for (std::size_t a = 0; a < near.size(); ++a) {
-        state.q[entry(i, a)] = Real(angles.q[a]);
-        state.v[entry(i, a)] = Real(angles.v[a]);
-      }
+      read_angles(i, state_.heading(i, rate), anchors_[i], state);
     });
+    return state;
+  }
+
+  /// Remembers the start of the step; goes back there, the stages still known.
+  void remember() {
+    state_.remember();
+    remembered_anchors_ = anchors_;
+  }
+  void return_to_start() {
+    state_.return_to_remembered();
+    anchors_ = remembered_anchors_;
+  }
+
+  /// The state at x of the last step, by the polynomials through its rates.
+  State<Space, N, Real> glance(double time, double x) const {
+    State<Space, N, Real> state = empty_state(time);
+    const Real h(last_h_);
+    const auto rate_at = columns_.rate_at(Real(x), h);
+    const int legs = 1 + static_cast<int>(turn_ * std::abs(x) / far_turn);
+    for (int i = 0; i < links(); ++i) {
+      const Real* z = state_.remembered_free(i);
+      const Numbers rate = components<D>([&](std::size_t k) { return z[k] + weighed(rate_at, stages_[i] + k * Z); });
+      AngleAnchor<Space, Real> anchor = remembered_anchors_[i];
+      Numbers rod{}, low{};
+      for (int leg = 1; leg <= legs; ++leg) {
+        const Real at = Real(x) * Real(leg) / Real(legs);
+        const auto up_to = columns_.up_to(at);
+        for (std::size_t k = 0; k < D; ++k) {
+          rod[k] = state_.remembered_along(i)[k] + (h * at * z[k] + weighed(up_to, stages_[i] + k * Z));
+        }
+        anchor.follow(scaled(constants_[i].inverse_length, rod));
+      }
+      read_angles(i, RodState<Space, N, Real>::heading_of(rod.data(), low.data(), rate), anchor, state);
+    }
     return state;
   }
 
@@ -315,6 +398,34 @@ class ChainStages {
     for (std::size_t k = 0; k < D; ++k) x[k].store(to + k * Z);
   }
 
+  using Weights = typename detail::StageColumns<S, Real>::Weights;
+  static Real weighed(const Weights& weights, const Real* x) {
+    Real sum(0);
+    for (std::size_t j = 0; j < S; ++j) sum += weights[j] * x[j];
+    return sum;
+  }
+
+  State<Space, N, Real> empty_state(double time) const {
+    State<Space, N, Real> state;
+    state.time = time;
+    state.q.resize(Space::dof * links());
+    state.v.resize(Space::dof * links());
+    return state;
+  }
+
+  template <class LinkHeading>
+  void read_angles(int i, const LinkHeading& heading, const AngleAnchor<Space, Real>& anchor,
+                   State<Space, N, Real>& state) const {
+    using Wide = typename decltype(heading.u)::value_type;
+    std::array<Wide, Space::dof> near;
+    for (std::size_t a = 0; a < near.size(); ++a) near[a] = Wide(anchor.angles()[a]);
+    const auto angles = user_angles(heading, near);
+    for (std::size_t a = 0; a < near.size(); ++a) {
+      state.q[entry(i, a)] = Real(angles.q[a]);
+      state.v[entry(i, a)] = Real(angles.v[a]);
+    }
+  }
+
   // Where coordinate a of link i stands in the user's vectors.
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
 
@@ -331,6 +442,21 @@ class ChainStages {
   void add_hanging(int i, Placed& placed) const {
     const L tension = columns_.hb() * L(constants_[i].hanging);
     for (std::size_t k = 0; k < D; ++k) placed.pull[k] = fma(tension, placed.rod[k], placed.pull[k]);
+  }
+
+  double slowest_pace() const {
+    const double length = static_cast<double>(chain_.lengths().sum());
+    return 0.15 * links() * links() * std::abs(chain_.gravity()) / length;
+  }
+
+  StepShape shape_of(const L& quartic, const L& decay) const {
+    alignas(pack_alignment) Real paces[Z], squares[Z];
+    quartic.store(paces);
+    decay.store(squares);
+    StepShape shape;
+    for (std::size_t k = 0; k < S; ++k) shape.decay[k] = std::sqrt(static_cast<double>(squares[k]));
+    shape.pace = std::sqrt(slowest_pace() + std::pow(static_cast<double>(paces[S / 2]), 0.25));
+    return shape;
   }
 
   void set_torques(double time) {
@@ -454,7 +580,7 @@ class ChainStages {
   detail::StageColumns<S, Real> columns_;
   std::int64_t restoring_interval_;  // steps: Gauss methods keep lengths but for rounding
   RodState<Space, N, Real> state_;
-  detail::PerLink<AngleAnchor<Space, Real>, N> anchors_, saved_anchors_{anchors_};
+  detail::PerLink<AngleAnchor<Space, Real>, N> anchors_, saved_anchors_{anchors_}, remembered_anchors_{anchors_};
   detail::LinkArray<per_link, N, Real> stages_;
   detail::LinkArray<Space::torque_components * Z, N, Real> torque_;
   Real fastest_fall_;   // g/l of the shortest link

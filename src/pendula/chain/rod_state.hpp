@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
@@ -37,7 +38,8 @@ class RodState {
         inverse_mass_(links_),
         inverse_mass_low_(links_),
         product_(links_),
-        rows_(links_) {
+        rows_(links_),
+        rates_(links_) {
     for (int i = 0; i < links_; ++i) {
       for (std::size_t k = 0; k < D; ++k) {
         inverse_mass_[i][k] = links[i].inverse_mass.value;
@@ -67,11 +69,14 @@ class RodState {
   }
 
   /// Direction and rate of link i, in more digits than Real where there is such a type, for angles to be read from.
-  auto heading(int i, const Vector& rate) const {
+  auto heading(int i, const Vector& rate) const { return heading_of(along_[i], along_low_[i], rate); }
+
+  /// The same of any rod, as the sum of two.
+  static auto heading_of(const Real* along, const Real* along_low, const Vector& rate) {
     Heading<Space, Wide> heading;
     Wide squared(0);
     for (std::size_t k = 0; k < D; ++k) {
-      heading.u[k] = Wide(along_[i][k]) + Wide(along_low_[i][k]);
+      heading.u[k] = Wide(along[k]) + Wide(along_low[k]);
       squared += heading.u[k] * heading.u[k];
     }
     using std::sqrt;
@@ -93,19 +98,22 @@ class RodState {
   /// The rates ξ̇ of all rods, from the pivot out: visit(i, ξ̇_i, τ_i).
   template <class Visit>
   void for_each_rate(const Links& links, Visit visit) const {
-    eliminate(links);
-    Real tau = rows_[0].offset;
-    Vector before{};
-    for (int i = 0; i < links_; ++i) {
-      const bool last = i + 1 == links_;
-      const Real next = last ? Real(0) : rows_[i + 1].offset - rows_[i + 1].coupling * tau;
-      Vector pull = scaled(tau, vector(along_[i]));
-      if (!last) pull = difference(pull, scaled(next, vector(along_[i + 1])));
-      const Vector bond = scaled(links[i].inverse_mass.value, pull);
-      visit(i, sum(vector(free_[i]), difference(bond, before)), tau);
-      before = bond;
-      tau = next;
-    }
+    eliminate(links, [&](int i) { return -exact_product_of(i); });
+    for_each_bond(links,
+                  [&](int i, const Vector& change, const Real& tau) { visit(i, sum(vector(free_[i]), change), tau); });
+  }
+
+  /// The rates and accelerations of all rods where nothing but gravity acts: visit(i, ξ̇_i, ξ̈_i). With multipliers λ
+  /// that keep |ξ̇|² + ξ·ξ̈ = 0, ξ̈_i is made of weight and λ as ξ̇_i is of z_i and τ.
+  template <class Visit>
+  void for_each_acceleration(const Links& links, const Real& gravity, Visit visit) const {
+    for_each_rate(links, [&](int i, const Vector& rate, const Real&) { rates_[i] = rate; });
+    const auto fallen = [&](int i) { return i == 0 ? Real(-gravity) : Real(0); };
+    eliminate(links, [&](int i) { return -(dot(rates_[i], rates_[i]) + along_[i][D - 1] * fallen(i)); });
+    for_each_bond(links, [&](int i, Vector change, const Real&) {
+      change[D - 1] += fallen(i);
+      visit(i, rates_[i], change);
+    });
   }
 
   /// Takes multipliers λ(i) into the free rates, and keeps every ξ·z; shifted(i, λ_i, change of z_i since the start of
@@ -182,6 +190,26 @@ class RodState {
   void restore(std::size_t place) {
     for (std::size_t k = 0; k < 4; ++k) *held()[k] = saved_[place][k];
   }
+
+  /// Keeps the state as what glances and looks go back to; the first time allocates.
+  void remember() {
+    if (!remembered_) remembered_.emplace(std::array{along_, along_low_, free_, free_low_});
+    for (std::size_t k = 0; k < 4; ++k) (*remembered_)[k] = *held()[k];
+  }
+  void return_to_remembered() {
+    for (std::size_t k = 0; k < 4; ++k) *held()[k] = (*remembered_)[k];
+    for (int i = 0; i < links_; ++i) {
+      Vector product, low;
+      for (std::size_t k = 0; k < D; ++k) {
+        const Twofold<Real> exact = exact_product(along_[i][k], free_[i][k]);
+        product[k] = exact.value;
+        low[k] = exact.low;
+      }
+      product_[i] = total(product.data(), low.data());
+    }
+  }
+  const Real* remembered_along(int i) const { return (*remembered_)[0][i]; }
+  const Real* remembered_free(int i) const { return (*remembered_)[2][i]; }
 
   static constexpr int block = D == 2 ? 4 : 8;  ///< links that are worked on at a time
   static constexpr std::size_t block_size = block * D;
@@ -280,14 +308,33 @@ class RodState {
     return total(product.data(), low.data());
   }
 
-  void eliminate(const Links& links) const {
+  // The rows of the multipliers, right(i) being what their equations have on the right (multipliers.hpp).
+  template <class Right>
+  void eliminate(const Links& links, Right right) const {
     MultiplierRow<Real> row;
     Real beyond(0);
     for (int i = links_; i-- > 0;) {
       const Vector rod = vector(along_[i]);
       const Real before = i == 0 ? Real(0) : Real(-links[i - 1].inverse_mass.value * dot(vector(along_[i - 1]), rod));
-      rows_[i] = row = row.next(links[i].inverse_masses * dot(rod, rod), beyond, before, -exact_product_of(i));
+      rows_[i] = row = row.next(links[i].inverse_masses * dot(rod, rod), beyond, before, right(i));
       beyond = before;
+    }
+  }
+
+  // What multipliers move the rods by, from the pivot out: visit(i, e_i − e_{i−1}, multiplier of rod i).
+  template <class Visit>
+  void for_each_bond(const Links& links, Visit visit) const {
+    Real multiplier = rows_[0].offset;
+    Vector before{};
+    for (int i = 0; i < links_; ++i) {
+      const bool last = i + 1 == links_;
+      const Real next = last ? Real(0) : rows_[i + 1].offset - rows_[i + 1].coupling * multiplier;
+      Vector pull = scaled(multiplier, vector(along_[i]));
+      if (!last) pull = difference(pull, scaled(next, vector(along_[i + 1])));
+      const Vector bond = scaled(links[i].inverse_mass.value, pull);
+      visit(i, difference(bond, before), multiplier);
+      before = bond;
+      multiplier = next;
     }
   }
 
@@ -298,8 +345,10 @@ class RodState {
   Numbers gained_;  // by z in the last step, all gauges apart
   Numbers inverse_mass_, inverse_mass_low_;
   std::array<std::array<Numbers, 4>, 2> saved_{{{along_, along_, along_, along_}, {along_, along_, along_, along_}}};
+  std::optional<std::array<Numbers, 4>> remembered_;
   detail::PerLink<Real, N> product_;
   mutable detail::PerLink<MultiplierRow<Real>, N> rows_;
+  mutable detail::PerLink<Vector, N> rates_;
 };
 
 }  // namespace pendula

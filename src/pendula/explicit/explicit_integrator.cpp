@@ -1,10 +1,13 @@
 #include <algorithm>
+#include <array>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
 #include <boost/numeric/odeint/stepper/generation.hpp>
+#include <boost/numeric/odeint/stepper/modified_midpoint.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <pendula/explicit/explicit_integrator.hpp>
 #include <pendula/numeric/compensated.hpp>
@@ -46,7 +49,7 @@ class ExplicitIntegrator : public PlainIntegrator {
   Outcome start(double time, const double* q, const double* v) override {
     time_.assign(time);
     statistics_ = {};
-    proposed_ = 0;
+    proposed_ = before_.step = 0;
     const std::size_t k = x_.size() / 2;
     std::copy_n(v, k, std::copy_n(q, k, x_.begin()));
     return require_finite_rate();
@@ -58,6 +61,39 @@ class ExplicitIntegrator : public PlainIntegrator {
     const auto k = static_cast<std::ptrdiff_t>(x_.size() / 2);
     std::copy(x_.begin(), x_.begin() + k, q);
     std::copy(x_.begin() + k, x_.end(), v);
+  }
+
+  void remember_steps(bool wanted) override {
+    remembers_ = wanted;
+    before_.step = 0;
+  }
+
+  /// By the cubic through the ends and the rates there.
+  void glance(double time, double* q, double* v) override {
+    if (before_.step == 0) return read_state(q, v);
+    find_rates();
+    const double h = before_.step, s = (time - before_.time) / h, r = 1 - s;
+    const double a = r * r * (1 + 2 * s), b = s * s * (1 + 2 * r), c = h * s * r * r, d = -h * s * s * r;
+    const std::size_t k = x_.size() / 2;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      const double value = a * before_.x[i] + b * x_[i] + c * before_.rate[i] + d * before_.end_rate[i];
+      (i < k ? q[i] : v[i - k]) = value;
+    }
+  }
+
+  Outcome look(double time, double* q, double* v, double& work) override {
+    work = statistics_.load_work;
+    if (before_.step == 0 || time == this->time()) {
+      read_state(q, v);
+      return {.status = Status::ok, .time = time};
+    }
+    Vector x = before_.x;
+    const double h = time - before_.time;
+    advance(x, before_.time, h);
+    if (!is_finite(x)) return {.status = Status::not_finite, .time = before_.time, .step = h};
+    const std::size_t k = x.size() / 2;
+    for (std::size_t i = 0; i < x.size(); ++i) (i < k ? q[i] : v[i - k]) = x[i];
+    return {.status = Status::ok, .time = time, .step = h};
   }
 
   const Statistics& statistics() const override { return statistics_; }
@@ -72,7 +108,17 @@ class ExplicitIntegrator : public PlainIntegrator {
  protected:
   RightHandSide& right_hand_side() { return right_hand_side_; }
 
-  Outcome accept(double h) {
+  /// Moves x on by h, which is part of a step that was accepted.
+  virtual void advance(Vector& x, double time, double h) = 0;
+
+  /// The state is that of the end of a step; it began at `before`.
+  Outcome accept(double h, const Vector& before) {
+    if (remembers_) {
+      before_.time = time();
+      before_.step = h;
+      before_.x = before;
+      before_.has_rates = false;
+    }
     time_.add(h);
     ++statistics_.steps;
     return {.status = Status::ok, .time = time(), .step = h};
@@ -104,11 +150,29 @@ class ExplicitIntegrator : public PlainIntegrator {
     return at == x.end() ? -1 : static_cast<int>((at - x.begin()) % parts_);
   }
 
+  void find_rates() {
+    if (before_.has_rates) return;
+    before_.rate.resize(x_.size());
+    before_.end_rate.resize(x_.size());
+    right_hand_side_(before_.x, before_.rate, before_.time);
+    right_hand_side_(x_, before_.end_rate, time());
+    before_.has_rates = true;
+  }
+
+  // The last step.
+  struct Remembered {
+    double time = 0, step = 0;  // 0: there was none
+    Vector x, rate, end_rate;
+    bool has_rates = false;
+  };
+
   std::unique_ptr<ForwardDynamics> dynamics_;
   int parts_;
   std::string kernel_;
   RightHandSide right_hand_side_;
   Compensated<double> time_{};
+  bool remembers_ = false;
+  Remembered before_;  // rates are found when they are asked for
 };
 
 class FixedStepIntegrator : public ExplicitIntegrator {
@@ -120,7 +184,8 @@ class FixedStepIntegrator : public ExplicitIntegrator {
     for (int parts = 1; parts <= most_parts; parts *= 2) {
       if (try_in(parts, h)) {
         x_.swap(next_);
-        return accept(h);
+        parts_of_last_ = parts;
+        return accept(h, next_);
       }
       ++statistics_.rejected_steps;
     }
@@ -133,26 +198,28 @@ class FixedStepIntegrator : public ExplicitIntegrator {
 
   bool try_in(int parts, double h) {
     next_ = x_;
-    for (int part = 0; part < parts && is_finite(next_); ++part) {
-      stepper_.do_step(std::ref(right_hand_side()), next_, time() + part * (h / parts), h / parts);
-    }
+    take(parts, next_, time(), h);
     return is_finite(next_);
   }
 
+  void take(int parts, Vector& x, double time, double h) {
+    for (int part = 0; part < parts && is_finite(x); ++part) {
+      stepper_.do_step(std::ref(right_hand_side()), x, time + part * (h / parts), h / parts);
+    }
+  }
+
+  void advance(Vector& x, double time, double h) override { take(parts_of_last_, x, time, h); }
+
   odeint::runge_kutta4<Vector> stepper_;
+  int parts_of_last_ = 1;
   Vector next_;
 };
 
-/// Embedded pair with odeint's step control; h is only an upper bound.
-template <class Stepper>
+/// Steps of its own size; h is only an upper bound.
 class AdaptiveIntegrator : public ExplicitIntegrator {
  public:
-  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
-                     double tolerance)
-      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
-        stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)),
-        next_(x_.size()),
-        next_rate_(x_.size()) {}
+  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel)
+      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel), next_(x_.size()), next_rate_(x_.size()) {}
 
   Outcome step(double h) override {
     const bool cut = proposed_ > h;  // a step that is cut short says nothing about the size of the next one
@@ -164,18 +231,44 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
         tried = size / 8;
       } else if (accepted) {
         x_.swap(next_);
-        if (hands_on_rate) rate_.swap(next_rate_);
-        if (!cut || tried < size) proposed_ = tried;
-        return accept(size);
+        const bool tells = !cut || tried < size;
+        if (tells) proposed_ = tried;
+        hand_on(tells);
+        if (!cut) statistics_.count_chosen(size);
+        return accept(size, next_);
       }
       ++statistics_.rejected_steps;
     }
     return failure(Status::tolerance_not_met, tried, next_);
   }
 
+ protected:
+  /// Tries a step of the size `tried` to `next_`, and makes it the size that the next one should have.
+  virtual bool try_step(double& tried) = 0;
+  /// After a step that was accepted; whether it says how to take the next one.
+  virtual void hand_on(bool tells) = 0;
+
+  Vector next_, next_rate_;
+
+ private:
+  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
+
+  static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
+  static constexpr int max_attempts = 100;
+};
+
+/// An embedded pair with odeint's step control.
+template <class Stepper>
+class PairIntegrator : public AdaptiveIntegrator {
+ public:
+  PairIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
+                 double tolerance)
+      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel),
+        stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
+
  private:
   // The rate is kept here, not in the stepper, whose memory is no part of the member.
-  bool try_step(double& tried) {
+  bool try_step(double& tried) override {
     double at = time();
     if constexpr (hands_on_rate) {
       return stepper_.try_step(std::ref(right_hand_side()), x_, rate_, at, next_, next_rate_, tried) == odeint::success;
@@ -183,16 +276,134 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
       return stepper_.try_step(std::ref(right_hand_side()), x_, at, next_, tried) == odeint::success;
     }
   }
+  void hand_on(bool) override {
+    if (hands_on_rate) rate_.swap(next_rate_);
+  }
 
-  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
+  void advance(Vector& x, double time, double h) override {
+    Stepper plain;
+    plain.do_step(std::ref(right_hand_side()), x, time, h);
+  }
 
   static constexpr bool hands_on_rate =
       std::is_same_v<typename Stepper::stepper_category, odeint::explicit_error_stepper_fsal_tag>;
-  static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
-  static constexpr int max_attempts = 100;
 
   typename odeint::result_of::make_controlled<Stepper>::type stepper_;
-  Vector next_, next_rate_;
+};
+
+/// Bulirsch–Stoer: odeint's modified midpoints in 2, 4, 6, … substeps, extrapolated to infinitely many. Order and step
+/// are those that take least work for the way (Hairer, Nørsett, Wanner, Solving ODEs I, II.9). odeint's own control is
+/// not used: the order that it has come to is hidden in it, and would be no part of the member.
+class ExtrapolationIntegrator : public AdaptiveIntegrator {
+ public:
+  ExtrapolationIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts,
+                          std::string_view kernel, double tolerance)
+      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel), tolerance_(tolerance) {
+    table_.fill(Vector(x_.size()));
+  }
+
+  Outcome start(double time, const double* q, const double* v) override {
+    row_ = first_row;
+    return AdaptiveIntegrator::start(time, q, v);
+  }
+
+  void member(MemberNumbers& numbers) override {
+    AdaptiveIntegrator::member(numbers);
+    numbers(row_);
+  }
+
+  /// Steps are so long that no cubic follows them.
+  void glance(double time, double* q, double* v) override {
+    double work = 0;
+    look(time, q, v, work);
+  }
+
+ private:
+  static constexpr std::size_t rows = 9, first_row = 4, least_row = 2;
+
+  static constexpr unsigned short substeps(std::size_t row) { return static_cast<unsigned short>(2 * (row + 1)); }
+  // Accelerations of all rows up to this one.
+  static constexpr double work(std::size_t row) { return static_cast<double>((row + 1) * (row + 2) + 1); }
+
+  // Rows until one converges: the one that is expected to, or one of its neighbours.
+  bool try_step(double& tried) override {
+    const double h = tried;
+    right_hand_side()(x_, rate_, time());
+    for (std::size_t row = 0; row <= row_ + 1; ++row) {
+      add_row(row, x_, time(), h);
+      if (row == 0) continue;
+      const double error = largest_error();
+      if (!std::isfinite(error)) break;
+      best_[row] = best_step(h, error, row);
+      if (row + 1 < row_ || error > 1) continue;
+      next_ = table_[0];
+      row_of_last_ = row;
+      tried = choose(row);
+      return true;
+    }
+    next_ = table_[0];
+    tried = std::min(best_[row_], 0.7 * h);
+    return false;
+  }
+
+  void hand_on(bool tells) override {
+    if (tells) row_ = next_row_;
+  }
+
+  void advance(Vector& x, double time, double h) override {
+    rate_.swap(next_rate_);  // which is part of the member
+    right_hand_side()(x, rate_, time);
+    for (std::size_t row = 0; row <= row_of_last_; ++row) add_row(row, x, time, h);
+    rate_.swap(next_rate_);
+    x = table_[0];
+  }
+
+  /// The table by Aitken and Neville: its new row, from the last, whose ends stand in table_. The rates at x are known.
+  void add_row(std::size_t row, const Vector& x, double time, double h) {
+    midpoint_.set_steps(substeps(row));
+    midpoint_.do_step(std::ref(right_hand_side()), x, rate_, time, table_[row], h);
+    for (std::size_t column = row; column > 0; --column) {
+      const double ratio = static_cast<double>(substeps(row)) / substeps(column - 1);
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        double& end = table_[column - 1][i];
+        end = table_[column][i] + (table_[column][i] - end) / (ratio * ratio - 1);
+      }
+    }
+  }
+
+  /// Of the last two columns of a row, relative to what is tolerated.
+  double largest_error() const {
+    double largest = 0;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      const double error = std::abs(table_[0][i] - table_[1][i]) / (tolerance_ * (1 + std::abs(x_[i])));
+      if (!(error <= largest)) largest = error;
+    }
+    return largest;
+  }
+
+  /// How long a step may be that converges in a row.
+  static double best_step(double h, double error, std::size_t row) {
+    const double exponent = 1 / (2 * static_cast<double>(row) + 1), most = std::pow(50, exponent);
+    return h * std::clamp(0.94 * std::pow(0.65 / std::max(error, 1e-30), exponent), 1 / (4 * most), most);
+  }
+
+  /// The row for the next step, and how long that is to be, where a step has converged in `row`.
+  double choose(std::size_t row) {
+    const auto effort = [&](std::size_t k) { return work(k) / best_[k]; };
+    next_row_ = row;
+    if (row > 1 && effort(row - 1) < 0.8 * effort(row)) --next_row_;
+    const bool grows = next_row_ == row && (row == 1 || effort(row) < 0.9 * effort(row - 1));
+    if (grows) ++next_row_;
+    next_row_ = std::clamp(next_row_, least_row, rows - 2);
+    return next_row_ <= row ? best_[next_row_] : best_[row] * work(next_row_) / work(row);
+  }
+
+  double tolerance_;
+  odeint::modified_midpoint<Vector> midpoint_;
+  std::array<Vector, rows> table_;
+  std::array<double, rows> best_{};
+  std::size_t row_ = first_row, next_row_ = first_row;  // that a step is expected to converge in
+  std::size_t row_of_last_ = first_row;                 // that the last one did
 };
 
 }  // namespace
@@ -200,8 +411,8 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
 std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates,
                                                           int parts, const RunOptions& options,
                                                           std::string_view kernel) {
-  using Dopri5 = AdaptiveIntegrator<odeint::runge_kutta_dopri5<Vector>>;
-  using Fehlberg78 = AdaptiveIntegrator<odeint::runge_kutta_fehlberg78<Vector>>;
+  using Dopri5 = PairIntegrator<odeint::runge_kutta_dopri5<Vector>>;
+  using Fehlberg78 = PairIntegrator<odeint::runge_kutta_fehlberg78<Vector>>;
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
     throw std::invalid_argument("tolerance: expected a positive number, got " + std::to_string(options.tolerance));
   }
@@ -212,6 +423,9 @@ std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<Forwar
       return std::make_unique<Dopri5>(std::move(dynamics), coordinates, parts, kernel, options.tolerance);
     case Method::fehlberg78:
       return std::make_unique<Fehlberg78>(std::move(dynamics), coordinates, parts, kernel, options.tolerance);
+    case Method::bulirsch_stoer:
+      return std::make_unique<ExtrapolationIntegrator>(std::move(dynamics), coordinates, parts, kernel,
+                                                       options.tolerance);
     case Method::gauss:
     case Method::radau:
       break;

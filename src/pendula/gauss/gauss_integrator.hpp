@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/system/options.hpp>
@@ -13,6 +14,13 @@ namespace pendula {
 /// The tableau family of an implicit method.
 constexpr Family family_of(Method method) {
   return method == Method::radau ? Family::radau : Family::gauss;
+}
+
+/// Throws std::invalid_argument where there is neither a step nor a tolerance.
+inline StepperOptions stepper_options(const RunOptions& options) {
+  if (!is_adaptive(options)) return {};
+  if (options.tolerance > 0) return {.tolerance = options.tolerance};
+  throw std::invalid_argument("tolerance: expected a positive number where no step is asked for");
 }
 
 /// Throws std::invalid_argument where a solver that has Newton only is asked for fixed points.
@@ -35,9 +43,9 @@ class GaussIntegrator : public PlainIntegrator {
 
  public:
   template <class... SolverOptions>
-  GaussIntegrator(const Model& model, int stages, const GaussDescription& described,
+  GaussIntegrator(const Model& model, const RunOptions& options, const GaussDescription& described,
                   const SolverOptions&... solver_options)
-      : stepper_(model, stages, {}, solver_options...), described_(described) {}
+      : stepper_(model, options.stages, stepper_options(options), solver_options...), described_(described) {}
 
   Outcome start(double time, const double* q, const double* v) override {
     using Numbers = Eigen::Map<const Eigen::VectorXd>;
@@ -45,20 +53,38 @@ class GaussIntegrator : public PlainIntegrator {
   }
   Outcome step(double h) override { return named(stepper_.step(h)); }
   double time() const override { return stepper_.time(); }
-  void read_state(double* q, double* v) const override {
-    using Numbers = Eigen::Map<Eigen::VectorXd>;
-    const State state = stepper_.state();
-    Numbers(q, coordinates()) = state.q;
-    Numbers(v, coordinates()) = state.v;
+  void read_state(double* q, double* v) const override { write(stepper_.state(), q, v); }
+  void remember_steps(bool wanted) override { stepper_.remember_steps(wanted); }
+  void glance(double time, double* q, double* v) override { write(stepper_.glance(time), q, v); }
+  Outcome look(double time, double* q, double* v, double& work) override {
+    State state;
+    const Outcome outcome = stepper_.look(time, state, work);
+    if (outcome) write(state, q, v);
+    return named(outcome);
   }
   const Statistics& statistics() const override { return stepper_.statistics(); }
   void member(MemberNumbers& numbers) override { numbers(stepper_); }
+  int linearize() override {
+    if constexpr (LinearizingSolver<Solver>) {
+      stepper_.linearize();
+      return stepper_.linearization().size();
+    }
+    return 0;
+  }
+  void push([[maybe_unused]] double* tangents, [[maybe_unused]] int count) override {
+    if constexpr (LinearizingSolver<Solver>) stepper_.linearization().push(tangents, count);
+  }
   Description describe() const override {
     return {described_.solver, name_of(stepper_.solver().iteration()), described_.kernel};
   }
 
  private:
   Eigen::Index coordinates() const { return stepper_.solver().coordinates(); }
+
+  void write(const State& state, double* q, double* v) const {
+    std::copy_n(state.q.data(), coordinates(), q);
+    std::copy_n(state.v.data(), coordinates(), v);
+  }
 
   // Coordinates of a chain are ordered by kind, those of one link a number of links apart.
   Outcome named(Outcome outcome) const {

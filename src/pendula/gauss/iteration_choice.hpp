@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -34,15 +35,18 @@ class IterationChoice {
   void begin_step() {
     active_ = preferred_;
     iterations_ = {};
-    if (is_automatic() && ++steps_ % trial_interval == trial_step && may_win(other(preferred_))) {
-      active_ = other(preferred_);
-    }
+    gave_up_ = false;
+    if (is_automatic() && is_time_for_trial() && may_win(other(preferred_))) active_ = other(preferred_);
   }
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(preferred_, spent_, gave_up_, steps_);
+    numbers(preferred_, spent_, steps_, wait_, next_wait_);
   }
+
+  /// Whether Newton takes over where a fixed point does not contract; else the step is not solved.
+  void allow_newton(bool allowed) { newton_is_allowed_ = allowed; }
+  bool newton_is_allowed() const { return newton_is_allowed_; }
 
   void count_iteration() { ++iterations_[index(active_)]; }
 
@@ -57,12 +61,15 @@ class IterationChoice {
     if (gave_up_) {
       preferred_ = Iteration::newton;
       spent_[index(Iteration::fixed_point)] = forbidden;
+      wait_ = next_wait_;
+      next_wait_ = std::min(2 * next_wait_, trial_interval);
     } else {
       spent_[index(active_)] = cost_of(active_, iterations_[index(active_)]);
     }
     gave_up_ = false;
     const Iteration rival = other(preferred_);
     if (spent_[index(rival)] > 0 && spent_[index(rival)] < worthwhile * spent_[index(preferred_)]) preferred_ = rival;
+    if (preferred_ == Iteration::fixed_point) next_wait_ = 1;
   }
 
  private:
@@ -79,6 +86,12 @@ class IterationChoice {
   // hardly more of the other.
   bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
 
+  // A fixed point that has given up is tried again soon, and then ever more seldom: it may have been one long step.
+  bool is_time_for_trial() {
+    const bool is_turn = ++steps_ % trial_interval == trial_step;
+    return wait_ > 0 ? --wait_ == 0 : is_turn;
+  }
+
   static constexpr int trial_interval = 64, trial_step = 8;
   static constexpr double last_evaluation = 0.3;  // of forces after the last Newton iteration, in iterations
   static constexpr double worthwhile = 0.9;       // what a change has to save
@@ -89,7 +102,9 @@ class IterationChoice {
   std::array<double, 2> spent_{};  // by the last step with each iteration, 0: none yet
   std::array<int, 2> iterations_{};
   bool gave_up_ = false;
+  bool newton_is_allowed_ = true;
   std::int64_t steps_ = 0;
+  int wait_ = 0, next_wait_ = 1;  // steps until a fixed point that has given up is tried; 0: it is its turn as usual
 };
 
 }  // namespace pendula

@@ -6,6 +6,7 @@
 #include <pendula/gauss/lagrangian_fixed_point.hpp>
 #include <pendula/gauss/lagrangian_newton.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
+#include <pendula/gauss/lagrangian_tangent.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/tableau.hpp>
@@ -41,6 +42,11 @@ class LagrangianSolver {
     count_ = 0;
   }
 
+  void prepare_again(double time, double h) {
+    stages_.prepare_again(time, h);
+    count_ = 0;
+  }
+
   Correction correct() {
     ++count_;
     choice_.count_iteration();
@@ -48,6 +54,7 @@ class LagrangianSolver {
     if (!forces_are_found_) return last_ = newton_.correct(stages_);
     const Correction correction = fixed_point_.correct(stages_);
     if (choice_.is_automatic() && diverges(correction.relative, last_.relative, count_, epsilon)) {
+      if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN(), -1};
       stages_.start_cold();
       choice_.give_up_fixed_point();
       forces_are_found_ = false;
@@ -55,6 +62,8 @@ class LagrangianSolver {
     }
     return last_ = correction;
   }
+
+  void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
 
   Convergence convergence() const {
     return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
@@ -70,6 +79,8 @@ class LagrangianSolver {
   int turning_part() const { return stages_.turning_coordinate(); }
   double defect() { return stages_.defect(); }
   double predictor_gain() const { return stages_.predictor_gain(); }
+  Tempo tempo() const { return stages_.tempo(); }
+  StepShape shape() { return stages_.shape(); }
   bool loaded() const { return stages_.model().loaded(); }
   bool damped() const { return stages_.model().damped(); }
   bool dissipates() const { return family_ == Family::radau; }
@@ -88,12 +99,21 @@ class LagrangianSolver {
     stages_.accept();
   }
 
+  /// The derivative of the step that was solved and not yet accepted.
+  using Tangent = LagrangianTangent<S, Width>;
+  Tangent make_tangent() const { return Tangent(stages_.model(), stages_.stages()); }
+  void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
+
   State state(double time) const { return {time, stages_.position_with_turns(), stages_.velocity(time)}; }
   Vector momentum() const { return stages_.momentum(); }
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(stages_, choice_);
   }
+  void forget() { stages_.forget(); }
+  State glance(double time, double x) const { return stages_.glance(time, x); }
+  void remember() { stages_.remember(); }
+  void return_to_start() { stages_.return_to_start(); }
   void save() { stages_.save(); }
   void restore() { stages_.restore(); }
 

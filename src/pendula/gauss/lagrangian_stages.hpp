@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <pendula/gauss/pace.hpp>
 #include <pendula/gauss/stage_columns.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/full_turns.hpp>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -51,8 +53,9 @@ class LagrangianStages {
   Status start(double time, const Vector& q, const Vector& v) {
     time_ = time;
     forget();
-    fastest_ = most_kinetic_ = 0;
+    fastest_ = fastest_here_ = most_kinetic_ = 0;
     steps_ = 0;
+    pace_.start(model_, time, q, v);
     masses_.start(model_.parameters(time), q);
     Vector p;
     S::momentum_from_velocity(model_.parameters(time), q, v, p);
@@ -83,16 +86,36 @@ class LagrangianStages {
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, q_, turns_, p_, U_, last_h_, masses_, weight_, fastest_, most_kinetic_, steps_);
+    numbers(time_, q_, turns_, p_, U_, last_h_, masses_, weight_, pace_, fastest_, most_kinetic_, steps_);
   }
   void save() { saved_ = {q_, p_, turns_, time_}; }
   void restore() {
-    q_ = saved_.q;
-    p_ = saved_.p;
-    turns_ = saved_.turns;
-    time_ = saved_.time;
+    take(saved_);
     read_masses();  // as they are here, not where the step failed
     forget();
+  }
+
+  /// Remembers the start of the step; goes back there, the stages still known.
+  void remember() { remembered_ = {q_, p_, turns_, time_}; }
+  void return_to_start() { take(remembered_); }
+
+  /// The state at x of the last step, by the polynomials through its rates.
+  SystemState<S> glance(double time, double x) const {
+    const auto up_to = columns_.up_to(x), rate_at = columns_.rate_at(x, last_h_);
+    SystemState<S> state;
+    state.time = time;
+    for (std::size_t k = 0; k < count; ++k) {
+      Compensated<double> q = remembered_.q[k];
+      double moved = 0, rate = 0;
+      for (std::size_t j = 0; j < static_cast<std::size_t>(stages()); ++j) {
+        moved += up_to[j] * U_[k][j];
+        rate += rate_at[j] * U_[k][j];
+      }
+      q.add(moved);
+      state.q[at(k)] = detail::with_turns(q, remembered_.turns[k]);
+      state.v[at(k)] = rate;
+    }
+    return state;
   }
 
   // --- A step ---
@@ -110,6 +133,17 @@ class LagrangianStages {
       start_cold();
     }
     last_h_ = 0;  // what was predicted from is gone until the step is accepted
+    step_ = h;
+    set_scales();
+  }
+
+  /// Predicts the stages of another step from where the last one began that was solved, not accepted: from that one's.
+  void prepare_again(double time, double h) {
+    time_ = time;
+    columns_.predict_at(0, h / step_);
+    columns_.prepare(h, 0);
+    set_context();
+    for (auto& increments : U_) columns_.extrapolated_increments(increments).store(increments);
     step_ = h;
     set_scales();
   }
@@ -195,6 +229,27 @@ class LagrangianStages {
   }
   double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
 
+  Tempo tempo() const {
+    const Vector q = position(), v = velocity(time_);
+    Vector a;
+    S::acceleration(model_.parameters(time_), q, v, model_.inputs(time_), a);
+    return pace_.at(v, a);
+  }
+
+  /// Of the stages as they were solved. Sizes of rates are √(Σ M_kk v_k²).
+  StepShape shape() {
+    const L inverse = inverse_hb();
+    L eighth_powers(0.0), speed(0.0), coefficients(0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+      const L v = L::load(U_[k]) * inverse, a = columns_.legendre(U_[k]), square = v * v;
+      const L weight(weight_[k] * weight_[k]);
+      if (S::coordinate_is_angle[k]) eighth_powers = fma(square * square, square * square, eighth_powers);
+      speed = fma(weight, square, speed);
+      coefficients = fma(weight * a, a, coefficients);
+    }
+    return shape_of(eighth_powers, speed, coefficients);
+  }
+
   /// Energy that forces, and what holds time, bring in the step.
   double work() const {
     Lanes V;
@@ -223,6 +278,7 @@ class LagrangianStages {
     count_turns();
     last_h_ = step_;
     time_ += step_;
+    fastest_ = std::max(fastest_, std::exchange(fastest_here_, 0));
     if (!S::constant_masses || ++steps_ % 16 == 0) read_masses();
   }
 
@@ -230,6 +286,21 @@ class LagrangianStages {
 
  private:
   using State = std::array<Compensated<double>, count>;
+
+  struct Kept {
+    State q, p;
+    std::array<double, count> turns;
+    double time;
+  };
+  void take(const Kept& kept) {
+    q_ = kept.q;
+    p_ = kept.p;
+    turns_ = kept.turns;
+    time_ = kept.time;
+  }
+
+  // Of coordinates: what corrections need not be compared with.
+  static constexpr double invisible = 1e-9;
 
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
@@ -284,6 +355,24 @@ class LagrangianStages {
     return L::load(inverse);
   }
 
+  StepShape shape_of(const L& eighth_powers, const L& speed, const L& coefficients) {
+    alignas(pack_alignment) Stored powers, speeds, squares;
+    eighth_powers.store(powers);
+    speed.store(speeds);
+    coefficients.store(squares);
+    fastest_here_ = *std::max_element(speeds, speeds + stages());
+    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
+    StepShape shape;
+    shape.pace = pace_.of(powers[stages() / 2]);
+    const double scale = fastest > 0 ? shape.pace / std::sqrt(fastest) : 0;
+    const double rounding = StepShape::visible * floor_ / invisible;
+    for (int k = 0; k < stages(); ++k) {
+      const double size = std::sqrt(squares[k]);
+      shape.decay[static_cast<std::size_t>(k)] = size > rounding ? scale * size : 0;
+    }
+    return shape;
+  }
+
   // Time and inputs at the stages.
   void set_context() {
     if (is_set_ && !model_.driven()) return;
@@ -305,7 +394,6 @@ class LagrangianStages {
   }
 
   void set_scales() {
-    static constexpr double invisible = 1e-9;
     floor_ = 0;
     for (std::size_t k = 0; k < count; ++k) {
       const double size = std::max(std::abs(q_[k].value), S::coordinate_is_angle[k] ? 1.0 : 0.0);
@@ -321,14 +409,13 @@ class LagrangianStages {
   alignas(pack_alignment) Stored U_[2 * count]{};
   State q_, p_;
   std::array<double, count> turns_{};
-  struct {
-    State q, p;
-    std::array<double, count> turns;
-    double time;
-  } saved_{};
+  Kept saved_{}, remembered_{};
   MassScale<S> masses_;
   std::array<double, count> weight_{}, inverse_weight_{};
-  double floor_ = 0, time_ = 0, step_ = 0, last_h_ = 0, fastest_ = 0, most_kinetic_ = 0;
+  Pace<S> pace_;
+  double floor_ = 0, time_ = 0, step_ = 0, last_h_ = 0;
+  double fastest_ = 0, fastest_here_ = 0;  // Σ M_kk v_k², of all steps so far and of the stages
+  double most_kinetic_ = 0;
   std::int64_t steps_ = 0;
   bool is_predicted_ = false, is_set_ = false;
 };

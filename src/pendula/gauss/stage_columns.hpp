@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <pendula/gauss/node_polynomials.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -8,7 +9,8 @@
 namespace pendula::detail {
 
 /// The coefficients of a step, one column a stage, padded to `Width` lanes. S may be Eigen::Dynamic: then columns are
-/// padded like rows, and what lanes beyond the stages hold must be finite.
+/// padded like rows, and what lanes beyond the stages hold must be finite. Another step size costs a few operations on
+/// packs: steps may differ from one to the next.
 template <int S, class Real, int Width = lanes_for<Real>(S)>
 class StageColumns {
   using L = Pack<Width, RegisterFor<Width, Real>>;
@@ -16,34 +18,40 @@ class StageColumns {
 
  public:
   explicit StageColumns(Family family = Family::gauss, int stages = S)
-      : coefficients_(tableau_of<S, Real>(family, stages)) {
-    for (int i = 0; i < stages; ++i) {
-      for (int j = 0; j < stages; ++j) m_[j][i] = coefficients_.m(i, j);
-    }
-    fold();
-  }
+      : StageColumns(tableau_of<S, Real>(family, stages)) {}
 
-  int stages() const { return coefficients_.stages(); }
+  int stages() const { return static_cast<int>(stages_); }
 
   /// For a step of `h` after one of `previous` (0: there is none).
   void prepare(Real h, Real previous) {
-    const Real ratio = previous == 0 ? Real(1) : Real(h / previous);
-    coefficients_.prepare(h, previous);
     if (h != h_) {
       h_ = h;
       fold();
-    } else if (ratio == ratio_) {
-      return;
     }
-    ratio_ = ratio;
-    extrapolate();
+    if (previous == 0) return;
+    const Real ratio = h / previous;
+    if (ratio != ratio_) predict_at(Real(1), ratio);
+  }
+
+  /// Predictions are for a step that begins at `from`, in steps from the start of the one that they are made of, and is
+  /// `ratio` times as long.
+  void predict_at(Real from, Real ratio) {
+    from_ = from;
+    ratio_ = from == 1 ? ratio : Real(0);
+    half_ = polynomials_.lagrange(Real(from + ratio / 2));
+    const auto values = polynomials_.lagrange(fma(L(ratio), L::load(c_), L(from)));
+    // b_i/b_j, not of h b: of a step of no length that would be no number.
+    for (std::size_t j = 0; j < stages_; ++j) {
+      values[j].store(extrapolation_[j]);
+      (L::load(b_) * L(Real(ratio * inverse_b_[j])) * values[j]).store(increments_[j]);
+    }
   }
 
   Real h() const { return h_; }
-  Real c(std::size_t i) const { return coefficients_.c(static_cast<int>(i)); }
-  Real m(std::size_t i, std::size_t j) const { return coefficients_.m(static_cast<int>(i), static_cast<int>(j)); }
+  Real c(std::size_t i) const { return c_[i]; }
+  Real m(std::size_t i, std::size_t j) const { return m_[j][i]; }
   Real hb(std::size_t j) const { return hb_[j]; }
-  Real ha(std::size_t i, std::size_t j) const { return coefficients_.ha(static_cast<int>(i), static_cast<int>(j)); }
+  Real ha(std::size_t i, std::size_t j) const { return m_[j][i] * hb_[j]; }
 
   L hb() const { return L::load(hb_); }          ///< h b
   L hc() const { return L::load(hc_); }          ///< h c
@@ -59,11 +67,20 @@ class StageColumns {
 
   /// The polynomial through stage values that hold the factor h b, at the start of their step.
   Real at_start(const Real* x) const {
-    Real sum = start_[0] * x[0];
-    for (std::size_t j = 1; j < columns; ++j) sum += start_[j] * x[j];
+    Real sum(0);
+    for (std::size_t j = 0; j < stages_; ++j) sum += h_ == 0 ? Real(0) : Real(start_[j] * x[j] / hb_[j]);
     return sum;
   }
-  Real predictor_gain() const { return coefficients_.predictor_gain(); }
+  /// How much larger the error of the stage polynomial is at the last stage of the next step than at its own start.
+  Real predictor_gain() const {
+    Real gain(1);
+    for (std::size_t j = 0; j < stages_; ++j) gain *= (1 + c_[stages_ - 1] - c_[j]) / c_[j];
+    return gain;
+  }
+
+  /// Coefficients of the Legendre polynomials on the step, times h, of the polynomial through stage values that hold
+  /// the factor h b.
+  L legendre(const Real* x) const { return product(legendre_, x); }
 
   /// The polynomial through the last step's stage values, at this step's stages.
   L extrapolated(const Real* last) const { return product(extrapolation_, last); }
@@ -74,11 +91,45 @@ class StageColumns {
   /// That polynomial in the middle of this step.
   Real at_half(const Real* last) const {
     Real sum = half_[0] * last[0];
-    for (std::size_t j = 1; j < columns; ++j) sum += half_[j] * last[j];
+    for (std::size_t j = 1; j < stages_; ++j) sum += half_[j] * last[j];
     return sum;
   }
 
+  using Weights = typename NodePolynomials<S, Real>::Values;
+
+  /// Of stage values that hold the factor h b: what they add up to from the start of their step to x.
+  Weights up_to(const Real& x) const {
+    Weights weights = polynomials_.integrals(x);
+    for (std::size_t j = 0; j < stages_; ++j) weights[j] *= inverse_b_[j];
+    return weights;
+  }
+
+  /// The polynomial through them at x, their step being h.
+  Weights rate_at(const Real& x, const Real& h) const {
+    Weights weights = polynomials_.lagrange(x);
+    for (std::size_t j = 0; j < stages_; ++j) weights[j] *= inverse_b_[j] / h;
+    return weights;
+  }
+
  private:
+  explicit StageColumns(const Tableau<S, Real>& tableau)
+      : family_(tableau.family), stages_(static_cast<std::size_t>(tableau.stages())), polynomials_(tableau) {
+    start_ = polynomials_.lagrange(Real(0));
+    for (std::size_t j = 0; j < stages_; ++j) {
+      const auto column = static_cast<Eigen::Index>(j);
+      b_[j] = tableau.b[column];
+      inverse_b_[j] = 1 / b_[j];
+      c_[j] = tableau.c[column];
+      c_low_[j] = tableau.c_low[column];
+      for (std::size_t i = 0; i < stages_; ++i) {
+        m_[j][i] = tableau.m(static_cast<Eigen::Index>(i), column);
+        legendre_[j][i] = polynomials_.legendre(i, j) * inverse_b_[j];
+      }
+    }
+    fold();
+    predict_at(Real(1), Real(1));
+  }
+
   static L product(const Real (&column)[columns][Z], const Real* x, const L& start = L(Real(0))) {
     L even = fma(L(x[0]), L::load(column[0]), start);
     if constexpr (columns == 1) return even;
@@ -91,35 +142,30 @@ class StageColumns {
   }
 
   void fold() {
-    for (int i = 0; i < stages(); ++i) {
-      const Twofold<Real> exact = exact_product(h_, coefficients_.c(i));
+    for (std::size_t i = 0; i < stages_; ++i) {
+      const Twofold<Real> exact = exact_product(h_, c_[i]);
       hc_[i] = exact.value;
-      hc_low_[i] = exact.low + h_ * coefficients_.c_low(i);
-      hb_[i] = coefficients_.hb(i);
-      start_[i] = h_ == 0 ? Real(0) : Real(coefficients_.lagrange(i, Real(0)) / hb_[i]);
+      hc_low_[i] = exact.low + h_ * c_low_[i];
+      hb_[i] = h_ * b_[i];
     }
+    round_weights(family_, h_, hb_, stages());
   }
 
-  // b_i/b_j, not of h b: of a step of no length that would be no number.
-  void extrapolate() {
-    for (int j = 0; j < stages(); ++j) {
-      half_[j] = coefficients_.lagrange(j, 1 + ratio_ / 2);
-      for (int i = 0; i < stages(); ++i) {
-        extrapolation_[j][i] = coefficients_.extrapolation(i, j);
-        increments_[j][i] = ratio_ * (coefficients_.b(i) / coefficients_.b(j)) * extrapolation_[j][i];
-      }
-    }
-  }
-
-  StepCoefficients<S, Real> coefficients_;
-  Real h_{0}, ratio_{0};
+  Family family_;
+  std::size_t stages_;
+  NodePolynomials<S, Real> polynomials_;
+  Real h_{0}, from_{1}, ratio_{1};
   alignas(pack_alignment) Real m_[columns][Z] = {};
+  alignas(pack_alignment) Real legendre_[columns][Z] = {};
   alignas(pack_alignment) Real extrapolation_[columns][Z] = {};
   alignas(pack_alignment) Real increments_[columns][Z] = {};
+  alignas(pack_alignment) Real b_[Z] = {};
+  alignas(pack_alignment) Real c_[Z] = {};
   alignas(pack_alignment) Real hb_[Z] = {};
   alignas(pack_alignment) Real hc_[Z] = {};
   alignas(pack_alignment) Real hc_low_[Z] = {};
-  Real half_[columns] = {}, start_[columns] = {};
+  Real c_low_[columns] = {}, inverse_b_[columns] = {};
+  typename NodePolynomials<S, Real>::Values half_{}, start_{};
 };
 
 }  // namespace pendula::detail

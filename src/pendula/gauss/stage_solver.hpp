@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <pendula/gauss/roundoff.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 
@@ -16,7 +17,8 @@ struct Correction {
 /// What solves the stage equations of a step: it owns the model, the state and the workspace. Parts are what messages
 /// name: the links of a chain, the coordinates of any other system.
 template <class S>
-concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, double time, double h) {
+concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, double time, double h,
+                               double x) {
   typename S::Model;  // what it is built from, with the number of stages and options of its own
   typename S::Real;   // what it computes in: round-off is that of this type
   { fixed.parts() } -> std::convertible_to<int>;
@@ -31,9 +33,20 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
   solver.save();
   solver.restore();
 
-  // Predicts the stages of the next step, improves them once, moves the state to the end of the step.
+  // Remember the state at the start of a step that is about to be accepted; go back there, the stages still known, so
+  // that prepare_again may follow. The state in between by the polynomials through them, `time` being that of the start
+  // and x in steps from there.
+  solver.remember();
+  solver.return_to_start();
+  { fixed.glance(time, x) } -> std::convertible_to<typename S::State>;
+
+  // Predicts the stages of the next step, cold after `forget`; or those of another step from where one began that was
+  // solved and not accepted. Improves them once, moves the state to the end of the step.
   solver.prepare(time, h);
+  solver.forget();
+  solver.prepare_again(time, h);
   { solver.correct() } -> std::same_as<Correction>;
+  solver.allow_newton(true);  // or else a step is not solved where a fixed point does not contract
   { fixed.convergence() } -> std::same_as<Convergence>;  // of its corrections; may change from one to the next
   solver.accept();
 
@@ -56,6 +69,9 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
   // far; how much larger the error of a prediction is than such a defect.
   { solver.defect() } -> std::convertible_to<double>;
   { fixed.predictor_gain() } -> std::convertible_to<double>;
+  // Of the state; what the stages show of the step.
+  { fixed.tempo() } -> std::same_as<Tempo>;
+  { solver.shape() } -> std::same_as<StepShape>;
   // Whether energy may come or go, may only go, and whether the method itself takes some.
   { fixed.loaded() } -> std::convertible_to<bool>;
   { fixed.damped() } -> std::convertible_to<bool>;

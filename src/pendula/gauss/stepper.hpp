@@ -3,16 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <pendula/gauss/linearization.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
+#include <pendula/gauss/step_controller.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <utility>
+#include <vector>
 
 namespace pendula {
 
 struct StepperOptions {
   int max_iterations = 50;
+  double tolerance = 0;  ///< of the error of a step, relative to the size of the motion; 0: steps are as asked for
+  /// How steps are chosen. Loads take or bring energy anyway.
+  std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
 };
 
 /// Takes implicit Gauss–Legendre steps with any solver of the stage equations, and does not know which one it has.
@@ -25,22 +35,101 @@ class GaussStepper {
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
   template <class... SolverOptions>
   GaussStepper(const Model& model, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
-      : solver_(model, stages, solver_options...), options_(options), at_roundoff_(solver_.parts(), epsilon()) {}
+      : solver_(model, stages, solver_options...),
+        options_(options),
+        at_roundoff_(solver_.parts(), epsilon()),
+        controller_(stages, solver_.dissipates() ? 2 * stages - 1 : 2 * stages, options.tolerance,
+                    options.steering.value_or(solver_.loaded() || solver_.dissipates() ? Steering::greedy
+                                                                                       : Steering::symmetric)) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
     time_.assign(state.time);
     statistics_ = {};
+    before_.step = 0;
+    forget_linearization();
     const Status status = solver_.start(state);
+    if (status == Status::ok && controller_.chooses()) controller_.start(solver_.tempo());
     return {.status = status, .time = time(), .part = status == Status::ok ? -1 : solver_.singular_part()};
   }
 
-  /// Advances by `h`. Where the stage equations cannot be solved, the step is taken in halves, quarters … as far as
-  /// `smallest_part`; if that fails too, the state is left as it was and the outcome says why.
+  /// Advances by `h`; where there is a tolerance, by a step of its own choice, at most `h`. Where the stage equations
+  /// cannot be solved, the step is taken in halves, quarters … as far as `smallest_part`; if that fails too, the state
+  /// is left as it was and the outcome says why.
   Outcome step(double h) {
+    forget_linearization();
+    if (controller_.chooses()) return chosen_step(h);
     Outcome outcome = attempt(h);
     if (!outcome) outcome = step_in_parts(h);
     if (outcome) ++statistics_.steps;
+    return outcome;
+  }
+
+  /// Reverses the motion where it is: from here on, symmetric steps of its own choice are the ones that it took.
+  Outcome turn_back() {
+    State state = this->state();
+    state.v = -state.v;
+    const Status status = solver_.start(state);
+    controller_.turn_back();
+    before_.step = 0;
+    return {.status = status, .time = time(), .part = status == Status::ok ? -1 : solver_.singular_part()};
+  }
+
+  /// Whether steps are remembered from now on, for glance and look.
+  void remember_steps(bool wanted) {
+    remembers_ = wanted;
+    before_.step = 0;
+  }
+
+  /// The state at `time` within the last step, by the polynomials through its stages: positions of one order more than
+  /// there are stages, rates of as many.
+  /// Of a step that was taken in parts no polynomial is left: then it is a look.
+  State glance(double time) {
+    if (before_.step == 0) return state();
+    State there;
+    if (before_.in_parts && look(time, there)) return there;
+    return solver_.glance(time, before_.elapsed(time) / before_.step);
+  }
+
+  /// The same at the full order of the method, by a step from where the last one began, which the polynomials predict.
+  Outcome look(double time, State& there) {
+    double work = 0;
+    return look(time, there, work);
+  }
+
+  /// And what loads have brought by then  [J].
+  Outcome look(double time, State& there, double& work) {
+    work = statistics_.load_work;
+    if (before_.step == 0 || is_rounding(time - this->time())) {
+      there = solver_.state(time);
+      return {.status = Status::ok, .time = time};
+    }
+    const Remembered before = before_;
+    const bool remembers = std::exchange(remembers_, false);
+    looks_ = true;
+    read_member();
+    solver_.return_to_start();
+    time_ = before.time;
+    statistics_.load_work = before.work;
+    const double h = before.elapsed(time);
+    Outcome outcome;
+    if (!is_rounding(h)) {
+      if (!before.in_parts) {
+        solver_.prepare_again(this->time(), h);
+        outcome = solve(h);
+        if (outcome) outcome = accept(h, outcome);
+      }
+      if (before.in_parts || !outcome) {
+        solver_.forget();
+        outcome = attempt(h);
+        if (!outcome) outcome = step_in_parts(h);
+      }
+    }
+    if (outcome) there = solver_.state(time);
+    work = statistics_.load_work;
+    write_member();
+    looks_ = false;
+    remembers_ = remembers;
     return outcome;
   }
 
@@ -50,10 +139,20 @@ class GaussStepper {
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, statistics_, at_roundoff_, solver_);
+    numbers(time_, statistics_, at_roundoff_, controller_, solver_);
   }
 
   const Solver& solver() const { return solver_; }
+
+  /// From now on every step leaves its derivative behind. Beside the iterations a step costs one or two of Newton's
+  /// more.
+  void linearize() requires LinearizingSolver<Solver> {
+    if (!linearization_) linearization_.emplace(solver_.make_tangent());
+  }
+
+  /// The derivative of the last step, of a run that `linearize` has asked it of; the identity where no step was made
+  /// yet, or the last one failed.
+  auto& linearization() requires LinearizingSolver<Solver> { return *linearization_; }
 
   /// A failing step is tried in parts down to this fraction of it.
   static constexpr double smallest_part = 1.0 / 1024;
@@ -70,9 +169,58 @@ class GaussStepper {
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
   static constexpr double largest_energy_defect = 0.02;
 
+  // Halvings of a step that cost less by fixed point than the whole by Newton. Where they do not help, it is Newton's.
+  static constexpr int fixed_point_worth = 3;
+
+  // A step of the controller's choice that is smaller than this, of the time so far, does not move it; nor has one a
+  // chance that was shortened so often.
+  static constexpr double smallest_chosen = 1e-13;
+  static constexpr int most_attempts = 100;
+
+  /// One step of the controller's choice. One that errs too much is taken again, shorter, from what it has found.
+  Outcome chosen_step(double most) {
+    const StepController before = controller_;
+    int shorter = fixed_point_worth;
+    bool is_found = false;
+    for (int attempts = 1;; ++attempts) {
+      const double chosen = controller_.step();
+      const bool is_cut = !(chosen * (1 + 1e-9) < most);
+      const double h = is_cut ? most : chosen;
+      is_found ? solver_.prepare_again(time(), h) : solver_.prepare(time(), h);
+      solver_.allow_newton(shorter == 0);
+      Outcome outcome = solve(h);
+      solver_.allow_newton(true);
+      is_found = bool(outcome);
+      if (is_found) {
+        if (controller_.accepts(solver_.shape(), h)) {
+          outcome = accept(h, outcome);
+          if (!outcome) return outcome;
+          ++statistics_.steps;
+          if (is_cut) return outcome;
+          statistics_.count_chosen(h);
+          controller_.move_on(h, [&] { return solver_.tempo(); });
+          return outcome;
+        }
+        ++statistics_.rejected_steps;
+        outcome.status = Status::tolerance_not_met;
+      } else {
+        controller_.shrink(h, 0.5);
+        solver_.forget();
+        if (shorter > 0 && --shorter == 0) controller_ = before;
+      }
+      if (h < smallest_chosen * std::abs(time()) || attempts == most_attempts) return outcome;
+    }
+  }
+
   /// One step of exactly h; on failure the state is what it was.
   Outcome attempt(double h) {
     solver_.prepare(time(), h);
+    const Outcome outcome = solve(h);
+    return outcome ? accept(h, outcome) : outcome;
+  }
+
+  /// Iterates on the stages, which are predicted.
+  Outcome solve(double h) {
     at_roundoff_.restart();
     Correction correction;
     double first = 0;
@@ -84,7 +232,8 @@ class GaussStepper {
       if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
       const Status status = status_of_solution(first);
       if (status != Status::ok) return failure(status, h, iteration, correction);
-      return accept(h, iteration, correction);
+      return {
+          .status = Status::ok, .time = time(), .step = h, .iterations = iteration, .residual = correction.relative};
     }
     return failure(Status::not_converged, h, options_.max_iterations, correction);
   }
@@ -93,21 +242,50 @@ class GaussStepper {
   // damp what they do not resolve are asked for no more than that energy does not grow.
   Status status_of_solution(double first) {
     const double turn = solver_.turn();
-    if (!solver_.continues() || !(turn < solver_.largest_turn())) return Status::wrong_root;
+    if (!solver_.continues() || !(turn < largest_turn())) return Status::wrong_root;
     if (first > trusted_prediction || turn > trusted_turn) {
       const double energy = solver_.energy_defect();
       if (!(energy < largest_energy_defect)) return Status::wrong_root;
       if (!(energy > -largest_energy_defect) && !solver_.damped()) return Status::wrong_root;
     }
     defect_ = 0;
-    if (solver_.dissipates() || first < noticed_defect * solver_.predictor_gain()) return Status::ok;
-    defect_ = solver_.defect();
+    if (!solver_.dissipates() && may_have_defect(first)) defect_ = solver_.defect();
     return Status::ok;
+  }
+
+  // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that.
+  bool may_have_defect(double first) const {
+    if (controller_.chooses()) return solver_.damped();
+    return first >= noticed_defect * solver_.predictor_gain();
+  }
+
+  // Of a step of the controller's choice, the error is known too.
+  double largest_turn() const { return controller_.chooses() ? 3 : solver_.largest_turn(); }
+
+  // All that the next steps depend on, in and out of a place for it.
+  void read_member() {
+    MemberNumbers counted(MemberNumbers::Pass::count);
+    member(counted);
+    member_.resize(counted.count());
+    MemberNumbers numbers(MemberNumbers::Pass::read, member_.data());
+    member(numbers);
+  }
+  void write_member() {
+    MemberNumbers numbers(MemberNumbers::Pass::write, member_.data());
+    member(numbers);
   }
 
   // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
   Outcome step_in_parts(double h) {
     const Compensated<double> start = time_;
+    const bool remembers = std::exchange(remembers_, false);
+    if (remembers) remember(h, true, statistics_.load_work);
+    const Outcome outcome = parts_of(h, start);
+    remembers_ = remembers;
+    return outcome;
+  }
+
+  Outcome parts_of(double h, const Compensated<double>& start) {
     const double work = statistics_.load_work;
     solver_.save();
     double done = 0, part = 0.5;
@@ -123,6 +301,7 @@ class GaussStepper {
         solver_.restore();
         time_ = start;
         statistics_.load_work = work;
+        forget_linearization();
         return outcome;
       }
     }
@@ -131,13 +310,27 @@ class GaussStepper {
     return {.status = Status::ok, .time = time(), .step = h};
   }
 
-  Outcome accept(double h, int iterations, const Correction& correction) {
-    if (solver_.singular_part() >= 0) return failure(Status::singular_mass_matrix, h, iterations, correction);
+  void forget_linearization() {
+    if constexpr (LinearizingSolver<Solver>) {
+      if (linearization_ && !looks_) linearization_->clear();
+    }
+  }
+
+  Outcome accept(double h, Outcome outcome) {
+    if (solver_.singular_part() >= 0) {
+      return failure(Status::singular_mass_matrix, h, outcome.iterations, {outcome.residual, -1});
+    }
+    const double work = statistics_.load_work;
     if (solver_.loaded()) statistics_.load_work += solver_.work();
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
+    if (remembers_) remember(h, false, work);
+    if constexpr (LinearizingSolver<Solver>) {
+      if (linearization_ && !looks_) solver_.linearize(linearization_->next());
+    }
     solver_.accept();
     time_.add(h);
-    return {.status = Status::ok, .time = time(), .step = h, .iterations = iterations, .residual = correction.relative};
+    outcome.time = time();
+    return outcome;
   }
 
   // A failure where coordinates are singular is theirs, whatever shape it took.
@@ -157,12 +350,35 @@ class GaussStepper {
             .part = part};
   }
 
+  // The last step, which began here.
+  struct Remembered {
+    Compensated<double> time{};
+    double step = 0;  // 0: there was none
+    bool in_parts = false;
+    double work = 0;  // that loads had brought
+
+    double elapsed(double at) const { return (at - time.value) - time.compensation; }
+  };
+
+  // Of the time.
+  bool is_rounding(double h) const { return std::abs(h) <= 8 * epsilon() * std::abs(time()); }
+
+  void remember(double h, bool in_parts, double work) {
+    solver_.remember();
+    before_ = {time_, h, in_parts, work};
+  }
+
   Solver solver_;
   StepperOptions options_;
   RoundoffStop at_roundoff_;
+  StepController controller_;
   Compensated<double> time_{};
   double defect_ = 0;  // of the last solution
   Statistics statistics_;
+  bool remembers_ = false, looks_ = false;
+  Remembered before_;
+  std::vector<double> member_;  // of the end of the step, while `look` is in it
+  std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;
 };
 
 }  // namespace pendula

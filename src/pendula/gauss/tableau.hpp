@@ -154,6 +154,33 @@ Tableau<S, Real> tableau_of(Family family, int stages) {
   return detail::make_tableau<S, Real>(family, generated);
 }
 
+namespace detail {
+
+// Weights h b that do not sum to h exactly would make every step drift by an ulp of h. The inner ones are rounded to
+// multiples of ulp(h), so that what they leave of h is exact, and its halves, the two equal outer ones, are too; of
+// Radau, whose weights are all different, the last one takes it.
+template <class Real, class Weights>
+void round_weights(Family family, const Real& h, Weights& hb, int stages) {
+  if (stages == 1) {
+    hb[0] = h;
+    return;
+  }
+  const bool symmetric = family == Family::gauss;
+  Real rest = h;
+  for (int j = symmetric ? 1 : 0; j + 1 < stages; ++j) {
+    const Real sum = h + hb[j];
+    hb[j] = sum - h;
+    rest -= hb[j];
+  }
+  if (!symmetric) {
+    hb[stages - 1] = rest;
+  } else {
+    hb[0] = hb[stages - 1] = rest / 2;
+  }
+}
+
+}  // namespace detail
+
 /// The tableau with the step size folded in, and the predictor for the ratio of this step to the last.
 template <int S = Eigen::Dynamic, class Real = double>
 class StepCoefficients {
@@ -206,32 +233,9 @@ class StepCoefficients {
   void fold(Real h) {
     h_ = h;
     hb_ = h * tableau_.b;
-    make_sum_exact();
+    detail::round_weights(tableau_.family, h_, hb_, stages());
     ha_ = tableau_.m * hb_.asDiagonal();
     h2a2_ = (h * h) * tableau_.a_squared;
-  }
-
-  // Weights that do not sum to h exactly would make every step drift by an ulp of h. The inner ones are rounded to
-  // multiples of ulp(h), so that what they leave of h is exact, and its halves, the two equal outer ones, are too; of
-  // Radau, whose weights are all different, the last one takes it.
-  void make_sum_exact() {
-    const Eigen::Index s = hb_.size();
-    if (s == 1) {
-      hb_[0] = h_;
-      return;
-    }
-    const bool symmetric = tableau_.family == Family::gauss;
-    Real rest = h_;
-    for (Eigen::Index j = symmetric ? 1 : 0; j + 1 < s; ++j) {
-      const Real sum = h_ + hb_[j];
-      hb_[j] = sum - h_;
-      rest -= hb_[j];
-    }
-    if (!symmetric) {
-      hb_[s - 1] = rest;
-    } else {
-      hb_[0] = hb_[s - 1] = rest / 2;
-    }
   }
 
   // ℓ_j(1 + ratio·c_i) on the nodes c.

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <pendula/gauss/node_polynomials.hpp>
+#include <pendula/gauss/pace.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/stage_system.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/mass_scale.hpp>
@@ -36,6 +39,7 @@ class VelocityNewton {
       : family_(family),
         model_(model),
         coefficients_(tableau_of<Eigen::Dynamic>(family, stages)),
+        polynomials_(tableau_of<Eigen::Dynamic>(family, stages)),
         system_(stages),
         at_(static_cast<std::size_t>(stages)) {
     for (Stage& stage : at_) stage.last_a.setZero();
@@ -43,11 +47,12 @@ class VelocityNewton {
 
   Status start(const State& state) {
     forget();
-    fastest_ = most_kinetic_ = 0;
+    fastest_ = fastest_here_ = most_kinetic_ = 0;
     time_ = state.time;
     q_.assign(state.q);
     v_.assign(state.v);
     const auto parameters = model_.parameters(time_);
+    pace_.start(model_, time_, state.q, state.v);
     masses_.start(parameters, state.q);
     if (masses_.singular() >= 0) return Status::singular_mass_matrix;
     S::acceleration(parameters, state.q, state.v, model_.inputs(time_), acceleration_);
@@ -55,14 +60,27 @@ class VelocityNewton {
   }
 
   void prepare(double time, double h) {
-    time_ = time;
     coefficients_.prepare(h, last_h_);
+    set_context(time);
     for (int i = 0; i < stages(); ++i) {
-      Stage& stage = at(i);
-      stage.parameters = model_.parameters(time + coefficients_.hc(i));
-      stage.inputs = model_.inputs(time + coefficients_.hc(i));
-      stage.a = acceleration_;
-      if (last_h_ != 0) extrapolate(stage.a, i);
+      at(i).a = acceleration_;
+      if (last_h_ != 0) extrapolate(at(i).a, i);
+    }
+    set_weights();
+  }
+
+  /// Predicts the stages of another step from where the last one began that was solved, not accepted: from that one's.
+  void prepare_again(double time, double h) {
+    const double ratio = h / coefficients_.h();
+    coefficients_.prepare(h, 0);
+    set_context(time);
+    std::array<Vector, max_stages> found;
+    for (int i = 0; i < stages(); ++i) found[static_cast<std::size_t>(i)] = at(i).a;
+    for (int i = 0; i < stages(); ++i) {
+      at(i).a.setZero();
+      for (int j = 0; j < stages(); ++j) {
+        at(i).a += coefficients_.lagrange(j, ratio * coefficients_.c(i)) * found[static_cast<std::size_t>(j)];
+      }
     }
     set_weights();
   }
@@ -77,6 +95,7 @@ class VelocityNewton {
     return apply();
   }
 
+  static constexpr void allow_newton(bool) {}
   static constexpr Convergence convergence() { return Convergence::quadratic; }
   static constexpr Iteration iteration() { return Iteration::newton; }
   static constexpr int worst_part() { return -1; }
@@ -113,6 +132,37 @@ class VelocityNewton {
     return off > 0 ? std::sqrt(off / fastest_) : 0;
   }
 
+  Tempo tempo() const {
+    Vector a;
+    S::acceleration(model_.parameters(time_), q_.value, v_.value, model_.inputs(time_), a);
+    return pace_.at(v_.value, a);
+  }
+
+  StepShape shape() {
+    place_stages();
+    const auto squared = [&](const Vector& v) { return v.cwiseProduct(weight_).squaredNorm(); };
+    fastest_here_ = 0;
+    for (int i = 0; i < stages(); ++i) fastest_here_ = std::max(fastest_here_, squared(at(i).v));
+    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
+    StepShape shape;
+    shape.pace = pace_.at(at(stages() / 2).v, Vector::Zero()).pace;
+    double largest = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double size = std::max(std::abs(q_.value[index(k)]), S::coordinate_is_angle[k] ? 1.0 : 0.0);
+      largest = std::max(largest, weight_[index(k)] * size);
+    }
+    const double rounding = StepShape::visible * largest;
+    for (int k = 0; k < stages(); ++k) {
+      Vector coefficient = Vector::Zero();
+      for (int j = 0; j < stages(); ++j) {
+        coefficient += polynomials_.legendre(static_cast<std::size_t>(k), static_cast<std::size_t>(j)) * at(j).v;
+      }
+      const double h = std::abs(coefficients_.h()), size = h * std::sqrt(squared(coefficient));
+      if (size > rounding) shape.decay[static_cast<std::size_t>(k)] = size * shape.pace / std::sqrt(fastest);
+    }
+    return shape;
+  }
+
   double work() const {
     double work = 0;
     for (int i = 0; i < stages(); ++i) {
@@ -128,12 +178,14 @@ class VelocityNewton {
     q_.add(moved);
     v_.add(pushed);
     last_h_ = coefficients_.h();
+    time_ += last_h_;
     for (Stage& stage : at_) stage.last_a = stage.a;
+    fastest_ = std::max(fastest_, std::exchange(fastest_here_, 0));
   }
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, q_, v_, acceleration_, last_h_, masses_, fastest_, most_kinetic_);
+    numbers(time_, q_, v_, acceleration_, last_h_, masses_, pace_, fastest_, most_kinetic_);
     for (Stage& stage : at_) numbers(stage.last_a);
   }
   void save() { saved_ = {q_, v_}; }
@@ -145,6 +197,29 @@ class VelocityNewton {
   }
 
   State state(double time) const { return {time, q_.value, v_.value}; }
+
+  void remember() { remembered_ = {q_, v_}; }
+  void return_to_start() {
+    q_ = remembered_[0];
+    v_ = remembered_[1];
+  }
+
+  /// The state at x of the last step, by the polynomials through its rates and accelerations.
+  State glance(double time, double x) const {
+    const auto up_to = polynomials_.integrals(x);
+    State state{time, remembered_[0].value, remembered_[1].value};
+    for (int j = 0; j < stages(); ++j) {
+      Vector v = remembered_[1].value;
+      for (int k = 0; k < stages(); ++k) v += coefficients_.m(j, k) * (last_h_ * coefficients_.b(k)) * at(k).last_a;
+      const double weight = last_h_ * up_to[static_cast<std::size_t>(j)];
+      state.q += weight * v;
+      state.v += weight * at(j).last_a;
+    }
+    return state;
+  }
+
+  /// The next step starts cold.
+  void forget() { last_h_ = 0; }
 
  private:
   static constexpr std::size_t count = S::coordinates;
@@ -160,7 +235,13 @@ class VelocityNewton {
   Stage& at(int i) { return at_[static_cast<std::size_t>(i)]; }
   const Stage& at(int i) const { return at_[static_cast<std::size_t>(i)]; }
 
-  void forget() { last_h_ = 0; }
+  void set_context(double time) {
+    time_ = time;
+    for (int i = 0; i < stages(); ++i) {
+      at(i).parameters = model_.parameters(time + coefficients_.hc(i));
+      at(i).inputs = model_.inputs(time + coefficients_.hc(i));
+    }
+  }
 
   void extrapolate(Vector& a, int i) const {
     a.setZero();
@@ -260,14 +341,17 @@ class VelocityNewton {
   Family family_;
   Model model_;
   StepCoefficients<Eigen::Dynamic> coefficients_;
+  detail::NodePolynomials<Eigen::Dynamic, double> polynomials_;
   detail::StageSystem<S::coordinates> system_;
   std::vector<Stage> at_;
   Compensated<Vector> q_, v_;
-  std::array<Compensated<Vector>, 2> saved_;
+  std::array<Compensated<Vector>, 2> saved_, remembered_;
   Vector acceleration_;  // at the start: the cold start of the predictor
   Vector weight_;
   MassScale<S> masses_;
-  double time_ = 0, last_h_ = 0, fastest_ = 0, most_kinetic_ = 0;
+  Pace<S> pace_;
+  double time_ = 0, last_h_ = 0, most_kinetic_ = 0;
+  double fastest_ = 0, fastest_here_ = 0;  // Σ M_kk v_k², of all steps so far and of the stages
 };
 
 }  // namespace pendula

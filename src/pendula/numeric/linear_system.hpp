@@ -20,11 +20,16 @@ class LinearSystem {
   /// not finite.
   void solve() {
     solution = right;
+    solve(solution.data(), 1);
+  }
+
+  /// The same for `count` right-hand sides, (size x count) column by column, each replaced by its solution.
+  void solve(double* columns, Index count) {
     for (Index k = 0; k < size(); ++k) {
-      bring_up_pivot(k);
-      eliminate(k);
+      bring_up_pivot(k, columns, count);
+      eliminate(k, columns, count);
     }
-    substitute_back();
+    for (Index j = 0; j < count; ++j) substitute_back(columns + j * size());
   }
 
   Eigen::MatrixXd matrix;
@@ -35,7 +40,7 @@ class LinearSystem {
   double* column(Index j) { return matrix.data() + j * size(); }
 
   // A NaN stays where it is, and spreads.
-  void bring_up_pivot(Index k) {
+  void bring_up_pivot(Index k, double* columns, Index count) {
     const double* const pivots = column(k);
     Index largest = k;
     for (Index i = k + 1; i < size(); ++i) {
@@ -43,11 +48,11 @@ class LinearSystem {
     }
     if (largest == k) return;
     for (Index j = k; j < size(); ++j) std::swap(column(j)[k], column(j)[largest]);
-    std::swap(solution[k], solution[largest]);
+    for (Index j = 0; j < count; ++j) std::swap(columns[j * size() + k], columns[j * size() + largest]);
   }
 
   // Two columns at a time: each reads the multipliers once.
-  void eliminate(Index k) {
+  void eliminate(Index k, double* columns, Index count) {
     double* const multipliers = column(k);
     const double inverse = 1 / multipliers[k];
     for (Index i = k + 1; i < size(); ++i) multipliers[i] *= inverse;
@@ -61,13 +66,16 @@ class LinearSystem {
       }
     }
     if (j < size()) subtract(multipliers, column(j)[k], column(j), k + 1, size());
-    subtract(multipliers, solution[k], solution.data(), k + 1, size());
+    for (Index i = 0; i < count; ++i) {
+      double* const x = columns + i * size();
+      subtract(multipliers, x[k], x, k + 1, size());
+    }
   }
 
-  void substitute_back() {
+  void substitute_back(double* x) {
     for (Index k = size(); k-- > 0;) {
-      solution[k] /= column(k)[k];
-      subtract(column(k), solution[k], solution.data(), 0, k);
+      x[k] /= column(k)[k];
+      subtract(column(k), x[k], x, 0, k);
     }
   }
 

@@ -12,7 +12,7 @@ struct Checkpoint {
   std::int64_t rows = 0;       ///< that the run had come by; later ones are there only because it ended
   std::int64_t since_row = 0;  ///< steps since the last of them
   Member integrator;
-  Member record;  ///< of the rows (RunRecord)
+  Member record;  ///< of the rows and the events (RunRecord, EventWatch)
 };
 
 }  // namespace pendula

@@ -21,7 +21,7 @@ namespace detail {
 using Doubt = std::optional<std::string>;
 
 inline std::string smaller_step_advice(const RunOptions& run) {
-  if (is_adaptive(run.method)) return "a smaller run.tolerance may help";
+  if (is_adaptive(run)) return "a smaller run.tolerance may help";
   if (run.method == Method::rk4) return "a smaller run.step, or run.method = \"gauss\", may help";
   return run.stages < 4 ? "a smaller run.step or more run.stages may help" : "a smaller run.step may help";
 }
@@ -38,23 +38,25 @@ inline Doubt of_energy(const Subject& subject, const RunOptions& run, const Ener
 }
 
 inline Doubt of_defect(const RunOptions& run, double defect) {
-  static constexpr double trusted = 0.02;
+  // Steps of the program's choice follow what they resolve as closely as the tolerance wants.
+  const double trusted = is_adaptive(run) ? std::max(1e-3, 30 * std::sqrt(run.tolerance)) : 0.02;
   if (defect <= trusted || run.stages == 1) return {};
-  return "a step missed the velocity by " + pendula::rounded(defect, 2) + " of the fastest; " +
-         smaller_step_advice(run);
+  const std::string advice =
+      is_adaptive(run) ? "run.method = \"radau\" is made for damping that fast" : smaller_step_advice(run);
+  return "a step missed the velocity by " + pendula::rounded(defect, 2) + " of the fastest; " + advice;
 }
 
-/// Near a pole φ moves faster than steps follow, even in parts.
-inline Doubt of_pole(const Subject& subject, const RunReport& report) {
+/// Near a pole φ moves faster than steps of one size follow, even in parts.
+inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunReport& report) {
   const std::int64_t rejected = report.statistics.rejected_steps;
-  if (!subject.has_poles() || report.description.solver != "dense" || rejected == 0) return {};
+  if (is_adaptive(run) || !subject.has_poles() || report.description.solver != "dense" || rejected == 0) return {};
   return "the dense solver came near a pole of (theta, phi) and took " + std::to_string(rejected) +
          " steps in parts; run.solver = \"chain\" knows no pole";
 }
 
 /// Whether a second run is worth its time: none that was wrong had followed the motion so closely.
 inline bool is_doubtful(const RunOptions& run, const Statistics& statistics) {
-  return run.method != Method::gauss || statistics.largest_defect > 2e-5;
+  return run.method != Method::gauss || is_adaptive(run) || statistics.largest_defect > 2e-5;
 }
 
 /// Runs again with longer steps, or a tolerance a hundred times as large: where that ends elsewhere, the steps or the
@@ -67,7 +69,7 @@ inline Doubt of_step(const RunSetup& setup, const RunReport& report, const std::
   coarser.step *= in_parts ? 3 : 2;
   coarser.tolerance *= 100;
   const auto integrator = setup.subject->make_integrator(coarser);
-  const double step = is_adaptive(coarser.method) ? std::numeric_limits<double>::infinity() : coarser.step;
+  const double step = is_adaptive(coarser) ? std::numeric_limits<double>::infinity() : coarser.step;
   Motion other = setup.start;
   const RunResult result = simulate(
       *integrator, setup.start, {step, setup.duration, std::numeric_limits<std::int64_t>::max()},
@@ -76,9 +78,9 @@ inline Doubt of_step(const RunSetup& setup, const RunReport& report, const std::
   const double off =
       result.outcome ? setup.subject->distance(report.last, other) : std::numeric_limits<double>::infinity();
   if (off <= trusted) return {};
-  const std::string what = is_adaptive(coarser.method) ? "with a hundred times the tolerance"
-                           : in_parts                  ? "with three times the step"
-                                                       : "with twice the step";
+  const std::string what = is_adaptive(coarser) ? "with a hundred times the tolerance"
+                           : in_parts           ? "with three times the step"
+                                                : "with twice the step";
   return what + " the motion ends " +
          (std::isfinite(off) ? "elsewhere, by " + pendula::rounded(off, 2) + " of its size" : "before its time") +
          ": the last state cannot be trusted; " + smaller_step_advice(setup.options);
@@ -96,7 +98,7 @@ inline std::vector<std::string> doubts(const RunSetup& setup, const RunReport& r
   };
   add(detail::of_energy(*setup.subject, setup.options, balance));
   add(detail::of_defect(setup.options, report.statistics.largest_defect));
-  add(detail::of_pole(*setup.subject, report));
+  add(detail::of_pole(*setup.subject, setup.options, report));
   if (detail::is_doubtful(setup.options, report.statistics)) add(detail::of_step(setup, report, stop));
   return doubts;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <memory>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/plain_chain.hpp>
+#include <pendula/numeric/directions.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/system/member.hpp>
 #include <pendula/system/motion.hpp>
@@ -53,6 +55,31 @@ class Integrator {
     return motion;
   }
 
+  /// Whether steps are remembered from now on, so that glance and look can go back into the last one; it costs a copy
+  /// of the state a step.
+  void remember_steps(bool wanted) { integrator_->remember_steps(wanted); }
+
+  /// The state at `time` within the last step by the polynomial through its stages: cheap. Positions are of one order
+  /// more than there are stages, rates of as many.
+  Motion glance(double time) {
+    Motion motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
+    integrator_->glance(time, motion.q.data(), motion.v.data());
+    return motion;
+  }
+
+  /// The same at the full order of the method: by a step from where the last one began. The integrator is left as it
+  /// was; `motion` is set where the outcome is ok.
+  Outcome look(double time, Motion& motion) {
+    double work = 0;
+    return look(time, motion, work);
+  }
+
+  /// And what loads have brought by then  [J].
+  Outcome look(double time, Motion& motion, double& work) {
+    motion = Motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
+    return integrator_->look(time, motion.q.data(), motion.v.data(), work);
+  }
+
   const Statistics& statistics() const { return integrator_->statistics(); }
 
   /// A copy of all that the next steps depend on.
@@ -62,6 +89,18 @@ class Integrator {
   /// and the options are the same is the caller's to know: refused, by std::invalid_argument, is only another number of
   /// numbers.
   void resume(const Member& member) { become(*integrator_, member); }
+
+  /// From now on every step leaves its derivative behind, for `push`; gives how many rows a tangent has. Throws
+  /// std::invalid_argument for methods that have none: explicit ones, and the velocity form.
+  int linearize() {
+    const int rows = integrator_->linearize();
+    if (rows > 0) return rows;
+    throw std::invalid_argument("tangents: expected method = gauss or radau in momentum form, other steps have none");
+  }
+
+  /// Replaces tangents at the start of the last step, (rows x any), by those at its end: by the exact derivative of the
+  /// step. Coordinates are the integrator's own: of a chain those of chain_tangent.hpp, of a generated kernel (δq, δp).
+  void push(Directions<>& tangents) { integrator_->push(tangents.data(), static_cast<int>(tangents.cols())); }
 
   Description describe() const {
     const auto [solver, iteration, kernel] = integrator_->describe();

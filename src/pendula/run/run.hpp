@@ -8,8 +8,12 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/checkpoint.hpp>
 #include <pendula/run/doubts.hpp>
+#include <pendula/run/event.hpp>
+#include <pendula/run/event_watch.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/observer.hpp>
 #include <pendula/run/run_record.hpp>
@@ -20,6 +24,15 @@
 #include <vector>
 
 namespace pendula {
+
+namespace detail {
+
+/// Of the polynomial that shows a step: through the stages of an implicit method, else a cubic.
+inline int glance_degree(const RunOptions& options) {
+  return is_explicit(options.method) ? 3 : options.stages;
+}
+
+}  // namespace detail
 
 /// One run of anything that moves, once.
 class Run {
@@ -51,24 +64,42 @@ class Run {
 
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
   void integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report);
-  void take(const Motion& motion);
-  Observation look_at(const Motion& motion);
+  void take(const Motion& motion, double work);
+  std::optional<Motion> take_events(RunReport& report);
+  void tell(const Occurrence& happened);
+  Observation look_at(const Motion& motion, double work);
+  void look_at_end(const RunResult& result);
   void come_by(const RowPlace& place, bool last);
   void finish(RunReport& report);
+  void warn_of_events(RunReport& report) const;
+  void doubt(RunReport& report, const std::function<bool()>& stop) const;
+
+  /// What is kept of a run besides its observers, for checkpoints.
+  struct Kept {
+    RunRecord record;  // of the rows; where those are wanted at times, of the first and the last state, too
+    EventWatch watch;
+
+    template <class Numbers>
+    void member(Numbers& numbers) {
+      numbers(record, watch);
+    }
+  };
 
   RunSetup setup_;
   std::unique_ptr<Integrator> integrator_;
   std::vector<Observer*> observers_;
-  RunRecord record_;       // of the rows; where those are wanted at times, of the first and the last state, too
-  std::int64_t rows_ = 0;  // that there were
-  std::vector<double> row_;
-  std::chrono::steady_clock::time_point kept_ = std::chrono::steady_clock::now();
+  Kept kept_;
+  std::int64_t rows_ = 0;           // that there were
+  double step_ = 0, step_end_ = 0;  // the last step's size and end
+  std::vector<double> row_, event_row_;
+  std::chrono::steady_clock::time_point kept_at_ = std::chrono::steady_clock::now();
 };
 
 inline Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
       integrator_(setup_.subject->make_integrator(setup_.options)),
-      record_(*setup_.subject, setup_.start, setup_.duration) {}
+      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration),
+            EventWatch(setup_.events, detail::glance_degree(setup_.options))} {}
 
 inline RunReport Run::go(const std::function<bool()>& stop) {
   return go(nullptr, stop);
@@ -76,7 +107,7 @@ inline RunReport Run::go(const std::function<bool()>& stop) {
 
 inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
   integrator_->resume(checkpoint.integrator);
-  become(record_, checkpoint.record);
+  become(kept_, checkpoint.record);
   return go(&checkpoint, stop);
 }
 
@@ -85,34 +116,46 @@ inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& st
   report.stepping_seconds = std::nan("");
   integrate(from, stop, report);
   finish(report);
-  report.last = record_.last();
+  report.last = kept_.record.last();
   report.rows = rows_;
   report.description = integrator_->describe();
   report.statistics = integrator_->statistics();
-  report.energy_error = record_.energy_error();
-  report.energy_final = record_.energy();
-  report.table = record_.table();
-  if (report.end == RunEnd::complete && setup_.doubted)
-    report.warnings = doubts(setup_, report, record_.balance(), stop);
+  report.energy_error = kept_.record.energy_error();
+  report.energy_final = kept_.record.energy();
+  report.table = kept_.record.table();
+  report.events = kept_.watch.tallies();
+  report.event_cost = kept_.watch.cost();
+  doubt(report, stop);
   return report;
 }
 
 inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
   const RunOptions& options = setup_.options;
-  const double largest_step = is_adaptive(options.method) ? std::numeric_limits<double>::infinity() : options.step;
+  const double largest_step = is_adaptive(options) ? std::numeric_limits<double>::infinity() : options.step;
   const Schedule schedule{largest_step, setup_.duration, setup_.every, setup_.rows};
-  const auto on_row = [&](const Motion& motion) { take(motion); };
+  const auto on_row = [&](const Motion& motion, double work = 0) { take(motion, work); };
   const auto on_way = [&](const RowPlace& place, bool last) { come_by(place, last); };
+  const auto on_step = [&] {
+    step_ = integrator_->time() - std::exchange(step_end_, integrator_->time());
+    return take_events(report);
+  };
+  integrator_->remember_steps(!setup_.events.empty());
   rows_ = from == nullptr ? 0 : from->rows;
+  step_end_ = from == nullptr ? setup_.start.time : from->time;
   try {
-    if (from == nullptr && setup_.rows.any() && setup_.rows.at(0) != 0) look_at(setup_.start);
-    const RunResult result = from == nullptr ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way)
-                                             : pendula::go_on(*integrator_, setup_.start.time, schedule,
-                                                              {from->rows, from->since_row}, on_row, stop, on_way);
-    if (setup_.rows.any() && integrator_->time() != record_.last().time) look_at(integrator_->state());
+    if (from == nullptr && setup_.rows.any() && setup_.rows.at(0) != 0) look_at(setup_.start, 0);
+    from == nullptr ? kept_.watch.start(setup_.start) : kept_.watch.resume(integrator_->state());
+    const RunResult result = from == nullptr
+                                 ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way, on_step)
+                                 : pendula::go_on(*integrator_, setup_.start.time, schedule,
+                                                  {from->rows, from->since_row}, on_row, stop, on_way, on_step);
+    if (setup_.rows.any()) look_at_end(result);
     report.stepping_seconds = result.stepping_seconds;
     report.step = result.outcome;
-    report.end = !result.outcome ? RunEnd::step_failed : result.stopped ? RunEnd::stopped : RunEnd::complete;
+    report.end = !result.outcome  ? RunEnd::step_failed
+                 : result.end     ? RunEnd::event
+                 : result.stopped ? RunEnd::stopped
+                                  : RunEnd::complete;
   } catch (const NotFinite&) {
     report.end = RunEnd::not_finite;
     report.step.time = integrator_->time();
@@ -122,20 +165,49 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
   }
 }
 
-inline void Run::take(const Motion& motion) {
-  const Observation seen = look_at(motion);
+inline void Run::take(const Motion& motion, double work) {
+  const Observation seen = look_at(motion, work);
   ++rows_;
-  for (Observer* observer : observers_) observer->take({motion, seen, row_});
+  for (Observer* observer : observers_) observer->take({motion, seen, row_, step_});
+}
+
+// The first event that ends the run does so, and is the last one that is told.
+inline std::optional<Motion> Run::take_events(RunReport& report) {
+  if (setup_.events.empty()) return {};
+  for (const Occurrence& happened : kept_.watch.after_step(*integrator_)) {
+    tell(happened);
+    if (!setup_.events[happened.event].stop) continue;
+    report.ended_by = happened.event;
+    return happened.motion;
+  }
+  return {};
+}
+
+inline void Run::tell(const Occurrence& happened) {
+  const Observation seen = setup_.subject->observe(happened.motion);
+  event_row_.clear();
+  setup_.subject->append_row(happened.motion, seen, event_row_);
+  const EventRow row{setup_.events[happened.event], happened.up, {happened.motion, seen, event_row_, step_}};
+  for (Observer* observer : observers_) observer->happen(row);
 }
 
 // The energy is not finite wherever anything else is not.
-inline Observation Run::look_at(const Motion& motion) {
+inline Observation Run::look_at(const Motion& motion, double work) {
   Observation seen = setup_.subject->observe(motion);
   if (!std::isfinite(seen.energy)) throw NotFinite();
   row_.clear();
   setup_.subject->append_row(motion, seen, row_);
-  record_.add(motion, seen, row_, integrator_->statistics().load_work);
+  kept_.record.add(motion, seen, row_, work);
   return seen;
+}
+
+// The last state, where that is no row.
+inline void Run::look_at_end(const RunResult& result) {
+  const double time = result.end ? result.end->time : integrator_->time();
+  if (time == kept_.record.last().time) return;
+  Motion motion;
+  double work = 0;
+  if (integrator_->look(time, motion, work)) look_at(motion, work);
 }
 
 inline void Run::come_by(const RowPlace& place, bool last) {
@@ -144,12 +216,36 @@ inline void Run::come_by(const RowPlace& place, bool last) {
   if (!last && std::ranges::none_of(observers_, wants)) {
     if (std::isinf(setup_.checkpoint)) return;
     const Clock::time_point now = Clock::now();
-    if (std::chrono::duration<double>(now - kept_).count() < setup_.checkpoint) return;
-    kept_ = now;
+    if (std::chrono::duration<double>(now - kept_at_).count() < setup_.checkpoint) return;
+    kept_at_ = now;
   }
   const Checkpoint checkpoint{integrator_->time(), place.rows, place.since_row, integrator_->member(),
-                              member_of(record_)};
+                              member_of(kept_)};
   for (Observer* observer : observers_) observer->keep(checkpoint);
+}
+
+inline void Run::warn_of_events(RunReport& report) const {
+  const auto warn = [&](std::size_t event, const std::string& what, double time, const std::string& so) {
+    if (std::isnan(time)) return;
+    report.warnings.push_back("event " + setup_.events[event].name + ": " + what + " before t = " + rounded(time) +
+                              " s; where that is so, " + so);
+  };
+  const std::vector<EventTally>& tallies = kept_.watch.tallies();
+  for (std::size_t k = 0; k < tallies.size(); ++k) {
+    warn(k, "not finite", tallies[k].not_finite, "nothing was looked for");
+    warn(k, "changes too often for the steps", tallies[k].not_told, "it counts once at most in a step");
+  }
+}
+
+// Of a run that an event ended, up to there.
+inline void Run::doubt(RunReport& report, const std::function<bool()>& stop) const {
+  warn_of_events(report);
+  if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
+  RunSetup whole = setup_;
+  if (report.end == RunEnd::event) whole.duration = report.last.time - setup_.start.time;
+  for (std::string& sentence : doubts(whole, report, kept_.record.balance(), stop)) {
+    report.warnings.push_back(std::move(sentence));
+  }
 }
 
 // The first failure is the one that is told.
@@ -158,7 +254,7 @@ inline void Run::finish(RunReport& report) {
     try {
       observer->finish();
     } catch (...) {
-      if (report.end != RunEnd::complete && report.end != RunEnd::stopped) continue;
+      if (report.end != RunEnd::complete && report.end != RunEnd::event && report.end != RunEnd::stopped) continue;
       report.end = RunEnd::observer_failed;
       report.failure = std::current_exception();
     }

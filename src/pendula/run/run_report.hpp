@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <limits>
 #include <memory>
+#include <pendula/run/event.hpp>
 #include <pendula/run/row_times.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/subject.hpp>
@@ -25,11 +27,14 @@ struct RunSetup {
   RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
   bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
   double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
+  /// To look for.
+  std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
 };
 
 /// Why a run was over.
 enum class RunEnd {
   complete,         ///< it came to its end
+  event,            ///< it came to an event that ends it, RunReport::ended_by
   stopped,          ///< it was asked to stop
   step_failed,      ///< RunReport::step says how
   not_finite,       ///< the energy of its last state is not a number; that state is no row
@@ -47,8 +52,11 @@ struct RunReport {
   Statistics statistics;
   double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN where a row ended the run
   EnergyError energy_error;
-  double energy_final = 0;            ///< of the last row  [J]
-  std::vector<TableRow> table;        ///< a few rows, evenly over the run, the last one among them
+  double energy_final = 0;         ///< of the last row  [J]
+  std::vector<TableRow> table;     ///< a few rows, evenly over the run, the last one among them
+  std::vector<EventTally> events;  ///< of each of RunSetup::events
+  std::size_t ended_by = 0;        ///< number of an event, where one ended the run
+  EventCost event_cost;
   std::vector<std::string> warnings;  ///< why not to trust a run that ended well: one sentence each
 };
 

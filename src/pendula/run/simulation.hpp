@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/row_times.hpp>
+#include <pendula/system/motion.hpp>
 #include <pendula/system/outcome.hpp>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 namespace pendula {
@@ -24,9 +27,11 @@ struct Schedule {
 
 /// What came of a run.
 struct RunResult {
-  Outcome outcome;              ///< of the step that ended it
-  bool stopped = false;         ///< whether it was asked to end before its time
-  double stepping_seconds = 0;  ///< wall time inside the integrator, without rows
+  Outcome outcome;       ///< of the step that ended it
+  bool stopped = false;  ///< whether it was asked to end before its time
+  /// Where it ended within the last step.
+  std::optional<Motion> end = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
+  double stepping_seconds = 0;     ///< wall time inside the integrator, without rows
 };
 
 namespace detail {
@@ -67,8 +72,11 @@ struct RowPlace {
 
 namespace detail {
 
+/// No step is the last but for the schedule.
+inline constexpr auto runs_on = [] { return std::optional<Motion>(); };
+
 /// What a run goes by, and who is told: see go_on.
-template <class OnRow, class Stop, class OnWay>
+template <class OnRow, class Stop, class OnWay, class OnStep>
 struct Course {
   Integrator& integrator;
   double begin;
@@ -77,29 +85,36 @@ struct Course {
   OnRow on_row;
   const Stop& stop;
   OnWay on_way;
+  OnStep on_step;
   RunResult result = {};
   bool near_end = false;  // the end may have had a say in a step since: a longer run would not come by here
 
   double elapsed() const { return integrator.time() - begin; }
   bool is_over() const { return at_end(schedule, elapsed()); }
-  bool goes_on() const { return result.outcome && !result.stopped; }
+  bool goes_on() const { return result.outcome && !result.stopped && !result.end; }
 
   void step() {
     const double h = next_step(schedule, elapsed());
     const bool was_near = std::exchange(near_end, may_be_cut(schedule, h, result.outcome.step));
     if (near_end && !was_near) on_way(place, true);
     result.outcome = integrator.step(h);
+    if (result.outcome) result.end = on_step();
     result.stopped = stop();
   }
 
-  void row(const Motion& motion) {
-    on_row(motion);
+  void row(const Motion& motion, double work) {
+    if constexpr (std::is_invocable_v<OnRow, const Motion&, double>) {
+      on_row(motion, work);
+    } else {
+      on_row(motion);
+    }
+    last_row = motion.time;
     ++place.rows;
     place.since_row = 0;
   }
 
   void come_by() {
-    if (!near_end) on_way(place, !goes_on() || is_over());
+    if (!near_end && !result.end) on_way(place, !goes_on() || is_over());
   }
 
   /// A row every so many steps, and at the last state.
@@ -110,70 +125,69 @@ struct Course {
     }
   }
   void take_row() {
+    if (result.end) {
+      if (result.end->time != last_row) row_at(result.end->time);
+      return;
+    }
     const bool is_row = place.since_row == schedule.every;
     if (!is_row) come_by();
-    if (place.since_row > 0) row(integrator.state());
+    if (place.since_row > 0) row(integrator.state(), integrator.statistics().load_work);
     if (is_row) come_by();
   }
 
-  /// Rows at times: steps to the first one that comes by some; then again from where that began, to each time exactly,
-  /// and on from where it ended.
+  /// Rows at times: steps to the first one that comes by some, and looks back into it.
   void to_next_times() {
     while (goes_on() && !is_over()) {
-      const double reach = std::isinf(schedule.step) ? 10 * result.outcome.step : schedule.step;
-      if (reach == 0 || schedule.rows.at(place.rows) <= (elapsed() + reach) * (1 + 1e-9)) before = integrator.member();
       step();
       if (result.outcome && is_reached(schedule.rows.at(place.rows))) return;
     }
   }
   void take_times() {
-    if (!result.outcome || !is_reached(schedule.rows.at(place.rows))) return come_by();
-    const Member after = integrator.member();
+    if (!result.outcome) return come_by();
     for (double time = 0; is_reached(time = schedule.rows.at(place.rows));) {
-      if (elapsed() - time <= slack()) {
-        row(at(time));
-        continue;
-      }
-      integrator.resume(before);
-      Outcome part;
-      while (part && !is_reached(time)) part = integrator.step(time - elapsed());
-      if (!part) {
-        result.outcome = part;
-        return;
-      }
-      row(at(time));
-      integrator.resume(after);
+      if (result.end && begin + time > result.end->time) break;
+      if (!row_at(begin + time)) return;
     }
     come_by();
+  }
+
+  /// A row within the last step.
+  bool row_at(double time) {
+    Motion motion;
+    double work = 0;
+    const Outcome looked = integrator.look(time, motion, work);
+    if (looked) {
+      row(motion, work);
+    } else {
+      result.outcome = looked;
+    }
+    return bool(looked);
   }
 
   // But for rounding, whatever the end of the run is.
   double slack() const { return 8 * std::numeric_limits<double>::epsilon() * elapsed(); }
   bool is_reached(double time) const { return time <= elapsed() + slack(); }
-  Motion at(double time) const {
-    Motion motion = integrator.state();
-    motion.time = begin + time;
-    return motion;
-  }
 
-  Member before = {};  // of a step that comes by rows
+  double last_row = std::numeric_limits<double>::quiet_NaN();
 };
 
 }  // namespace detail
 
 /// Runs `integrator`, which is at `place`, on to the end of a schedule that began at the time `begin`. Calls
-/// on_row(const Motion&) every `schedule.every` accepted steps, and at the last state, also where the run fails or is
-/// stopped; or at the times of `schedule.rows`, which the steps do not depend on. bool stop() is asked after every
-/// step. Calls on_way(place, last) where a longer run would come by as well: where it begins, where rows are, before a
-/// step that the end may cut short, and where the run fails or is stopped; `last` tells that there may be none after
-/// it.
-template <class OnRow, class Stop, class OnWay>
+/// on_row(const Motion&), or on_row(const Motion&, double work) with what loads have brought by then, every
+/// `schedule.every` accepted steps, and at the last state, also where the run fails or is stopped; or at the times of
+/// `schedule.rows`, which the steps do not depend on. bool stop() is asked after every step. Calls on_way(place, last)
+/// where a longer run would come by as well: where it begins, where rows are, before a step that the end may cut short,
+/// and where the run fails or is stopped; `last` tells that there may be none after it. Asks std::optional<Motion>
+/// on_step() after every accepted step whether the run ends within it, at that state.
+template <class OnRow, class Stop, class OnWay, class OnStep = decltype(detail::runs_on)>
 RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, const RowPlace& place, OnRow on_row,
-                const Stop& stop, OnWay on_way) {
+                const Stop& stop, OnWay on_way, OnStep on_step = detail::runs_on) {
   using Clock = std::chrono::steady_clock;
   detail::require(schedule);
-  detail::Course<OnRow, Stop, OnWay> course{integrator, begin, schedule, place, on_row, stop, on_way};
+  detail::Course<OnRow, Stop, OnWay, OnStep> course{integrator, begin, schedule, place, on_row, stop, on_way, on_step};
   const bool at_times = schedule.rows.any();
+  if (at_times) integrator.remember_steps(true);
   on_way(place, true);
   while (course.goes_on() && !course.is_over()) {
     const auto before = Clock::now();
@@ -186,15 +200,15 @@ RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, 
 
 /// Runs `integrator` from `start`, which is a row unless rows are wanted at other times, over `schedule`. Throws
 /// std::invalid_argument on a schedule that makes no sense.
-template <class OnRow, class Stop, class OnWay>
+template <class OnRow, class Stop, class OnWay, class OnStep = decltype(detail::runs_on)>
 RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
-                   const Stop& stop, OnWay on_way) {
+                   const Stop& stop, OnWay on_way, OnStep on_step = detail::runs_on) {
   detail::require(schedule);
   const Outcome started = integrator.start(start);
   const bool is_row = !schedule.rows.any() || schedule.rows.at(0) == 0;
-  if (is_row) on_row(start);
+  if (is_row) on_row(start);  // nothing has brought anything yet
   if (!started) return {.outcome = started};
-  return go_on(integrator, start.time, schedule, {is_row ? 1 : 0, 0}, on_row, stop, on_way);
+  return go_on(integrator, start.time, schedule, {is_row ? 1 : 0, 0}, on_row, stop, on_way, on_step);
 }
 
 /// The same without a way.

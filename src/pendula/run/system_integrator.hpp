@@ -22,13 +22,13 @@ std::unique_ptr<PlainIntegrator> make_system_integrator(const PlainSystem& plain
   const Family family = family_of(options.method);
   if (options.form == Form::velocity) {
     require_newton(options.iteration);
-    return std::make_unique<GaussIntegrator<VelocityNewton<S>>>(model, options.stages, described, family);
+    return std::make_unique<GaussIntegrator<VelocityNewton<S>>>(model, options, described, family);
   }
   if (options.stages <= 4) {
-    return std::make_unique<GaussIntegrator<LagrangianSolver<S, 4>>>(model, options.stages, described,
-                                                                     options.iteration, family);
+    return std::make_unique<GaussIntegrator<LagrangianSolver<S, 4>>>(model, options, described, options.iteration,
+                                                                     family);
   }
-  return std::make_unique<GaussIntegrator<LagrangianSolver<S, 8>>>(model, options.stages, described, options.iteration,
+  return std::make_unique<GaussIntegrator<LagrangianSolver<S, 8>>>(model, options, described, options.iteration,
                                                                    family);
 }
 

@@ -9,7 +9,7 @@ namespace pendula {
 
 /// How time is advanced: implicit Gauss–Legendre, Radau IIA where damping is stiff, or an explicit method for
 /// comparison (paper §3.2).
-enum class Method { gauss, radau, rk4, dopri5, fehlberg78 };
+enum class Method { gauss, radau, rk4, dopri5, fehlberg78, bulirsch_stoer };
 
 /// Which form of the equations Gauss–Legendre solves: (q, p) is symplectic, (q, q̇) is the paper's.
 enum class Form { momentum, velocity };
@@ -24,15 +24,17 @@ constexpr bool is_explicit(Method method) {
   return method != Method::gauss && method != Method::radau;
 }
 
+/// Whether an explicit method chooses its steps; implicit ones do where no step is asked for.
 constexpr bool is_adaptive(Method method) {
-  return method == Method::dopri5 || method == Method::fehlberg78;
+  return method == Method::dopri5 || method == Method::fehlberg78 || method == Method::bulirsch_stoer;
 }
 
 /// What scenarios call the values of an option, in the order of its enumerators.
 template <class Option>
 inline constexpr std::array<std::string_view, 0> names_of{};
 template <>
-inline constexpr std::array<std::string_view, 5> names_of<Method>{"gauss", "radau", "rk4", "dopri5", "fehlberg78"};
+inline constexpr std::array<std::string_view, 6> names_of<Method>{"gauss",  "radau",      "rk4",
+                                                                  "dopri5", "fehlberg78", "bulirsch-stoer"};
 template <>
 inline constexpr std::array<std::string_view, 2> names_of<Form>{"momentum", "velocity"};
 template <>
@@ -53,12 +55,24 @@ requires(!names_of<Option>.empty()) std::ostream& operator<<(std::ostream& out, 
 /// What a run is asked to do.
 struct RunOptions {
   Method method = Method::gauss;
-  int stages = 2;                              ///< gauss: 1..8, order 2·stages; radau: 2, 3, order 2·stages − 1
+  int stages = 2;  ///< gauss: 1..8, order 2·stages; radau: 2, 3, order 2·stages − 1; stages_for a tolerance
   Form form = Form::momentum;                  ///< gauss
   Solver solver = Solver::automatic;           ///< gauss
   Iteration iteration = Iteration::automatic;  ///< gauss
-  double step = 1e-3;                          ///< gauss, rk4  [s]
-  double tolerance = 1e-9;                     ///< dopri5, fehlberg78: error a step, relative and absolute
+  double step = 1e-3;       ///< gauss, radau, rk4  [s]; 0, of gauss and radau: of their own choice, by tolerance
+  double tolerance = 1e-9;  ///< gauss, radau: of the motion, relative to its size, but for what chaos makes of it;
+                            ///< explicit adaptive ones: error a step, relative and absolute
 };
+
+/// Whether steps follow from the tolerance.
+constexpr bool is_adaptive(const RunOptions& options) {
+  return is_adaptive(options.method) || (!is_explicit(options.method) && options.step == 0);
+}
+
+/// Stages of the fewest evaluations for a tolerance.
+constexpr int stages_for(Method method, double tolerance) {
+  if (method == Method::radau) return 3;
+  return tolerance > 1e-5 ? 4 : tolerance > 1e-8 ? 6 : 8;
+}
 
 }  // namespace pendula

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <ostream>
 #include <span>
@@ -104,15 +105,22 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
 
 /// Counts over a run.
 struct Statistics {
-  std::int64_t steps = 0;              ///< accepted steps
-  std::int64_t rejected_steps = 0;     ///< attempts that were not accepted
-  std::int64_t newton_iterations = 0;  ///< Newton or fixed-point iterations, all attempts
-  double load_work = 0;                ///< energy that torque and damping brought  [J]; NaN where nobody counts
-  double largest_defect = 0;           ///< of a step that was accepted: GaussStepper::step
+  std::int64_t steps = 0;                      ///< accepted steps
+  std::int64_t rejected_steps = 0;             ///< attempts that were not accepted
+  std::int64_t newton_iterations = 0;          ///< Newton or fixed-point iterations, all attempts
+  double load_work = 0;                        ///< energy that torque and damping brought  [J]; NaN where nobody counts
+  double largest_defect = 0;                   ///< of a step that was accepted: GaussStepper::step
+  double smallest_step = 0, largest_step = 0;  ///< of the method's own choice  [s]; 0: there was none
+
+  /// A step of the method's own choice was taken.
+  void count_chosen(double h) {
+    smallest_step = smallest_step == 0 ? h : std::min(smallest_step, h);
+    largest_step = std::max(largest_step, h);
+  }
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(steps, rejected_steps, newton_iterations, load_work, largest_defect);
+    numbers(steps, rejected_steps, newton_iterations, load_work, largest_defect, smallest_step, largest_step);
   }
 };
 

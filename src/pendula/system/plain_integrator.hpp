@@ -23,11 +23,30 @@ class PlainIntegrator {
   virtual Outcome step(double h) = 0;
   virtual double time() const = 0;
   virtual void read_state(double* q, double* v) const = 0;
+
+  /// Whether steps are remembered from now on, so that glance and look can go back into the last one; it costs a copy
+  /// of the state a step.
+  virtual void remember_steps(bool wanted) = 0;
+  /// The state at `time` within the last step, by polynomials through what the step knows: cheap, and of less digits.
+  virtual void glance(double time, double* q, double* v) = 0;
+  /// The same at the full order of the method: by a step from where the last one began. Leaves the integrator as it is.
+  /// `work` is what loads have brought by then  [J].
+  virtual Outcome look(double time, double* q, double* v, double& work) = 0;
+
   virtual const Statistics& statistics() const = 0;
   virtual Description describe() const = 0;
 
   /// All that the next steps depend on, of an integrator that was started or is being given another one's member.
   virtual void member(MemberNumbers& numbers) = 0;
+
+  /// From now on every step leaves its derivative behind; gives how many rows a tangent has, zero where the method has
+  /// no derivative. Coordinates are the integrator's own: of a chain those of chain_tangent.hpp, of a generated kernel
+  /// (δq, δp).
+  virtual int linearize() { return 0; }
+
+  /// Replaces tangents at the start of the last step, (rows x count) row by row, by those at its end, once `linearize`
+  /// has asked for that.
+  virtual void push(double* /*tangents*/, int /*count*/) {}
 };
 
 }  // namespace pendula

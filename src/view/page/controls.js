@@ -8,9 +8,10 @@ function say(text) {
 }
 
 class Controls {
-  constructor(player, stage, onTheme) {
+  constructor(player, stage, marks, onTheme) {
     this.player = player;
     this.stage = stage;
+    this.marks = marks;
     this.onTheme = onTheme;
     this.#fillSpeeds();
     this.#wireBar();
@@ -125,7 +126,7 @@ class Controls {
   }
 
   #actions() {
-    const { player, stage } = this;
+    const { player, stage, marks } = this;
     const turn = (x, y) => (shift) => (shift ? stage.move(x, y) : stage.turn(x, y));
     return {
       " ": () => this.#togglePlay(),
@@ -133,6 +134,8 @@ class Controls {
       ArrowRight: (shift) => player.step(shift ? 10 : 1),
       Home: () => player.seek(player.start),
       End: () => player.seek(player.end),
+      n: () => marks.go(1),
+      p: () => marks.go(-1),
       "+": () => player.faster(1),
       "=": () => player.faster(1),
       "-": () => player.faster(-1),

@@ -29,6 +29,7 @@ class Run {
     }
     this.energyError = described.energy ? take(Float32Array) : null;
     this.separations = described.separation ? take(Float32Array) : null;
+    this.stepSizes = described.steps ? take(Float32Array) : null;
   }
 
   /// The numbers of a column, undefined where the page has not got them.

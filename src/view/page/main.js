@@ -58,10 +58,12 @@ function start() {
   const panels = makePanels(player);
   let isDue = true;
   const due = () => (isDue = true);
-  const controls = new Controls(player, stage, () => {
+  const marks = new Marks(player);
+  const controls = new Controls(player, stage, marks, () => {
     palette.read();
     stage.themed();
     drawLegend();
+    marks.redraw();
     for (const each of panels) each.redraw();
     due();
   });

@@ -133,6 +133,11 @@ function makePanels(player) {
     const title = scene.loaded ? "Change of energy" : "Energy error";
     made.push(new LogPanel(title, player, (run) => run.energyError, (largest) => `|H − H₀|, relative: at most ${largest}`));
   }
+  if (runs.some((run) => run.stepSizes)) {
+    const least = Math.min(...runs.map((run) => run.stepSizes?.reduce((m, x) => (x < m ? x : m), Infinity) ?? Infinity));
+    made.push(new LogPanel("Step size", player, (run) => run.stepSizes,
+      (largest) => `From ${readable(least, 3)} to ${largest} ${scene.timeUnit}, of the step that each row lies in`));
+  }
   if (groups.length > 0) {
     const angles = new CoordinatesPanel(player);
     const phase = new PhasePanel(player, () => angles.wrapped.on);

@@ -190,7 +190,7 @@ class TimePlot {
     return linearTicks(axes.y, axes.height / 40, wrapped);
   }
 
-  // Zeros are drawn at the bottom, a tick below the least.
+  // Zeros, where there are any, are drawn at the bottom, a tick below the least.
   #logAxis() {
     const arrays = this.curves.map((curve) => curve.numbers);
     const { low, high } = rangeOf(arrays, (x) => (x > 0 ? Math.log10(x) : NaN));
@@ -198,9 +198,10 @@ class TimePlot {
     const top = empty ? -15 : Math.ceil(high);
     const bottom = Math.min(empty ? -17 : Math.floor(low), top - 2);
     const step = Math.max(1, Math.ceil((top - bottom) / Math.max(2, this.axes.height / 32)));
-    this.floor = bottom - step;
-    this.axes.y = { low: this.floor - 0.15 * step, high: top + 0.15 * step };
-    const ticks = [{ at: this.floor, text: "0" }];
+    const isZero = empty || arrays.some((numbers) => numbers.includes(0));
+    this.floor = isZero ? bottom - step : -Infinity;
+    this.axes.y = { low: (isZero ? this.floor : bottom) - 0.15 * step, high: top + 0.15 * step };
+    const ticks = isZero ? [{ at: this.floor, text: "0" }] : [];
     for (let k = bottom; k <= top; k += step) ticks.push({ at: k, text: powerOfTen(k) });
     return ticks;
   }

@@ -1,0 +1,196 @@
+"""Maps of ensembles: a kept number of every member, over two axes as colours, over one as a curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from .figure import GREEK, style, symbol
+from .run import PlotError
+
+WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
+SIDE = 5.2  # inches, of the longer side of a map
+DOTS = 200  # an inch, as pictures are written
+NEVER, FAILED = "#e8e8e8", "#b00020"
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """The numbers of an ensemble's file that a map shows."""
+
+    name: str
+    key: str
+    values: np.ndarray  # in the shape of the axes
+    unit: str
+    status: np.ndarray
+    axes: list[tuple[str, str, np.ndarray]]  # name, unit, values; the first one slowest
+    contour: np.ndarray | None
+    complete: bool
+
+    def lost(self) -> np.ndarray:
+        """Members that were not moved, or failed."""
+        return ~np.isin(self.status, (0, 1))
+
+
+def reject(path: Path, expected: str, got: str) -> PlotError:
+    return PlotError(f"{path}: expected {expected}, got {got}")
+
+
+def read(path: Path, key: str, contour: str = "") -> Ensemble:
+    """Reads a key of an ensemble's file, and the one that a contour is of. Raises PlotError."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            if str(file.attrs.get("kind", "")) != "ensemble":
+                raise reject(path, "a file of pendula ensemble", "another HDF5 file")
+            status = file["status"]
+            names = sorted(
+                name for name in file if file[name].shape == status.shape and not file[name].is_scale
+            )
+            for name in filter(None, (key, contour)):
+                if name not in names:
+                    raise reject(path, f"one of {', '.join(names)}", f'"{name}"')
+            axes = [
+                (scale.name[1:], str(scale.attrs.get("units", "")), scale[:])
+                for scale in (file[key].dims[k][0] for k in range(status.ndim))
+            ]
+            return Ensemble(
+                str(path),
+                key,
+                counted(file[key][...]),
+                str(file[key].attrs.get("units", "")),
+                status[...],
+                axes,
+                file[contour][...] if contour else None,
+                bool(file.attrs["complete"]),
+            )
+    except OSError as error:
+        raise reject(path, "a file of pendula ensemble", f"{error.strerror or error}") from None
+
+
+def counted(values: np.ndarray) -> np.ndarray:
+    """Doubles; a count that is not there is −1 in the file."""
+    return values if values.dtype.kind == "f" else np.where(values < 0, np.nan, values.astype(float))
+
+
+def named(name: str, unit: str) -> str:
+    """An axis or a colour bar: coordinates as symbols, start.theta[2] as θ₂ [rad], the rest in words."""
+    stem = name.removeprefix("start.").removeprefix("chain.")
+    coordinate = stem.replace("[", "_").rstrip("]")
+    is_symbol = ":" not in stem and coordinate.split("_")[0] in GREEK
+    text = symbol(coordinate) if is_symbol else stem.replace("_", " ").replace(":", " ")
+    return f"{text} [{unit}]" if unit and unit != "1" else text
+
+
+@dataclass(frozen=True)
+class MapChoice:
+    """How a map is drawn."""
+
+    scale: str = ""  # "log" or "linear"; else log where a positive number spans a wide range
+    level: float | None = None  # of the contour
+
+
+def is_log(values: np.ndarray, scale: str) -> bool:
+    if scale:
+        return scale == "log"
+    found = values[np.isfinite(values)]
+    return found.size > 0 and found.min() > 0 and found.max() > WIDE_RANGE * found.min()
+
+
+def colours(ensemble: Ensemble, values: np.ndarray, choice: MapChoice) -> tuple[str, Normalize]:
+    """A cyclic map for angles, else one of even brightness."""
+    if ensemble.unit == "rad":
+        return "twilight_shifted", Normalize(-np.pi, np.pi)
+    found = values[np.isfinite(values)]
+    if is_log(values, choice.scale):
+        positive = found[found > 0]
+        if positive.size == 0:
+            raise PlotError(f"{ensemble.name}: expected positive numbers for a logarithmic scale, got none")
+        return "viridis", LogNorm(positive.min(), positive.max())
+    return "viridis", Normalize(found.min(), found.max())
+
+
+def edges(values: np.ndarray) -> tuple[float, float]:
+    """Of an axis whose members are the middles of cells."""
+    half = (values[-1] - values[0]) / (len(values) - 1) / 2 if len(values) > 1 else 0.5
+    return values[0] - half, values[-1] + half
+
+
+def draw_map(drawn: Figure, axes: Axes, ensemble: Ensemble, choice: MapChoice) -> None:
+    """Two axes: the first one of the scenario to the right, the second upwards."""
+    values = shown(ensemble)
+    if not np.isfinite(values).any():
+        raise PlotError(f"{ensemble.name}: expected numbers of {ensemble.key}, got none")
+    extent = (*edges(ensemble.axes[0][2]), *edges(ensemble.axes[1][2]))
+    cmap, norm = colours(ensemble, values, choice)
+    place = {"origin": "lower", "extent": extent, "aspect": "auto", "interpolation": "nearest"}
+    marks = np.where(ensemble.lost().T[..., None], rgba(FAILED), rgba(NEVER))
+    axes.imshow(marks, **place)
+    image = axes.imshow(np.ma.masked_invalid(values.T), cmap=cmap, norm=norm, **place)
+    drawn.colorbar(image, ax=axes, label=named(ensemble.key, ensemble.unit))
+    if choice.level is not None:
+        first, second = (axis[2] for axis in ensemble.axes)
+        axes.contour(first, second, ensemble.contour.T, levels=[choice.level], colors="k", linewidths=0.8)
+    axes.grid(visible=False)
+    axes.set_xlabel(named(*ensemble.axes[0][:2]))
+    axes.set_ylabel(named(*ensemble.axes[1][:2]))
+    legend(axes, ensemble, values)
+
+
+def shown(ensemble: Ensemble) -> np.ndarray:
+    """Angles within a turn; nothing of members that failed."""
+    values = np.where(ensemble.lost(), np.nan, ensemble.values)
+    return np.mod(values + np.pi, 2 * np.pi) - np.pi if ensemble.unit == "rad" else values
+
+
+def rgba(colour: str) -> np.ndarray:
+    from matplotlib.colors import to_rgba
+
+    return np.array(to_rgba(colour))
+
+
+def legend(axes: Axes, ensemble: Ensemble, values: np.ndarray) -> None:
+    """What has no colour of the bar."""
+    lost = ensemble.lost()
+    patches = []
+    if (np.isnan(values) & ~lost).any():
+        patches.append(Patch(color=NEVER, label="never"))
+    if lost.any():
+        text = "failed" if ensemble.complete else "failed, or not run yet"
+        patches.append(Patch(color=FAILED, label=text))
+    if patches:
+        axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(0, -0.1), ncols=2, frameon=False)
+
+
+def draw_curve(axes: Axes, ensemble: Ensemble, choice: MapChoice) -> None:
+    """One axis."""
+    name, unit, values = ensemble.axes[0]
+    numbers = np.where(ensemble.lost(), np.nan, ensemble.values)
+    axes.plot(values, numbers, ".", markersize=2)
+    if is_log(numbers, choice.scale):
+        axes.set_yscale("log")
+    axes.set_xlabel(named(name, unit))
+    axes.set_ylabel(named(ensemble.key, ensemble.unit))
+
+
+def figure(ensemble: Ensemble, choice: MapChoice) -> Figure:
+    """A cell of a map is one dot of a picture at least."""
+    if len(ensemble.axes) > 2:
+        names = ", ".join(name for name, _, _ in ensemble.axes)
+        raise PlotError(f"{ensemble.name}: expected one axis or two, got {names}")
+    with style():
+        if len(ensemble.axes) == 1:
+            drawn = Figure(figsize=(SIDE, 0.7 * SIDE), layout="constrained")
+            draw_curve(drawn.add_subplot(), ensemble, choice)
+            return drawn
+        side = max(SIDE, 1.25 * max(ensemble.values.shape) / DOTS)
+        drawn = Figure(figsize=(1.15 * side, side), layout="constrained")
+        draw_map(drawn, drawn.add_subplot(), ensemble, choice)
+    return drawn

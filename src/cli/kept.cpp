@@ -1,0 +1,133 @@
+#include "cli/kept.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <pendula/run/quantity.hpp>
+
+#include "io/input_error.hpp"
+
+namespace pendula::cli {
+namespace {
+
+constexpr std::string_view event_prefix = "event:";
+
+/// Whether a quantity tells where points are: coordinates have rates.
+bool is_point(const Quantity& quantity, const std::vector<Quantity>& all) {
+  const auto named = [&](const std::string& name) {
+    return std::ranges::find(all, name, &Quantity::name) != all.end();
+  };
+  const bool is_rate = quantity.name.ends_with("_dot") && named(quantity.name.substr(0, quantity.name.size() - 4));
+  return quantity.name != "t" && quantity.name != "energy" && !is_rate && !named(quantity.name + "_dot");
+}
+
+}  // namespace
+
+Kept::Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events,
+           const std::optional<io::NaturalUnits>& natural) {
+  std::vector<Quantity> quantities = subject.quantities();
+  for (Quantity& quantity : quantities) quantity.unit = io::in_units(natural, quantity.unit);
+  std::vector<std::string> keep = plan.keep;
+  if (keep.empty()) {
+    keep = {"final", "energy_error", "steps"};
+    for (const io::EventPlan& event : events) keep.push_back(std::string(event_prefix) + event.name);
+  }
+  for (const std::string& what : keep) add(what, plan.keep_place, quantities, events, natural);
+}
+
+void Kept::add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
+               const std::vector<io::EventPlan>& events, const std::optional<io::NaturalUnits>& natural) {
+  const std::string second = io::in_units(natural, "s"), energy = io::in_units(natural, "J");
+  const auto has = [&](const std::string& name) {
+    return std::ranges::any_of(columns_, [&](const Column& each) { return each.column.name == name; });
+  };
+  if (what == "final" || what == "points") {
+    if (!has(what == "final" ? "t" : "energy")) add_last(quantities, what == "points");
+    return;
+  }
+  const std::array<std::pair<std::string_view, Column>, 3> single = {{
+      {"energy_error", {{"energy_error", "1"}, Source::energy_error}},
+      {"energy", {{"energy_start", energy}, Source::energy_start}},
+      {"steps", {{"steps", "1", true}, Source::steps}},
+  }};
+  for (const auto& [name, column] : single) {
+    if (what != name) continue;
+    if (!has(column.column.name)) columns_.push_back(column);
+    return;
+  }
+  if (has(what)) return;
+  if (what == "lyapunov") {
+    columns_.push_back({{what, "1/" + second}, Source::exponent});
+    columns_.push_back({{what + ":error", "1/" + second}, Source::exponent_error});
+    return;
+  }
+  const auto event = std::ranges::find_if(
+      events, [&](const io::EventPlan& each) { return what == std::string(event_prefix) + each.name; });
+  if (event == events.end()) {
+    std::string known = "final, points, energy, energy_error, steps, lyapunov";
+    for (const io::EventPlan& each : events) known += ", " + std::string(event_prefix) + each.name;
+    throw io::InputError(place + ": expected some of " + known + ", got \"" + what + '"');
+  }
+  const auto index = static_cast<std::size_t>(event - events.begin());
+  columns_.push_back({{what, second}, Source::event_time, index});
+  columns_.push_back({{what + ":count", "1", true}, Source::event_count, index});
+}
+
+void Kept::add_last(const std::vector<Quantity>& quantities, bool points) {
+  const std::vector<std::string> names = columns_of(quantities);
+  for (const Quantity& quantity : quantities) {
+    if ((is_point(quantity, quantities) || quantity.name == "energy") != points) continue;
+    for (std::size_t k = 0; k < quantity.size(); ++k) {
+      const std::size_t column = quantity.column(k);
+      columns_.push_back({{names[column], quantity.unit}, Source::last, column});
+    }
+  }
+}
+
+std::vector<io::EnsembleColumn> Kept::columns() const {
+  std::vector<io::EnsembleColumn> columns;
+  columns.reserve(columns_.size());
+  for (const Column& each : columns_) columns.push_back(each.column);
+  return columns;
+}
+
+bool Kept::lyapunov() const {
+  return std::ranges::any_of(columns_, [](const Column& each) { return each.source == Source::exponent; });
+}
+
+void Kept::append(const Subject& subject, const RunReport& report, double exponent, double exponent_error,
+                  std::vector<double>& row) const {
+  std::vector<double> last;
+  subject.append_row(report.last, subject.observe(report.last), last);
+  for (const Column& each : columns_) {
+    switch (each.source) {
+      case Source::last:
+        row.push_back(last[each.index]);
+        break;
+      case Source::energy_start:
+        row.push_back(report.energy_error.initial);
+        break;
+      case Source::energy_error:
+        row.push_back(report.energy_error.largest);
+        break;
+      case Source::steps:
+        row.push_back(static_cast<double>(report.statistics.steps));
+        break;
+      case Source::event_time:
+        row.push_back(report.events[each.index].first);
+        break;
+      case Source::event_count:
+        row.push_back(static_cast<double>(report.events[each.index].count));
+        break;
+      case Source::exponent:
+        row.push_back(exponent);
+        break;
+      case Source::exponent_error:
+        row.push_back(exponent_error);
+        break;
+    }
+  }
+}
+
+}  // namespace pendula::cli

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <pendula/ensemble/chunks.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/interrupt.hpp"
+#include "cli/kept.hpp"
+#include "io/ensemble_plan.hpp"
+#include "io/journal.hpp"
+#include "io/scenario.hpp"
+
+namespace pendula::cli {
+
+/// Thrown out of a member that was under way.
+struct Interrupted {};
+
+/// The scenario of an ensemble, and those of its members: the same with other numbers.
+class MemberScenarios {
+ public:
+  /// Reads the file; `quiet` says nothing on standard error where a model's kernel is made. Throws io::InputError.
+  MemberScenarios(const std::string& file, std::vector<std::string> overrides, bool quiet);
+
+  const io::ScenarioText& text() const { return text_; }
+  const std::vector<std::string>& overrides() const { return overrides_; }
+  /// Text of the model's file, once a scenario was read; empty where there is none.
+  const std::string& model() const { return model_; }
+
+  io::AnyScenario base() { return parse(overrides_); }
+
+  /// Several threads may ask at once. Throws io::InputError.
+  io::AnyScenario of_member(const io::EnsemblePlan& plan, std::int64_t member);
+
+ private:
+  io::AnyScenario parse(const std::vector<std::string>& overrides);
+  std::shared_ptr<const SystemEntry> find_system(const std::string& name, std::optional<int> links,
+                                                 const std::filesystem::path& folder);
+
+  io::ScenarioText text_;
+  std::vector<std::string> overrides_;
+  bool quiet_;
+  std::mutex guard_;
+  std::map<std::pair<std::string, int>, std::shared_ptr<const SystemEntry>> systems_;
+  std::string model_;
+};
+
+/// Moves members one by one. Several threads may share it.
+class MemberRuns {
+ public:
+  MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan, const Kept& kept, const InterruptGuard& guard);
+
+  /// What came of them; one that cannot be moved says so. Throws Interrupted.
+  io::DoneChunk run(const Chunk& members) const;
+
+  /// Reasons not to trust the end of a member, by a second look at it; none where it failed anyway.
+  std::vector<std::string> doubts(std::int64_t member) const;
+
+ private:
+  std::string run(std::int64_t member, std::vector<double>& rows) const;
+  template <class Scenario>
+  std::string run(const Scenario& scenario, std::vector<double>& rows) const;
+  template <class Scenario>
+  std::pair<double, double> leading_exponent(const Scenario& scenario) const;
+
+  MemberScenarios& scenarios_;
+  const io::EnsemblePlan& plan_;
+  const Kept& kept_;
+  const InterruptGuard& guard_;
+  std::size_t width_;
+};
+
+}  // namespace pendula::cli

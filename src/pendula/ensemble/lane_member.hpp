@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <pendula/chain/chain.hpp>
+#include <pendula/system/motion.hpp>
+#include <pendula/system/outcome.hpp>
+
+namespace pendula {
+
+/// One member of an ensemble: where it starts, when it ends, and its chain where that is its own.
+template <class Space, int N = Eigen::Dynamic>
+struct LaneMember {
+  Motion start;                            ///< angles and rates, (dof·n)  rad, rad/s
+  double end = 0;                          ///< s
+  const Chain<Space, N>* chain = nullptr;  ///< with as many links and no loads; nullptr: that of the ensemble
+};
+
+/// What became of it.
+struct LaneEnd {
+  Motion motion;               ///< at the end; where it failed, where its last accepted step ended
+  Status status = Status::ok;  ///< otherwise the scalar stepper may go on from `motion`
+  std::int64_t steps = 0;      ///< that were accepted
+  std::int64_t rejected_steps = 0;
+  double energy_error = 0;  ///< the largest |H − H_0| at any step, if that was asked for  [J]
+};
+
+/// How members are moved.
+struct LaneOptions {
+  double step = 0;          ///< s; 0: of each member's own choice, by tolerance
+  double tolerance = 1e-9;  ///< of the motion, relative to its size, as RunOptions::tolerance
+  double enough = 0;  ///< LaneStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
+  bool watches_energy = false;
+};
+
+}  // namespace pendula

@@ -1,0 +1,148 @@
+#pragma once
+
+#include <cstddef>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <utility>
+#include <xsimd/xsimd.hpp>
+
+/// Behind the parameters of a lambda that is only a part of the function it stands in.
+#define PENDULA_WRITTEN_OUT __attribute__((always_inline))
+
+namespace pendula {
+
+/// One number of several members of an ensemble, a member in each lane of a SIMD register; what becomes of a lane
+/// depends on that lane alone, to the last bit.
+///
+/// A product is rounded where it is written and never fused with a sum that it goes into, so that code that a compiler
+/// has copied and arranged in two ways still gives one result. What is to be rounded once says so: fma.
+template <class Register>
+class LanePack {
+ public:
+  static constexpr std::size_t width = Register::size;
+  static constexpr int size = static_cast<int>(width);
+  using Mask = typename Register::batch_bool_type;  ///< a yes or no for every member
+
+  LanePack() = default;
+  explicit LanePack(double value) : held_(value) {}
+  explicit LanePack(const Register& held) : held_(held) {}
+
+  static LanePack load(const double* from) { return LanePack(Register::load_aligned(from)); }
+  void store(double* to) const { held_.store_aligned(to); }
+  const Register& held() const { return held_; }
+
+  /// One member's; for what happens seldom.
+  double operator[](int lane) const {
+    alignas(pack_alignment) double values[width];
+    store(values);
+    return values[lane];
+  }
+  void set(int lane, double value) {
+    alignas(pack_alignment) double values[width];
+    store(values);
+    values[lane] = value;
+    held_ = Register::load_aligned(values);
+  }
+
+  friend LanePack operator+(const LanePack& a, const LanePack& b) { return LanePack(Register(a.held_ + b.held_)); }
+  friend LanePack operator-(const LanePack& a, const LanePack& b) { return LanePack(Register(a.held_ - b.held_)); }
+  friend LanePack operator*(const LanePack& a, const LanePack& b) {
+    return LanePack(rounded(Register(a.held_ * b.held_)));
+  }
+  friend LanePack operator/(const LanePack& a, const LanePack& b) { return LanePack(Register(a.held_ / b.held_)); }
+  friend LanePack operator-(const LanePack& a) { return LanePack(Register(-a.held_)); }
+
+  friend Mask operator<(const LanePack& a, const LanePack& b) { return a.held_ < b.held_; }
+  friend Mask operator<=(const LanePack& a, const LanePack& b) { return a.held_ <= b.held_; }
+  friend Mask operator>(const LanePack& a, const LanePack& b) { return b.held_ < a.held_; }
+  friend Mask operator>=(const LanePack& a, const LanePack& b) { return b.held_ <= a.held_; }
+  friend Mask operator==(const LanePack& a, const LanePack& b) { return a.held_ == b.held_; }
+
+  friend LanePack fma(const LanePack& a, const LanePack& b, const LanePack& c) {
+    return LanePack(detail::fused(a.held_, b.held_, c.held_));
+  }
+  friend LanePack sqrt(const LanePack& a) { return LanePack(Register(xsimd::sqrt(a.held_))); }
+  friend LanePack abs(const LanePack& a) { return LanePack(Register(xsimd::abs(a.held_))); }
+  friend LanePack floor(const LanePack& a) { return LanePack(Register(xsimd::floor(a.held_))); }
+  friend LanePack exp(const LanePack& a) { return LanePack(Register(xsimd::exp(a.held_))); }
+  friend LanePack log(const LanePack& a) { return LanePack(Register(xsimd::log(a.held_))); }
+  friend LanePack max(const LanePack& a, const LanePack& b) { return LanePack(Register(xsimd::max(a.held_, b.held_))); }
+  friend LanePack min(const LanePack& a, const LanePack& b) { return LanePack(Register(xsimd::min(a.held_, b.held_))); }
+  friend LanePack select(const Mask& which, const LanePack& yes, const LanePack& no) {
+    return LanePack(Register(xsimd::select(which, yes.held_, no.held_)));
+  }
+
+ private:
+  static Register rounded(const Register& product) {
+#if defined(__GNUC__) && !defined(__clang__)
+    using Raw = typename Register::register_type;
+    return Register(__builtin_assoc_barrier(static_cast<Raw>(product)));
+#else
+    return product;  // Clang fuses within one expression only
+#endif
+  }
+
+  Register held_;
+};
+
+/// The members that a register of this processor has room for.
+using MemberRegister = RegisterFor<8>;
+
+// A number that goes into all lanes.
+template <class Register>
+LanePack<Register> operator*(double a, const LanePack<Register>& b) {
+  return LanePack<Register>(a) * b;
+}
+
+template <class Register>
+Twofold<LanePack<Register>> exact_product(const LanePack<Register>& a, const LanePack<Register>& b) {
+  using L = LanePack<Register>;
+  const L product = a * b;
+  if constexpr (detail::has_fast_fma<double>) {
+    return {product, fma(a, b, -product)};
+  } else {
+    const auto high_bits = [](const L& x) {
+      const L spread = x * L(134217729.0);
+      return spread - (spread - x);
+    };
+    const L a_high = high_bits(a), b_high = high_bits(b);
+    const L a_low = a - a_high, b_low = b - b_high;
+    return {product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low};
+  }
+}
+
+/// a + b without loss where |a| ≥ |b|; else within a last bit of b (Dekker).
+template <class Number>
+Twofold<Number> ordered_sum(const Number& a, const Number& b) {
+  const Number sum = a + b;
+  return {sum, b - (sum - a)};
+}
+
+namespace detail {
+
+/// body(0), body(1), … written out, the numbers being constants.
+template <int Count, class Body>
+[[gnu::always_inline]] inline void unrolled(Body body) {
+  [&]<int... k>(std::integer_sequence<int, k...>) PENDULA_WRITTEN_OUT {
+    (body(std::integral_constant<int, k>()), ...);
+  }
+  (std::make_integer_sequence<int, Count>());
+}
+
+/// Chains so short that loops along them are written out.
+template <int N>
+inline constexpr bool is_short_chain = N > 0 && N <= 3;  // Eigen::Dynamic is negative
+
+/// body(0), body(1), … of all links, from the pivot on; written out where they are few.
+template <int N, class Body>
+[[gnu::always_inline]] inline void for_links(int links, Body body) {
+  if constexpr (is_short_chain<N>) {
+    unrolled<N>(body);
+  } else {
+    for (int i = 0; i < links; ++i) body(i);
+  }
+}
+
+}  // namespace detail
+
+}  // namespace pendula

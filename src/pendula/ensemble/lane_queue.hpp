@@ -1,0 +1,280 @@
+#pragma once
+
+#include <algorithm>
+#include <pendula/ensemble/lane_controller.hpp>
+#include <pendula/ensemble/lane_member.hpp>
+#include <pendula/ensemble/lane_rk4.hpp>
+#include <pendula/ensemble/lane_stepper.hpp>
+#include <pendula/ensemble/lane_turns.hpp>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+namespace pendula {
+
+/// Moves the members of an ensemble of chains to their ends by steps of a LaneStepper or LaneRk4, as many at once as a
+/// register has lanes. A lane whose member has come to its end takes the next one: none is idle until the last have
+/// begun. What a member does depends on nothing but itself, to the last bit.
+///
+/// A member that a fixed point cannot move ends where it is and says so; the others go on.
+template <class Stepper>
+class LaneQueue {
+ public:
+  using Space = typename Stepper::SpaceType;
+  static constexpr int N = Stepper::links_known;
+  using L = typename Stepper::L;
+  using Mask = typename L::Mask;
+  using Member = LaneMember<Space, N>;
+  static constexpr int lanes = L::size, stages = Stepper::stages;
+
+  /// Throws std::invalid_argument for a chain with loads: gravity alone is known here; and where an explicit method is
+  /// not told its step.
+  LaneQueue(const Chain<Space, N>& chain, const LaneOptions& options)
+      : chain_(chain),
+        links_(links_of(chain)),
+        options_(options),
+        stepper_(chain.links(), stepper_options(options)),
+        controller_(options.tolerance),
+        turns_(chain.links()) {}
+
+  /// Moves all members; ends[i] is what becomes of members[i]. Throws std::invalid_argument on another number of links
+  /// or coordinates, and unless there is an end for each member.
+  void run(std::span<const Member> members, std::span<LaneEnd> ends) {
+    if (ends.size() != members.size()) throw std::invalid_argument("ensemble: expected an end for each member");
+    members_ = members;
+    ends_ = ends;
+    next_ = 0;
+    for (int lane = 0; lane < lanes; ++lane) refill(lane);
+    begin();
+    while (xsimd::any(running())) step();
+  }
+
+  /// Fixed-point iterations that were made, of all lanes at once.
+  std::int64_t iterations() const requires(Stepper::is_implicit) { return stepper_.iterations(); }
+
+ private:
+  static constexpr double most_attempts = 40;  // at one step
+  static constexpr double largest_energy_defect = 0.02;
+  static constexpr double smallest_step = 1e-10;  // of the time that is left
+
+  static ChainLinks<Space, N, double> links_of(const Chain<Space, N>& chain) {
+    if (chain.loaded()) throw std::invalid_argument("ensemble: expected a chain without damping and torques");
+    return ChainLinks<Space, N, double>(chain);
+  }
+
+  // What a hundredth of the tolerance leaves out is not seen beside what the steps err by.
+  static typename Stepper::Options stepper_options(const LaneOptions& options) {
+    if constexpr (Stepper::is_implicit) {
+      typename Stepper::Options given;
+      if (options.step == 0) given.enough = std::max(1e-17, 1e-2 * options.tolerance);
+      if (options.enough > 0) given.enough = options.enough;
+      return given;
+    } else {
+      if (options.step == 0) throw std::invalid_argument("ensemble: expected a step for an explicit method");
+      return {};
+    }
+  }
+
+  bool chooses() const { return Stepper::is_implicit && options_.step == 0; }
+  Mask running() const { return running_ > L(0.0); }
+  auto along() const {
+    return [this](int i) -> const auto& {
+      return stepper_.chain().along(i);
+    };
+  }
+
+  // One step of all members.
+  void step() {
+    const L remaining = (end_ - time_.value) - time_.low;
+    const L wanted = chooses() ? controller_.step() : L(options_.step);
+    const Mask is_cut = !(wanted * L(1 + 1e-9) < remaining);
+    const L h = select(running() & is_cut, remaining, wanted);
+    const Mask found = stepper_.solve(h, running() & (h > smallest_step * remaining));
+    Mask good = found, wrong = found & !found;
+    if constexpr (Stepper::is_implicit) {
+      if (chooses()) {
+        const auto decay = [&](int k) { return stepper_.chain().decay(k); };
+        good = controller_.accepts(found, h, decay, stepper_.chain().pace_squared());
+      }
+      const Mask doubtful = good & stepper_.doubtful();
+      if (xsimd::any(doubtful)) {
+        wrong = accept_doubtful(good, doubtful);
+      } else {
+        accept(good);
+      }
+    } else {
+      accept(good);
+    }
+    good = good & !wrong;
+    const Twofold<L> later = exact_sum(time_.value, h);
+    time_ = {select(good, later.value, time_.value), select(good, time_.low + later.low, time_.low)};
+    steps_ = steps_ + select(good, L(1.0), L(0.0));
+    attempts_ = select(good, L(0.0), attempts_);
+    if (options_.watches_energy) watch_energy(good);
+    if (chooses()) move_on(good, h);
+    const Mask bad = running() & !good;
+    if (xsimd::any(bad)) reject(bad, found & !wrong, h, remaining);
+    const Mask over = good & is_cut;
+    if (xsimd::any(over)) retire(over, Status::ok);
+  }
+
+  void accept(const Mask& good) {
+    stepper_.accept(good);
+    turns_.follow(good, along());
+  }
+
+  // Whose energy does not balance has come to stages that are not those of the motion.
+  Mask accept_doubtful(const Mask& good, const Mask& doubtful) {
+    auto& chain = stepper_.chain();
+    const L before = chain.energy();
+    chain.save();
+    stepper_.accept(good);
+    const L after = chain.energy();
+    const L bound = largest_energy_defect * (chain.energy_scale() + abs(before));
+    const Mask wrong = doubtful & !(abs(after - before) <= bound);
+    chain.restore(wrong);
+    stepper_.forget(wrong);
+    const Mask right = good & !wrong;
+    for (int j = 0; j < Stepper::stages; ++j) turns_.follow(right, [&](int i) { return chain.along(i, j); });
+    turns_.follow(right, along());
+    return wrong;
+  }
+
+  void move_on(const Mask& good, const L& h) {
+    if constexpr (Stepper::is_implicit) {
+      L pace, quickening;
+      stepper_.chain().tempo(pace, quickening);
+      controller_.move_on(good, h, pace, quickening);
+    }
+  }
+
+  void watch_energy(const Mask& good) {
+    energy_error_ = select(good, max(energy_error_, abs(stepper_.chain().energy() - energy_)), energy_error_);
+  }
+
+  // Members whose step was not taken try a shorter one, or give up; those that were solved know already how short.
+  void reject(const Mask& bad, const Mask& solved, const L& h, const L& remaining) {
+    attempts_ = attempts_ + select(bad, L(1.0), L(0.0));
+    rejected_ = rejected_ + select(bad, L(1.0), L(0.0));
+    Mask lost = bad;
+    if (chooses()) {
+      controller_.shrink(bad & !solved, h, L(0.5));
+      lost = bad & ((attempts_ >= L(most_attempts)) | !(h > smallest_step * remaining));
+    }
+    if (xsimd::any(lost)) retire(lost, Status::not_converged);
+  }
+
+  void retire(const Mask& which, Status status) {
+    alignas(pack_alignment) double is_over[L::width];
+    select(which, L(1.0), L(0.0)).store(is_over);
+    stepper_.chain().find_rates();
+    for (int lane = 0; lane < lanes; ++lane) {
+      if (is_over[lane] == 0) continue;
+      write_end(lane, status);
+      refill(lane);
+    }
+    begin();
+  }
+
+  void write_end(int lane, Status status) {
+    LaneEnd& end = ends_[static_cast<std::size_t>(member_[lane])];
+    const int links = stepper_.chain().links();
+    end.status = status;
+    end.steps = static_cast<std::int64_t>(steps_[lane]);
+    end.rejected_steps = static_cast<std::int64_t>(rejected_[lane]);
+    end.energy_error = energy_error_[lane];
+    end.motion.time = status == Status::ok ? end_[lane] : time_.value[lane];
+    end.motion.q.resize(Space::dof * links);
+    end.motion.v.resize(Space::dof * links);
+    for (int i = 0; i < links; ++i) {
+      std::array<long double, Space::dof> near;
+      for (std::size_t a = 0; a < near.size(); ++a) near[a] = turns_.angles(lane, i)[a];
+      const auto angles = user_angles(stepper_.chain().heading(lane, i), near);
+      for (std::size_t a = 0; a < near.size(); ++a) {
+        const auto entry = static_cast<Eigen::Index>(a) * links + i;
+        end.motion.q[entry] = static_cast<double>(angles.q[a]);
+        end.motion.v[entry] = static_cast<double>(angles.v[a]);
+      }
+    }
+  }
+
+  // The next member comes into a lane that is free; members that are at their end already stay what they are.
+  void refill(int lane) {
+    running_.set(lane, 0);
+    while (next_ < members_.size()) {
+      const std::size_t member = next_++;
+      const Member& next = members_[member];
+      require(next, member);
+      if (!(next.end > next.start.time)) {
+        ends_[member] = {.motion = next.start};
+        continue;
+      }
+      take(lane, member, next);
+      return;
+    }
+  }
+
+  void take(int lane, std::size_t member, const Member& next) {
+    const bool own = next.chain != nullptr;
+    const double* q = next.start.q.data();
+    stepper_.start(lane, own ? links_of(*next.chain) : links_, (own ? *next.chain : chain_).gravity(), q,
+                   next.start.v.data());
+    turns_.start(lane, q, along());
+    member_[lane] = static_cast<std::ptrdiff_t>(member);
+    time_.value.set(lane, next.start.time);
+    end_.set(lane, next.end);
+    for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &energy_error_}) zero->set(lane, 0);
+    running_.set(lane, 1);
+    begins_.set(lane, 1);
+  }
+
+  // Members that have come into lanes.
+  void begin() {
+    const Mask begins = begins_ > L(0.0);
+    begins_ = L(0.0);
+    if constexpr (Stepper::is_implicit) {
+      if (chooses()) {
+        L pace, quickening;
+        stepper_.chain().tempo(pace, quickening);
+        controller_.start(begins, pace, quickening);
+      }
+    }
+    if (options_.watches_energy) energy_ = select(begins, stepper_.chain().energy(), energy_);
+  }
+
+  void require(const Member& member, std::size_t number) const {
+    const auto coordinates = static_cast<Eigen::Index>(Space::dof) * stepper_.chain().links();
+    const bool fits = member.start.q.size() == coordinates && member.start.v.size() == coordinates &&
+                      (member.chain == nullptr || member.chain->links() == stepper_.chain().links());
+    if (fits) return;
+    throw std::invalid_argument("ensemble: member " + std::to_string(number + 1) + ": expected " +
+                                std::to_string(coordinates) + " coordinates and rates, got " +
+                                std::to_string(member.start.q.size()) + " and " +
+                                std::to_string(member.start.v.size()));
+  }
+
+  Chain<Space, N> chain_;
+  ChainLinks<Space, N, double> links_;
+  LaneOptions options_;
+  Stepper stepper_;
+  LaneController<L, Stepper::stages> controller_;
+  LaneTurns<Space, N, L> turns_;
+  std::span<const Member> members_;
+  std::span<LaneEnd> ends_;
+  std::size_t next_ = 0;
+  std::ptrdiff_t member_[L::width] = {};
+  Twofold<L> time_{L(0.0), L(0.0)};
+  L end_{0.0}, running_{0.0}, begins_{0.0};
+  L steps_{0.0}, rejected_{0.0}, attempts_{0.0};
+  L energy_{0.0}, energy_error_{0.0};
+};
+
+/// By Gauss steps of S stages, of chains of N links.
+template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
+using GaussLanes = LaneQueue<LaneStepper<Space, S, N, Register>>;
+
+/// By explicit steps of order 4.
+template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
+using Rk4Lanes = LaneQueue<LaneRk4<Space, N, Register>>;
+
+}  // namespace pendula

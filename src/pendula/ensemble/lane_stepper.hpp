@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstdint>
+#include <pendula/ensemble/lane_chain.hpp>
+#include <pendula/ensemble/lane_stop.hpp>
+
+namespace pendula {
+
+/// How far the stage equations are solved.
+struct LaneStepperOptions {
+  /// Of the first correction that is left out, relative to what the step moves: by default a thousandth of a last bit.
+  double enough = 1e-18;
+  int max_iterations = 50;
+};
+
+/// Gauss steps of several chains at once, one in each lane, every one of a size of its own, by fixed point.
+///
+/// What becomes of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
+/// and one that fails stays where its last accepted step ended.
+template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
+class LaneStepper {
+ public:
+  using Chain = LaneChain<Space, S, N, Register>;
+  using L = typename Chain::L;
+  using Mask = typename L::Mask;
+  using Options = LaneStepperOptions;
+  using SpaceType = Space;
+  static constexpr int lanes = L::size, stages = S, links_known = N;
+  static constexpr bool is_implicit = true;
+
+  explicit LaneStepper(int links, LaneStepperOptions options = {})
+      : chain_(links), options_(options), stop_(options.enough) {}
+
+  Chain& chain() { return chain_; }
+  const Chain& chain() const { return chain_; }
+
+  /// A new member comes into a lane: LaneChain::start.
+  template <class... Start>
+  void start(int lane, const Start&... start) {
+    chain_.start(lane, start...);
+    known_.set(lane, cold);
+    last_.set(lane, 0);
+    depth_.set(lane, 0);
+    stop_.forget(lane);
+  }
+
+  /// Solves steps of `h` of the members that are `wanted`; gives those where that worked. The state stays what it was.
+  Mask solve(const L& h, const Mask& wanted) {
+    const L ratio = h / last_;
+    const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
+    const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
+    depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(1.0));
+    chain_.prepare(h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
+    const Mask found = iterate(wanted);
+    chain_.finish();
+    known_ = select(found, L(solved), L(cold));
+    depth_ = select(found, depth_, L(0.0));
+    last_ = h;
+    return found & (chain_.turn() < L(largest_turn * largest_turn));
+  }
+
+  /// Moves those of the members that were solved to the end of their step.
+  void accept(const Mask& which) {
+    chain_.accept(which);
+    known_ = select(which, L(accepted), known_);
+  }
+
+  /// Members whose stages may be a solution that is not the motion: those that came far from where they began, or turn
+  /// far.
+  Mask doubtful() const {
+    return (stop_.first() > L(trusted_prediction * trusted_prediction) * chain_.scale()) |
+           (chain_.turn() > L(trusted_turn * trusted_turn));
+  }
+
+  /// What is known of the stages of these members is wrong: their next step starts cold.
+  void forget(const Mask& which) { known_ = select(which, L(cold), known_); }
+
+  /// Iterations of all members that were made so far.
+  std::int64_t iterations() const { return iterations_; }
+
+ private:
+  static constexpr double cold = 0, solved = 1, accepted = 2;
+  static constexpr double largest_turn = 3;                               // rad
+  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
+  static L farthest_extrapolation() { return L(1.5); }
+
+  Mask iterate(const Mask& wanted) {
+    stop_.restart(chain_.scale());
+    Mask active = wanted, found = wanted & !wanted;
+    while (xsimd::any(active) && stop_.count() < options_.max_iterations) {
+      const auto verdict = stop_.judge(chain_.iterate(active), active);
+      found = found | (active & verdict.done & !verdict.lost);
+      active = active & !(verdict.done | verdict.lost);
+      ++iterations_;
+    }
+    return found;
+  }
+
+  Chain chain_;
+  LaneStepperOptions options_;
+  LaneStop<L> stop_;
+  L known_{cold}, last_{0.0},
+      depth_{0.0};  // of the stages: what they are of, the size of their step, how many were alike
+  std::int64_t iterations_ = 0;
+};
+
+}  // namespace pendula

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <pendula/ensemble/chunks.hpp>
+#include <pendula/run/event.hpp>
+#include <pendula/run/run.hpp>
+#include <pendula/run/run_report.hpp>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// One of many: what is moved, and from where. Members may share a subject.
+struct EnsembleMember {
+  std::shared_ptr<const Subject> subject;
+  Motion start;
+};
+
+/// How members are moved.
+struct EnsembleSchedule {
+  RunOptions options;
+  double duration = 10;            ///< s
+  std::int64_t every = 1;          ///< steps from one look at the energy to the next
+  std::vector<Event> events = {};  ///< to look for in each
+  int threads = 1;
+  std::int64_t chunk = 64;  ///< members that a thread takes at once
+};
+
+/// Moves every member, and calls observe(number, report) with its number from 0 on and all that is known of its run:
+/// from several threads at once and in any order. A report depends on its member alone, to the last bit; one that
+/// failed says so and stops nobody else. Throws as Run does on a schedule that makes no sense, and what `observe`
+/// throws.
+inline void propagate(std::span<const EnsembleMember> members, const EnsembleSchedule& schedule,
+                      const std::function<void(std::size_t number, const RunReport& report)>& observe) {
+  std::atomic<std::int64_t> next = 0;
+  const auto count = static_cast<std::int64_t>(members.size());
+  const std::int64_t size = std::max<std::int64_t>(schedule.chunk, 1);
+  const auto claim = [&]() -> std::optional<Chunk> {
+    const std::int64_t first = next.fetch_add(size);
+    if (first >= count) return std::nullopt;
+    return Chunk{first, std::min(first + size, count)};
+  };
+  for_each_chunk(schedule.threads, claim, [&](const Chunk& chunk) {
+    for (std::int64_t k = chunk.first; k < chunk.last; ++k) {
+      const auto number = static_cast<std::size_t>(k);
+      RunSetup setup{.subject = members[number].subject,
+                     .start = members[number].start,
+                     .options = schedule.options,
+                     .duration = schedule.duration,
+                     .every = schedule.every,
+                     .doubted = false,
+                     .events = schedule.events};
+      observe(number, Run(std::move(setup)).go());
+    }
+  });
+}
+
+}  // namespace pendula

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <concepts>
+#include <cstddef>
+#include <pendula/numeric/directions.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace pendula {
+
+/// A solver of stage equations that tells the derivative of a step, before the step is accepted.
+template <class S>
+concept LinearizingSolver = requires(S solver, const S& fixed, typename S::Tangent& tangent) {
+  { fixed.make_tangent() } -> std::same_as<typename S::Tangent>;
+  solver.linearize(tangent);
+};
+
+/// The derivative of one step, exactly that of the discrete step; of a step that was taken in parts, their product.
+/// What its coordinates and parameters are is told where the solver's tangent is (chain_tangent.hpp,
+/// lagrangian_tangent.hpp).
+///
+/// That of a run is the product of its steps, first to last of pushed tangents, last to first of pulled gradients: a
+/// copy of each step's linearization is what a gradient keeps of the run.
+template <class Tangent>
+class Linearization {
+ public:
+  using Real = typename Tangent::Real;
+
+  explicit Linearization(const Tangent& tangent) : parts_{tangent} {}
+
+  int size() const { return parts_.front().size(); }              ///< rows of a tangent
+  int parameters() const { return parts_.front().parameters(); }  ///< rows of a variation of the parameters
+
+  /// Replaces tangents at the start of the step, (size x any), by those at its end. Throws std::invalid_argument on
+  /// another number of rows.
+  void push(Directions<Real>& tangents) {
+    require_rows("tangents", tangents.rows(), size());
+    push(tangents.data(), columns(tangents));
+  }
+  void push(Real* tangents, int count) {
+    for (std::size_t k = 0; k < used_; ++k) parts_[k].push(tangents, count);
+  }
+
+  /// The same where parameters vary, too, (parameters x as many).
+  void push(Directions<Real>& tangents, const Directions<Real>& parameters) {
+    require_rows("tangents", tangents.rows(), size());
+    require_alike(parameters, tangents.cols());
+    for (std::size_t k = 0; k < used_; ++k) parts_[k].push(tangents.data(), columns(tangents), parameters.data());
+  }
+
+  /// The transpose: replaces gradients with respect to the end of the step, (size x any), by those with respect to its
+  /// start.
+  void pull(Directions<Real>& gradients) {
+    require_rows("gradients", gradients.rows(), size());
+    for (std::size_t k = used_; k-- > 0;) parts_[k].pull(gradients.data(), columns(gradients));
+  }
+
+  /// Adds the gradients with respect to the parameters to `parameters`, (parameters x as many).
+  void pull(Directions<Real>& gradients, Directions<Real>& parameters) {
+    require_rows("gradients", gradients.rows(), size());
+    require_alike(parameters, gradients.cols());
+    for (std::size_t k = used_; k-- > 0;) parts_[k].pull(gradients.data(), columns(gradients), parameters.data());
+  }
+
+  /// The whole matrix, (size x size).
+  Directions<Real> matrix() {
+    Directions<Real> matrix = Directions<Real>::Identity(size(), size());
+    push(matrix);
+    return matrix;
+  }
+
+  /// What follows is a step of no parts yet: the identity.
+  void clear() { used_ = 0; }
+  /// One part more, to be filled.
+  Tangent& next() {
+    if (used_ == parts_.size()) parts_.push_back(parts_.front());
+    return parts_[used_++];
+  }
+
+ private:
+  static int columns(const Directions<Real>& directions) { return static_cast<int>(directions.cols()); }
+  static void require_rows(const char* what, Eigen::Index got, int expected) {
+    if (got == expected) return;
+    throw std::invalid_argument(std::string("linearization: ") + what + ": expected " + std::to_string(expected) +
+                                " rows, got " + std::to_string(got));
+  }
+  void require_alike(const Directions<Real>& varied, Eigen::Index columns) const {
+    require_rows("parameters", varied.rows(), parameters());
+    if (varied.cols() == columns) return;
+    throw std::invalid_argument("linearization: parameters: expected " + std::to_string(columns) + " columns, got " +
+                                std::to_string(varied.cols()));
+  }
+
+  std::vector<Tangent> parts_;
+  std::size_t used_ = 0;
+};
+
+namespace detail {
+
+template <class Solver>
+struct LinearizationOf {
+  using type = char;  // of a solver without one
+};
+template <LinearizingSolver Solver>
+struct LinearizationOf<Solver> {
+  using type = Linearization<typename Solver::Tangent>;
+};
+
+}  // namespace detail
+
+}  // namespace pendula

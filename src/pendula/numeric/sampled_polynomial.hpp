@@ -1,0 +1,140 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+namespace pendula {
+
+/// The place of a sample, 0 to 8, between 0 and 1: Chebyshev points, both ends among them. Those of even number are the
+/// places of five samples.
+inline double sample_place(std::size_t sample) {
+  if (sample == 4) return 0.5;
+  return (1 - std::cos(std::numbers::pi * static_cast<double>(sample) / 8)) / 2;
+}
+
+/// Sizes |c_k| of the Chebyshev coefficients of the polynomial through values at Chebyshev points, one after the other.
+/// The sum of those after the first is how far it goes from the first, at most.
+template <std::size_t points>
+std::array<double, points> chebyshev_sizes(const std::array<double, points>& values) {
+  using Table = std::array<std::array<double, points>, points>;
+  static const Table weights = [] {
+    constexpr std::size_t degree = points - 1;
+    const auto end = [](std::size_t k) { return k == 0 || k == degree ? 0.5 : 1.0; };
+    Table table;
+    for (std::size_t k = 0; k < points; ++k) {
+      for (std::size_t j = 0; j < points; ++j) {
+        const double turn = std::numbers::pi * static_cast<double>(j * k % (2 * degree)) / static_cast<double>(degree);
+        table[k][j] = 2 * end(k) * end(j) * std::cos(turn) / static_cast<double>(degree);
+      }
+    }
+    return table;
+  }();
+  std::array<double, points> sizes;
+  for (std::size_t k = 0; k < points; ++k) {
+    sizes[k] = std::abs(std::inner_product(values.begin(), values.end(), weights[k].begin(), 0.0));
+  }
+  return sizes;
+}
+
+/// A polynomial of degree 8 on [0, 1] by its Bernstein coefficients, between the smallest and the largest of which it
+/// stays.
+class BernsteinPolynomial {
+ public:
+  static constexpr std::size_t size = 9;
+  using Numbers = std::array<double, size>;
+
+  explicit BernsteinPolynomial(const Numbers& coefficients) : b_(coefficients) {}
+
+  /// The one through values at the places of samples.
+  static BernsteinPolynomial through(const Numbers& values) {
+    Numbers coefficients;
+    Eigen::Map<Vector>(coefficients.data()) = from_samples() * Eigen::Map<const Vector>(values.data());
+    return BernsteinPolynomial(coefficients);
+  }
+
+  double operator()(double x) const {
+    Numbers b = b_;
+    for (std::size_t level = size - 1; level > 0; --level) {
+      for (std::size_t k = 0; k < level; ++k) b[k] += x * (b[k + 1] - b[k]);
+    }
+    return b[0];
+  }
+
+  double derivative(double x) const {
+    Numbers b = b_;
+    for (std::size_t level = size - 1; level > 1; --level) {
+      for (std::size_t k = 0; k < level; ++k) b[k] += x * (b[k + 1] - b[k]);
+    }
+    return static_cast<double>(size - 1) * (b[1] - b[0]);
+  }
+
+  /// 1 where it is surely above `band`, −1 where it is surely below −band, else 0.
+  int side(double band) const {
+    const auto [least, most] = std::ranges::minmax(b_);
+    return least > band ? 1 : most < -band ? -1 : 0;
+  }
+
+  /// The same of its derivative.
+  int slope_side(double band) const {
+    Numbers slopes;
+    for (std::size_t k = 0; k + 1 < size; ++k) slopes[k] = static_cast<double>(size - 1) * (b_[k + 1] - b_[k]);
+    slopes.back() = slopes.front();
+    return BernsteinPolynomial(slopes).side(band);
+  }
+
+  /// Whether it surely stays from −band to band.
+  bool is_within(double band) const {
+    return std::ranges::all_of(b_, [&](double value) { return std::abs(value) <= band; });
+  }
+
+  /// The same polynomial on [0, 1/2] and on [1/2, 1], each as one on [0, 1].
+  std::pair<BernsteinPolynomial, BernsteinPolynomial> halves() const {
+    Numbers left, right = b_;
+    for (std::size_t level = size; level > 0; --level) {
+      left[size - level] = right[0];
+      for (std::size_t k = 0; k + 1 < level; ++k) right[k] = (right[k] + right[k + 1]) / 2;
+    }
+    return {BernsteinPolynomial(left), BernsteinPolynomial(right)};
+  }
+
+  /// A zero between two places where it has different signs, by halving.
+  double zero(double from, double to) const {
+    const bool rises = (*this)(to) > 0;
+    for (int halvings = 0; halvings < 60; ++halvings) {
+      const double middle = (from + to) / 2;
+      ((*this)(middle) > 0) == rises ? to = middle : from = middle;
+    }
+    return (from + to) / 2;
+  }
+
+ private:
+  using Vector = Eigen::Matrix<double, size, 1>;
+  using Matrix = Eigen::Matrix<double, size, size>;
+
+  static const Matrix& from_samples() {
+    static const Matrix inverse = [] {
+      Matrix values;
+      for (std::size_t k = 0; k < size; ++k) {
+        Numbers unit{};
+        unit[k] = 1;
+        for (std::size_t j = 0; j < size; ++j) {
+          values(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) =
+              BernsteinPolynomial(unit)(sample_place(j));
+        }
+      }
+      return Matrix(values.inverse());
+    }();
+    return inverse;
+  }
+
+  Numbers b_;
+};
+
+}  // namespace pendula

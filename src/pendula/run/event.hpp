@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <pendula/system/motion.hpp>
+#include <string>
+
+namespace pendula {
+
+/// Which changes of sign are meant.
+enum class Direction { up, down, both };
+
+/// Something that happens where a function of the motion changes its sign.
+///
+/// A zero that is touched is none, nor is one that the motion starts or ends at; a jump over zero is one. Where the
+/// function is not finite nothing is looked for.
+struct Event {
+  std::string name;
+  std::function<double(const Motion&)> value;
+  Direction direction = Direction::both;
+  bool stop = false;  ///< whether the run ends there
+};
+
+/// That an event happened.
+struct Occurrence {
+  std::size_t event = 0;  ///< its number among those of the run
+  bool up = false;        ///< from − to +
+  Motion motion;          ///< the state at that instant, to round-off of the time
+};
+
+/// What is kept of an event along a run.
+struct EventTally {
+  std::int64_t count = 0;
+  double first = std::numeric_limits<double>::quiet_NaN();  ///< s; NaN where it never happened
+  double last = std::numeric_limits<double>::quiet_NaN();   ///< s
+  /// End of the first step in which the function was not finite  [s]; NaN where there is none.
+  double not_finite = std::numeric_limits<double>::quiet_NaN();
+  /// The same of steps in which it changed too often to be followed.
+  double not_told = std::numeric_limits<double>::quiet_NaN();
+
+  void add(double time) {
+    if (count++ == 0) first = time;
+    last = time;
+  }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(count, first, last, not_finite, not_told);
+  }
+};
+
+/// What looking for events has cost.
+struct EventCost {
+  std::int64_t glances = 0;  ///< states by the polynomial of a step
+  std::int64_t looks = 0;    ///< states at full order: about a step each
+};
+
+}  // namespace pendula

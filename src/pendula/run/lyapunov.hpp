@@ -1,0 +1,203 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <pendula/numeric/directions.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/simulation.hpp>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace pendula {
+
+/// What is told of a spectrum on the way.
+struct LyapunovProgress {
+  double time = 0;            ///< s, since the start
+  Eigen::VectorXd exponents;  ///< as they are so far, of all the time  [1/s]
+};
+
+struct LyapunovSpectrum {
+  Eigen::VectorXd exponents;  ///< the leading ones, descending; of the time after the settling  [1/s]
+  Eigen::VectorXd errors;     ///< of each  [1/s]; infinite where the run was too short to tell
+  double sum = 0;             ///< of them; of a whole spectrum the mean divergence  [1/s]
+  double duration = 0;        ///< s, that was run
+  double ftle = 0;            ///< finite-time exponent of one tangent over all of that  [1/s]
+  double megno = 0;           ///< mean exponential growth of nearby orbits: 2 where motion is regular, λ t/2 in chaos
+  RunResult result;           ///< how the run ended
+};
+
+/// The leading Lyapunov exponents of a motion: tangents are pushed by the exact derivatives of its steps, and made
+/// orthonormal again by QR before they fall into the leading directions (Benettin, Galgani, Giorgilli, Strelcyn 1980).
+/// Steps may have any sizes. The first tangent is never turned, so that FTLE and MEGNO (Cincotta, Simó 2000) are read
+/// off it on the way.
+///
+/// It is a value: a copy, and the integrator's member of the same instant, are all that goes on from there.
+class LyapunovTangents {
+ public:
+  /// `rows` as Integrator::linearize tells; the tangents are random, by `seed`.
+  LyapunovTangents(int rows, int count, unsigned seed = 1) : tangents_(rows, count), sums_(count) {
+    std::mt19937 random(seed);
+    for (Eigen::Index i = 0; i < tangents_.size(); ++i) {
+      tangents_.data()[i] = static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5;
+    }
+    sums_.setZero();
+    history_.push_back({0, sums_});
+  }
+
+  /// After a step of `integrator` to `time` since the start. Tells whether there is a new entry of the history.
+  bool follow(Integrator& integrator, double time) {
+    integrator.push(tangents_);
+    const double grown = std::log(tangents_.col(0).norm());
+    if (time_ > 0) follow_first(grown - grown_, time);
+    grown_ = grown;
+    time_ = time;
+    if (time - history_.back().time < interval_ && std::abs(grown_) < std::log(parted) / 2) return false;
+    make_orthonormal();
+    return counted() > 0;
+  }
+
+  /// Makes the last entry of the history.
+  void finish() {
+    if (time_ > history_.back().time) make_orthonormal();
+  }
+
+  LyapunovProgress progress() const { return {time_, (sums_ / std::max(counted(), smallest)).eval()}; }
+
+  /// The spectrum, when all is done.
+  LyapunovSpectrum spectrum() const {
+    LyapunovSpectrum spectrum;
+    spectrum.duration = time_;
+    spectrum.ftle = first_ / std::max(counted(), smallest);
+    spectrum.megno = time_ > 0 ? megno_ / time_ : 0;
+    average(spectrum);
+    sort(spectrum);
+    spectrum.sum = spectrum.exponents.sum();
+    return spectrum;
+  }
+
+ private:
+  static constexpr double smallest = std::numeric_limits<double>::min();
+  // How much more the fastest tangent may have grown than the slowest: what QR tells has as many digits less.
+  static constexpr double parted = 1e3;
+  // Of the time, until tangents have found their directions.
+  static constexpr double settling = 0.1;
+
+  struct Sums {
+    double time;
+    Eigen::VectorXd logarithms;  // of what R's diagonal has multiplied to
+  };
+
+  // Of the first step only directions are kept: it takes tangents of any kind into the tangent space.
+  double counted() const { return history_.size() < 2 ? 0 : time_ - history_[1].time; }
+
+  // Y = 2/t ∫ s d ln|w|, and its mean.
+  void follow_first(double growth, double time) {
+    const double step = time - time_;
+    first_ += growth;
+    weighted_ += (time - step / 2) * growth;
+    megno_ += step * 2 * weighted_ / time;
+  }
+
+  void make_orthonormal() {
+    const double span = time_ - history_.back().time;
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(tangents_);
+    const Eigen::VectorXd grown = qr.matrixQR().diagonal().cwiseAbs().array().max(smallest).log();
+    tangents_ = qr.householderQ() * Eigen::MatrixXd::Identity(tangents_.rows(), tangents_.cols());
+    if (history_.size() > 1) {
+      sums_ += grown;
+      const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());
+      interval_ = span * std::clamp(std::log(parted) / std::max(parting, smallest), 0.25, 2.0);
+    }
+    history_.push_back({time_, sums_});
+    grown_ = 0;
+  }
+
+  Eigen::VectorXd sums_at(double time) const {
+    const auto after = std::ranges::lower_bound(history_, time, {}, &Sums::time);
+    if (after == history_.begin()) return after->logarithms;
+    if (after == history_.end()) return history_.back().logarithms;
+    const Sums& before = *(after - 1);
+    const double part = (time - before.time) / (after->time - before.time);
+    return before.logarithms + part * (after->logarithms - before.logarithms);
+  }
+
+  // Errors from means over blocks, of whichever number of blocks scatters most: blocks that are too short are alike by
+  // what they remember. Regular motions drift apart linearly, tangents of any motion swing by a factor: what a run of
+  // the time t cannot tell from zero is some 3/t.
+  void average(LyapunovSpectrum& spectrum) const {
+    const double from = history_.size() < 2 ? 0 : std::max(settling * time_, history_[1].time), span = time_ - from;
+    spectrum.exponents = sums_;
+    spectrum.errors = Eigen::VectorXd::Constant(sums_.size(), std::numeric_limits<double>::infinity());
+    if (!(span > 0)) return;
+    spectrum.exponents = (sums_at(time_) - sums_at(from)) / span;
+    Eigen::ArrayXd worst = Eigen::ArrayXd::Zero(sums_.size());
+    for (const int blocks : {8, 16, 32}) {
+      Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(sums_.size());
+      for (int k = 0; k < blocks; ++k) {
+        const Eigen::VectorXd gained = sums_at(from + span * (k + 1) / blocks) - sums_at(from + span * k / blocks);
+        squares += (gained * (blocks / span) - spectrum.exponents).array().square();
+      }
+      worst = worst.max(squares / (blocks * (blocks - 1)));
+    }
+    spectrum.errors = (worst + 9 / (span * span)).sqrt();
+  }
+
+  static void sort(LyapunovSpectrum& spectrum) {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(spectrum.exponents.size()));
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<Eigen::Index>(k);
+    std::ranges::sort(order, std::greater<>(), [&](Eigen::Index k) { return std::pair(spectrum.exponents[k], -k); });
+    spectrum.exponents = spectrum.exponents(order).eval();
+    spectrum.errors = spectrum.errors(order).eval();
+  }
+
+  Directions<> tangents_;
+  Eigen::VectorXd sums_;
+  std::vector<Sums> history_;
+  double time_ = 0, interval_ = 0;
+  double grown_ = 0;  // logarithm of the first tangent's length
+  double first_ = 0, weighted_ = 0, megno_ = 0;
+};
+
+/// Runs `integrator` from `start` over `duration` in steps of at most `step`, which may be infinite where it chooses
+/// them, and finds the `count` leading exponents
+/// of the motion, 0 for all. Calls on_way(const LyapunovProgress&) where tangents were made orthonormal; bool stop() is
+/// asked after every step. Throws std::invalid_argument where there are not so many exponents, and for methods whose
+/// steps have no derivative.
+template <class OnWay, class Stop>
+LyapunovSpectrum find_lyapunov_spectrum(Integrator& integrator, const Motion& start, double step, double duration,
+                                        int count, OnWay on_way, const Stop& stop) {
+  const int all = 2 * static_cast<int>(start.q.size());
+  if (count < 0 || count > all) {
+    throw std::invalid_argument("count: expected 1 to " + std::to_string(all) + " exponents, got " +
+                                std::to_string(count));
+  }
+  LyapunovTangents tangents(integrator.linearize(), count == 0 ? all : count);
+  Schedule schedule;
+  schedule.step = step;
+  schedule.duration = duration;
+  schedule.every = std::numeric_limits<std::int64_t>::max();
+  double before = start.time;
+  const auto follow = [&] {
+    if (integrator.time() != before && tangents.follow(integrator, integrator.time() - start.time)) {
+      on_way(tangents.progress());
+    }
+    before = integrator.time();
+    return stop();
+  };
+  const RunResult result = simulate(
+      integrator, start, schedule, [](const Motion&) {}, follow);
+  tangents.finish();
+  LyapunovSpectrum spectrum = tangents.spectrum();
+  spectrum.result = result;
+  return spectrum;
+}
+
+}  // namespace pendula

@@ -1,0 +1,287 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <pendula/numeric/sampled_polynomial.hpp>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+inline int sign_of(double value) {
+  return value > 0 ? 1 : value < 0 ? -1 : 0;
+}
+
+/// Where a function of time changes its sign once, in parts of a step.
+struct SignChange {
+  double from = 0, to = 0;
+  int sign = 0;                 ///< after it
+  std::optional<double> guess;  ///< where about, and how steep the function is there; none at a jump
+  double slope = 0;             ///< a step
+};
+
+/// Finds every change of sign of a function within a step, from what the step's polynomial shows of it.
+///
+/// Five samples decide where the function is far from zero: they are Chebyshev points, and twice what the function was
+/// seen to vary by is less than what it is from zero. Else nine samples are interpolated, or halves where they do not
+/// tell the function. Bernstein coefficients, halved as long as needed, show pieces that are clear of zero or rise or
+/// fall all through, by more than interpolation and the polynomial may be off; what is neither, a zero that is nearly
+/// touched, is decided by states of full order, sampled and interpolated in the same way.
+///
+/// `Sight` has value(u), by the polynomial, and exact_value(u), at full order; u runs from 0 to 1.
+template <class Sight>
+class SignSearch {
+ public:
+  /// What values are taken from.
+  enum class By { polynomial, full_order };
+
+  /// `degree` of the step's polynomial: how fast its error falls with the length of the step.
+  SignSearch(Sight& sight, int degree) : sight_(sight), degree_(static_cast<std::size_t>(std::clamp(degree, 1, 8))) {}
+
+  /// Changes in order; `first` and `last` are the values at both ends, `sign` is the last one before the step that was
+  /// not 0, 0 where there was none. A zero at the beginning belongs to this step, one at its end to the next.
+  std::vector<SignChange> find(double first, double last, int sign, By by = By::polynomial) {
+    changes_.clear();
+    is_finite_ = true;
+    samples_left_ = most_samples;
+    first_value_ = first;
+    last_value_ = last;
+    missed_ = 0;
+    last_ = {0, sign, first == 0};
+    if (first != 0) node(0, sign_of(first));
+    search({0, 1, first, last, sign_of(last)}, 0, by);
+    if (!is_told()) by_ends(sign, sign_of(last));
+    return std::exchange(changes_, {});
+  }
+
+  /// Whether the function was finite wherever it was looked at.
+  bool is_finite() const { return is_finite_; }
+
+  /// Whether so many samples tell the function. Where they do not, as where it is nothing but rounding errors, no more
+  /// is found than that its signs differ.
+  bool is_told() const { return samples_left_ > 0; }
+
+ private:
+  static constexpr std::size_t points = BernsteinPolynomial::size;
+  static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30;
+  static constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  using Samples = BernsteinPolynomial::Numbers;
+
+  /// A part of the step, the values at its ends, and the sign of the latter, which is certain.
+  struct Interval {
+    double from, to, first, last;
+    int sign;
+
+    double at(double x) const { return x == 1 ? to : from + x * (to - from); }
+    double middle() const { return at(0.5); }
+  };
+
+  /// How far a polynomial may be from the function, and its derivative from the function's.
+  struct Band {
+    double value, slope;
+  };
+
+  /// Pieces that are not clear of zero, one after the other.
+  struct Doubtful {
+    bool open = false;
+    double from = 0;
+    int slope = 0;  // of all of them, or 0
+  };
+
+  struct Node {
+    double at = 0;
+    int sign = 0;
+    bool is_zero = false;  // and of that sign before
+  };
+
+  /// What the values between the last node and the next are known by.
+  struct Curve {
+    const BernsteinPolynomial& polynomial;
+    const Interval& interval;
+
+    double local(double u) const { return (u - interval.from) / (interval.to - interval.from); }
+  };
+
+  double sample(double u, By by) {
+    const double value = by == By::polynomial ? sight_.value(u) : sight_.exact_value(u);
+    --samples_left_;
+    is_finite_ &= std::isfinite(value);
+    return value;
+  }
+
+  void search(const Interval& interval, int halvings, By by) {
+    Samples values;
+    values.front() = interval.first;
+    values.back() = interval.last;
+    for (const std::size_t k : {2U, 4U, 6U}) values[k] = sample(interval.at(sample_place(k)), by);
+    if (halvings == 0 && is_far_from_zero(values)) return node(interval.to, interval.sign);
+    if (halvings == 0 && by == By::polynomial) take_ends(values);
+    for (const std::size_t k : {1U, 3U, 5U, 7U}) values[k] = sample(interval.at(sample_place(k)), by);
+    const auto finite = std::ranges::count_if(values, [](double value) { return std::isfinite(value); });
+    if (finite == 0) return node(interval.to, interval.last);
+    if (finite < std::ssize(values)) return unresolved(interval, values, halvings, by);
+    const Samples sizes = chebyshev_sizes(values);
+    double variation = 0;
+    for (std::size_t k = 1; k < points; ++k) variation += sizes[k];
+    const double tail = 2 * (sizes[points - 2] + sizes[points - 1]);
+    const double missed = by == By::polynomial ? 2 * missed_ : 0;
+    if (sizes[0] > variation + tail + missed) return node(interval.to, interval.sign);
+    const double largest = std::abs(*std::ranges::max_element(values, {}, [](double v) { return std::abs(v); }));
+    const double noise = 4 * epsilon * largest;
+    if (tail > 1e-3 * variation + noise) return unresolved(interval, values, halvings, by);
+    const double width = interval.to - interval.from;
+    const double miss =
+        by == By::polynomial ? missed + sizes[degree_] / std::pow(width, static_cast<double>(degree_)) : 0;
+    // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
+    const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
+    resolved(interval, BernsteinPolynomial::through(values), by,
+             {tail + noise + miss,
+              steepest(tail + noise, points - 1) + width * steepest(miss, static_cast<double>(degree_ + 1))});
+  }
+
+  /// The polynomial's values at the ends of the step in place of the true ones, and how far it misses them: rates by it
+  /// do, coordinates do not.
+  void take_ends(Samples& values) {
+    values.front() = sample(0, By::polynomial);
+    values.back() = sample(1, By::polynomial);
+    missed_ = std::max(std::abs(values.front() - first_value_), std::abs(values.back() - last_value_));
+    if (!std::isfinite(missed_)) missed_ = 0;
+  }
+
+  static bool is_far_from_zero(const Samples& values) {
+    const std::array<double, 5> sizes = chebyshev_sizes<5>({values[0], values[2], values[4], values[6], values[8]});
+    return sizes[0] > 2 * (sizes[1] + sizes[2] + sizes[3] + sizes[4]);  // not where one is no number
+  }
+
+  /// Halves; where those are too short for anything but a jump or a corner, or too many, the samples' signs.
+  void unresolved(const Interval& interval, const Samples& values, int halvings, By by) {
+    if (halvings < most_halvings && is_told()) {
+      const double middle = interval.middle(), value = values[4];
+      const bool is_near = !(std::abs(value) > 0.05 * (std::abs(interval.first) + std::abs(interval.last)));
+      const double certain = by == By::polynomial && is_near ? sample(middle, By::full_order) : value;
+      search({interval.from, middle, values.front(), value, sign_of(certain)}, halvings + 1, by);
+      search({middle, interval.to, value, values.back(), interval.sign}, halvings + 1, by);
+      return;
+    }
+    for (std::size_t k = 1; k + 1 < points; ++k) node(interval.at(sample_place(k)), values[k]);
+    node(interval.to, std::isfinite(interval.last) ? interval.sign : interval.last);
+  }
+
+  void by_ends(int first, int last) {
+    changes_.clear();
+    if (first * last < 0) changes_.push_back({0, 1, last, std::nullopt, 0});
+  }
+
+  void resolved(const Interval& interval, const BernsteinPolynomial& polynomial, By by, const Band& band) {
+    const Curve curve{polynomial, interval};
+    Doubtful doubtful;
+    walk(curve, polynomial, 0, 1, 0, by, band, doubtful);
+    close(doubtful, interval.to, by);
+    node(interval.to, interval.sign, &curve);
+  }
+
+  /// `piece` is the curve from `low` to `high`, as a polynomial on [0, 1].
+  void walk(const Curve& curve, const BernsteinPolynomial& piece, double low, double high, int halvings, By by,
+            const Band& band, Doubtful& doubtful) {
+    if (const int side = piece.side(band.value); side != 0) {
+      const double from = curve.interval.at(low);
+      close(doubtful, from, by);
+      node(from, side, &curve);
+      return node(curve.interval.at(high), side, &curve);
+    }
+    const int slope = piece.slope_side(band.slope * (high - low));
+    if (slope == 0 && !piece.is_within(band.value) && halvings < most_piece_halvings) {
+      const auto [left, right] = piece.halves();
+      const double middle = (low + high) / 2;
+      walk(curve, left, low, middle, halvings + 1, by, band, doubtful);
+      return walk(curve, right, middle, high, halvings + 1, by, band, doubtful);
+    }
+    if (!doubtful.open) {
+      doubtful = {true, curve.interval.at(low), slope};
+    } else if (doubtful.slope != slope) {
+      doubtful.slope = 0;
+    }
+  }
+
+  /// What rises or falls all through has a zero or none, as its ends tell; anything else takes a closer look. What full
+  /// order cannot tell either is a zero that is touched.
+  void close(Doubtful& doubtful, double to, By by) {
+    const bool is_known = !doubtful.open || doubtful.slope != 0 || by == By::full_order;
+    const double from = doubtful.from;
+    doubtful = {};
+    if (is_known) return;
+    const double first = from == 0 ? first_value_ : sample(from, By::full_order);
+    const double last = to == 1 ? last_value_ : sample(to, By::full_order);
+    search({from, to, first, last, sign_of(last)}, most_halvings / 2, By::full_order);
+  }
+
+  /// Goes on to a place where the function has a sign, 0 where that says nothing; a value that is not finite forgets
+  /// all before it.
+  void node(double u, double value) {
+    if (!std::isfinite(value)) {
+      last_ = {u, 0, false};
+    } else {
+      node(u, sign_of(value));
+    }
+  }
+  void node(double u, int sign, const Curve* curve = nullptr) {
+    if (sign == 0) return;
+    if (last_.sign != 0 && sign != last_.sign) changes_.push_back(change(u, sign, curve));
+    last_ = {u, sign, false};
+  }
+
+  SignChange change(double u, int sign, const Curve* curve) const {
+    SignChange change{last_.at, last_.is_zero ? last_.at : u, sign, std::nullopt, 0};
+    if (curve == nullptr || last_.is_zero || last_.at < curve->interval.from) return change;
+    const double from = curve->local(last_.at), to = curve->local(u);
+    if (sign_of(curve->polynomial(from)) * sign_of(curve->polynomial(to)) >= 0) return change;
+    const double zero = curve->polynomial.zero(from, to);
+    change.guess = curve->interval.at(zero);
+    change.slope = curve->polynomial.derivative(zero) / (curve->interval.to - curve->interval.from);
+    return change;
+  }
+
+  Sight& sight_;
+  std::size_t degree_;
+  std::vector<SignChange> changes_;
+  Node last_;
+  int samples_left_ = 0;
+  bool is_finite_ = true;
+  double first_value_ = 0, last_value_ = 0;  // at the ends of the step
+  double missed_ = 0;                        // by the polynomial there
+};
+
+/// The instant of a change: the zero to within `tolerance`, or of a jump the first place that was seen behind it.
+/// Newton's method with the slope of the guess, then secants, halving where they lead nowhere. The last place that
+/// `sight` is asked for is the one that is returned. None where full order does not have this change.
+template <class Sight>
+std::optional<double> locate(Sight& sight, const SignChange& change, double tolerance) {
+  double from = change.from, to = change.to;
+  double u = change.guess.value_or((from + to) / 2), slope = change.guess ? change.slope : 0;
+  double moved = to - from, before = 0, value_before = 0;
+  for (int tries = 0; tries < 100; ++tries) {
+    const double value = sight.exact_value(u);
+    if (value == 0 || from == to) return u;
+    if (!std::isfinite(value)) return std::nullopt;
+    (sign_of(value) == change.sign ? to : from) = u;
+    if (tries > 0 && std::abs(u - before) > 1e4 * tolerance) slope = (value - value_before) / (u - before);
+    before = u;
+    value_before = value;
+    const double next = u - value / slope;
+    if (change.guess && std::abs(next - u) <= tolerance) return u;  // a jump may be near without a small value
+    const bool leads = next > from && next < to && std::abs(next - u) < moved / 2;
+    if (!leads && to - from <= tolerance) break;
+    u = leads ? next : (from + to) / 2;
+    moved = std::abs(u - before);
+  }
+  if (from == change.from && sign_of(sight.exact_value(from)) == change.sign) return std::nullopt;
+  if (sign_of(sight.exact_value(to)) != change.sign) return std::nullopt;
+  return to;
+}
+
+}  // namespace pendula

@@ -1,0 +1,395 @@
+"""Ensembles: the same bytes whoever moves the members, and nothing lost whatever ends them."""
+
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from conftest import Result, program
+
+MAP = """\
+[chain]
+space   = "planar"
+masses  = [1.0, 1.0]
+lengths = [1.0, 1.0]
+
+[start]
+theta = [0.0, 0.0]
+
+[run]
+duration  = 4.0
+tolerance = 1e-6
+
+[[event]]
+name      = "flip"
+when      = "abs(theta_2) - pi"
+direction = "up"
+
+[[ensemble.axis]]
+key   = "start.theta[1]"
+from  = -3.0
+to    = 3.0
+count = 31
+
+[[ensemble.axis]]
+key   = "start.theta[2]"
+from  = -2.9
+to    = 2.9
+count = 17
+"""
+
+DRAWN = """\
+[chain]
+space   = "spatial"
+masses  = [1.0, 1.0]
+lengths = 1.0
+
+[start]
+theta = [1.0, 2.0]
+phi   = [0.0, 0.5]
+
+[run]
+duration = 1.0
+
+[[ensemble.random]]
+key  = "start.theta[2]"
+from = 1.0
+to   = 3.0
+
+[[ensemble.random]]
+key       = "chain.masses[1]"
+mean      = 1.0
+deviation = 0.1
+
+[ensemble]
+count = 300
+seed  = 7
+keep  = ["final", "points", "energy", "energy_error", "steps"]
+"""
+
+MEMBERS = 31 * 17
+
+
+def command(folder: Path, *arguments: str, scenario: str = MAP) -> list[str]:
+    (folder / "scenario.toml").write_text(scenario)
+    return [program(), "ensemble", "scenario.toml", "-o", "out.h5", *arguments]
+
+
+def run(folder: Path, *arguments: str, scenario: str = MAP, before: tuple = (), **options) -> Result:
+    done = subprocess.run(
+        [*before, *command(folder, *arguments, scenario=scenario)],
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False, **options,
+    )  # fmt: skip
+    return Result(done.returncode, done.stdout, done.stderr)
+
+
+def contents(file: Path) -> dict[str, bytes]:
+    """The bytes of every data set."""
+    with h5py.File(file) as opened:
+        assert opened.attrs["complete"] == 1
+        return {name: opened[name][...].tobytes() for name in opened}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("whole")
+    done = run(folder, "--threads", "1", "--json")
+    assert done.status == 0, done.err
+    assert done.json["members_done"] == MEMBERS
+    assert not (folder / "out.h5.parts").exists()
+    return contents(folder / "out.h5")
+
+
+def test_threads_do_not_matter(whole, tmp_path):
+    assert run(tmp_path, "--threads", "3").status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+def test_shards_share_a_file(whole, tmp_path):
+    for shard in ("2/3", "3/3"):
+        done = run(tmp_path, "--shard", shard)
+        assert done.status == 3
+        assert "are missing; to go on, say the same with --resume" in done.err
+        with h5py.File(tmp_path / "out.h5") as opened:
+            assert opened.attrs["complete"] == 0
+            assert (opened["status"][...] == -1).sum() == MEMBERS - opened.attrs["members_done"]
+    assert run(tmp_path, "--shard", "1/3").status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+@pytest.mark.skipif(not shutil.which("mpirun"), reason="no mpirun here")
+@pytest.mark.parametrize("ranks", [1, 2, 4])
+def test_ranks_do_not_matter(whole, tmp_path, ranks):
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    mpirun = ("mpirun", "--oversubscribe", "-n", str(ranks))
+    done = run(tmp_path, "--json", before=mpirun, env=os.environ | allowed)
+    assert done.status == 0, done.err
+    assert done.json["ranks"] == ranks
+    assert contents(tmp_path / "out.h5") == whole
+
+
+def test_killed_at_any_time_it_goes_on(whole, tmp_path):
+    """Twenty kills at random moments, some of them while the file is written."""
+    moments = random.Random(3)
+    kills = 0
+    resume: tuple[str, ...] = ()
+    while kills < 20:
+        process = subprocess.Popen(
+            command(tmp_path, "--threads", "2", *resume), cwd=tmp_path, stderr=subprocess.PIPE, text=True
+        )
+        time.sleep(moments.uniform(0.005, 0.15))
+        process.kill()
+        process.communicate()
+        kills += process.returncode == -signal.SIGKILL
+        if (tmp_path / "out.h5").exists() and not (tmp_path / "out.h5.parts").exists():
+            assert contents(tmp_path / "out.h5") == whole  # it was done: begin anew
+            (tmp_path / "out.h5").unlink()
+        resume = ("--resume",) if (tmp_path / "out.h5.parts").exists() else ()
+    assert run(tmp_path, *resume).status == 0
+    assert contents(tmp_path / "out.h5") == whole
+    assert {file.name for file in tmp_path.iterdir()} == {"scenario.toml", "out.h5"}
+
+
+def test_asked_to_end_it_leaves_what_it_has(whole, tmp_path):
+    process = subprocess.Popen(
+        command(tmp_path, "--threads", "1", "--set", "run.duration=40"),
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    time.sleep(0.5)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 3
+    assert "members are missing; to go on, say the same with --resume" in err
+    with h5py.File(tmp_path / "out.h5") as opened:
+        done = opened["status"][...] >= 0
+        assert 0 < done.sum() == opened.attrs["members_done"] < MEMBERS
+        assert np.isfinite(opened["theta_2"][...][done]).all()
+        assert np.isnan(opened["theta_2"][...][~done]).all()
+    refused = run(tmp_path, "--set", "run.duration=40")
+    assert refused.status == 2
+    assert "expected --resume" in refused.err
+    other = run(tmp_path, "--resume")  # without --set: another ensemble
+    assert other.status == 2
+    assert "expected the journals of this ensemble" in other.err
+
+
+def test_a_journal_that_was_cut_short_is_made_whole(whole, tmp_path):
+    assert run(tmp_path, "--shard", "1/2").status == 3
+    journal = max((tmp_path / "out.h5.parts").glob("*.journal"), key=lambda file: file.stat().st_size)
+    text = journal.read_bytes()
+    journal.write_bytes(text[:-5])
+    broken = bytearray(text)
+    broken[len(text) // 2] ^= 1  # a disk that lies
+    journal.with_name("copy.journal").write_bytes(broken)
+    assert run(tmp_path, "--resume").status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+def test_shards_that_end_at_once_make_one_whole_file(whole, tmp_path):
+    for _ in range(5):
+        # The scenario is written before the first of them begins to read it.
+        commands = [command(tmp_path, "--threads", "1", "--shard", f"{k}/4") for k in range(1, 5)]
+        shards = [subprocess.Popen(words, cwd=tmp_path) for words in commands]
+        ends = [shard.wait(timeout=120) for shard in shards]
+        assert set(ends) <= {0, 3} and 0 in ends
+        assert contents(tmp_path / "out.h5") == whole
+        assert not (tmp_path / "out.h5.parts").exists()
+        again = run(tmp_path, "--shard", "2/4")  # a job array that is sent once more
+        assert (again.status, again.out) == (0, "")
+        assert contents(tmp_path / "out.h5") == whole
+        (tmp_path / "out.h5").unlink()
+
+
+@pytest.mark.skipif(not shutil.which("mpirun"), reason="no mpirun here")
+def test_a_rank_that_fails_ends_the_job_and_loses_nothing(whole, tmp_path):
+    """One of two ranks has no room for its journal."""
+    words = command(tmp_path)
+    full = ["bash", "-c", 'ulimit -f 8; exec "$@"', "bash", *words]
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    mpirun = ["mpirun", "--oversubscribe", "-n", "1", *words, ":", "-n", "1", *full]
+    done = subprocess.run(
+        mpirun,
+        cwd=tmp_path,
+        env=os.environ | allowed,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "rank 1: " in done.stderr and "File too large" in done.stderr
+    assert run(tmp_path, "--resume").status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+def test_natural_units_are_named(tmp_path):
+    scenario = MAP.replace("[start]", 'units = "natural"\n\n[start]').replace(
+        "start.theta[2]", "chain.masses[2]"
+    )
+    scenario = scenario.replace("from  = -2.9", "from  = 0.1")
+    assert run(tmp_path, scenario=scenario).status == 0
+    with h5py.File(tmp_path / "out.h5") as opened:
+        assert opened["chain.masses[2]"].attrs["units"] == "M_1"
+        assert opened["t"].attrs["units"] == "sqrt(l_1/g)"
+
+
+def test_a_complete_one_is_left_alone(tmp_path):
+    assert run(tmp_path).status == 0
+    before = (tmp_path / "out.h5").stat().st_mtime_ns
+    again = run(tmp_path, "--resume")
+    assert (again.status, (tmp_path / "out.h5").stat().st_mtime_ns) == (0, before)
+    assert "has all members already" in again.err
+
+
+def test_xarray_opens_it_with_names(tmp_path):
+    run(tmp_path)
+    opened = xarray.open_dataset(tmp_path / "out.h5", engine="h5netcdf")
+    assert opened["event:flip"].dims == ("start.theta[1]", "start.theta[2]")
+    assert opened["event:flip"].attrs["units"] == "s"
+    assert opened["start.theta[1]"].attrs["units"] == "rad"
+    assert opened["start.theta[1]"].values[[0, -1]].tolist() == [-3, 3]
+    assert opened["steps"].dtype == np.int64
+    meanings = opened["status"].attrs["flag_meanings"].split()
+    assert meanings[:3] == ["not_run", "ok", "stopped_by_event"]
+    assert len(meanings) == len(opened["status"].attrs["flag_values"])
+
+
+@pytest.mark.parametrize("scenario", [MAP, DRAWN])
+def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario):
+    assert run(tmp_path, scenario=scenario).status == 0
+    with h5py.File(tmp_path / "out.h5") as opened:
+        status = opened["status"][...]
+        for member in random.Random(1).sample(range(status.size), 5):
+            place = np.unravel_index(member, status.shape)
+            if scenario is MAP:
+                keys = {
+                    name: opened[name][k]
+                    for name, k in zip(["start.theta[1]", "start.theta[2]"], place, strict=True)
+                }
+            else:
+                keys = {name: opened[name][place] for name in ("start.theta[2]", "chain.masses[1]")}
+            changes = [
+                part
+                for key, value in keys.items()
+                for part in ("--set", f"{key}={value!r}".replace("np.float64(", "").replace(")", ""))
+            ]
+            rows = ["simulate", "scenario.toml", "-o", "member.csv", "--quiet"]
+            subprocess.run([program(), *rows, *changes], cwd=tmp_path, check=True)
+            lines = (tmp_path / "member.csv").read_text().splitlines()
+            last = dict(zip(lines[0].split(","), map(float, lines[-1].split(",")), strict=True))
+            for name, value in last.items():
+                if name in opened:
+                    assert opened[name][place] == value, (member, name)
+
+
+def test_draws_are_those_of_the_seed(tmp_path):
+    """Uniform and normal as asked for, to three standard errors of 300; another seed gives others."""
+    assert run(tmp_path, scenario=DRAWN).status == 0
+    with h5py.File(tmp_path / "out.h5") as opened:
+        theta, mass = opened["start.theta[2]"][...], opened["chain.masses[1]"][...]
+        assert {"energy_start", "energy", "x_2", "steps"} <= set(opened)
+        assert np.allclose(opened["energy"][...], opened["energy_start"][...], rtol=0, atol=1e-6)
+    assert (theta.min(), theta.max()) == pytest.approx((1, 3), abs=0.05)
+    assert theta.mean() == pytest.approx(2, abs=3 * 2 / np.sqrt(12 * 300))
+    assert mass.mean() == pytest.approx(1, abs=3 * 0.1 / np.sqrt(300))
+    assert mass.std() == pytest.approx(0.1, abs=3 * 0.1 / np.sqrt(600))
+    assert abs(np.corrcoef(theta, mass)[0, 1]) < 3 / np.sqrt(300)
+    assert run(tmp_path, "--set", "ensemble.seed=8", scenario=DRAWN).status == 0
+    with h5py.File(tmp_path / "out.h5") as opened:
+        assert not np.isin(theta, opened["start.theta[2]"][...]).any()
+
+
+def test_a_member_that_cannot_be_moved_loses_nobody_else(tmp_path):
+    scenario = MAP.replace(
+        'key   = "start.theta[2]"\nfrom  = -2.9', 'key   = "chain.masses[2]"\nfrom  = -2.9'
+    )
+    done = run(tmp_path, scenario=scenario)
+    assert done.status == 0
+    assert "warning: 279 of 527 members failed; the first, member 0: --set chain.masses[2]=-2.9" in done.err
+    with h5py.File(tmp_path / "out.h5") as opened:
+        mass, status = opened["chain.masses[2]"][...], opened["status"][...]
+        names = opened["status"].attrs["flag_meanings"].split()
+        assert (status[:, mass <= 0] == names.index("wrong_input") - 1).all()
+        assert (status[:, mass > 0] == 0).all()
+        assert len(opened["message"]) == 279
+        assert opened["failed_member"][0] == 0
+        assert b"chain.masses[2]: expected" in opened["message"][0]
+
+
+def test_exponents_are_kept(tmp_path):
+    scenario = MAP.replace("count = 31", "count = 3").replace("count = 17", "count = 2")
+    done = run(tmp_path, "--set", 'ensemble.keep=["lyapunov"]', "--set", "run.duration=20", scenario=scenario)
+    assert done.status == 0, done.err
+    with h5py.File(tmp_path / "out.h5") as opened:
+        exponent, error = opened["lyapunov"][...], opened["lyapunov:error"][...]
+        assert opened["lyapunov"].attrs["units"] == "1/s"
+    assert (error > 0).all()
+    assert exponent[0].max() > 0.5  # from upside down it is chaotic
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("count = 31", "count = 0"), "ensemble.axis[1].count: expected an integer"),
+        (("key   = \"start.theta[2]\"", "key   = \"start.theta[1]\""), "expected another key than start.theta[1]"),
+        (("key   = \"start.theta[2]\"", "key   = \"start.theta[3]\""), "theta[3]: expected an array of at least 3"),
+        (("key   = \"start.theta[2]\"", "key   = \"start.thetta\""), "start.thetta: expected one of"),
+        (("from  = -2.9", "form  = -2.9"), 'got the unknown key "form"'),
+        (("[[ensemble.axis]]", "[[ensemble.axes]]"), 'got the unknown key "axes"'),
+        (("[run]", "[ensemble]\ncount = 5\n[run]"), "ensemble.count: expected a count of each axis"),
+        (("[run]", "[ensemble]\nkeep = [\"all\"]\n[run]"), 'expected some of final, points'),
+    ],
+)  # fmt: skip
+def test_wrong_tables_are_told(tmp_path, change, message):
+    done = run(tmp_path, scenario=MAP.replace(*change))
+    assert done.status == 2
+    assert message in done.err
+    assert not (tmp_path / "out.h5").exists()
+    assert not (tmp_path / "out.h5.parts").exists()
+
+
+def test_files_that_cannot_be_written(tmp_path):
+    (tmp_path / "out.h5").mkdir()
+    assert "out.h5: expected a file that can be written, got: a folder" in run(tmp_path).err
+    done = subprocess.run(
+        [program(), "ensemble", "scenario.toml", "-o", "nowhere/out.h5"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "nowhere/ does not exist" in done.stderr
+
+
+def test_a_full_disk_loses_nothing(whole, tmp_path):
+    """A limit on the size of files stands for it; what the journal has by then is there when there is room again."""
+    limit = 20_000
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    done = run(tmp_path, "--threads", "1", preexec_fn=limited)
+    assert done.status == 1
+    assert "could not be written: File too large" in done.err
+    kept = sum(file.stat().st_size for file in (tmp_path / "out.h5.parts").glob("*.journal"))
+    assert kept >= limit - 2000
+    assert run(tmp_path, "--resume").status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+def test_no_member_within_the_curve_flips(tmp_path):
+    """Two equal links at rest within 2 cos θ₁ + cos θ₂ = 1 have no energy for the second one to go over the top."""
+    assert run(tmp_path, "--set", "run.duration=20").status == 0
+    with h5py.File(tmp_path / "out.h5") as opened:
+        first, second = (opened[f"start.theta[{k}]"][...] for k in (1, 2))
+        flips = np.isfinite(opened["event:flip"][...])
+    within = 2 * np.cos(first)[:, None] + np.cos(second)[None] > 1
+    assert 100 < within.sum() < MEMBERS - 100
+    assert not flips[within].any()
+    assert flips[~within].mean() > 0.8

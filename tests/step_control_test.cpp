@@ -1,0 +1,229 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <pendula/pendula.hpp>
+#include <string>
+#include <vector>
+
+#include "support/random_chain.hpp"
+
+namespace pendula {
+namespace {
+
+template <class Space, int S>
+using Stepper = GaussStepper<ChainSolver<Space, S>>;
+
+template <class Space>
+State<Space> drawn_state(test::Random& random, int links) {
+  State<Space> state;
+  state.q = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, -3, 3);
+  state.v = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, -2, 2);
+  return state;
+}
+
+template <class Stepper>
+Motion run_to(Stepper& stepper, double end) {
+  while (end - stepper.time() > 1e-14 * end) {
+    const Outcome outcome = stepper.step(end - stepper.time());
+    EXPECT_TRUE(outcome) << outcome;
+    if (!outcome) break;
+  }
+  return stepper.state();
+}
+
+// Of random chains after two seconds, reached error over tolerance, sorted; the reference is a tolerance of 1e-16. What
+// chaos makes of errors by then is part of it: of the planar ones, a factor up to 10⁵.
+template <class Space, int S>
+std::vector<double> reached_over_asked(double tolerance, int count) {
+  test::Random random(1);
+  std::vector<double> ratios;
+  for (int k = 0; k < count; ++k) {
+    const int links = 1 + static_cast<int>(random.uniform(0, 6.999));
+    const auto chain = test::random_chain<Space>(random, links);
+    const auto start = drawn_state<Space>(random, links);
+    Stepper<Space, 8> exact(chain, 8, {.tolerance = 1e-16});
+    Stepper<Space, S> stepper(chain, S, {.tolerance = tolerance});
+    exact.start(start);
+    stepper.start(start);
+    ratios.push_back(ChainSubject<Space>(chain).distance(run_to(exact, 2), run_to(stepper, 2)) / tolerance);
+  }
+  std::ranges::sort(ratios);
+  return ratios;
+}
+
+struct Spread {
+  double within;  // share from 0.01 to 10
+  double middle, worst_in_twenty;
+};
+Spread spread_of(const std::vector<double>& ratios) {
+  const auto within = std::ranges::count_if(ratios, [](double ratio) { return ratio > 0.01 && ratio < 10; });
+  const auto at = [&](double part) {
+    return ratios[static_cast<std::size_t>(part * static_cast<double>(ratios.size()))];
+  };
+  return {static_cast<double>(within) / static_cast<double>(ratios.size()), at(0.5), at(0.95)};
+}
+
+template <class Space, int S>
+void expect_control(const std::vector<double>& tolerances, double within, double worst) {
+  for (const double tolerance : tolerances) {
+    const Spread spread = spread_of(reached_over_asked<Space, S>(tolerance, 100));
+    EXPECT_GT(spread.within, within) << tolerance;
+    EXPECT_LT(spread.worst_in_twenty, worst) << tolerance;
+    EXPECT_LT(spread.middle, 1) << tolerance;  // measured 0.17 to 0.5
+    EXPECT_GT(spread.middle, 0.05) << tolerance;
+  }
+}
+
+TEST(StepControl, ReachesWhatIsAskedFor) {
+  expect_control<Planar, 8>({1e-4, 1e-7, 1e-10}, 0.75, 50);  // measured 0.82 at least, 21 at most
+  expect_control<Planar, 4>({1e-4, 1e-7}, 0.75, 50);         // measured 0.84, 26
+  expect_control<Planar, 2>({1e-4, 1e-6}, 0.8, 40);          // measured 0.89, 18
+  expect_control<Spatial, 6>({1e-4, 1e-7, 1e-10}, 0.85, 5);  // measured 0.91, 2.3
+}
+
+// Two links, let go high: chaos. Largest energy error, relative, over each tenth of a run.
+std::vector<double> energy_by_tenths(const StepperOptions& options, int steps) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::Vector2d::Ones();
+  const Chain<Planar> chain(parameters);
+  Stepper<Planar, 4> stepper(chain, 4, options);
+  stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(2.5)));
+  const double start = energies(chain, stepper.state()).total();
+  std::vector<double> tenths(10);
+  for (int k = 0; k < steps; ++k) {
+    EXPECT_TRUE(stepper.step(1e9));
+    double& tenth = tenths[static_cast<std::size_t>(10.0 * k / steps)];
+    tenth = std::max(tenth, std::abs(energies(chain, stepper.state()).total() - start) / energy_scale(chain));
+  }
+  return tenths;
+}
+
+TEST(StepControl, SymmetricStepsDoNotDriftWhereGreedyOnesDo) {
+  const auto greedy = energy_by_tenths({.tolerance = 1e-6, .steering = Steering::greedy}, 60000);
+  const auto symmetric = energy_by_tenths({.tolerance = 1e-6}, 60000);
+  EXPECT_GT(greedy[9] / greedy[0], 7);        // measured 13.4: it goes on as it began
+  EXPECT_LT(symmetric[9] / symmetric[0], 7);  // measured 3.6, of chaos
+  EXPECT_LT(symmetric[9] / greedy[9], 0.05);  // measured 0.008
+}
+
+// Forward and back: how far from its start, relative, a run of three links ends.
+double left_behind(const StepperOptions& options) {
+  test::Random random(3);
+  const auto chain = test::random_chain<Spatial>(random, 3);
+  Stepper<Spatial, 6> stepper(chain, 6, options);
+  stepper.start(drawn_state<Spatial>(random, 3));
+  for (int k = 0; k < 140; ++k) stepper.step(1e9);
+  const Motion there = stepper.state();
+  for (int k = 0; k < 50; ++k) stepper.step(1e9);
+  stepper.turn_back();
+  for (int k = 0; k < 50; ++k) stepper.step(1e9);
+  Motion back = stepper.state();
+  back.v = -back.v;
+  back.time = there.time;
+  return ChainSubject<Spatial>(chain).distance(there, back);
+}
+
+TEST(StepControl, ASymmetricRunReturns) {
+  EXPECT_LT(left_behind({.tolerance = 1e-6}), 1e-12);                               // measured 2.2e-15
+  EXPECT_GT(left_behind({.tolerance = 1e-6, .steering = Steering::greedy}), 1e-3);  // measured 0.07
+}
+
+// A step that is looked into, from 0 to 1 of it: distance of what is found from a step that ends there.
+template <class Space, int S, class Find>
+double farthest_in_step(double h, Find find) {
+  test::Random random(5);
+  const auto chain = test::random_chain<Space>(random, 3);
+  const auto start = drawn_state<Space>(random, 3);
+  double farthest = 0;
+  for (const double part : {0.0, 0.1, 0.37, 0.5, 0.81, 1.0}) {
+    Stepper<Space, S> stepper(chain, S);
+    Stepper<Space, 8> exact(chain, 8);
+    stepper.start(start);
+    exact.start(start);
+    stepper.remember_steps(true);
+    stepper.step(h);
+    for (int k = 0; k < 8 && part > 0; ++k) exact.step(part * h / 8);
+    farthest = std::max(farthest, ChainSubject<Space>(chain).distance(exact.state(), find(stepper, part * h)));
+  }
+  return farthest;
+}
+template <class Space, int S>
+double farthest_glance(double h) {
+  return farthest_in_step<Space, S>(h, [](auto& stepper, double time) { return stepper.glance(time); });
+}
+template <class Space, int S>
+double farthest_look(double h) {
+  return farthest_in_step<Space, S>(h, [](auto& stepper, double time) {
+    State<Space> there;
+    EXPECT_TRUE(stepper.look(time, there));
+    return there;
+  });
+}
+
+// Halving the step: rates are of order s within a step, looks of order 2 s + 1 as one step is.
+TEST(DenseOutput, HasItsOrders) {
+  EXPECT_NEAR(std::log2(farthest_glance<Planar, 3>(0.02) / farthest_glance<Planar, 3>(0.01)), 3, 0.3);
+  EXPECT_NEAR(std::log2(farthest_glance<Spatial, 4>(0.04) / farthest_glance<Spatial, 4>(0.02)), 4, 0.5);
+  EXPECT_NEAR(std::log2(farthest_look<Planar, 2>(0.02) / farthest_look<Planar, 2>(0.01)), 5, 0.5);
+  EXPECT_NEAR(std::log2(farthest_look<Spatial, 3>(0.04) / farthest_look<Spatial, 3>(0.02)), 7, 1);
+  EXPECT_LT((farthest_look<Planar, 8>(0.02)), 1e-13);
+  EXPECT_LT((farthest_look<Spatial, 8>(0.02)), 1e-13);
+}
+
+TEST(DenseOutput, LeavesTheRunAsItIs) {
+  test::Random random(6);
+  const auto chain = test::random_chain<Spatial>(random, 4);
+  const auto start = drawn_state<Spatial>(random, 4);
+  Stepper<Spatial, 6> plain(chain, 6, {.tolerance = 1e-9}), looked(chain, 6, {.tolerance = 1e-9});
+  plain.start(start);
+  looked.start(start);
+  looked.remember_steps(true);
+  for (int k = 0; k < 200; ++k) {
+    const double before = looked.time();
+    plain.step(1e9);
+    looked.step(1e9);
+    State<Spatial> there;
+    for (const double part : {0.9, 0.2}) {
+      EXPECT_TRUE(looked.look(before + part * (looked.time() - before), there));
+      looked.glance(before + part * (looked.time() - before));
+    }
+    ASSERT_EQ(member_of(plain), member_of(looked)) << k;
+  }
+}
+
+// A step that is taken in parts has no polynomial of its own.
+TEST(DenseOutput, KnowsStepsThatWereTakenInParts) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::Vector2d::Ones();
+  const Chain<Planar> chain(parameters);
+  const auto start = State<Planar>::from_angles(Eigen::Vector2d(1, 2), Eigen::Vector2d(3, -2));
+  Stepper<Planar, 8> stepper(chain, 8), exact(chain, 8);
+  stepper.remember_steps(true);
+  stepper.start(start);
+  ASSERT_TRUE(stepper.step(1));
+  ASSERT_GT(stepper.statistics().rejected_steps, 0);
+  exact.start(start);
+  exact.step(0.6);
+  State<Planar> there;
+  ASSERT_TRUE(stepper.look(0.6, there));
+  const ChainSubject<Planar> subject(chain);
+  EXPECT_LT(subject.distance(exact.state(), there), 1e-13);                // measured 0
+  EXPECT_LT(subject.distance(exact.state(), stepper.glance(0.6)), 1e-13);  // measured 0
+}
+
+// What hardly moves has no step that is too long: upright, rounding alone makes it fall.
+TEST(StepControl, DoesNotStallWhereNothingMoves) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::Vector2d::Ones();
+  const Chain<Planar> chain(parameters);
+  for (const double angle : {0.0, 3.141592653589793}) {
+    Stepper<Planar, 8> stepper(chain, 8, {.tolerance = 1e-9});
+    stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(angle)));
+    run_to(stepper, 20);
+    EXPECT_LT(stepper.statistics().steps, 1000) << angle;  // measured 8, 398
+  }
+}
+
+}  // namespace
+}  // namespace pendula
