@@ -6,7 +6,7 @@
 #include <ctime>
 #include <numbers>
 #include <pendula/chain/invariants.hpp>
-#include <pendula/ensemble/lane_queue.hpp>
+#include <pendula/lanes/lane_queue.hpp>
 #include <random>
 #include <vector>
 

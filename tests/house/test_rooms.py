@@ -14,7 +14,9 @@ KNOWS = {
     "pendula/gauss": {"pendula/system", "pendula/numeric"},
     "pendula/explicit": {"pendula/system", "pendula/numeric"},
     "pendula/chain": {"pendula/explicit", "pendula/gauss", "pendula/system", "pendula/numeric"},
+    "pendula/lanes": {"pendula/chain", "pendula/gauss", "pendula/system", "pendula/numeric"},
     "pendula/run": {
+        "pendula/lanes",
         "pendula/chain",
         "pendula/explicit",
         "pendula/gauss",
@@ -23,13 +25,14 @@ KNOWS = {
     },
     "pendula/ensemble": {
         "pendula/run",
+        "pendula/lanes",
         "pendula/chain",
-        "pendula/gauss",
         "pendula/system",
         "pendula/numeric",
     },
     "library": {
         "pendula/run",
+        "pendula/lanes",
         "pendula/chain",
         "pendula/explicit",
         "pendula/gauss",

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <array>
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 #include <pendula/gauss/node_polynomials.hpp>
 #include <pendula/gauss/tableau.hpp>
 

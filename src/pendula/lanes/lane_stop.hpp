@@ -1,6 +1,6 @@
 #pragma once
 
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <pendula/ensemble/lane_chain.hpp>
-#include <pendula/ensemble/lane_stop.hpp>
+#include <pendula/lanes/lane_chain.hpp>
+#include <pendula/lanes/lane_stop.hpp>
 
 namespace pendula {
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <algorithm>
-#include <pendula/ensemble/lane_controller.hpp>
-#include <pendula/ensemble/lane_member.hpp>
-#include <pendula/ensemble/lane_rk4.hpp>
-#include <pendula/ensemble/lane_stepper.hpp>
-#include <pendula/ensemble/lane_turns.hpp>
+#include <pendula/lanes/lane_controller.hpp>
+#include <pendula/lanes/lane_member.hpp>
+#include <pendula/lanes/lane_rk4.hpp>
+#include <pendula/lanes/lane_stepper.hpp>
+#include <pendula/lanes/lane_turns.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>

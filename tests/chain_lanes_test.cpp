@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 #include <pendula/chain/invariants.hpp>
-#include <pendula/ensemble/lane_queue.hpp>
+#include <pendula/lanes/lane_queue.hpp>
 #include <pendula/run/integrator.hpp>
 #include <random>
 #include <type_traits>

@@ -6,8 +6,8 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
-#include <pendula/ensemble/lane_links.hpp>
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_links.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 

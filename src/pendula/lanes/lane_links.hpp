@@ -3,7 +3,7 @@
 #include <cmath>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 

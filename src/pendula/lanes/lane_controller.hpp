@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 #include <pendula/gauss/step_controller.hpp>
 
 namespace pendula {

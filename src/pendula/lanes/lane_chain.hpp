@@ -6,9 +6,9 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
-#include <pendula/ensemble/lane_columns.hpp>
-#include <pendula/ensemble/lane_links.hpp>
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_columns.hpp>
+#include <pendula/lanes/lane_links.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 #include <type_traits>
 
 namespace pendula {

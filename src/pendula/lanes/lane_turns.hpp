@@ -5,7 +5,7 @@
 #include <numbers>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
-#include <pendula/ensemble/lane_pack.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 
