@@ -62,7 +62,7 @@ void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<
     steps += static_cast<double>(end.steps);
     failed += end.status == Status::ok ? 0 : 1;
   }
-  options.watches_energy = true;
+  options.energy_every = 1;
   Queue watching(chain, options);
   watching.run(members, ends);
   double energy = 0;

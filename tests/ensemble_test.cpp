@@ -4,12 +4,15 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <mutex>
 #include <pendula/ensemble/propagate.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "support/random_chain.hpp"
@@ -38,6 +41,16 @@ EnsembleSchedule schedule(int threads) {
   return schedule;
 }
 
+RunSetup setup_of(const EnsembleMember& member, const EnsembleSchedule& plan) {
+  return {.subject = member.subject,
+          .start = member.start,
+          .options = plan.options,
+          .duration = plan.duration,
+          .every = plan.every,
+          .doubted = false,
+          .events = plan.events};
+}
+
 std::vector<RunReport> reports(const std::vector<EnsembleMember>& all, const EnsembleSchedule& schedule) {
   std::vector<RunReport> reports(all.size());
   std::mutex guard;
@@ -55,14 +68,9 @@ TEST(Propagate, MovesEachMemberAsIfItWereAlone) {
   const std::vector<EnsembleMember> all = members(10);
   const std::vector<RunReport> by_one = reports(all, schedule(1)), by_three = reports(all, schedule(3));
   for (std::size_t k = 0; k < all.size(); ++k) {
-    const EnsembleSchedule plan = schedule(1);
-    pendula::Run alone({.subject = all[k].subject,
-                        .start = all[k].start,
-                        .options = plan.options,
-                        .duration = plan.duration,
-                        .every = plan.every,
-                        .doubted = false});
-    const RunReport expected = alone.go();
+    const RunSetup alone = setup_of(all[k], schedule(1));
+    ASSERT_TRUE(lane_kind(alone));
+    const RunReport expected = run_members({&alone, 1})[0];
     ASSERT_EQ(expected.end, RunEnd::complete);
     for (const std::vector<RunReport>& found : {by_one, by_three}) {
       EXPECT_EQ(found[k].end, RunEnd::complete);
@@ -96,6 +104,149 @@ TEST(Propagate, WhatAnObserverThrowsEndsIt) {
 
 TEST(Propagate, OfNobodyIsNothing) {
   EXPECT_TRUE(reports({}, schedule(2)).empty());
+}
+
+// --- In lanes ---
+
+template <class Space>
+class RunsInLanes : public testing::Test {
+ protected:
+  using SpaceType = Space;
+
+  // Of random chains, from random states.
+  static std::vector<RunSetup> setups(int count, int links, const RunOptions& options, double duration) {
+    Random random(11);
+    std::vector<RunSetup> setups;
+    for (int k = 0; k < count; ++k) {
+      const Eigen::Index coordinates = Space::dof * links;
+      const auto angles = random.matrix<Eigen::VectorXd>(coordinates, 1, -3, 3);
+      setups.push_back({.subject = std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)),
+                        .start = Motion(0, angles, random.matrix<Eigen::VectorXd>(coordinates, 1, -4, 4)),
+                        .options = options,
+                        .duration = duration,
+                        .every = 7,
+                        .doubted = false});
+    }
+    return setups;
+  }
+
+  // By the scalar chain solver, the method that lanes have.
+  static RunReport alone(RunSetup setup) {
+    setup.options.solver = Solver::chain;
+    setup.options.iteration = Iteration::fixed_point;
+    return pendula::Run(std::move(setup)).go();
+  }
+};
+
+using Spaces = testing::Types<Planar, Spatial>;
+TYPED_TEST_SUITE(RunsInLanes, Spaces);
+
+RunOptions constant(double step, int stages = 4) {
+  RunOptions options;
+  options.stages = stages;
+  options.step = step;
+  return options;
+}
+
+template <class Space>
+std::vector<Event> crossings() {
+  const auto coordinate = [](Eigen::Index k) { return [k](const Motion& motion) { return std::sin(motion.q[k]); }; };
+  std::vector<Event> events;
+  for (Eigen::Index k = 0; k < 2 * Space::dof; ++k) {
+    events.push_back({"q" + std::to_string(k), coordinate(k), k % 2 == 0 ? Direction::both : Direction::up});
+  }
+  events.push_back({"turns", [](const Motion& motion) { return motion.v[0]; }, Direction::down});
+  return events;
+}
+
+// Largest differences seen: 1e-13 of the state, 8e-15 of the energy error, 2e-15 s of times.
+TYPED_TEST(RunsInLanes, ReportWhatTheScalarSolverWould) {
+  std::vector<RunSetup> setups = this->setups(37, 2, constant(2e-3), 2);
+  for (RunSetup& setup : setups) setup.events = crossings<TypeParam>();
+  const std::vector<RunReport> found = run_members(setups);
+  std::int64_t happened = 0;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    ASSERT_TRUE(lane_kind(setups[k]));
+    const RunReport expected = this->alone(setups[k]);
+    ASSERT_EQ(found[k].end, RunEnd::complete);
+    EXPECT_EQ(found[k].last.time, 2);
+    EXPECT_LT((found[k].last.q - expected.last.q).cwiseAbs().maxCoeff(), 1e-12) << k;
+    EXPECT_LT((found[k].last.v - expected.last.v).cwiseAbs().maxCoeff(), 1e-12) << k;
+    EXPECT_EQ(found[k].statistics.steps, expected.statistics.steps);
+    EXPECT_EQ(found[k].rows, expected.rows);
+    EXPECT_EQ(found[k].energy_error.initial, expected.energy_error.initial);
+    EXPECT_EQ(found[k].energy_error.scale, expected.energy_error.scale);
+    EXPECT_NEAR(found[k].energy_error.largest, expected.energy_error.largest, 1e-13);
+    for (std::size_t e = 0; e < setups[k].events.size(); ++e) {
+      EXPECT_EQ(found[k].events[e].count, expected.events[e].count) << k << ", " << setups[k].events[e].name;
+      if (expected.events[e].count == 0) continue;
+      EXPECT_NEAR(found[k].events[e].first, expected.events[e].first, 1e-13);
+      EXPECT_NEAR(found[k].events[e].last, expected.events[e].last, 1e-13);
+      happened += found[k].events[e].count;
+    }
+  }
+  EXPECT_GT(happened, 140);
+}
+
+TYPED_TEST(RunsInLanes, EndAtAnEvent) {
+  std::vector<RunSetup> setups = this->setups(21, 3, constant(5e-3), 3);
+  for (RunSetup& setup : setups) {
+    setup.events = crossings<TypeParam>();
+    setup.events.back().stop = true;
+  }
+  const std::vector<RunReport> found = run_members(setups);
+  int ended = 0;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    const RunReport expected = this->alone(setups[k]);
+    ASSERT_EQ(found[k].end, expected.end) << k;
+    if (expected.end != RunEnd::event) continue;
+    ++ended;
+    EXPECT_EQ(found[k].ended_by, setups[k].events.size() - 1);
+    EXPECT_NEAR(found[k].last.time, expected.last.time, 1e-12);  // seen: 2e-14
+    EXPECT_NEAR(found[k].last.v[0], 0, 1e-12);                   // seen: 7e-14
+    EXPECT_EQ(found[k].events.back().count, 1);
+    EXPECT_EQ(found[k].events[0].count, expected.events[0].count);
+  }
+  EXPECT_GT(ended, 5);
+}
+
+// Whose steps are too long for a fixed point is run alone, and reports what it would.
+TYPED_TEST(RunsInLanes, WhoCannotBeMovedThereIsRunAlone) {
+  std::vector<RunSetup> setups = this->setups(9, 2, constant(0.02), 1);
+  setups[4].start.v *= 1e4;
+  const std::vector<RunReport> found = run_members(setups);
+  const RunReport expected = pendula::Run(setups[4]).go();
+  EXPECT_EQ(found[4].end, expected.end);
+  EXPECT_EQ(found[4].description.solver, expected.description.solver);
+  EXPECT_EQ(found[4].step.status, expected.step.status);
+  EXPECT_EQ(found[4].last.q, expected.last.q);
+  for (const std::size_t k : {3U, 5U}) EXPECT_EQ(found[k].end, RunEnd::complete);
+}
+
+TYPED_TEST(RunsInLanes, OfSeveralKindsEachGoesWithItsOwn) {
+  std::vector<RunSetup> setups = this->setups(12, 2, constant(0.01), 1);
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    if (k % 3 == 1) setups[k].options = {.stages = 6, .step = 0, .tolerance = 1e-7};
+    if (k % 4 == 2) setups[k].options.stages = 3;  // not compiled for lanes
+    setups[k].duration = 0.3 + 0.1 * static_cast<double>(k);
+  }
+  EXPECT_FALSE(lane_kind(setups[2]));
+  const std::vector<RunReport> found = run_members(setups);
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    const RunReport expected = run_members({&setups[k], 1})[0];
+    EXPECT_EQ(found[k].end, RunEnd::complete);
+    EXPECT_EQ(found[k].last.time, setups[k].duration);
+    EXPECT_EQ(found[k].last.q, expected.last.q);
+    EXPECT_EQ(found[k].statistics.steps, expected.statistics.steps);
+  }
+}
+
+TYPED_TEST(RunsInLanes, LeaveOffWhenAsked) {
+  const std::vector<RunSetup> setups = this->setups(20, 2, constant(0.01), 10);
+  int asked = 0;
+  const std::vector<RunReport> found = run_members(setups, [&] { return ++asked > 50; });
+  for (const RunReport& report : found) EXPECT_EQ(report.end, RunEnd::stopped);
+  EXPECT_LT(asked, 60);
 }
 
 }  // namespace

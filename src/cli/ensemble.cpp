@@ -82,7 +82,7 @@ class EnsembleProgress {
 
 /// Of a number of members alone, so that whoever goes on has the same ones.
 std::int64_t chunk_of(std::int64_t members) {
-  return std::clamp<std::int64_t>(members / 256, 1, 256);
+  return std::clamp<std::int64_t>(members / 128, 1, 512);
 }
 
 template <class Scenario>

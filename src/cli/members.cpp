@@ -3,6 +3,7 @@
 #include <cmath>
 #include <iostream>
 #include <limits>
+#include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run.hpp>
 #include <variant>
@@ -17,7 +18,7 @@ namespace pendula::cli {
 namespace {
 
 template <class Scenario>
-RunSetup setup_of(const Scenario& scenario) {
+RunSetup setup_of(const Scenario& scenario, io::SharedExpressions& shared) {
   const std::shared_ptr<const Subject> subject = subject_of(scenario);
   return {.subject = subject,
           .start = scenario.start,
@@ -25,20 +26,16 @@ RunSetup setup_of(const Scenario& scenario) {
           .duration = scenario.duration,
           .every = scenario.every,
           .doubted = false,
-          .events = io::events_of(scenario.events, subject, scenario.start)};
-}
-
-std::vector<std::string> names_of(const std::vector<Event>& events) {
-  std::vector<std::string> names;
-  names.reserve(events.size());
-  for (const Event& event : events) names.push_back(event.name);
-  return names;
+          .events = io::events_of(scenario.events, subject, scenario.start, shared)};
 }
 
 }  // namespace
 
 MemberScenarios::MemberScenarios(const std::string& file, std::vector<std::string> overrides, bool quiet)
-    : text_(io::read_scenario_text(file)), overrides_(std::move(overrides)), quiet_(quiet) {}
+    : text_(io::read_scenario_text(file)),
+      overrides_(std::move(overrides)),
+      document_(text_.text, text_.name, overrides_),
+      quiet_(quiet) {}
 
 io::AnyScenario MemberScenarios::of_member(const io::EnsemblePlan& plan, std::int64_t member) {
   std::vector<std::string> overrides = overrides_;
@@ -46,10 +43,12 @@ io::AnyScenario MemberScenarios::of_member(const io::EnsemblePlan& plan, std::in
   return parse(overrides);
 }
 
+io::AnyScenario MemberScenarios::quickly_of_member(const io::EnsemblePlan& plan, std::int64_t member) {
+  return document_.with(plan.keys(), plan.values(member), find());
+}
+
 io::AnyScenario MemberScenarios::parse(const std::vector<std::string>& overrides) {
-  const io::FindSystem find = [this](const std::string& name, std::optional<int> links,
-                                     const std::filesystem::path& folder) { return find_system(name, links, folder); };
-  return io::parse_scenario(text_.text, text_.name, overrides, find);
+  return io::parse_scenario(text_.text, text_.name, overrides, find());
 }
 
 std::shared_ptr<const SystemEntry> MemberScenarios::find_system(const std::string& name, std::optional<int> links,
@@ -70,21 +69,40 @@ MemberRuns::MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan,
                        const InterruptGuard& guard)
     : scenarios_(scenarios), plan_(plan), kept_(kept), guard_(guard), width_(kept.columns().size() + 1) {}
 
+/// One member, from its scenario to its report.
+struct MemberRuns::Member {
+  std::optional<io::AnyScenario> scenario;  // none where it cannot be read
+  std::string problem;
+  std::optional<RunSetup> setup;  // of one that waits for others
+  RunReport report;
+};
+
 io::DoneChunk MemberRuns::run(const Chunk& members) const {
+  std::vector<Member> all;
+  std::vector<RunSetup> waiting;
+  io::SharedExpressions shared;
+  for (std::int64_t number = members.first; number < members.last; ++number) {
+    all.push_back(member(number, shared));
+    if (all.back().setup) waiting.push_back(*all.back().setup);
+  }
+  std::vector<RunReport> reports = run_members(waiting, [&] { return guard_.interrupted(); });
+  auto next = reports.begin();
   io::DoneChunk done;
   done.members = members;
   done.rows.reserve(static_cast<std::size_t>(members.size()) * width_);
-  for (std::int64_t member = members.first; member < members.last; ++member) {
-    const std::string message = run(member, done.rows);
-    if (!message.empty()) done.messages.push_back({member, message});
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k].setup) all[k].report = std::move(*next++);
+    const std::string message = append(all[k], done.rows);
+    if (!message.empty()) done.messages.push_back({members.first + static_cast<std::int64_t>(k), message});
   }
   return done;
 }
 
 std::vector<std::string> MemberRuns::doubts(std::int64_t member) const {
   try {
-    RunSetup setup =
-        std::visit([](const auto& scenario) { return setup_of(scenario); }, scenarios_.of_member(plan_, member));
+    io::SharedExpressions shared;
+    RunSetup setup = std::visit([&](const auto& scenario) { return setup_of(scenario, shared); },
+                                scenarios_.of_member(plan_, member));
     setup.doubted = true;
     return Run(std::move(setup)).go([&] { return guard_.interrupted(); }).warnings;
   } catch (const io::InputError&) {
@@ -92,32 +110,66 @@ std::vector<std::string> MemberRuns::doubts(std::int64_t member) const {
   }
 }
 
-// Appends the row of a member; gives what there is to say.
-std::string MemberRuns::run(std::int64_t member, std::vector<double>& rows) const {
-  const std::size_t begin = rows.size();
+// Reads a member, and runs it unless it can go with others. One that something is wrong with is read once more, with
+// its places in the file.
+MemberRuns::Member MemberRuns::member(std::int64_t number, io::SharedExpressions& shared) const {
   try {
-    return std::visit([&](const auto& scenario) { return run(scenario, rows); }, scenarios_.of_member(plan_, member));
+    return member_of(scenarios_.quickly_of_member(plan_, number), shared);
+  } catch (const io::InputError&) {
+  }
+  try {
+    return member_of(scenarios_.of_member(plan_, number), shared);
   } catch (const io::InputError& error) {
-    rows.resize(begin);
-    rows.push_back(io::member_status("wrong_input"));
-    rows.resize(begin + width_, std::nan(""));
-    return error.what();
+    Member unreadable;
+    unreadable.problem = error.what();
+    return unreadable;
   }
 }
 
+MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const {
+  Member member;
+  member.scenario = std::move(scenario);
+  RunSetup setup = std::visit([&](const auto& read) { return setup_of(read, shared); }, *member.scenario);
+  if (lane_kind(setup)) {
+    member.setup = std::move(setup);
+  } else {
+    member.report =
+        std::visit([&](const auto& read) { return run_alone(read, std::move(setup)); }, *member.scenario);
+  }
+  return member;
+}
+
 template <class Scenario>
-std::string MemberRuns::run(const Scenario& scenario, std::vector<double>& rows) const {
-  RunSetup setup = setup_of(scenario);
-  const std::shared_ptr<const Subject> subject = setup.subject;
-  const std::vector<std::string> events = names_of(setup.events);
+RunReport MemberRuns::run_alone(const Scenario& scenario, RunSetup setup) const {
   Run one = told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
-  const RunReport report = one.go([&] { return guard_.interrupted(); });
-  if (report.end == RunEnd::stopped) throw Interrupted();
-  const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
-  const auto [exponent, error] = kept_.lyapunov() ? leading_exponent(scenario) : std::pair(0.0, 0.0);
-  rows.push_back(io::member_status(ending.status));
-  kept_.append(*subject, report, exponent, error, rows);
-  return ending.message;
+  return one.go([&] { return guard_.interrupted(); });
+}
+
+// Appends the row of a member; gives what there is to say.
+std::string MemberRuns::append(const Member& member, std::vector<double>& rows) const {
+  const std::size_t begin = rows.size();
+  const auto add = [&](const auto& scenario) {
+    const RunReport& report = member.report;
+    if (report.end == RunEnd::stopped) throw Interrupted();
+    const std::shared_ptr<const Subject> subject = subject_of(scenario);
+    std::vector<std::string> events;
+    for (const io::EventPlan& event : scenario.events) events.push_back(event.name);
+    const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
+    const auto [exponent, error] = kept_.lyapunov() ? leading_exponent(scenario) : std::pair(0.0, 0.0);
+    rows.push_back(io::member_status(ending.status));
+    kept_.append(*subject, report, exponent, error, rows);
+    return ending.message;
+  };
+  std::string problem = member.problem;
+  try {
+    if (member.scenario) return std::visit(add, *member.scenario);
+  } catch (const io::InputError& error) {
+    problem = error.what();
+  }
+  rows.resize(begin);
+  rows.push_back(io::member_status("wrong_input"));
+  rows.resize(begin + width_, std::nan(""));
+  return problem;
 }
 
 template <class Scenario>

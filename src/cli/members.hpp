@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <pendula/ensemble/chunks.hpp>
+#include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <string>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/kept.hpp"
 #include "io/ensemble_plan.hpp"
+#include "io/event_reader.hpp"
 #include "io/journal.hpp"
 #include "io/scenario.hpp"
 
@@ -37,23 +39,31 @@ class MemberScenarios {
 
   io::AnyScenario base() { return parse(overrides_); }
 
-  /// Several threads may ask at once. Throws io::InputError.
+  /// Several threads may ask at once. Throws io::InputError. Quickly means without places in the file (io::ScenarioDocument).
   io::AnyScenario of_member(const io::EnsemblePlan& plan, std::int64_t member);
+  io::AnyScenario quickly_of_member(const io::EnsemblePlan& plan, std::int64_t member);
 
  private:
   io::AnyScenario parse(const std::vector<std::string>& overrides);
   std::shared_ptr<const SystemEntry> find_system(const std::string& name, std::optional<int> links,
                                                  const std::filesystem::path& folder);
 
+  io::FindSystem find() {
+    return [this](const std::string& name, std::optional<int> links, const std::filesystem::path& folder) {
+      return find_system(name, links, folder);
+    };
+  }
+
   io::ScenarioText text_;
   std::vector<std::string> overrides_;
+  io::ScenarioDocument document_;
   bool quiet_;
   std::mutex guard_;
   std::map<std::pair<std::string, int>, std::shared_ptr<const SystemEntry>> systems_;
   std::string model_;
 };
 
-/// Moves members one by one. Several threads may share it.
+/// Moves members. Several threads may share it.
 class MemberRuns {
  public:
   MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan, const Kept& kept, const InterruptGuard& guard);
@@ -65,9 +75,13 @@ class MemberRuns {
   std::vector<std::string> doubts(std::int64_t member) const;
 
  private:
-  std::string run(std::int64_t member, std::vector<double>& rows) const;
+  struct Member;
+
+  Member member(std::int64_t number, io::SharedExpressions& shared) const;
+  Member member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const;
   template <class Scenario>
-  std::string run(const Scenario& scenario, std::vector<double>& rows) const;
+  RunReport run_alone(const Scenario& scenario, RunSetup setup) const;
+  std::string append(const Member& member, std::vector<double>& rows) const;
   template <class Scenario>
   std::pair<double, double> leading_exponent(const Scenario& scenario) const;
 

@@ -41,24 +41,23 @@ EventPlan read_event(const Section& table) {
 /// A function of the motion that evaluates an expression in the columns of its row.
 class RowFunction {
  public:
-  RowFunction(std::shared_ptr<const Subject> subject, const std::string& text, const Motion& start)
-      : subject_(std::move(subject)), names_(subject_->columns()), expression_(text, names_) {
+  RowFunction(std::shared_ptr<const Subject> subject, std::shared_ptr<Expression> expression, const Motion& start)
+      : subject_(std::move(subject)), expression_(std::move(expression)) {
     subject_->append_row(start, {}, row_);
     const std::size_t of_motion = row_.size() - 1;  // without points; the last is the energy
     const auto is_observed = [&](std::size_t column) { return column >= of_motion; };
-    observes_ = std::ranges::any_of(expression_.columns(), is_observed);
+    observes_ = std::ranges::any_of(expression_->columns(), is_observed);
   }
 
   double operator()(const Motion& motion) {
     row_.clear();
     subject_->append_row(motion, observes_ ? subject_->observe(motion) : Observation(), row_);
-    return expression_(row_);
+    return (*expression_)(row_);
   }
 
  private:
   std::shared_ptr<const Subject> subject_;
-  std::vector<std::string> names_;
-  Expression expression_;
+  std::shared_ptr<Expression> expression_;
   std::vector<double> row_;
   bool observes_ = false;  // energy or points, which cost more than what the motion has
 };
@@ -82,10 +81,20 @@ std::vector<EventPlan> read_events(const Section& root) {
 
 std::vector<Event> events_of(const std::vector<EventPlan>& plans, const std::shared_ptr<const Subject>& subject,
                              const Motion& start) {
+  SharedExpressions shared;
+  return events_of(plans, subject, start, shared);
+}
+
+std::vector<Event> events_of(const std::vector<EventPlan>& plans, const std::shared_ptr<const Subject>& subject,
+                             const Motion& start, SharedExpressions& shared) {
   std::vector<Event> events;
+  if (plans.empty()) return events;
+  const std::vector<std::string> names = subject->columns();
   for (const EventPlan& plan : plans) {
     try {
-      const auto function = std::make_shared<RowFunction>(subject, plan.when, start);
+      std::shared_ptr<Expression>& expression = shared[{plan.when, names}];
+      if (!expression) expression = std::make_shared<Expression>(plan.when, names);
+      const auto function = std::make_shared<RowFunction>(subject, expression, start);
       const double value = (*function)(start);
       if (!std::isfinite(value)) {
         throw ExpressionError("an expression that is finite at the start", shortest(value) + " there");

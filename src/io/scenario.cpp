@@ -453,11 +453,7 @@ std::string read_text(const std::filesystem::path& file) {
   return read_stream(stream, file.string());
 }
 
-}  // namespace
-
-AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides,
-                           const FindSystem& find) {
-  const toml::table document = parse_toml(text, name, overrides);
+AnyScenario read_document(const toml::table& document, std::string_view name, const FindSystem& find) {
   if (document.contains("system")) {
     const std::filesystem::path folder = std::filesystem::path(name).parent_path();
     const RunSections sections(document);
@@ -469,6 +465,30 @@ AnyScenario parse_scenario(std::string_view text, std::string_view name, std::sp
   const Entry space = sections.chain.require("space", "\"planar\" or \"spatial\"");
   if (space.choice(space_names) == 0) return read<Planar>(sections);
   return read<Spatial>(sections);
+}
+
+}  // namespace
+
+AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides,
+                           const FindSystem& find) {
+  return read_document(parse_toml(text, name, overrides), name, find);
+}
+
+struct ScenarioDocument::Document {
+  std::string name;
+  toml::table root;
+};
+
+ScenarioDocument::ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides)
+    : document_(std::make_unique<const Document>(std::string(name), parse_toml(text, name, overrides))) {}
+
+ScenarioDocument::~ScenarioDocument() = default;
+
+AnyScenario ScenarioDocument::with(std::span<const std::string> keys, std::span<const double> numbers,
+                                   const FindSystem& find) const {
+  toml::table changed = document_->root;
+  for (std::size_t k = 0; k < keys.size(); ++k) set_number(changed, keys[k], numbers[k]);
+  return read_document(changed, document_->name, find);
 }
 
 ScenarioText read_scenario_text(const std::filesystem::path& file) {

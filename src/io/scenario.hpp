@@ -79,6 +79,24 @@ std::shared_ptr<const SystemEntry> built_in_system(const std::string& model, std
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
                            const FindSystem& find = built_in_system);
 
+/// A scenario's text that is read once, and from which others are made that differ in a few numbers.
+class ScenarioDocument {
+ public:
+  /// As parse_scenario.
+  ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides);
+  ~ScenarioDocument();
+  ScenarioDocument(const ScenarioDocument&) = delete;
+  ScenarioDocument& operator=(const ScenarioDocument&) = delete;
+
+  /// The scenario with numbers[k] in place of what the text has for keys[k]. Its places, and those of the InputError
+  /// that it throws, are not known: parse_scenario knows them.
+  AnyScenario with(std::span<const std::string> keys, std::span<const double> numbers, const FindSystem& find) const;
+
+ private:
+  struct Document;
+  std::unique_ptr<const Document> document_;
+};
+
 /// The text of a scenario, and what stands for its file in messages.
 struct ScenarioText {
   std::string name, text;

@@ -188,17 +188,10 @@ void set_element(toml::table& table, std::string_view name, std::size_t element,
   node->as_array()->replace(array->cbegin() + static_cast<std::ptrdiff_t>(element - 1), std::move(value));
 }
 
-void apply_override(toml::table& root, const std::string& text) {
-  const std::string where = std::string(override_prefix) + printable(text);
-  require_shallow(text, where);
-  const std::size_t equals = text.find('=');
-  const std::string_view whole_key = trimmed(std::string_view(text).substr(0, equals));
+/// Puts a value in the place of what `whole_key` names.
+void put(toml::table& root, std::string_view whole_key, toml::node& value, const std::string& where) {
   const auto [key, element] = split_element(whole_key);
   const std::vector<std::string_view> path = key_path(key);
-  if (equals == std::string::npos || path.empty()) {
-    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
-  }
-  toml::table value = parse_value(trimmed(std::string_view(text).substr(equals + 1)), where);
   toml::table* table = &root;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     // A table made here takes the override as its place; one that stands in the file keeps its own.
@@ -210,8 +203,20 @@ void apply_override(toml::table& root, const std::string& text) {
     }
     table = next->as_table();
   }
-  if (element > 0) return set_element(*table, path.back(), element, *value.get("value"), where, whole_key);
-  table->insert_or_assign(path.back(), std::move(*value.get("value")));
+  if (element > 0) return set_element(*table, path.back(), element, value, where, whole_key);
+  table->insert_or_assign(path.back(), std::move(value));
+}
+
+void apply_override(toml::table& root, const std::string& text) {
+  const std::string where = std::string(override_prefix) + printable(text);
+  require_shallow(text, where);
+  const std::size_t equals = text.find('=');
+  const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
+  if (equals == std::string::npos || key_path(split_element(key).first).empty()) {
+    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
+  }
+  toml::table value = parse_value(trimmed(std::string_view(text).substr(equals + 1)), where);
+  put(root, key, *value.get("value"), where);
 }
 
 std::string expected_number(Sign sign, Units units) {
@@ -273,6 +278,15 @@ toml::table parse_toml(std::string_view text, std::string_view name, std::span<c
   toml::table root = parse(text, std::string(name));
   for (const std::string& override : overrides) apply_override(root, override);
   return root;
+}
+
+void set_number(toml::table& root, std::string_view key, double number) {
+  const std::string where = std::string(override_prefix) + std::string(key);
+  if (key_path(split_element(key).first).empty()) throw InputError(where + ": expected a key such as run.step");
+  const bool is_integer = std::abs(number) < 0x1p53 && number == std::floor(number);
+  toml::value<std::int64_t> integer(is_integer ? static_cast<std::int64_t>(number) : 0);
+  toml::value<double> real(number);
+  put(root, key, is_integer ? static_cast<toml::node&>(integer) : real, where);
 }
 
 std::string location(const toml::source_region& source) {

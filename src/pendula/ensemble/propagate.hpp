@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <pendula/ensemble/chunks.hpp>
+#include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/event.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/run_report.hpp>
@@ -50,17 +51,19 @@ inline void propagate(std::span<const EnsembleMember> members, const EnsembleSch
     return Chunk{first, std::min(first + size, count)};
   };
   for_each_chunk(schedule.threads, claim, [&](const Chunk& chunk) {
-    for (std::int64_t k = chunk.first; k < chunk.last; ++k) {
-      const auto number = static_cast<std::size_t>(k);
-      RunSetup setup{.subject = members[number].subject,
-                     .start = members[number].start,
-                     .options = schedule.options,
-                     .duration = schedule.duration,
-                     .every = schedule.every,
-                     .doubted = false,
-                     .events = schedule.events};
-      observe(number, Run(std::move(setup)).go());
+    std::vector<RunSetup> setups;
+    const auto first = static_cast<std::size_t>(chunk.first);
+    for (const EnsembleMember& member : members.subspan(first, static_cast<std::size_t>(chunk.size()))) {
+      setups.push_back({.subject = member.subject,
+                        .start = member.start,
+                        .options = schedule.options,
+                        .duration = schedule.duration,
+                        .every = schedule.every,
+                        .doubted = false,
+                        .events = schedule.events});
     }
+    const std::vector<RunReport> reports = run_members(setups);
+    for (std::size_t k = 0; k < reports.size(); ++k) observe(first + k, reports[k]);
   });
 }
 

@@ -193,6 +193,26 @@ class LaneChain {
     return components<D>([&](std::size_t k) { return stages_[i].rod[k][static_cast<std::size_t>(j)]; });
   }
 
+  /// Rods of the members whose step was accepted, and their rates, when `share` of it was done, by the polynomial through
+  /// its stages; visit(i, ξ, ξ̇).
+  template <class Visit>
+  void for_each_glance(double share, Visit visit) {
+    const typename Columns::Shares& weights = columns_.shares(share);
+    const L inverse_h = L(1.0) / columns_.h();
+    for (int i = 0; i < links(); ++i) {
+      Vector rod = rods_[i].along, rate = zero();
+      for (std::size_t k = 0; k < D; ++k) {
+        const Stages& advance = stages_[i].past[newest_].advance[k];
+        for (std::size_t j = 0; j < static_cast<std::size_t>(S); ++j) {
+          rod[k] = fma(L(-weights.ahead[j]), advance[j], rod[k]);
+          rate[k] = fma(L(weights.values[j]), advance[j], rate[k]);
+        }
+        rate[k] = rate[k] * inverse_h;
+      }
+      visit(i, rod, rate);
+    }
+  }
+
   /// Keeps where the rods are, and goes back there.
   void save() { saved_ = rods_; }
   void restore(const Mask& which) {

@@ -136,6 +136,25 @@ class LaneColumns {
     return sum;
   }
 
+  /// What stage values, times h, are weighed with when a share of the step is done.
+  struct Shares {
+    double share = -1;
+    std::array<double, static_cast<std::size_t>(S)> values, ahead;  ///< for the value then; for the integral from then on
+  };
+  const Shares& shares(double share) {
+    Shares* weights = &shares_.front();
+    for (Shares& kept : shares_) {
+      if (kept.share == share) return kept;
+      weights = &kept;
+      if (kept.share < 0) break;
+    }
+    weights->share = share;
+    weights->values = polynomials_.lagrange(share);
+    weights->ahead = polynomials_.integrals(share);
+    for (int j = 0; j < S; ++j) weights->ahead[at(j)] = b_[j] - weights->ahead[at(j)];
+    return *weights;
+  }
+
   /// Σ_j x_j.
   static L total(const Stages& x) {
     if constexpr (S == 1) return x[0];
@@ -188,6 +207,7 @@ class LaneColumns {
   std::array<Stages, static_cast<std::size_t>(S)> within_;
   std::array<L, static_cast<std::size_t>(most_depth)> across_;
   Mask deep_;
+  std::array<Shares, 10> shares_;  // those that are asked for again and again; the last one is what was asked last
 };
 
 }  // namespace pendula

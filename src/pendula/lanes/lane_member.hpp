@@ -18,10 +18,10 @@ struct LaneMember {
 /// What became of it.
 struct LaneEnd {
   Motion motion;               ///< at the end; where it failed, where its last accepted step ended
-  Status status = Status::ok;  ///< otherwise the scalar stepper may go on from `motion`
+  Status status = Status::ok;  ///< otherwise a scalar stepper may do it
   std::int64_t steps = 0;      ///< that were accepted
   std::int64_t rejected_steps = 0;
-  double energy_error = 0;  ///< the largest |H − H_0| at any step, if that was asked for  [J]
+  double energy_error = 0;  ///< the largest |H − H_0| where it was looked at  [J]
 };
 
 /// How members are moved.
@@ -29,7 +29,7 @@ struct LaneOptions {
   double step = 0;          ///< s; 0: of each member's own choice, by tolerance
   double tolerance = 1e-9;  ///< of the motion, relative to its size, as RunOptions::tolerance
   double enough = 0;  ///< LaneStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
-  bool watches_energy = false;
+  std::int64_t energy_every = 0;  ///< steps from one look at the energy to the next; 0: it is not looked at
 };
 
 }  // namespace pendula

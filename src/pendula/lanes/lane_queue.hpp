@@ -1,14 +1,17 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <pendula/lanes/lane_controller.hpp>
 #include <pendula/lanes/lane_member.hpp>
 #include <pendula/lanes/lane_rk4.hpp>
+#include <pendula/lanes/lane_sight.hpp>
 #include <pendula/lanes/lane_stepper.hpp>
 #include <pendula/lanes/lane_turns.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 namespace pendula {
 
@@ -37,22 +40,43 @@ class LaneQueue {
         controller_(options.tolerance),
         turns_(chain.links()) {}
 
-  /// Moves all members; ends[i] is what becomes of members[i]. Throws std::invalid_argument on another number of links
-  /// or coordinates, and unless there is an end for each member.
-  void run(std::span<const Member> members, std::span<LaneEnd> ends) {
+  /// Who sees every step from now on, and may end a member or all.
+  void set_watch(LaneWatch& watch) requires(Stepper::is_implicit) {
+    watch_ = &watch;
+    if (watch.wants_steps()) sight_.emplace(stepper_, turns_);
+  }
+
+  /// Moves all members; ends[i] is what becomes of members[i]; false where the watch made it leave off. Throws
+  /// std::invalid_argument on another number of links or coordinates, and unless there is an end for each member.
+  bool run(std::span<const Member> members, std::span<LaneEnd> ends) {
     if (ends.size() != members.size()) throw std::invalid_argument("ensemble: expected an end for each member");
     members_ = members;
     ends_ = ends;
     next_ = 0;
     for (int lane = 0; lane < lanes; ++lane) refill(lane);
     begin();
-    while (xsimd::any(running())) step();
+    while (xsimd::any(running())) {
+      step();
+      if (watch_ != nullptr && watch_->stops()) return false;
+    }
+    return true;
   }
 
   /// Fixed-point iterations that were made, of all lanes at once.
   std::int64_t iterations() const requires(Stepper::is_implicit) { return stepper_.iterations(); }
 
  private:
+  struct NoSight {};
+  template <class Of>
+  static auto sight_of() {
+    if constexpr (Of::is_implicit) {
+      return std::type_identity<LaneSight<Of, LaneTurns<Space, N, L>>>();
+    } else {
+      return std::type_identity<NoSight>();
+    }
+  }
+  using Sight = typename decltype(sight_of<Stepper>())::type;
+
   static constexpr double most_attempts = 40;  // at one step
   static constexpr double largest_energy_defect = 0.02;
   static constexpr double smallest_step = 1e-10;  // of the time that is left
@@ -62,11 +86,11 @@ class LaneQueue {
     return ChainLinks<Space, N, double>(chain);
   }
 
-  // What a hundredth of the tolerance leaves out is not seen beside what the steps err by.
+  // What a ten-thousandth of the tolerance leaves out is not seen beside what the steps err by.
   static typename Stepper::Options stepper_options(const LaneOptions& options) {
     if constexpr (Stepper::is_implicit) {
       typename Stepper::Options given;
-      if (options.step == 0) given.enough = std::max(1e-17, 1e-2 * options.tolerance);
+      if (options.step == 0) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
       if (options.enough > 0) given.enough = options.enough;
       return given;
     } else {
@@ -106,15 +130,17 @@ class LaneQueue {
       accept(good);
     }
     good = good & !wrong;
-    const Twofold<L> later = exact_sum(time_.value, h);
+    const L begin = time_.value;
+    const Twofold<L> later = exact_sum(begin, h);
     time_ = {select(good, later.value, time_.value), select(good, time_.low + later.low, time_.low)};
     steps_ = steps_ + select(good, L(1.0), L(0.0));
     attempts_ = select(good, L(0.0), attempts_);
-    if (options_.watches_energy) watch_energy(good);
+    if (options_.energy_every > 0) watch_energy(good);
+    const Mask is_finished = show(good, begin, is_cut);
     if (chooses()) move_on(good, h);
     const Mask bad = running() & !good;
     if (xsimd::any(bad)) reject(bad, found & !wrong, h, remaining);
-    const Mask over = good & is_cut;
+    const Mask over = good & (is_cut | is_finished);
     if (xsimd::any(over)) retire(over, Status::ok);
   }
 
@@ -135,7 +161,8 @@ class LaneQueue {
     chain.restore(wrong);
     stepper_.forget(wrong);
     const Mask right = good & !wrong;
-    for (int j = 0; j < Stepper::stages; ++j) turns_.follow(right, [&](int i) { return chain.along(i, j); });
+    const Mask far = right & stepper_.turns_far();
+    for (int j = 0; j < Stepper::stages; ++j) turns_.follow(far, [&](int i) { return chain.along(i, j); });
     turns_.follow(right, along());
     return wrong;
   }
@@ -148,8 +175,24 @@ class LaneQueue {
     }
   }
 
+  // To whoever watches; gives whose motion is over.
+  Mask show(const Mask& good, const L& begin, const Mask& is_cut) {
+    if constexpr (Stepper::is_implicit) {
+      if (sight_ && xsimd::any(good)) {
+        sight_->set(good, begin, select(is_cut, end_, time_.value));
+        watch_->after_step(*sight_);
+        return sight_->finished();
+      }
+    }
+    return good & !good;
+  }
+
   void watch_energy(const Mask& good) {
-    energy_error_ = select(good, max(energy_error_, abs(stepper_.chain().energy() - energy_)), energy_error_);
+    since_look_ = since_look_ + select(good, L(1.0), L(0.0));
+    const Mask due = good & (since_look_ >= L(static_cast<double>(options_.energy_every)));
+    if (!xsimd::any(due)) return;
+    since_look_ = select(due, L(0.0), since_look_);
+    energy_error_ = select(due, max(energy_error_, abs(stepper_.chain().energy() - energy_)), energy_error_);
   }
 
   // Members whose step was not taken try a shorter one, or give up; those that were solved know already how short.
@@ -223,7 +266,10 @@ class LaneQueue {
     member_[lane] = static_cast<std::ptrdiff_t>(member);
     time_.value.set(lane, next.start.time);
     end_.set(lane, next.end);
-    for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &energy_error_}) zero->set(lane, 0);
+    for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &since_look_, &energy_error_}) zero->set(lane, 0);
+    if constexpr (Stepper::is_implicit) {
+      if (sight_) sight_->seat(lane, member);
+    }
     running_.set(lane, 1);
     begins_.set(lane, 1);
   }
@@ -239,7 +285,7 @@ class LaneQueue {
         controller_.start(begins, pace, quickening);
       }
     }
-    if (options_.watches_energy) energy_ = select(begins, stepper_.chain().energy(), energy_);
+    if (options_.energy_every > 0) energy_ = select(begins, stepper_.chain().energy(), energy_);
   }
 
   void require(const Member& member, std::size_t number) const {
@@ -266,7 +312,9 @@ class LaneQueue {
   Twofold<L> time_{L(0.0), L(0.0)};
   L end_{0.0}, running_{0.0}, begins_{0.0};
   L steps_{0.0}, rejected_{0.0}, attempts_{0.0};
-  L energy_{0.0}, energy_error_{0.0};
+  L energy_{0.0}, energy_error_{0.0}, since_look_{0.0};
+  LaneWatch* watch_ = nullptr;
+  std::optional<Sight> sight_;
 };
 
 /// By Gauss steps of S stages, of chains of N links.

@@ -68,9 +68,11 @@ class LaneStepper {
   /// Members whose stages may be a solution that is not the motion: those that came far from where they began, or turn
   /// far.
   Mask doubtful() const {
-    return (stop_.first() > L(trusted_prediction * trusted_prediction) * chain_.scale()) |
-           (chain_.turn() > L(trusted_turn * trusted_turn));
+    return (stop_.first() > L(trusted_prediction * trusted_prediction) * chain_.scale()) | turns_far();
   }
+
+  /// Members whose angles are to be followed from stage to stage.
+  Mask turns_far() const { return chain_.turn() > L(trusted_turn * trusted_turn); }
 
   /// What is known of the stages of these members is wrong: their next step starts cold.
   void forget(const Mask& which) { known_ = select(which, L(cold), known_); }

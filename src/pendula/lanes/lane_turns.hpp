@@ -135,6 +135,15 @@ class LaneTurns<Planar, N, L> {
     return {angle(lane, turns_[i]) + full_turn * turns_[i].count[lane]};
   }
 
+  /// The same of all members.
+  L angles(int i) const { return fma(L(full_turn), turns_[i].count, angle(turns_[i].at)); }
+
+  /// The angle of a rod that lies nearest to another.
+  static L near(const std::array<L, 2>& rod, const L& other) {
+    const L x = angle(rod);
+    return fma(L(full_turn), floor(fma(other - x, L(1 / full_turn), L(0.5))), x);
+  }
+
  private:
   struct Turn {
     std::array<L, 2> at{L(0.0), L(-1.0)};  // the rod when it was last followed
@@ -143,6 +152,7 @@ class LaneTurns<Planar, N, L> {
 
   static constexpr double full_turn = 2 * std::numbers::pi;
 
+  static L angle(const std::array<L, 2>& rod) { return atan2(rod[0], -rod[1]); }
   static double angle(int lane, const Turn& turn) {
     std::array<double, 1> q;
     Planar::Link::coordinates(std::array{turn.at[0][lane], turn.at[1][lane]}, q);

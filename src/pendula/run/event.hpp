@@ -5,8 +5,11 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/system/motion.hpp>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace pendula {
 
@@ -51,6 +54,21 @@ struct EventTally {
     numbers(count, first, last, not_finite, not_told);
   }
 };
+
+/// Why not to trust what was found of events along a run: one sentence each.
+inline std::vector<std::string> event_warnings(std::span<const Event> events, std::span<const EventTally> tallies) {
+  std::vector<std::string> warnings;
+  const auto warn = [&](const Event& event, const std::string& what, double time, const std::string& so) {
+    if (std::isnan(time)) return;
+    warnings.push_back("event " + event.name + ": " + what + " before t = " + rounded(time) + " s; where that is so, " +
+                       so);
+  };
+  for (std::size_t k = 0; k < tallies.size(); ++k) {
+    warn(events[k], "not finite", tallies[k].not_finite, "nothing was looked for");
+    warn(events[k], "changes too often for the steps", tallies[k].not_told, "it counts once at most in a step");
+  }
+  return warnings;
+}
 
 /// What looking for events has cost.
 struct EventCost {

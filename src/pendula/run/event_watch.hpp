@@ -16,12 +16,43 @@ namespace pendula {
 
 namespace detail {
 
-/// The states of the last step of an integrator, by the share of it that is done, 0 to 1. Those that every event
-/// begins with are kept.
+/// The last step of an integrator, as events are looked for in it: by the share of it that is done, 0 to 1, which is at
+/// `time`.
+class LastStep {
+ public:
+  explicit LastStep(Integrator& integrator) : integrator_(integrator) {}
+
+  void state(Motion& motion) const { motion = integrator_.state(); }
+  void glance(double /*share*/, double time, Motion& motion) { motion = integrator_.glance(time); }
+  /// `begin` is where it began.
+  bool look(const Motion& /*begin*/, double time, Motion& motion) { return bool(integrator_.look(time, motion)); }
+
+ private:
+  Integrator& integrator_;
+};
+
+/// States of a step that were looked at: those that every event begins with, and the last one.
+struct StepViews {
+  struct View {
+    double share = -1;
+    Motion motion;
+  };
+  std::array<View, 9> kept;
+  Motion passing;
+
+  void forget() {
+    for (View& view : kept) view.share = -1;
+  }
+};
+
+/// The states of a step, by the share of it that is done. `Step` is as LastStep.
+template <class Step>
 class StepStates {
  public:
-  StepStates(Integrator& integrator, const Motion& begin, const Motion& end, EventCost& cost)
-      : integrator_(integrator), begin_(begin), end_(end), cost_(cost) {}
+  StepStates(Step& step, const Motion& begin, const Motion& end, StepViews& views, EventCost& cost)
+      : step_(step), begin_(begin), end_(end), views_(views), cost_(cost) {
+    views.forget();
+  }
 
   double time(double u) const { return begin_.time + u * (end_.time - begin_.time); }
   double length() const { return end_.time - begin_.time; }
@@ -34,13 +65,13 @@ class StepStates {
 
   /// By the step's polynomial.
   const Motion& glance(double u) {
-    for (Glance& kept : kept_) {
-      if (kept.u == u) return kept.motion;
-      if (kept.u >= 0) continue;
-      kept = {u, new_glance(u)};
-      return kept.motion;
+    for (StepViews::View& view : views_.kept) {
+      if (view.share == u) return view.motion;
+      if (view.share >= 0) continue;
+      view.share = u;
+      return new_glance(u, view.motion);
     }
-    return passing_ = new_glance(u);
+    return new_glance(u, views_.passing);
   }
 
   /// At full order; the polynomial's where the step cannot be taken.
@@ -48,36 +79,29 @@ class StepStates {
     if (u <= 0) return begin_;
     if (u >= 1) return end_;
     ++cost_.looks;
-    if (integrator_.look(time(u), passing_)) {
-      passing_.time = time(u);
-    } else {
-      passing_ = new_glance(u);
-    }
-    return passing_;
+    if (!step_.look(begin_, time(u), views_.passing)) return new_glance(u, views_.passing);
+    views_.passing.time = time(u);
+    return views_.passing;
   }
 
  private:
-  struct Glance {
-    double u = -1;
-    Motion motion;
-  };
-
-  Motion new_glance(double u) {
+  const Motion& new_glance(double u, Motion& motion) {
     ++cost_.glances;
-    return integrator_.glance(time(u));
+    step_.glance(u, time(u), motion);
+    return motion;
   }
 
-  Integrator& integrator_;
+  Step& step_;
   const Motion &begin_, &end_;
+  StepViews& views_;
   EventCost& cost_;
-  std::array<Glance, 9> kept_;
-  Motion passing_;
 };
 
 /// One function of them.
+template <class Step>
 class StepValues {
  public:
-  StepValues(StepStates& states, const std::function<double(const Motion&)>& function)
+  StepValues(StepStates<Step>& states, const std::function<double(const Motion&)>& function)
       : states_(states), function_(function) {}
 
   double value(double u) { return function_(states_.glance(u)); }
@@ -90,7 +114,7 @@ class StepValues {
   const Motion& seen() const { return *seen_; }
 
  private:
-  StepStates& states_;
+  StepStates<Step>& states_;
   const std::function<double(const Motion&)>& function_;
   const Motion* seen_ = nullptr;
 };
@@ -121,10 +145,15 @@ class EventWatch {
   void resume(const Motion& motion) { motion_ = motion; }
 
   /// What happened in the step that `integrator` has just taken, by time; nothing after an event that ends the run.
-  std::vector<Occurrence> after_step(Integrator& integrator) {
-    const Motion before = std::exchange(motion_, integrator.state());
+  std::vector<Occurrence> after_step(Integrator& integrator) { return after_step(detail::LastStep(integrator)); }
+
+  /// The same of any other step that shows itself as LastStep does.
+  template <class Step>
+  std::vector<Occurrence> after_step(Step step) {
+    std::swap(before_, motion_);
+    step.state(motion_);
     std::vector<Occurrence> found;
-    detail::StepStates states(integrator, before, motion_, cost_);
+    detail::StepStates<Step> states(step, before_, motion_, views_, cost_);
     for (std::size_t k = 0; k < events_.size(); ++k) look_for(k, states, found);
     const auto place = [](const Occurrence& happened) { return std::pair(happened.motion.time, happened.event); };
     std::ranges::sort(found, {}, place);
@@ -148,10 +177,11 @@ class EventWatch {
     int sign = 0;  // the last that was not 0; 0 where it is not known
   };
 
-  void look_for(std::size_t k, detail::StepStates& states, std::vector<Occurrence>& found) {
+  template <class Step>
+  void look_for(std::size_t k, detail::StepStates<Step>& states, std::vector<Occurrence>& found) {
     const Event& event = events_[k];
     const Side before = sides_[k];
-    detail::StepValues values(states, event.value);
+    detail::StepValues<Step> values(states, event.value);
     SignSearch search(values, degree_);
     const double last = event.value(motion_);
     const auto search_by = [&](auto by) {
@@ -166,7 +196,8 @@ class EventWatch {
   }
 
   /// Adds what happened at changes; nothing, and false, where the motion does not have one of them.
-  bool locate_all(std::size_t k, const std::vector<SignChange>& changes, detail::StepValues& values, double resolution,
+  template <class Values>
+  bool locate_all(std::size_t k, const std::vector<SignChange>& changes, Values& values, double resolution,
                   std::vector<Occurrence>& found) const {
     const std::size_t before = found.size();
     for (const SignChange& change : changes) {
@@ -190,7 +221,8 @@ class EventWatch {
   std::vector<EventTally> tallies_;
   std::vector<Side> sides_;
   int degree_;
-  Motion motion_;  // at the end of the last step
+  Motion before_, motion_;  // at both ends of the last step
+  detail::StepViews views_;
   EventCost cost_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <pendula/chain/plain_chain.hpp>
+#include <pendula/lanes/plain_lanes.hpp>
 #include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
@@ -16,6 +17,8 @@ struct SpaceLibrary {
   std::unique_ptr<PlainIntegrator> (*make_integrator)(const PlainChain&, const RunOptions&);
   /// The fixed-n kernels of this build, by number of links.
   std::span<const KernelEntry> kernels;
+  /// Members in lanes, by steps of a number of stages; nullptr for those that are moved one by one.
+  MoveMembers* (*lanes)(int stages);
 };
 
 /// The compiled library for one instruction set. There are several in one file, each compiled for itself; all that

@@ -9,7 +9,6 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/checkpoint.hpp>
 #include <pendula/run/doubts.hpp>
 #include <pendula/run/event.hpp>
@@ -71,7 +70,6 @@ class Run {
   void look_at_end(const RunResult& result);
   void come_by(const RowPlace& place, bool last);
   void finish(RunReport& report);
-  void warn_of_events(RunReport& report) const;
   void doubt(RunReport& report, const std::function<bool()>& stop) const;
 
   /// What is kept of a run besides its observers, for checkpoints.
@@ -224,22 +222,9 @@ inline void Run::come_by(const RowPlace& place, bool last) {
   for (Observer* observer : observers_) observer->keep(checkpoint);
 }
 
-inline void Run::warn_of_events(RunReport& report) const {
-  const auto warn = [&](std::size_t event, const std::string& what, double time, const std::string& so) {
-    if (std::isnan(time)) return;
-    report.warnings.push_back("event " + setup_.events[event].name + ": " + what + " before t = " + rounded(time) +
-                              " s; where that is so, " + so);
-  };
-  const std::vector<EventTally>& tallies = kept_.watch.tallies();
-  for (std::size_t k = 0; k < tallies.size(); ++k) {
-    warn(k, "not finite", tallies[k].not_finite, "nothing was looked for");
-    warn(k, "changes too often for the steps", tallies[k].not_told, "it counts once at most in a step");
-  }
-}
-
 // Of a run that an event ended, up to there.
 inline void Run::doubt(RunReport& report, const std::function<bool()>& stop) const {
-  warn_of_events(report);
+  report.warnings = event_warnings(setup_.events, report.events);
   if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
   RunSetup whole = setup_;
   if (report.end == RunEnd::event) whole.duration = report.last.time - setup_.start.time;

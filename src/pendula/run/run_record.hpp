@@ -25,6 +25,15 @@ struct EnergyError {
   }
 };
 
+namespace detail {
+
+/// What the energies of a chain are compared with, given Σ M_i |g| l_i.
+inline double compared_with(std::optional<double> scale, double initial) {
+  return scale.value_or(0) > 0 ? *scale : std::abs(initial);
+}
+
+}  // namespace detail
+
 /// How far the energy is from what the start had and loads brought, over the rows; relative to all that there was.
 struct EnergyBalance {
   double most = 0, least = 0;  ///< relative, above and below
@@ -138,7 +147,7 @@ class RunRecord {
     balance_.least = std::min(balance_.least, off / whole);
   }
 
-  double compared_with() const { return !scale_ ? largest_sum_ : *scale_ > 0 ? *scale_ : std::abs(initial_); }
+  double compared_with() const { return scale_ ? detail::compared_with(scale_, initial_) : largest_sum_; }
 
   std::optional<double> scale_;
   std::pair<std::size_t, std::size_t> shown_;

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/lanes/lane_queue.hpp>
+#include <vector>
+
+#include "library/chain_lanes.hpp"
+
+namespace pendula {
+
+template <class Space, int S>
+bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
+                  std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+  if (members.empty()) return true;
+  std::vector<Chain<Space>> chains;
+  chains.reserve(members.size());  // so that pointers to them stay
+  std::vector<LaneMember<Space>> starts;
+  starts.reserve(members.size());
+  for (const PlainMember& member : members) {
+    const auto numbers = [&](const double* from) {
+      return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(from, Space::dof * member.chain.links));
+    };
+    chains.push_back(chain_of<Space>(member.chain));
+    starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
+  }
+  LaneOptions asked;
+  asked.step = options.step;
+  asked.tolerance = options.tolerance;
+  asked.energy_every = every;
+  GaussLanes<Space, S> queue(chains.front(), asked);
+  queue.set_watch(watch);
+  std::vector<LaneEnd> reached(members.size());
+  const bool is_done = queue.run(starts, reached);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const LaneEnd& from = reached[k];
+    PlainMemberEnd& to = ends[k];
+    std::copy_n(from.motion.q.data(), from.motion.q.size(), to.q);
+    std::copy_n(from.motion.v.data(), from.motion.v.size(), to.v);
+    to.time = from.motion.time;
+    to.status = from.status;
+    to.steps = from.steps;
+    to.rejected_steps = from.rejected_steps;
+    to.energy_error = from.energy_error;
+  }
+  return is_done;
+}
+
+template <class Space>
+MoveMembers* chain_lanes(int stages) {
+  switch (stages) {
+    case 2:
+      return &move_members<Space, 2>;
+    case 4:
+      return &move_members<Space, 4>;
+    case 6:
+      return &move_members<Space, 6>;
+    case 8:
+      return &move_members<Space, 8>;
+    default:
+      return nullptr;
+  }
+}
+
+}  // namespace pendula

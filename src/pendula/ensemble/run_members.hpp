@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <pendula/ensemble/lane_runs.hpp>
+#include <pendula/run/run.hpp>
+#include <pendula/run/run_report.hpp>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. A report
+/// depends on its setup alone, to the last bit; of a run that was stopped it says that and nothing else. Throws as Run.
+inline std::vector<RunReport> run_members(
+    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; }) {
+  std::vector<RunReport> reports(setups.size());
+  std::map<LaneKind, std::vector<std::size_t>> kinds;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    if (const auto kind = lane_kind(setups[k])) {
+      kinds[*kind].push_back(k);
+    } else {
+      reports[k] = Run(setups[k]).go(stop);
+    }
+  }
+  for (const auto& [kind, numbers] : kinds) {
+    std::vector<const RunSetup*> alike;
+    alike.reserve(numbers.size());
+    for (const std::size_t k : numbers) alike.push_back(&setups[k]);
+    std::vector<RunReport> found = kind.dimension == Planar::dimension ? LaneRuns<Planar>(alike, stop).go()
+                                                                       : LaneRuns<Spatial>(alike, stop).go();
+    for (std::size_t k = 0; k < numbers.size(); ++k) reports[numbers[k]] = std::move(found[k]);
+  }
+  return reports;
+}
+
+}  // namespace pendula

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <pendula/chain/plain_chain.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
+#include <span>
+
+namespace pendula {
+
+/// The steps that members in lanes have just taken, as those who watch them see them; q and v are all the angles and
+/// their rates.
+class LaneSteps {
+ public:
+  LaneSteps() = default;
+  LaneSteps(const LaneSteps&) = delete;
+  LaneSteps& operator=(const LaneSteps&) = delete;
+  virtual ~LaneSteps() = default;
+
+  virtual int lanes() const = 0;
+  /// Whether the member in a lane has taken one.
+  virtual bool took_step(int lane) const = 0;
+  /// Its number, from 0 on, and the times that its step began and ended at  [s].
+  virtual std::size_t member(int lane) const = 0;
+  virtual double begin(int lane) const = 0;
+  virtual double end(int lane) const = 0;
+
+  /// Where it is now.
+  virtual void state(int lane, double* q, double* v) = 0;
+  /// Where it was when a share of the step was done, 0 to 1, by the polynomial through the step's stages: cheap where
+  /// several lanes ask for the same share.
+  virtual void glance(int lane, double share, double* q, double* v) = 0;
+  /// Its motion is over, whatever its time.
+  virtual void finish(int lane) = 0;
+};
+
+/// Who watches members while they are moved.
+class LaneWatch {
+ public:
+  LaneWatch() = default;
+  LaneWatch(const LaneWatch&) = delete;
+  LaneWatch& operator=(const LaneWatch&) = delete;
+  virtual ~LaneWatch() = default;
+
+  /// Whether to look into steps at all: `after_step` is called for those of all lanes together.
+  virtual bool wants_steps() const = 0;
+  virtual void after_step(LaneSteps& steps) = 0;
+  /// Whether to leave off; asked after every step.
+  virtual bool stops() = 0;
+};
+
+/// One of many chains as plain numbers, which is how members cross from a program to the compiled library (library.hpp):
+/// where it starts, and when it ends. Everything pointed at belongs to the caller.
+struct PlainMember {
+  PlainChain chain;
+  double start, end;    ///< s
+  const double *q, *v;  ///< (dof·links)
+};
+
+/// What became of it.
+struct PlainMemberEnd {
+  double *q, *v;  ///< (dof·links), of the caller, written
+  double time;    ///< s
+  Status status;  ///< otherwise the member came no further than here
+  std::int64_t steps, rejected_steps;
+  double energy_error;  ///< the largest |H − H_0| at every so many steps  [J]
+};
+
+/// Moves chains of one number of links and without loads by Gauss steps of `options`, a member in each lane; `every`
+/// how many steps from one look at the energy to the next. What becomes of a member depends on that member alone, to
+/// the last bit. False where `watch` made it leave off.
+using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
+                         std::span<PlainMemberEnd> ends, LaneWatch& watch);
+
+}  // namespace pendula
