@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/ensemble/chunks.hpp>
+#include <pendula/ensemble/lane_runs.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
@@ -80,9 +81,9 @@ class EnsembleProgress {
   Clock::time_point began_ = Clock::now(), drawn_at_ = began_;
 };
 
-/// Of a number of members alone, so that whoever goes on has the same ones.
-std::int64_t chunk_of(std::int64_t members) {
-  return std::clamp<std::int64_t>(members / 128, 1, 512);
+/// Of the ensemble alone, so that whoever goes on has the same ones: a few members for each lane, where they go there.
+std::int64_t chunk_of(std::int64_t members, bool in_lanes) {
+  return std::clamp<std::int64_t>(members / 128, in_lanes ? 32 : 1, 512);
 }
 
 template <class Scenario>
@@ -99,7 +100,7 @@ class Session {
         scenarios_(options.scenario, options.overrides, options.json),
         plan_(io::parse_ensemble(scenarios_.text().text, scenarios_.text().name, options.overrides)),
         kept_(std::visit([&](const auto& scenario) { return kept_of(scenario, plan_); }, scenarios_.base())),
-        head_{origin(), plan_, kept_.columns(), chunk_of(plan_.count), natural_units()},
+        head_{origin(), plan_, kept_.columns(), chunk_of(plan_.count, go_in_lanes()), natural_units()},
         folder_(io::link_target(options.output) + ".parts") {}
 
   ExitStatus run() {
@@ -116,6 +117,11 @@ class Session {
   }
 
  private:
+  bool go_in_lanes() {
+    return std::visit([](const auto& scenario) { return lane_kind(member_setup(scenario)).has_value(); },
+                      scenarios_.base());
+  }
+
   std::optional<io::NaturalUnits> natural_units() {
     return std::visit([](const auto& scenario) { return scenario.natural; }, scenarios_.base());
   }
@@ -181,7 +187,7 @@ class Session {
                            ": expected --resume, or no such folder, got what an ensemble that was not finished "
                            "left; to begin anew, delete it");
     }
-    if (options_.resume && !is_begun && !fs::exists(options_.output, unknown)) {
+    if (options_.resume && !fs::is_directory(folder_, unknown) && !fs::exists(options_.output, unknown)) {
       throw io::InputError(folder_ + ": expected what an ensemble has left, to go on with, got nothing");
     }
     const std::vector<bool> there = io::done_chunks(folder_, head_);

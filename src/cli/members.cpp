@@ -8,7 +8,6 @@
 #include <pendula/run/run.hpp>
 #include <variant>
 
-#include "cli/scenario_subject.hpp"
 #include "io/ensemble_file.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
@@ -19,14 +18,9 @@ namespace {
 
 template <class Scenario>
 RunSetup setup_of(const Scenario& scenario, io::SharedExpressions& shared) {
-  const std::shared_ptr<const Subject> subject = subject_of(scenario);
-  return {.subject = subject,
-          .start = scenario.start,
-          .options = scenario.run,
-          .duration = scenario.duration,
-          .every = scenario.every,
-          .doubted = false,
-          .events = io::events_of(scenario.events, subject, scenario.start, shared)};
+  RunSetup setup = member_setup(scenario);
+  setup.events = io::events_of(scenario.events, setup.subject, scenario.start, shared);
+  return setup;
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 
 #include "cli/interrupt.hpp"
 #include "cli/kept.hpp"
+#include "cli/scenario_subject.hpp"
 #include "io/ensemble_plan.hpp"
 #include "io/event_reader.hpp"
 #include "io/journal.hpp"
@@ -25,6 +26,17 @@ namespace pendula::cli {
 
 /// Thrown out of a member that was under way.
 struct Interrupted {};
+
+/// The run of a member, but for events.
+template <class Scenario>
+RunSetup member_setup(const Scenario& scenario) {
+  return {.subject = subject_of(scenario),
+          .start = scenario.start,
+          .options = scenario.run,
+          .duration = scenario.duration,
+          .every = scenario.every,
+          .doubted = false};
+}
 
 /// The scenario of an ensemble, and those of its members: the same with other numbers.
 class MemberScenarios {

@@ -63,6 +63,8 @@ class Reader {
     if (unknown) left_ = 0;
   }
 
+  std::uint64_t left() const { return left_; }
+
   /// Empty where there are not so many.
   std::string take(std::uint64_t bytes) {
     if (bytes > left_) return {};
@@ -192,10 +194,14 @@ FolderLock::~FolderLock() {
 
 bool journals_are_of(const std::string& folder, const JournalKind& kind) {
   const std::string head = head_of(kind);
-  return std::ranges::any_of(journals_in(folder), [&](const fs::path& file) {
+  bool are_of_another = false;
+  for (const fs::path& file : journals_in(folder)) {
     Reader reader(file);
-    return reader.take(head.size()) == head;
-  });
+    const std::string begin = reader.take(std::min<std::uint64_t>(head.size(), reader.left()));
+    if (begin == head) return true;
+    are_of_another |= !head.starts_with(begin);
+  }
+  return !are_of_another;
 }
 
 void read_journals(const std::string& folder, const JournalKind& kind,

@@ -160,10 +160,12 @@ def test_killed_at_any_time_it_goes_on(whole, tmp_path):
 
 def test_asked_to_end_it_leaves_what_it_has(whole, tmp_path):
     process = subprocess.Popen(
-        command(tmp_path, "--threads", "1", "--set", "run.duration=40"),
+        command(tmp_path, "--threads", "1", "--set", "run.duration=400"),
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    time.sleep(0.5)
+    journals = (tmp_path / "out.h5.parts").glob
+    while process.poll() is None and not any(file.stat().st_size > 2000 for file in journals("*.journal")):
+        time.sleep(0.005)
     process.send_signal(signal.SIGTERM)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 3
@@ -173,7 +175,7 @@ def test_asked_to_end_it_leaves_what_it_has(whole, tmp_path):
         assert 0 < done.sum() == opened.attrs["members_done"] < MEMBERS
         assert np.isfinite(opened["theta_2"][...][done]).all()
         assert np.isnan(opened["theta_2"][...][~done]).all()
-    refused = run(tmp_path, "--set", "run.duration=40")
+    refused = run(tmp_path, "--set", "run.duration=400")
     assert refused.status == 2
     assert "expected --resume" in refused.err
     other = run(tmp_path, "--resume")  # without --set: another ensemble
@@ -189,6 +191,15 @@ def test_a_journal_that_was_cut_short_is_made_whole(whole, tmp_path):
     broken = bytearray(text)
     broken[len(text) // 2] ^= 1  # a disk that lies
     journal.with_name("copy.journal").write_bytes(broken)
+    assert run(tmp_path, "--resume").status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+@pytest.mark.parametrize("left", [None, b"", b"pendula jour"])
+def test_killed_before_its_journal_said_anything(whole, tmp_path, left):
+    (tmp_path / "out.h5.parts").mkdir()
+    if left is not None:
+        (tmp_path / "out.h5.parts" / "7-0.journal").write_bytes(left)
     assert run(tmp_path, "--resume").status == 0
     assert contents(tmp_path / "out.h5") == whole
 
@@ -262,14 +273,24 @@ def test_xarray_opens_it_with_names(tmp_path):
     assert len(meanings) == len(opened["status"].attrs["flag_values"])
 
 
-@pytest.mark.parametrize("scenario", [MAP, DRAWN])
-def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario):
+STEADY = MAP.replace("tolerance = 1e-6", "step = 5e-3\nstages = 4\nsolver = \"chain\"")
+DENSE = MAP.replace("tolerance = 1e-6", "tolerance = 1e-6\nsolver = \"dense\"")
+NEWTON = DRAWN.replace("duration = 1.0", "duration = 1.0\niteration = \"newton\"")
+
+
+# In lanes to rounding, seen: 6e-13; alone to the last bit.
+@pytest.mark.parametrize(
+    ("scenario", "within"),
+    [(STEADY, 1e-10), (DENSE, 0), (NEWTON, 0)],
+    ids=["lanes", "dense", "newton"],
+)
+def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario, within):
     assert run(tmp_path, scenario=scenario).status == 0
     with h5py.File(tmp_path / "out.h5") as opened:
         status = opened["status"][...]
         for member in random.Random(1).sample(range(status.size), 5):
             place = np.unravel_index(member, status.shape)
-            if scenario is MAP:
+            if status.ndim == 2:
                 keys = {
                     name: opened[name][k]
                     for name, k in zip(["start.theta[1]", "start.theta[2]"], place, strict=True)
@@ -277,9 +298,7 @@ def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario):
             else:
                 keys = {name: opened[name][place] for name in ("start.theta[2]", "chain.masses[1]")}
             changes = [
-                part
-                for key, value in keys.items()
-                for part in ("--set", f"{key}={value!r}".replace("np.float64(", "").replace(")", ""))
+                part for key, value in keys.items() for part in ("--set", f"{key}={float(value)!r}")
             ]
             rows = ["simulate", "scenario.toml", "-o", "member.csv", "--quiet"]
             subprocess.run([program(), *rows, *changes], cwd=tmp_path, check=True)
@@ -287,7 +306,7 @@ def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario):
             last = dict(zip(lines[0].split(","), map(float, lines[-1].split(",")), strict=True))
             for name, value in last.items():
                 if name in opened:
-                    assert opened[name][place] == value, (member, name)
+                    assert abs(opened[name][place] - value) <= within, (member, name)
 
 
 def test_draws_are_those_of_the_seed(tmp_path):
