@@ -1,5 +1,6 @@
 // Ensembles of planar chains with a member in every lane: what a step of a member costs, and members of ten seconds.
-// Prints medians of several runs, of this thread's processor time.
+// Prints medians of several runs, of this thread's processor time. Given the name of a file, it writes starts and ends
+// of double pendulums there instead, and prints times and errors by tolerance: heyoka_batch.py does the same of them.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -79,9 +80,82 @@ void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<
   std::printf("\n");
 }
 
+// --- Against heyoka ---
+
+// At rest, from angles that fill the square evenly.
+std::vector<LaneMember<Planar, 2>> spread_members(int count) {
+  std::vector<LaneMember<Planar, 2>> members(static_cast<std::size_t>(count));
+  const auto angle = [](double x) { return (2 * (x - std::floor(x)) - 1) * std::numbers::pi; };
+  for (int k = 0; k < count; ++k) {
+    auto& member = members[static_cast<std::size_t>(k)];
+    member.start = Motion(0, Eigen::VectorXd(2), Eigen::VectorXd::Zero(2));
+    member.start.q << angle(0.75487766624669276 * (k + 1)), angle(0.56984029099805327 * (k + 1));
+    member.end = 10;
+  }
+  return members;
+}
+
+void write(const char* file, const std::vector<LaneMember<Planar, 2>>& members, const std::vector<LaneEnd>& ends) {
+  std::FILE* const out = std::fopen(file, "w");
+  if (out == nullptr) return std::perror(file);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    for (const Eigen::VectorXd* numbers : {&members[k].start.q, &ends[k].motion.q, &ends[k].motion.v}) {
+      for (const double x : *numbers) std::fprintf(out, "%.17g ", x);
+    }
+    std::fprintf(out, "\n");
+  }
+  std::fclose(out);
+}
+
+// The error that half of the members have at most: distance in angles and rates from the reference.
+double median_error(const std::vector<LaneEnd>& ends, const std::vector<LaneEnd>& reference) {
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    const Motion &a = ends[k].motion, &b = reference[k].motion;
+    errors.push_back(std::max((a.q - b.q).cwiseAbs().maxCoeff(), (a.v - b.v).cwiseAbs().maxCoeff()));
+  }
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+  return errors[errors.size() / 2];
+}
+
+template <int S>
+void race(const Chain<Planar, 2>& chain, const std::vector<LaneMember<Planar, 2>>& members,
+          const std::vector<LaneEnd>& reference, double tolerance) {
+  std::vector<LaneEnd> ends(members.size());
+  GaussLanes<Planar, S, 2> queue(chain, {.tolerance = tolerance});
+  std::vector<double> times;
+  for (int run = 0; run < 9; ++run) {
+    const double start = processor_time();
+    queue.run(members, ends);
+    times.push_back(processor_time() - start);
+  }
+  std::sort(times.begin(), times.end());
+  std::printf("%d stages, tolerance %.0e: %7.2f us a member (best %7.2f), error %.1e\n", S, tolerance,
+              times[4] / static_cast<double>(members.size()) * 1e6,
+              times[0] / static_cast<double>(members.size()) * 1e6, median_error(ends, reference));
+}
+
+void race_all(const char* file) {
+  const auto chain = equal_chain<2>(2);
+  const auto members = spread_members(1024);
+  std::vector<LaneEnd> reference(members.size());
+  GaussLanes<Planar, 8, 2>(chain, {.step = 1.0 / 512}).run(members, reference);
+  write(file, members, reference);
+  for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7}) {
+    race<4>(chain, members, reference, tolerance);
+    race<5>(chain, members, reference, tolerance);
+    race<6>(chain, members, reference, tolerance);
+  }
+  for (const double tolerance : {1e-9, 1e-12, 1e-14, 1e-15}) race<8>(chain, members, reference, tolerance);
+}
+
 }  // namespace
 
-int main() {
+int main(int count, char** words) {
+  if (count > 1) {
+    race_all(words[1]);
+    return 0;
+  }
   const auto two = equal_chain<2>(2);
   const auto second = members_of<2>(2, 64, 1), ten_seconds = members_of<2>(2, 512, 10);
   measure<GaussLanes<Planar, 2, 2>>("n=2 s=2 h=1e-3 round-off", two, second, {.step = 1e-3});

@@ -109,6 +109,7 @@ function(_pendula_compile_copy copy arch)
   pendula_own_target(${copy})
   # Sealing needs machine code, and would not make symbols local that a program must have once.
   target_compile_options(${copy} PRIVATE ${_pendula_flags_${arch}} -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+  target_compile_definitions(${copy} PRIVATE $<$<BOOL:${PENDULA_CHECKED}>:PENDULA_FEW_LANES>)
   list(GET _pendula_archs 0 least)
   if(NOT arch STREQUAL least)
     # Without optimisation, Eigen's empty constants would be initialised when a program starts (check_runs_nothing.cmake).

@@ -97,8 +97,8 @@ class EnsembleLanes : public testing::Test {};
 
 constexpr int any = Eigen::Dynamic;
 using Cases =
-    testing::Types<Case<Planar, 1, any, 2>, Case<Planar, 2, 2, 2>, Case<Planar, 4, 2, 2>, Case<Planar, 5, 3, 3>,
-                   Case<Planar, 8, any, 4>, Case<Spatial, 2, 2, 2>, Case<Spatial, 3, any, 3>, Case<Spatial, 8, any, 1>>;
+    testing::Types<Case<Planar, 1, any, 2>, Case<Planar, 4, 2, 2>, Case<Planar, 5, 3, 3>, Case<Planar, 8, any, 4>,
+                   Case<Spatial, 2, 2, 2>, Case<Spatial, 3, any, 3>, Case<Spatial, 8, any, 1>>;
 TYPED_TEST_SUITE(EnsembleLanes, Cases);
 
 // Largest difference to the scalar chain solver after half a second, which makes of rounding what it does.

@@ -152,6 +152,7 @@ template <class Space>
 std::vector<Event> crossings() {
   const auto coordinate = [](Eigen::Index k) { return [k](const Motion& motion) { return std::sin(motion.q[k]); }; };
   std::vector<Event> events;
+  events.reserve(2 * Space::dof + 1);
   for (Eigen::Index k = 0; k < 2 * Space::dof; ++k) {
     events.push_back({"q" + std::to_string(k), coordinate(k), k % 2 == 0 ? Direction::both : Direction::up});
   }

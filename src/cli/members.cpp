@@ -127,8 +127,7 @@ MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, io::SharedExp
   if (lane_kind(setup)) {
     member.setup = std::move(setup);
   } else {
-    member.report =
-        std::visit([&](const auto& read) { return run_alone(read, std::move(setup)); }, *member.scenario);
+    member.report = std::visit([&](const auto& read) { return run_alone(read, std::move(setup)); }, *member.scenario);
   }
   return member;
 }
@@ -147,6 +146,7 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
     if (report.end == RunEnd::stopped) throw Interrupted();
     const std::shared_ptr<const Subject> subject = subject_of(scenario);
     std::vector<std::string> events;
+    events.reserve(scenario.events.size());
     for (const io::EventPlan& event : scenario.events) events.push_back(event.name);
     const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
     const auto [exponent, error] = kept_.lyapunov() ? leading_exponent(scenario) : std::pair(0.0, 0.0);

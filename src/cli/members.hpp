@@ -51,7 +51,8 @@ class MemberScenarios {
 
   io::AnyScenario base() { return parse(overrides_); }
 
-  /// Several threads may ask at once. Throws io::InputError. Quickly means without places in the file (io::ScenarioDocument).
+  /// Several threads may ask at once. Throws io::InputError. Quickly means without places in the file
+  /// (io::ScenarioDocument).
   io::AnyScenario of_member(const io::EnsemblePlan& plan, std::int64_t member);
   io::AnyScenario quickly_of_member(const io::EnsemblePlan& plan, std::int64_t member);
 

@@ -73,8 +73,8 @@ class FolderLock {
   int descriptor_ = -1;
 };
 
-/// Whether any journal in the folder is of that kind, or none of another: one that was cut short before it says what it is
-/// of counts for nothing.
+/// Whether any journal in the folder is of that kind, or none of another: one that was cut short before it says what it
+/// is of counts for nothing.
 bool journals_are_of(const std::string& folder, const JournalKind& kind);
 
 /// Calls take(chunk) for every whole record of all journals in the folder, in any order, some perhaps twice.

@@ -273,9 +273,9 @@ def test_xarray_opens_it_with_names(tmp_path):
     assert len(meanings) == len(opened["status"].attrs["flag_values"])
 
 
-STEADY = MAP.replace("tolerance = 1e-6", "step = 5e-3\nstages = 4\nsolver = \"chain\"")
-DENSE = MAP.replace("tolerance = 1e-6", "tolerance = 1e-6\nsolver = \"dense\"")
-NEWTON = DRAWN.replace("duration = 1.0", "duration = 1.0\niteration = \"newton\"")
+STEADY = MAP.replace("tolerance = 1e-6", 'step = 5e-3\nstages = 4\nsolver = "chain"')
+DENSE = MAP.replace("tolerance = 1e-6", 'tolerance = 1e-6\nsolver = "dense"')
+NEWTON = DRAWN.replace("duration = 1.0", 'duration = 1.0\niteration = "newton"')
 
 
 # In lanes to rounding, seen: 6e-13; alone to the last bit.
@@ -297,9 +297,7 @@ def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario, within):
                 }
             else:
                 keys = {name: opened[name][place] for name in ("start.theta[2]", "chain.masses[1]")}
-            changes = [
-                part for key, value in keys.items() for part in ("--set", f"{key}={float(value)!r}")
-            ]
+            changes = [part for key, value in keys.items() for part in ("--set", f"{key}={float(value)!r}")]
             rows = ["simulate", "scenario.toml", "-o", "member.csv", "--quiet"]
             subprocess.run([program(), *rows, *changes], cwd=tmp_path, check=True)
             lines = (tmp_path / "member.csv").read_text().splitlines()

@@ -51,8 +51,8 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
   const RunOptions& options = setup.options;
   const bool fits = options.method == Method::gauss && options.form == Form::momentum &&
                     options.solver != Solver::dense && options.iteration != Iteration::newton && options.step >= 0 &&
-                    std::isfinite(options.step) && (options.step > 0 || options.tolerance > 0) && setup.every >= 1 && setup.duration > 0 &&
-                    std::isfinite(setup.duration) && !setup.rows.any() && !setup.doubted;
+                    std::isfinite(options.step) && (options.step > 0 || options.tolerance > 0) && setup.every >= 1 &&
+                    setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() && !setup.doubted;
   if (!fits) return {};
   const std::optional<LaneKind> planar = detail::lane_kind_in<Planar>(setup);
   return planar ? planar : detail::lane_kind_in<Spatial>(setup);
@@ -205,7 +205,8 @@ class LaneRuns : private LaneWatch {
     const std::size_t k = steps.member(lane);
     const RunSetup& setup = *setups_[k];
     if (setup.events.empty()) return;
-    for (const Occurrence& happened : watches_[k].after_step(Step(steps, lane, setup, alone_[static_cast<std::size_t>(lane)]))) {
+    for (const Occurrence& happened :
+         watches_[k].after_step(Step(steps, lane, setup, alone_[static_cast<std::size_t>(lane)]))) {
       if (!setup.events[happened.event].stop) continue;
       reports_[k].end = RunEnd::event;
       reports_[k].ended_by = happened.event;

@@ -29,9 +29,10 @@ struct EnsembleMember {
 /// How members are moved.
 struct EnsembleSchedule {
   RunOptions options;
-  double duration = 10;            ///< s
-  std::int64_t every = 1;          ///< steps from one look at the energy to the next
-  std::vector<Event> events = {};  ///< to look for in each
+  double duration = 10;    ///< s
+  std::int64_t every = 1;  ///< steps from one look at the energy to the next
+  /// To look for in each.
+  std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
 };

@@ -29,8 +29,8 @@ inline std::vector<RunReport> run_members(
     std::vector<const RunSetup*> alike;
     alike.reserve(numbers.size());
     for (const std::size_t k : numbers) alike.push_back(&setups[k]);
-    std::vector<RunReport> found = kind.dimension == Planar::dimension ? LaneRuns<Planar>(alike, stop).go()
-                                                                       : LaneRuns<Spatial>(alike, stop).go();
+    std::vector<RunReport> found =
+        kind.dimension == Planar::dimension ? LaneRuns<Planar>(alike, stop).go() : LaneRuns<Spatial>(alike, stop).go();
     for (std::size_t k = 0; k < numbers.size(); ++k) reports[numbers[k]] = std::move(found[k]);
   }
   return reports;

@@ -193,8 +193,8 @@ class LaneChain {
     return components<D>([&](std::size_t k) { return stages_[i].rod[k][static_cast<std::size_t>(j)]; });
   }
 
-  /// Rods of the members whose step was accepted, and their rates, when `share` of it was done, by the polynomial through
-  /// its stages; visit(i, ξ, ξ̇).
+  /// Rods of the members whose step was accepted, and their rates, when `share` of it was done, by the polynomial
+  /// through its stages; visit(i, ξ, ξ̇).
   template <class Visit>
   void for_each_glance(double share, Visit visit) {
     const typename Columns::Shares& weights = columns_.shares(share);

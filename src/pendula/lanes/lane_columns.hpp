@@ -1,9 +1,9 @@
 #pragma once
 
 #include <array>
-#include <pendula/lanes/lane_pack.hpp>
 #include <pendula/gauss/node_polynomials.hpp>
 #include <pendula/gauss/tableau.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 
@@ -139,7 +139,8 @@ class LaneColumns {
   /// What stage values, times h, are weighed with when a share of the step is done.
   struct Shares {
     double share = -1;
-    std::array<double, static_cast<std::size_t>(S)> values, ahead;  ///< for the value then; for the integral from then on
+    std::array<double, static_cast<std::size_t>(S)> values,
+        ahead;  ///< for the value then; for the integral from then on
   };
   const Shares& shares(double share) {
     Shares* weights = &shares_.front();

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <pendula/lanes/lane_pack.hpp>
 #include <pendula/gauss/step_controller.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 

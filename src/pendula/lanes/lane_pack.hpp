@@ -63,7 +63,9 @@ class LanePack {
   }
   friend LanePack sqrt(const LanePack& a) { return LanePack(Register(xsimd::sqrt(a.held_))); }
   friend LanePack abs(const LanePack& a) { return LanePack(Register(xsimd::abs(a.held_))); }
-  friend LanePack atan2(const LanePack& y, const LanePack& x) { return LanePack(Register(xsimd::atan2(y.held_, x.held_))); }
+  friend LanePack atan2(const LanePack& y, const LanePack& x) {
+    return LanePack(Register(xsimd::atan2(y.held_, x.held_)));
+  }
   friend LanePack floor(const LanePack& a) { return LanePack(Register(xsimd::floor(a.held_))); }
   friend LanePack exp(const LanePack& a) { return LanePack(Register(xsimd::exp(a.held_))); }
   friend LanePack log(const LanePack& a) { return LanePack(Register(xsimd::log(a.held_))); }

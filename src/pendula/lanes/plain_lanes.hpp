@@ -50,8 +50,8 @@ class LaneWatch {
   virtual bool stops() = 0;
 };
 
-/// One of many chains as plain numbers, which is how members cross from a program to the compiled library (library.hpp):
-/// where it starts, and when it ends. Everything pointed at belongs to the caller.
+/// One of many chains as plain numbers, which is how members cross from a program to the compiled library
+/// (library.hpp): where it starts, and when it ends. Everything pointed at belongs to the caller.
 struct PlainMember {
   PlainChain chain;
   double start, end;    ///< s
