@@ -9,6 +9,7 @@
 #include <pendula/chain/invariants.hpp>
 #include <pendula/lanes/lane_queue.hpp>
 #include <random>
+#include <type_traits>
 #include <vector>
 
 namespace {
@@ -118,21 +119,21 @@ double median_error(const std::vector<LaneEnd>& ends, const std::vector<LaneEnd>
   return errors[errors.size() / 2];
 }
 
-template <int S>
-void race(const Chain<Planar, 2>& chain, const std::vector<LaneMember<Planar, 2>>& members,
-          const std::vector<LaneEnd>& reference, double tolerance) {
+template <class Queue>
+void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<LaneMember<Planar, 2>>& members,
+          const std::vector<LaneEnd>& reference, const LaneOptions& options) {
   std::vector<LaneEnd> ends(members.size());
-  GaussLanes<Planar, S, 2> queue(chain, {.tolerance = tolerance});
+  Queue queue(chain, options);
   std::vector<double> times;
   for (int run = 0; run < 9; ++run) {
     const double start = processor_time();
     queue.run(members, ends);
-    times.push_back(processor_time() - start);
+    times.push_back((processor_time() - start) / static_cast<double>(members.size()));
   }
   std::sort(times.begin(), times.end());
-  std::printf("%d stages, tolerance %.0e: %7.2f us a member (best %7.2f), error %.1e\n", S, tolerance,
-              times[4] / static_cast<double>(members.size()) * 1e6,
-              times[0] / static_cast<double>(members.size()) * 1e6, median_error(ends, reference));
+  std::printf("%-10s %s %-6.0e %7.2f us a member (best %7.2f), error %.1e\n", what,
+              options.step > 0 ? "step     " : "tolerance", options.step > 0 ? options.step : options.tolerance,
+              times[4] * 1e6, times[0] * 1e6, median_error(ends, reference));
 }
 
 void race_all(const char* file) {
@@ -141,12 +142,24 @@ void race_all(const char* file) {
   std::vector<LaneEnd> reference(members.size());
   GaussLanes<Planar, 8, 2>(chain, {.step = 1.0 / 512}).run(members, reference);
   write(file, members, reference);
-  for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7}) {
-    race<4>(chain, members, reference, tolerance);
-    race<5>(chain, members, reference, tolerance);
-    race<6>(chain, members, reference, tolerance);
+  const auto go = [&](auto queue, const char* what, const LaneOptions& options) {
+    race<typename decltype(queue)::type>(what, chain, members, reference, options);
+  };
+  for (const double tolerance : {1e-5, 1e-6, 1e-7}) {
+    go(std::type_identity<GaussLanes<Planar, 4, 2>>(), "4 stages", {.tolerance = tolerance});
   }
-  for (const double tolerance : {1e-9, 1e-12, 1e-14, 1e-15}) race<8>(chain, members, reference, tolerance);
+  for (const double tolerance : {1e-9, 1e-12, 1e-14}) {
+    go(std::type_identity<GaussLanes<Planar, 8, 2>>(), "8 stages", {.tolerance = tolerance});
+  }
+  for (const double step : {1e-2, 5e-3}) {
+    go(std::type_identity<ExplicitLanes<Planar, ClassicalRungeKutta, 2>>(), "rk4", {.step = step});
+  }
+  for (const double tolerance : {1e-6, 1e-7, 1e-8}) {
+    go(std::type_identity<ExplicitLanes<Planar, DormandPrince5, 2>>(), "dopri5", {.tolerance = tolerance});
+  }
+  for (const double tolerance : {1e-7, 1e-8, 1e-10, 1e-11, 1e-13, 1e-15}) {
+    go(std::type_identity<ExplicitLanes<Planar, Fehlberg8, 2>>(), "fehlberg78", {.tolerance = tolerance});
+  }
 }
 
 }  // namespace
@@ -160,7 +173,7 @@ int main(int count, char** words) {
   const auto second = members_of<2>(2, 64, 1), ten_seconds = members_of<2>(2, 512, 10);
   measure<GaussLanes<Planar, 2, 2>>("n=2 s=2 h=1e-3 round-off", two, second, {.step = 1e-3});
   measure<GaussLanes<Planar, 2, 2>>("n=2 s=2 h=1e-3 to 1e-9", two, second, {.step = 1e-3, .enough = 1e-9});
-  measure<Rk4Lanes<Planar, 2>>("n=2 rk4 h=1e-3", two, second, {.step = 1e-3});
+  measure<ExplicitLanes<Planar, ClassicalRungeKutta, 2>>("n=2 rk4 h=1e-3", two, second, {.step = 1e-3});
   measure<GaussLanes<Planar, 8, 2>>("n=2 s=8 h=1/128 round-off", two, ten_seconds, {.step = 1.0 / 128});
   measure<GaussLanes<Planar, 4, 2>>("n=2 s=4 T=10 tolerance 1e-6", two, ten_seconds, {.tolerance = 1e-6});
   measure<GaussLanes<Planar, 5, 2>>("n=2 s=5 T=10 tolerance 1e-6", two, ten_seconds, {.tolerance = 1e-6});

@@ -14,16 +14,6 @@
 #include "io/summary.hpp"
 
 namespace pendula::cli {
-namespace {
-
-template <class Scenario>
-RunSetup setup_of(const Scenario& scenario, io::SharedExpressions& shared) {
-  RunSetup setup = member_setup(scenario);
-  setup.events = io::events_of(scenario.events, setup.subject, scenario.start, shared);
-  return setup;
-}
-
-}  // namespace
 
 MemberScenarios::MemberScenarios(const std::string& file, std::vector<std::string> overrides, bool quiet)
     : text_(io::read_scenario_text(file)),
@@ -95,8 +85,7 @@ io::DoneChunk MemberRuns::run(const Chunk& members) const {
 std::vector<std::string> MemberRuns::doubts(std::int64_t member) const {
   try {
     io::SharedExpressions shared;
-    RunSetup setup = std::visit([&](const auto& scenario) { return setup_of(scenario, shared); },
-                                scenarios_.of_member(plan_, member));
+    RunSetup setup = setup_of(scenarios_.of_member(plan_, member), shared);
     setup.doubted = true;
     return Run(std::move(setup)).go([&] { return guard_.interrupted(); }).warnings;
   } catch (const io::InputError&) {
@@ -123,13 +112,25 @@ MemberRuns::Member MemberRuns::member(std::int64_t number, io::SharedExpressions
 MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const {
   Member member;
   member.scenario = std::move(scenario);
-  RunSetup setup = std::visit([&](const auto& read) { return setup_of(read, shared); }, *member.scenario);
+  RunSetup setup = setup_of(*member.scenario, shared);
   if (lane_kind(setup)) {
     member.setup = std::move(setup);
   } else {
     member.report = std::visit([&](const auto& read) { return run_alone(read, std::move(setup)); }, *member.scenario);
   }
   return member;
+}
+
+RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpressions& shared) const {
+  RunSetup setup = std::visit(
+      [&](const auto& read) {
+        RunSetup found = member_setup(read);
+        found.events = io::events_of(read.events, found.subject, read.start, shared);
+        return found;
+      },
+      scenario);
+  if (plan_.chooses_method) setup.options = quickest_in_lanes(setup);
+  return setup;
 }
 
 template <class Scenario>

@@ -12,7 +12,8 @@
 namespace pendula::io {
 namespace {
 
-constexpr std::array<std::string_view, 5> ensemble_keys = {"axis", "random", "count", "seed", "keep"};
+constexpr std::array<std::string_view, 6> ensemble_keys = {"axis", "random", "count", "seed", "method", "keep"};
+constexpr std::array<std::string_view, 2> methods = {"run", "auto"};
 constexpr std::array<std::string_view, 4> axis_keys = {"key", "from", "to", "count"};
 constexpr std::array<std::string_view, 5> random_keys = {"key", "from", "to", "mean", "deviation"};
 
@@ -184,6 +185,7 @@ EnsemblePlan parse_ensemble(std::string_view text, const std::string& name, std:
     plan.count = product(ensemble, plan.axes);
   }
   if (seed) plan.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<std::int64_t>::max()));
+  if (const auto method = ensemble.find("method")) plan.chooses_method = method->choice(methods) == 1;
   if (!keep) return plan;
   if (!keep->is_array()) keep->fail("a list of what to keep, such as [\"final\", \"energy_error\"]");
   plan.keep_place = keep->place();

@@ -31,6 +31,7 @@ struct EnsemblePlan {
   std::vector<EnsembleDraw> draws;  ///< or these
   std::int64_t count = 0;           ///< of members
   std::uint64_t seed = 1;
+  bool chooses_method = false;    ///< by what takes least, in place of that of [run]
   std::vector<std::string> keep;  ///< as in the scenario; empty for what is usual
   std::string keep_place;         ///< `where: key`
 

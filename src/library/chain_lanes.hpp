@@ -5,12 +5,12 @@
 
 namespace pendula {
 
-/// Members in lanes by Gauss steps of as many stages as a tolerance may ask for (stages_for), or of two; nullptr for
-/// other numbers of them.
+/// Members in lanes: by Gauss steps of as many stages as a tolerance may ask for (stages_for), or of two, and by
+/// explicit Runge–Kutta methods; nullptr for others.
 template <class Space>
-MoveMembers* chain_lanes(int stages);
+MoveMembers* chain_lanes(const RunOptions& options);
 
-extern template MoveMembers* chain_lanes<Planar>(int);
-extern template MoveMembers* chain_lanes<Spatial>(int);
+extern template MoveMembers* chain_lanes<Planar>(const RunOptions&);
+extern template MoveMembers* chain_lanes<Spatial>(const RunOptions&);
 
 }  // namespace pendula

@@ -1,7 +1,7 @@
-#include "library/lane_stages.hpp"
+#include "library/lane_methods.hpp"
 
 namespace pendula {
 
-template MoveMembers* chain_lanes<Planar>(int);
+template MoveMembers* chain_lanes<Planar>(const RunOptions&);
 
 }  // namespace pendula

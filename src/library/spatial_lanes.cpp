@@ -1,7 +1,7 @@
-#include "library/lane_stages.hpp"
+#include "library/lane_methods.hpp"
 
 namespace pendula {
 
-template MoveMembers* chain_lanes<Spatial>(int);
+template MoveMembers* chain_lanes<Spatial>(const RunOptions&);
 
 }  // namespace pendula

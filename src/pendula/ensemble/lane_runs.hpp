@@ -25,10 +25,11 @@ namespace pendula {
 /// Runs that members in lanes can take together: all that their steps have in common.
 struct LaneKind {
   int dimension = 0, links = 0, stages = 0;
+  Method method = Method::gauss;
   double step = 0, tolerance = 0;
   std::int64_t every = 0;
 
-  auto tied() const { return std::tie(dimension, links, stages, step, tolerance, every); }
+  auto tied() const { return std::tie(dimension, links, stages, method, step, tolerance, every); }
   bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
 };
 
@@ -38,20 +39,38 @@ template <class Space>
 std::optional<LaneKind> lane_kind_in(const RunSetup& setup) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
   const RunOptions& options = setup.options;
-  if (chain == nullptr || chain->chain().loaded() || library_of<Space>().lanes(options.stages) == nullptr) return {};
-  const double tolerance = options.step == 0 ? options.tolerance : 0;
-  return LaneKind{Space::dimension, chain->chain().links(), options.stages, options.step, tolerance, setup.every};
+  if (chain == nullptr || chain->chain().loaded() || library_of<Space>().lanes(options) == nullptr) return {};
+  LaneKind kind{Space::dimension, chain->chain().links(), 0, options.method, 0, 0, setup.every};
+  if (options.method == Method::gauss) kind.stages = options.stages;
+  (is_adaptive(options) ? kind.tolerance : kind.step) = is_adaptive(options) ? options.tolerance : options.step;
+  return kind;
+}
+
+/// About how fast a chain of one kind swings  [1/s]; none of others.
+template <class Space>
+std::optional<double> natural_pace_in(const Subject& subject) {
+  const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
+  if (found == nullptr) return {};
+  const Chain<Space>& chain = found->chain();
+  return chain.links() * std::sqrt(0.15 * std::abs(chain.gravity()) / chain.lengths().sum());
 }
 
 }  // namespace detail
 
+/// About how fast a chain swings  [1/s]; infinite for what is none.
+inline double natural_pace(const Subject& subject) {
+  const std::optional<double> planar = detail::natural_pace_in<Planar>(subject);
+  return planar ? *planar : detail::natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
+}
+
 /// The kind of a run that goes in lanes; none of others. Chains that gravity alone moves, by Gauss steps of the chain
-/// solver, and as many of their stages as lanes were compiled for. It depends on the run alone.
+/// solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods. It depends on
+/// the run alone.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
   const RunOptions& options = setup.options;
-  const bool fits = options.method == Method::gauss && options.form == Form::momentum &&
-                    options.solver != Solver::dense && options.iteration != Iteration::newton && options.step >= 0 &&
-                    std::isfinite(options.step) && (options.step > 0 || options.tolerance > 0) && setup.every >= 1 &&
+  const double chosen = is_adaptive(options) ? options.tolerance : options.step;
+  const bool fits = options.form == Form::momentum && options.solver != Solver::dense &&
+                    options.iteration != Iteration::newton && chosen > 0 && std::isfinite(chosen) && setup.every >= 1 &&
                     setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() && !setup.doubted;
   if (!fits) return {};
   const std::optional<LaneKind> planar = detail::lane_kind_in<Planar>(setup);
@@ -102,7 +121,7 @@ class LaneRuns : private LaneWatch {
       members.push_back({plain(chain(k), {}), start.time, start.time + setup.duration, start.q.data(), start.v.data()});
       ends_.push_back({&q(0, static_cast<Eigen::Index>(k)), &v(0, static_cast<Eigen::Index>(k)), 0, {}, 0, 0, 0});
     }
-    MoveMembers* const move_members = library_of<Space>().lanes(first.options.stages);
+    MoveMembers* const move_members = library_of<Space>().lanes(first.options);
     stopped_ = !move_members(first.options, first.every, members, ends_, *this);
     for (std::size_t k = 0; k < setups_.size(); ++k) {
       if (reports_[k].end == RunEnd::event) continue;
@@ -126,7 +145,7 @@ class LaneRuns : private LaneWatch {
     report.rows = 1 + (end.steps + setup.every - 1) / setup.every;
     report.statistics.steps = end.steps;
     report.statistics.rejected_steps = end.rejected_steps;
-    report.description = {"chain", "fixed-point", ""};
+    if (!is_explicit(setup.options.method)) report.description = {"chain", "fixed-point", ""};
     report.events = watches_[k].tallies();
     report.event_cost = watches_[k].cost();
     report.warnings = event_warnings(setup.events, report.events);
@@ -174,6 +193,9 @@ class LaneRuns : private LaneWatch {
       steps_.glance(lane_, share, motion.q.data(), motion.v.data());
     }
     bool look(const Motion& begin, double time, Motion& motion) {
+      prepare(time, motion);
+      const double share = (time - begin.time) / (steps_.end(lane_) - begin.time);
+      if (steps_.look(lane_, share, motion.q.data(), motion.v.data())) return true;
       return alone_.take(steps_.member(lane_), setup_, begin, steps_.end(lane_)) &&
              alone_.integrator->look(time, motion);
     }

@@ -18,8 +18,11 @@ class LaneController {
   explicit LaneController(double tolerance)
       : log_tolerance_(std::log(tolerance)), first_scale_(std::min(1.0, std::exp(log_tolerance_ / order))) {}
 
-  /// Members that start, at their tempo.
-  void start(const Mask& which, const L& pace, const L& quickening) {
+  /// Members that start, at the tempo of the stepper's chain.
+  template <class Stepper>
+  void start(const Mask& which, Stepper& stepper) {
+    L pace, quickening;
+    stepper.chain().tempo(pace, quickening);
     scale_ = select(which, L(first_scale_), scale_);
     last_ = select(which, L(0.0), last_);
     start_density(which, select(pace > L(0.0), pace, L(1.0)), quickening);
@@ -34,11 +37,11 @@ class LaneController {
     return select(last_ > L(0.0), min(step, most_growth * last_), step);
   }
 
-  /// Which of the steps `h` that were solved are good enough; those that are not get a shorter one. decay(k): as of
-  /// LaneChain, pace: R h, squared.
-  template <class Decay>
-  Mask accepts(const Mask& which, const L& h, Decay decay, const L& pace_squared) {
-    const L size = 0.5 * log(max(pace_squared, L(tiny)));
+  /// Which of the steps `h` that were solved are good enough; those that are not get a shorter one.
+  template <class Stepper>
+  Mask accepts(const Mask& which, const L& h, Stepper& stepper) {
+    const auto decay = [&](int k) { return stepper.chain().decay(k); };
+    const L size = 0.5 * log(max(stepper.chain().pace_squared(), L(tiny)));
     log_error_ = log_error(decay, size) + L(std::log(safety)) - max(size, L(std::log(shortest)));
     const Mask good = log_error_ <= L(log_tolerance_);
     const Mask bad = which & !good;
@@ -56,8 +59,11 @@ class LaneController {
     steps_ = select(which, L(0.0), steps_);
   }
 
-  /// Steps h that were chosen were taken, to states of this tempo.
-  void move_on(const Mask& which, const L& h, const L& pace, const L& quickening) {
+  /// Steps h that were chosen were taken.
+  template <class Stepper>
+  void move_on(const Mask& which, const L& h, Stepper& stepper) {
+    L pace, quickening;
+    stepper.chain().tempo(pace, quickening);
     last_ = select(which, h, last_);
     const L next = fma(scale_, quickening, density_);
     const Mask follows = (next < farthest * pace) & (farthest * next > pace);

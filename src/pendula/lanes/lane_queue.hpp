@@ -2,22 +2,20 @@
 
 #include <algorithm>
 #include <optional>
-#include <pendula/lanes/lane_controller.hpp>
+#include <pendula/lanes/lane_explicit.hpp>
 #include <pendula/lanes/lane_member.hpp>
-#include <pendula/lanes/lane_rk4.hpp>
 #include <pendula/lanes/lane_sight.hpp>
 #include <pendula/lanes/lane_stepper.hpp>
 #include <pendula/lanes/lane_turns.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 
 namespace pendula {
 
-/// Moves the members of an ensemble of chains to their ends by steps of a LaneStepper or LaneRk4, as many at once as a
-/// register has lanes. A lane whose member has come to its end takes the next one: none is idle until the last have
-/// begun. What a member does depends on nothing but itself, to the last bit.
+/// Moves the members of an ensemble of chains to their ends by steps of a LaneStepper or LaneExplicit, as many at once
+/// as a register has lanes. A lane whose member has come to its end takes the next one: none is idle until the last
+/// have begun. What a member does depends on nothing but itself, to the last bit.
 ///
 /// A member that a fixed point cannot move ends where it is and says so; the others go on.
 template <class Stepper>
@@ -41,7 +39,7 @@ class LaneQueue {
         turns_(chain.links()) {}
 
   /// Who sees every step from now on, and may end a member or all.
-  void set_watch(LaneWatch& watch) requires(Stepper::is_implicit) {
+  void set_watch(LaneWatch& watch) {
     watch_ = &watch;
     if (watch.wants_steps()) sight_.emplace(stepper_, turns_);
   }
@@ -66,16 +64,7 @@ class LaneQueue {
   std::int64_t iterations() const requires(Stepper::is_implicit) { return stepper_.iterations(); }
 
  private:
-  struct NoSight {};
-  template <class Of>
-  static auto sight_of() {
-    if constexpr (Of::is_implicit) {
-      return std::type_identity<LaneSight<Of, LaneTurns<Space, N, L>>>();
-    } else {
-      return std::type_identity<NoSight>();
-    }
-  }
-  using Sight = typename decltype(sight_of<Stepper>())::type;
+  using Sight = LaneSight<Stepper, LaneTurns<Space, N, L>>;
 
   static constexpr double most_attempts = 40;  // at one step
   static constexpr double largest_energy_defect = 0.02;
@@ -94,12 +83,14 @@ class LaneQueue {
       if (options.enough > 0) given.enough = options.enough;
       return given;
     } else {
-      if (options.step == 0) throw std::invalid_argument("ensemble: expected a step for an explicit method");
+      if (options.step == 0 && !Stepper::can_choose) {
+        throw std::invalid_argument("ensemble: expected a step for a method that chooses none");
+      }
       return {};
     }
   }
 
-  bool chooses() const { return Stepper::is_implicit && options_.step == 0; }
+  bool chooses() const { return Stepper::can_choose && options_.step == 0; }
   Mask running() const { return running_ > L(0.0); }
   auto along() const {
     return [this](int i) -> const auto& {
@@ -115,11 +106,8 @@ class LaneQueue {
     const L h = select(running() & is_cut, remaining, wanted);
     const Mask found = stepper_.solve(h, running() & (h > smallest_step * remaining));
     Mask good = found, wrong = found & !found;
+    if (chooses()) good = controller_.accepts(found, h, stepper_);
     if constexpr (Stepper::is_implicit) {
-      if (chooses()) {
-        const auto decay = [&](int k) { return stepper_.chain().decay(k); };
-        good = controller_.accepts(found, h, decay, stepper_.chain().pace_squared());
-      }
       const Mask doubtful = good & stepper_.doubtful();
       if (xsimd::any(doubtful)) {
         wrong = accept_doubtful(good, doubtful);
@@ -137,7 +125,7 @@ class LaneQueue {
     attempts_ = select(good, L(0.0), attempts_);
     if (options_.energy_every > 0) watch_energy(good);
     const Mask is_finished = show(good, begin, is_cut);
-    if (chooses()) move_on(good, h);
+    if (chooses()) controller_.move_on(good, h, stepper_);
     const Mask bad = running() & !good;
     if (xsimd::any(bad)) reject(bad, found & !wrong, h, remaining);
     const Mask over = good & (is_cut | is_finished);
@@ -167,24 +155,12 @@ class LaneQueue {
     return wrong;
   }
 
-  void move_on(const Mask& good, const L& h) {
-    if constexpr (Stepper::is_implicit) {
-      L pace, quickening;
-      stepper_.chain().tempo(pace, quickening);
-      controller_.move_on(good, h, pace, quickening);
-    }
-  }
-
   // To whoever watches; gives whose motion is over.
   Mask show(const Mask& good, const L& begin, const Mask& is_cut) {
-    if constexpr (Stepper::is_implicit) {
-      if (sight_ && xsimd::any(good)) {
-        sight_->set(good, begin, select(is_cut, end_, time_.value));
-        watch_->after_step(*sight_);
-        return sight_->finished();
-      }
-    }
-    return good & !good;
+    if (!sight_ || !xsimd::any(good)) return good & !good;
+    sight_->set(good, begin, select(is_cut, end_, time_.value));
+    watch_->after_step(*sight_);
+    return sight_->finished();
   }
 
   void watch_energy(const Mask& good) {
@@ -267,9 +243,7 @@ class LaneQueue {
     time_.value.set(lane, next.start.time);
     end_.set(lane, next.end);
     for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &since_look_, &energy_error_}) zero->set(lane, 0);
-    if constexpr (Stepper::is_implicit) {
-      if (sight_) sight_->seat(lane, member);
-    }
+    if (sight_) sight_->seat(lane, member);
     running_.set(lane, 1);
     begins_.set(lane, 1);
   }
@@ -278,13 +252,7 @@ class LaneQueue {
   void begin() {
     const Mask begins = begins_ > L(0.0);
     begins_ = L(0.0);
-    if constexpr (Stepper::is_implicit) {
-      if (chooses()) {
-        L pace, quickening;
-        stepper_.chain().tempo(pace, quickening);
-        controller_.start(begins, pace, quickening);
-      }
-    }
+    if (chooses()) controller_.start(begins, stepper_);
     if (options_.energy_every > 0) energy_ = select(begins, stepper_.chain().energy(), energy_);
   }
 
@@ -303,7 +271,7 @@ class LaneQueue {
   ChainLinks<Space, N, double> links_;
   LaneOptions options_;
   Stepper stepper_;
-  LaneController<L, Stepper::stages> controller_;
+  typename Stepper::Controller controller_;
   LaneTurns<Space, N, L> turns_;
   std::span<const Member> members_;
   std::span<LaneEnd> ends_;
@@ -321,8 +289,8 @@ class LaneQueue {
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
 using GaussLanes = LaneQueue<LaneStepper<Space, S, N, Register>>;
 
-/// By explicit steps of order 4.
-template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
-using Rk4Lanes = LaneQueue<LaneRk4<Space, N, Register>>;
+/// By explicit steps.
+template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
+using ExplicitLanes = LaneQueue<LaneExplicit<Space, Method, N, Register>>;
 
 }  // namespace pendula

@@ -51,6 +51,13 @@ class LaneSight : public LaneSteps {
     view_at(share).read(lane, q, v);
   }
 
+  bool look(int lane, double share, double* q, double* v) override {
+    if constexpr (Stepper::is_implicit) return LaneSteps::look(lane, share, q, v);
+    look_now();
+    look_again(share).read(lane, q, v);
+    return true;
+  }
+
  private:
   static constexpr double nothing = -1;
   static constexpr std::size_t most_views = 10;
@@ -100,7 +107,19 @@ class LaneSight : public LaneSteps {
     View& view = views_[k];
     if (view.share == share) return view;
     view.share = share;
-    chain_.for_each_glance(share, [&](int i, const Vector& rod, const Vector& rate) {
+    chain_.for_each_glance(share, writer(view));
+    return view;
+  }
+
+  const View& look_again(double share) {
+    View& view = views_.back();  // of what was glanced at last
+    view.share = nothing;
+    if constexpr (!Stepper::is_implicit) chain_.for_each_look(share, writer(view));
+    return view;
+  }
+
+  auto writer(View& view) const {
+    return [this, &view](int i, const Vector& rod, const Vector& rate) {
       const std::size_t first = entry(i, 0);
       if constexpr (Space::dof == 1) {
         Turns::near(rod, L::load(now_.q[first].numbers)).store(view.q[first].numbers);
@@ -111,8 +130,7 @@ class LaneSight : public LaneSteps {
         };
         write_angles(i, rod, rate, now, view);
       }
-    });
-    return view;
+    };
   }
 
   // θ̇ of a rod in the plane.

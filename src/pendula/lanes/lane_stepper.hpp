@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <pendula/lanes/lane_chain.hpp>
+#include <pendula/lanes/lane_controller.hpp>
 #include <pendula/lanes/lane_stop.hpp>
 
 namespace pendula {
@@ -26,7 +27,8 @@ class LaneStepper {
   using Options = LaneStepperOptions;
   using SpaceType = Space;
   static constexpr int lanes = L::size, stages = S, links_known = N;
-  static constexpr bool is_implicit = true;
+  static constexpr bool is_implicit = true, can_choose = true;
+  using Controller = LaneController<L, S>;
 
   explicit LaneStepper(int links, LaneStepperOptions options = {})
       : chain_(links), options_(options), stop_(options.enough) {}

@@ -31,6 +31,8 @@ class LaneSteps {
   /// Where it was when a share of the step was done, 0 to 1, by the polynomial through the step's stages: cheap where
   /// several lanes ask for the same share.
   virtual void glance(int lane, double share, double* q, double* v) = 0;
+  /// The same at the full order of the method; false where that is for others to find.
+  virtual bool look(int /*lane*/, double /*share*/, double* /*q*/, double* /*v*/) { return false; }
   /// Its motion is over, whatever its time.
   virtual void finish(int lane) = 0;
 };
@@ -67,7 +69,7 @@ struct PlainMemberEnd {
   double energy_error;  ///< the largest |H − H_0| at every so many steps  [J]
 };
 
-/// Moves chains of one number of links and without loads by Gauss steps of `options`, a member in each lane; `every`
+/// Moves chains of one number of links and without loads by the steps of `options`, a member in each lane; `every`
 /// how many steps from one look at the energy to the next. What becomes of a member depends on that member alone, to
 /// the last bit. False where `watch` made it leave off.
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,

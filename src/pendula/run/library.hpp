@@ -17,8 +17,8 @@ struct SpaceLibrary {
   std::unique_ptr<PlainIntegrator> (*make_integrator)(const PlainChain&, const RunOptions&);
   /// The fixed-n kernels of this build, by number of links.
   std::span<const KernelEntry> kernels;
-  /// Members in lanes, by steps of a number of stages; nullptr for those that are moved one by one.
-  MoveMembers* (*lanes)(int stages);
+  /// Members in lanes; nullptr for methods and stages that move them one by one.
+  MoveMembers* (*lanes)(const RunOptions&);
 };
 
 /// The compiled library for one instruction set. There are several in one file, each compiled for itself; all that

@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-template <class Space, int S>
+template <class Space, class Queue>
 bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                   std::span<PlainMemberEnd> ends, LaneWatch& watch) {
   if (members.empty()) return true;
@@ -26,10 +26,10 @@ bool move_members(const RunOptions& options, std::int64_t every, std::span<const
     starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
   }
   LaneOptions asked;
-  asked.step = options.step;
+  asked.step = is_adaptive(options) ? 0 : options.step;
   asked.tolerance = options.tolerance;
   asked.energy_every = every;
-  GaussLanes<Space, S> queue(chains.front(), asked);
+  Queue queue(chains.front(), asked);
   queue.set_watch(watch);
   std::vector<LaneEnd> reached(members.size());
   const bool is_done = queue.run(starts, reached);
@@ -48,17 +48,35 @@ bool move_members(const RunOptions& options, std::int64_t every, std::span<const
 }
 
 template <class Space>
-MoveMembers* chain_lanes(int stages) {
+MoveMembers* gauss_lanes(int stages) {
   switch (stages) {
     case 4:
-      return &move_members<Space, 4>;
+      return &move_members<Space, GaussLanes<Space, 4>>;
 #ifndef PENDULA_FEW_LANES  // where sanitizers make minutes of their compilation
     case 2:
-      return &move_members<Space, 2>;
+      return &move_members<Space, GaussLanes<Space, 2>>;
     case 6:
-      return &move_members<Space, 6>;
+      return &move_members<Space, GaussLanes<Space, 6>>;
     case 8:
-      return &move_members<Space, 8>;
+      return &move_members<Space, GaussLanes<Space, 8>>;
+#endif
+    default:
+      return nullptr;
+  }
+}
+
+template <class Space>
+MoveMembers* chain_lanes(const RunOptions& options) {
+  switch (options.method) {
+    case Method::gauss:
+      return gauss_lanes<Space>(options.stages);
+    case Method::dopri5:
+      return &move_members<Space, ExplicitLanes<Space, DormandPrince5>>;
+#ifndef PENDULA_FEW_LANES
+    case Method::rk4:
+      return &move_members<Space, ExplicitLanes<Space, ClassicalRungeKutta>>;
+    case Method::fehlberg78:
+      return &move_members<Space, ExplicitLanes<Space, Fehlberg8>>;
 #endif
     default:
       return nullptr;
