@@ -46,19 +46,26 @@ std::vector<LaneMember<Planar, N>> members_of(int links, int count, double end, 
   return members;
 }
 
+// Of nine runs, a member's, sorted.
+template <class Queue, class Members>
+std::vector<double> times_of(Queue& queue, const Members& members, std::vector<LaneEnd>& ends) {
+  std::vector<double> times;
+  for (int run = 0; run < 9; ++run) {
+    const double start = processor_time();
+    queue.run(members, ends);
+    times.push_back((processor_time() - start) / static_cast<double>(members.size()));
+  }
+  std::sort(times.begin(), times.end());
+  return times;
+}
+
 // Medians over runs; energy errors are of one more run, relative to Σ M g l.
 template <class Queue, int N>
 void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<LaneMember<Planar, N>>& members,
              LaneOptions options) {
   std::vector<LaneEnd> ends(members.size());
   Queue queue(chain, options);
-  std::vector<double> times;
-  for (int run = 0; run < 9; ++run) {
-    const double start = processor_time();
-    queue.run(members, ends);
-    times.push_back(processor_time() - start);
-  }
-  std::sort(times.begin(), times.end());
+  const std::vector<double> times = times_of(queue, members, ends);
   double steps = 0, failed = 0;
   for (const LaneEnd& end : ends) {
     steps += static_cast<double>(end.steps);
@@ -71,12 +78,12 @@ void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<
   for (const LaneEnd& end : ends) energy = std::max(energy, end.energy_error / energy_scale(chain));
   const auto count = static_cast<double>(members.size());
   std::printf("%-34s %8.2f us a member (best %8.2f), %7.0f steps, %9.3g member-steps/s, energy %.1e, failed %.0f", what,
-              times[4] / count * 1e6, times[0] / count * 1e6, steps / count, steps / times[4], energy, failed);
+              times[4] * 1e6, times[0] * 1e6, steps / count, steps / (times[4] * count), energy, failed);
   if constexpr (requires { queue.iterations(); }) {
     const double iterations = static_cast<double>(queue.iterations()) / 9;
     std::printf(", %.2f iterations", iterations * Queue::lanes / steps);
     std::printf(", %.2f ns a link, stage, iteration and member",
-                times[4] * 1e9 / (iterations * Queue::lanes * chain.links() * Queue::stages));
+                times[4] * count * 1e9 / (iterations * Queue::lanes * chain.links() * Queue::stages));
   }
   std::printf("\n");
 }
@@ -124,13 +131,7 @@ void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<Lan
           const std::vector<LaneEnd>& reference, const LaneOptions& options) {
   std::vector<LaneEnd> ends(members.size());
   Queue queue(chain, options);
-  std::vector<double> times;
-  for (int run = 0; run < 9; ++run) {
-    const double start = processor_time();
-    queue.run(members, ends);
-    times.push_back((processor_time() - start) / static_cast<double>(members.size()));
-  }
-  std::sort(times.begin(), times.end());
+  const std::vector<double> times = times_of(queue, members, ends);
   std::printf("%-10s %s %-6.0e %7.2f us a member (best %7.2f), error %.1e\n", what,
               options.step > 0 ? "step     " : "tolerance", options.step > 0 ? options.step : options.tolerance,
               times[4] * 1e6, times[0] * 1e6, median_error(ends, reference));

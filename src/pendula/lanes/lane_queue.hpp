@@ -123,8 +123,8 @@ class LaneQueue {
     time_ = {select(good, later.value, time_.value), select(good, time_.low + later.low, time_.low)};
     steps_ = steps_ + select(good, L(1.0), L(0.0));
     attempts_ = select(good, L(0.0), attempts_);
-    if (options_.energy_every > 0) watch_energy(good);
     const Mask is_finished = show(good, begin, is_cut);
+    if (options_.energy_every > 0) watch_energy(good & !is_finished);  // who is finished is so within the step
     if (chooses()) controller_.move_on(good, h, stepper_);
     const Mask bad = running() & !good;
     if (xsimd::any(bad)) reject(bad, found & !wrong, h, remaining);
