@@ -224,9 +224,11 @@ TYPED_TEST(RunsInLanes, ExplicitMethodsGoThereToo) {
         setup.events.push_back({"x", [&, k](const Motion& motion) { return subject.observe(motion).points[k]; }});
       }
     }
+    if (method != Method::dopri5 && !lane_kind(setups[0])) continue;  // sanitized lanes have that one only
     const std::vector<RunReport> found = run_members(setups);
     std::int64_t happened = 0;
     for (std::size_t k = 0; k < setups.size(); ++k) {
+      ASSERT_TRUE(lane_kind(setups[k]));
       RunSetup exact = setups[k];
       exact.options = {.stages = 8, .step = 0, .tolerance = 1e-13};
       const RunReport expected = this->alone(exact);
