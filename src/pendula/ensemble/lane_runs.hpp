@@ -46,22 +46,7 @@ std::optional<LaneKind> lane_kind_in(const RunSetup& setup) {
   return kind;
 }
 
-/// About how fast a chain of one kind swings  [1/s]; none of others.
-template <class Space>
-std::optional<double> natural_pace_in(const Subject& subject) {
-  const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
-  if (found == nullptr) return {};
-  const Chain<Space>& chain = found->chain();
-  return chain.links() * std::sqrt(0.15 * std::abs(chain.gravity()) / chain.lengths().sum());
-}
-
 }  // namespace detail
-
-/// About how fast a chain swings  [1/s]; infinite for what is none.
-inline double natural_pace(const Subject& subject) {
-  const std::optional<double> planar = detail::natural_pace_in<Planar>(subject);
-  return planar ? *planar : detail::natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
-}
 
 /// The kind of a run that goes in lanes; none of others. Chains that gravity alone moves, by Gauss steps of the chain
 /// solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods. It depends on
