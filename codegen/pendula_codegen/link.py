@@ -196,15 +196,18 @@ class LinkKernel:
         terms = (factor.symbol * vector for factor, vector in zip(factors, vectors, strict=True))
         return sum(terms, zeros(self.model.dimension, 1))
 
-    def angles(self) -> list[str]:
-        """C++ for the coordinates of a direction u."""
+    def angles(self) -> list[tuple[str, str]]:
+        """C++ for (y, x) of each coordinate atan2(y, x) of a direction u."""
         u = Matrix([Symbol(f"u[{k}]") for k in range(self.model.dimension)])
         powers = [
             (lambda _, exponent: exponent == 2, lambda base, _: f"{base} * {base}"),
             (lambda _, exponent: exponent == Rational(1, 2), lambda base, _: f"sqrt({base})"),
         ]
-        printed = (cxxcode(angle, user_functions={"Pow": powers}) for angle in self.model.angles(u))
-        return [text.replace("std::", "") for text in printed]
+
+        def printed(part: Expr) -> str:
+            return cxxcode(part, user_functions={"Pow": powers}).replace("std::", "")
+
+        return [(printed(y), printed(x)) for y, x in (a.args for a in self.model.angles(u))]
 
     def trig_names(self) -> list[str]:
         return [f"{f.__name__}_{q}" for q in self.model.coordinates for f in (sin, cos)]

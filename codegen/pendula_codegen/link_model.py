@@ -14,7 +14,7 @@ class LinkModel:
 
     coordinates         angles of one link (dof symbols), absolute, rad
     direction           unit vector along the rod as a function of the coordinates, (dimension x 1)
-    angles              the inverse of direction: unit vector -> coordinates
+    angles              the inverse of direction: unit vector -> coordinates, each an atan2
     up                  unit vector against gravity, (dimension x 1)
     mass, length, damping   parameters of one link: kg, m, N m s
     gravity             parameter of the chain: m/s²

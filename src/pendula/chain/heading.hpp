@@ -59,14 +59,22 @@ Real unwrapped(const Real& x, const Real& near) {
   return x + turn * round((near - x) / turn);
 }
 
+/// Angles of a direction in space.
+template <class Real>
+struct SpatialAngles {
+  std::array<Real, 2> q;
+  bool opposite = false;  ///< whether sin θ is negative
+};
+
 /// Of (θ, φ) and (−θ, φ + π), which are the same direction, whichever lies nearer to `near`.
 template <class Real>
-std::array<Real, 2> nearest_angles(const std::array<Real, 2>& q, const std::array<Real, 2>& near) {
-  const Real minus_theta = -q[0], opposite = q[1] + half_turn<Real>();
+SpatialAngles<Real> nearest_angles(const std::array<Real, 2>& q, const std::array<Real, 2>& near) {
+  const Real minus_theta = -q[0], across = q[1] + half_turn<Real>();
   const std::array<Real, 2> same{unwrapped(q[0], near[0]), unwrapped(q[1], near[1])};
-  const std::array<Real, 2> other{unwrapped(minus_theta, near[0]), unwrapped(opposite, near[1])};
+  const std::array<Real, 2> other{unwrapped(minus_theta, near[0]), unwrapped(across, near[1])};
   const auto distance = [&](const auto& x) { return norm<Real>(x[0] - near[0], x[1] - near[1]); };
-  return distance(other) < distance(same) ? other : same;
+  const bool opposite = distance(other) < distance(same);
+  return {opposite ? other : same, opposite};
 }
 
 }  // namespace detail
@@ -79,35 +87,58 @@ std::array<Real, 1> user_coordinates(const Heading<Planar, Real>& heading, const
   return {detail::unwrapped(q[0], near[0])};
 }
 
+namespace detail {
+
+template <class Real>
+SpatialAngles<Real> spatial_angles(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
+  using std::atan2;
+  const auto& [u, u_dot] = heading;
+  std::array<Real, 2> q;
+  Spatial::Link::coordinates(u, q);
+  if (is_vertical(u)) {
+    const bool rests = is_vertical(u_dot);
+    q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
+  }
+  return nearest_angles(q, near);
+}
+
+}  // namespace detail
+
 /// The user's θ, φ of a direction, continuous with the angles `near` of a moment before.
 ///
 /// At the pole (sin θ < 32 ulp) φ is the plane in which the link moves, or what it was if the link rests.
 template <class Real>
 std::array<Real, 2> user_coordinates(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
-  using std::atan2;
-  const auto& [u, u_dot] = heading;
-  std::array<Real, 2> q;
-  Spatial::Link::coordinates(u, q);
-  if (detail::is_vertical(u)) {
-    const bool rests = detail::is_vertical(u_dot);
-    q[1] = rests ? near[1] : atan2(u_dot[1], u_dot[0]);
-  }
-  return detail::nearest_angles(q, near);
+  return detail::spatial_angles(heading, near).q;
 }
 
-/// The same with their rates; at the pole of space φ̇ is zero.
-template <class Space, class Real>
-LinkAngles<Space, Real> user_angles(const Heading<Space, Real>& heading, const std::array<Real, Space::dof>& near) {
-  using Link = typename Space::Link;
-  LinkAngles<Space, Real> angles;
+/// The user's angles and their rates.
+template <class Real>
+LinkAngles<Planar, Real> user_angles(const Heading<Planar, Real>& heading, const std::array<Real, 1>& near) {
+  using Link = Planar::Link;
+  LinkAngles<Planar, Real> angles;
   angles.q = user_coordinates(heading, near);
-  typename Link::template Trig<Real> trig;
-  Link::trig(angles.q, trig);
-  Real inverse(1);
-  if constexpr (Space::dof == 2) {
-    Real determinant;
-    Link::metric_determinant(trig, determinant);
-    inverse = detail::is_vertical(heading.u) ? Real(0) : Real(1 / determinant);
+  Link::Trig<Real> trig;
+  Link::trig_of(heading.u, trig);
+  Link::rates(trig, Real(1), heading.u_dot, angles.v);
+  return angles;
+}
+
+/// The same in space; at the pole φ̇ is zero.
+template <class Real>
+LinkAngles<Spatial, Real> user_angles(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
+  using Link = Spatial::Link;
+  const auto [q, opposite] = detail::spatial_angles(heading, near);
+  LinkAngles<Spatial, Real> angles{q, {}};
+  Link::Trig<Real> trig;
+  Real inverse(0);
+  if (detail::is_vertical(heading.u)) {
+    Link::trig(q, trig);
+  } else {
+    Link::trig_of(heading.u, trig);
+    if (opposite) trig = {-trig.sin_theta, trig.cos_theta, -trig.sin_phi, -trig.cos_phi};
+    Link::metric_determinant(trig, inverse);
+    inverse = Real(1) / inverse;
   }
   Link::rates(trig, inverse, heading.u_dot, angles.v);
   return angles;

@@ -33,10 +33,15 @@ class IterationChoice {
   bool is_automatic() const { return wanted_ == Iteration::automatic; }
 
   void begin_step() {
+    begin_look();
+    if (is_automatic() && is_time_for_trial() && may_win(other(preferred_))) active_ = other(preferred_);
+  }
+
+  /// A look back into a step: not the time for a trial, and no matter how the step was solved.
+  void begin_look() {
     active_ = preferred_;
     iterations_ = {};
     gave_up_ = false;
-    if (is_automatic() && is_time_for_trial() && may_win(other(preferred_))) active_ = other(preferred_);
   }
 
   template <class Numbers>

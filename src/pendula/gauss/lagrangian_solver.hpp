@@ -113,7 +113,10 @@ class LagrangianSolver {
   void forget() { stages_.forget(); }
   State glance(double time, double x) const { return stages_.glance(time, x); }
   void remember() { stages_.remember(); }
-  void return_to_start() { stages_.return_to_start(); }
+  void return_to_start() {
+    stages_.return_to_start();
+    choice_.begin_look();
+  }
   void save() { stages_.save(); }
   void restore() { stages_.restore(); }
 

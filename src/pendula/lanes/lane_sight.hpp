@@ -156,7 +156,7 @@ class LaneSight : public LaneSteps {
         heading.u[k] = along[k][lane];
         heading.u_dot[k] = moving[k][lane];
       }
-      const auto angles = user_angles<Space, double>(heading, near(lane));
+      const auto angles = user_angles(heading, near(lane));
       for (std::size_t a = 0; a < dof; ++a) {
         view.q[entry(i, a)].numbers[lane] = angles.q[a];
         view.v[entry(i, a)].numbers[lane] = angles.v[a];

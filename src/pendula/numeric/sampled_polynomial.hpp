@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -54,8 +52,10 @@ class BernsteinPolynomial {
 
   /// The one through values at the places of samples.
   static BernsteinPolynomial through(const Numbers& values) {
-    Numbers coefficients;
-    Eigen::Map<Vector>(coefficients.data()) = from_samples() * Eigen::Map<const Vector>(values.data());
+    Numbers coefficients{};
+    for (std::size_t j = 0; j < size; ++j) {
+      for (std::size_t k = 0; k < size; ++k) coefficients[k] += from_samples()[j][k] * values[j];
+    }
     return BernsteinPolynomial(coefficients);
   }
 
@@ -115,23 +115,29 @@ class BernsteinPolynomial {
   }
 
  private:
-  using Vector = Eigen::Matrix<double, size, 1>;
-  using Matrix = Eigen::Matrix<double, size, size>;
-
-  static const Matrix& from_samples() {
-    static const Matrix inverse = [] {
-      Matrix values;
-      for (std::size_t k = 0; k < size; ++k) {
-        Numbers unit{};
-        unit[k] = 1;
-        for (std::size_t j = 0; j < size; ++j) {
-          values(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) =
-              BernsteinPolynomial(unit)(sample_place(j));
-        }
-      }
-      return Matrix(values.inverse());
+  // Of the polynomials that are one at one place of samples and zero at the others.
+  static const std::array<Numbers, size>& from_samples() {
+    static const std::array<Numbers, size> found = [] {
+      std::array<Numbers, size> polynomials;
+      for (std::size_t j = 0; j < size; ++j) polynomials[j] = one_at(j);
+      return polynomials;
     }();
-    return inverse;
+    return found;
+  }
+
+  // The product of (x − a)/(x_j − a) over the places a of all others, each of which raises the degree by one.
+  static Numbers one_at(std::size_t j) {
+    Numbers b{1};
+    double degree = 0;
+    for (std::size_t other = 0; other < size; ++other) {
+      if (other == j) continue;
+      const double a = sample_place(other), scale = 1 / ((sample_place(j) - a) * ++degree);
+      for (std::size_t k = static_cast<std::size_t>(degree) + 1; k-- > 0;) {
+        const double raised = k == 0 ? 0 : static_cast<double>(k) * (1 - a) * b[k - 1];
+        b[k] = scale * (raised - (degree - static_cast<double>(k)) * a * b[k]);
+      }
+    }
+    return b;
   }
 
   Numbers b_;

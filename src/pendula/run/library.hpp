@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <pendula/chain/plain_chain.hpp>
 #include <pendula/lanes/plain_lanes.hpp>
@@ -29,6 +30,9 @@ struct Library {
   std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" where there is one only
   SpaceLibrary planar, spatial;
   std::span<const SystemEntry* const> systems;  ///< kernels of this build that are no chains
+  /// Makes directions, (rows, count) numbers row by row, an orthonormal basis of what the first of them span, for any
+  /// number of them; `lengths`, (count), gets |R_kk| of the QR decomposition, by Householder reflections.
+  void (*make_orthonormal)(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
 };
 
 /// The library for the best instruction set that this processor has, or for the lesser one that the environment

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +9,7 @@
 #include <limits>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/library.hpp>
 #include <pendula/run/simulation.hpp>
 #include <random>
 #include <stdexcept>
@@ -108,9 +108,9 @@ class LyapunovTangents {
 
   void make_orthonormal() {
     const double span = time_ - history_.back().time;
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(tangents_);
-    const Eigen::VectorXd grown = qr.matrixQR().diagonal().cwiseAbs().array().max(smallest).log();
-    tangents_ = qr.householderQ() * Eigen::MatrixXd::Identity(tangents_.rows(), tangents_.cols());
+    Eigen::VectorXd grown(tangents_.cols());
+    library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+    grown = grown.array().max(smallest).log().matrix().eval();
     if (history_.size() > 1) {
       sums_ += grown;
       const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());
@@ -138,16 +138,22 @@ class LyapunovTangents {
     spectrum.errors = Eigen::VectorXd::Constant(sums_.size(), std::numeric_limits<double>::infinity());
     if (!(span > 0)) return;
     spectrum.exponents = (sums_at(time_) - sums_at(from)) / span;
-    Eigen::ArrayXd worst = Eigen::ArrayXd::Zero(sums_.size());
+    Eigen::VectorXd worst = Eigen::VectorXd::Zero(sums_.size());
     for (const int blocks : {8, 16, 32}) {
-      Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(sums_.size());
+      Eigen::VectorXd squares = Eigen::VectorXd::Zero(sums_.size());
       for (int k = 0; k < blocks; ++k) {
-        const Eigen::VectorXd gained = sums_at(from + span * (k + 1) / blocks) - sums_at(from + span * k / blocks);
-        squares += (gained * (blocks / span) - spectrum.exponents).array().square();
+        Eigen::VectorXd gained = sums_at(from + span * (k + 1) / blocks);
+        gained -= sums_at(from + span * k / blocks);
+        for (Eigen::Index i = 0; i < gained.size(); ++i) {
+          const double off = gained[i] * (blocks / span) - spectrum.exponents[i];
+          squares[i] += off * off;
+        }
       }
-      worst = worst.max(squares / (blocks * (blocks - 1)));
+      for (Eigen::Index i = 0; i < worst.size(); ++i) {
+        worst[i] = std::max(worst[i], squares[i] / (blocks * (blocks - 1)));
+      }
     }
-    spectrum.errors = (worst + 9 / (span * span)).sqrt();
+    for (Eigen::Index i = 0; i < worst.size(); ++i) spectrum.errors[i] = std::sqrt(worst[i] + 9 / (span * span));
   }
 
   static void sort(LyapunovSpectrum& spectrum) {

@@ -1,0 +1,10 @@
+#pragma once
+
+#include <cstddef>
+
+namespace pendula {
+
+/// As Library::make_orthonormal.
+void make_orthonormal(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
+
+}  // namespace pendula
