@@ -46,10 +46,12 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
     if (!has(what == "final" ? "t" : "energy")) add_last(quantities, what == "points");
     return;
   }
-  const std::array<std::pair<std::string_view, Column>, 3> single = {{
+  const std::array<std::pair<std::string_view, Column>, 5> single = {{
       {"energy_error", {{"energy_error", "1"}, Source::energy_error}},
       {"energy", {{"energy_start", energy}, Source::energy_start}},
       {"steps", {{"steps", "1", true}, Source::steps}},
+      {"ftle", {{"ftle", "1/" + second}, Source::ftle}},
+      {"megno", {{"megno", "1"}, Source::megno}},
   }};
   for (const auto& [name, column] : single) {
     if (what != name) continue;
@@ -65,7 +67,7 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
   const auto event = std::ranges::find_if(
       events, [&](const io::EventPlan& each) { return what == std::string(event_prefix) + each.name; });
   if (event == events.end()) {
-    std::string known = "final, points, energy, energy_error, steps, lyapunov";
+    std::string known = "final, points, energy, energy_error, steps, lyapunov, ftle, megno";
     for (const io::EventPlan& each : events) known += ", " + std::string(event_prefix) + each.name;
     throw io::InputError(place + ": expected some of " + known + ", got \"" + what + '"');
   }
@@ -92,11 +94,13 @@ std::vector<io::EnsembleColumn> Kept::columns() const {
   return columns;
 }
 
-bool Kept::lyapunov() const {
-  return std::ranges::any_of(columns_, [](const Column& each) { return each.source == Source::exponent; });
+bool Kept::chaos() const {
+  return std::ranges::any_of(columns_, [](const Column& each) {
+    return each.source == Source::exponent || each.source == Source::ftle || each.source == Source::megno;
+  });
 }
 
-void Kept::append(const Subject& subject, const RunReport& report, double exponent, double exponent_error,
+void Kept::append(const Subject& subject, const RunReport& report, const LyapunovSpectrum& spectrum,
                   std::vector<double>& row) const {
   std::vector<double> last;
   subject.append_row(report.last, subject.observe(report.last), last);
@@ -121,10 +125,16 @@ void Kept::append(const Subject& subject, const RunReport& report, double expone
         row.push_back(static_cast<double>(report.events[each.index].count));
         break;
       case Source::exponent:
-        row.push_back(exponent);
+        row.push_back(spectrum.exponents[0]);
         break;
       case Source::exponent_error:
-        row.push_back(exponent_error);
+        row.push_back(spectrum.errors[0]);
+        break;
+      case Source::ftle:
+        row.push_back(spectrum.ftle);
+        break;
+      case Source::megno:
+        row.push_back(spectrum.megno);
         break;
     }
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/subject.hpp>
 #include <string>
@@ -21,14 +22,26 @@ class Kept {
        const std::optional<io::NaturalUnits>& natural);
 
   std::vector<io::EnsembleColumn> columns() const;
-  bool lyapunov() const;
+  /// Whether anything is kept that tangents tell.
+  bool chaos() const;
 
-  /// Appends the numbers of a member; of its exponent and the error where that is kept.
-  void append(const Subject& subject, const RunReport& report, double exponent, double exponent_error,
+  /// Appends the numbers of a member; `spectrum` is looked at where `chaos`.
+  void append(const Subject& subject, const RunReport& report, const LyapunovSpectrum& spectrum,
               std::vector<double>& row) const;
 
  private:
-  enum class Source { last, energy_start, energy_error, steps, event_time, event_count, exponent, exponent_error };
+  enum class Source {
+    last,
+    energy_start,
+    energy_error,
+    steps,
+    event_time,
+    event_count,
+    exponent,
+    exponent_error,
+    ftle,
+    megno
+  };
 
   struct Column {
     io::EnsembleColumn column;

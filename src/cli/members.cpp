@@ -150,9 +150,9 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
     events.reserve(scenario.events.size());
     for (const io::EventPlan& event : scenario.events) events.push_back(event.name);
     const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
-    const auto [exponent, error] = kept_.lyapunov() ? leading_exponent(scenario) : std::pair(0.0, 0.0);
+    const LyapunovSpectrum spectrum = kept_.chaos() ? leading_exponent(scenario) : LyapunovSpectrum();
     rows.push_back(io::member_status(ending.status));
-    kept_.append(*subject, report, exponent, error, rows);
+    kept_.append(*subject, report, spectrum, rows);
     return ending.message;
   };
   std::string problem = member.problem;
@@ -168,16 +168,16 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
 }
 
 template <class Scenario>
-std::pair<double, double> MemberRuns::leading_exponent(const Scenario& scenario) const {
+LyapunovSpectrum MemberRuns::leading_exponent(const Scenario& scenario) const {
   const double step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  const LyapunovSpectrum found = told_at_keys(scenario, scenarios_.text().name, [&] {
+  LyapunovSpectrum found = told_at_keys(scenario, scenarios_.text().name, [&] {
     const auto integrator = subject_of(scenario)->make_integrator(scenario.run);
     return find_lyapunov_spectrum(
         *integrator, scenario.start, step, scenario.duration, 1, [](const LyapunovProgress&) {},
         [&] { return guard_.interrupted(); });
   });
   if (found.result.stopped) throw Interrupted();
-  return {found.exponents[0], found.errors[0]};
+  return found;
 }
 
 }  // namespace pendula::cli

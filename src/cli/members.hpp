@@ -97,7 +97,7 @@ class MemberRuns {
   RunReport run_alone(const Scenario& scenario, RunSetup setup) const;
   std::string append(const Member& member, std::vector<double>& rows) const;
   template <class Scenario>
-  std::pair<double, double> leading_exponent(const Scenario& scenario) const;
+  LyapunovSpectrum leading_exponent(const Scenario& scenario) const;
 
   MemberScenarios& scenarios_;
   const io::EnsemblePlan& plan_;

@@ -367,15 +367,21 @@ def test_a_member_that_cannot_be_moved_loses_nobody_else(tmp_path):
         assert b"chain.masses[2]: expected" in opened["message"][0]
 
 
-def test_exponents_are_kept(tmp_path):
+def test_exponents_are_kept(pendula, tmp_path):
     scenario = MAP.replace("count = 31", "count = 3").replace("count = 17", "count = 2")
-    done = run(tmp_path, "--set", 'ensemble.keep=["lyapunov"]', "--set", "run.duration=20", scenario=scenario)
+    keep = 'ensemble.keep=["lyapunov", "ftle", "megno"]'
+    done = run(tmp_path, "--set", keep, "--set", "run.duration=20", scenario=scenario)
     assert done.status == 0, done.err
     with h5py.File(tmp_path / "out.h5") as opened:
         exponent, error = opened["lyapunov"][...], opened["lyapunov:error"][...]
-        assert opened["lyapunov"].attrs["units"] == "1/s"
+        ftle, megno = opened["ftle"][...], opened["megno"][...]
+        assert opened["lyapunov"].attrs["units"] == opened["ftle"].attrs["units"] == "1/s"
+        start = [f"{key}={float(opened[key][0])!r}" for key in ("start.theta[1]", "start.theta[2]")]
     assert (error > 0).all()
     assert exponent[0].max() > 0.5  # from upside down it is chaotic
+    change = [word for each in (*start, "run.duration=20") for word in ("--set", each)]
+    alone = pendula("lyapunov", "scenario.toml", *change, "--count", "1", "--json").json
+    assert (ftle[0, 0], megno[0, 0]) == (alone["ftle"], alone["megno"])
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ class RoundoffStop {
   // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding; of
   // those that are as small as a last bit, half the way on a scale of powers will do.
   bool has_stalled(double rate, double exponent) const {
-    if (last_[0] > small_) return false;
+    if (last_[0] > small_ || (rate < 0.5 && last_[0] > epsilon_)) return false;
     const double average = std::pow(best_ / first_, exponent);
     return rate >= std::max(0.5, (1 + average) / 2) || (last_[0] <= epsilon_ && rate >= std::sqrt(average));
   }
