@@ -22,6 +22,7 @@ class LagrangianJacobians {
 
   explicit LagrangianJacobians(int stages) : at_(static_cast<std::size_t>(stages)) {}
 
+  int stages() const { return static_cast<int>(at_.size()); }
   Stage& operator[](int i) { return at_[index(i)]; }
   const Stage& operator[](int i) const { return at_[index(i)]; }
 
@@ -49,11 +50,10 @@ class LagrangianJacobians {
   }
 
   /// ∂(residual i)/∂V_k, by the chain rule through Q_j = … + h a_jk V_k.
-  Matrix block(const Stages& stages, int i, int k) const {
-    const auto& columns = stages.columns();
+  Matrix block(const typename Stages::Columns& columns, int i, int k) const {
     Matrix block = columns.ha(index(i), index(k)) * (at_[index(i)].p_D_q - at_[index(k)].f_D_v);
     if (i == k) block += at_[index(i)].p_D_v;
-    for (int j = 0; j < stages.stages(); ++j) {
+    for (int j = 0; j < columns.stages(); ++j) {
       block -= (columns.ha(index(i), index(j)) * columns.ha(index(j), index(k))) * at_[index(j)].f_D_q;
     }
     return block;

@@ -28,7 +28,7 @@ class LagrangianNewton {
     for (int i = 0; i < stages.stages(); ++i) push(stages, i);
     for (int i = 0; i < stages.stages(); ++i) {
       system_.residual(i) = residual(stages, i);
-      for (int j = 0; j < stages.stages(); ++j) system_.block(i, j) = jacobians_.block(stages, i, j);
+      for (int j = 0; j < stages.stages(); ++j) system_.block(i, j) = jacobians_.block(stages.columns(), i, j);
     }
     system_.solve();
     return apply(stages);

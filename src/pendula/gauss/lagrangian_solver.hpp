@@ -101,7 +101,7 @@ class LagrangianSolver {
 
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<S, Width>;
-  Tangent make_tangent() const { return Tangent(stages_.model(), stages_.stages()); }
+  Tangent make_tangent() const { return Tangent(stages_); }
   void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
 
   State state(double time) const { return {time, stages_.position_with_turns(), stages_.velocity(time)}; }

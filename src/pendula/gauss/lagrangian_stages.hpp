@@ -36,6 +36,7 @@ class LagrangianStages {
   using Vector = typename S::template Vector<double>;
   using Matrix = typename S::template Matrix<double>;
   using Model = SystemModel<S>;
+  using Columns = detail::StageColumns<Eigen::Dynamic, double, Width>;
   /// One number a lane.
   using Stored = double[static_cast<std::size_t>(Width)];
 
@@ -44,7 +45,7 @@ class LagrangianStages {
   }
 
   const Model& model() const { return model_; }
-  const detail::StageColumns<Eigen::Dynamic, double, Width>& columns() const { return columns_; }
+  const Columns& columns() const { return columns_; }
   int stages() const { return columns_.stages(); }
   double time_of(int stage) const { return time_ + columns_.h() * columns_.c(static_cast<std::size_t>(stage)); }
 
@@ -403,7 +404,7 @@ class LagrangianStages {
   }
 
   Model model_;
-  detail::StageColumns<Eigen::Dynamic, double, Width> columns_;
+  Columns columns_;
   typename S::template Parameters<L> parameters_;
   typename S::template Inputs<L> inputs_;
   alignas(pack_alignment) Stored U_[2 * count]{};

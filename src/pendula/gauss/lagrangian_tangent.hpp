@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <pendula/gauss/lagrangian_direction.hpp>
 #include <pendula/gauss/lagrangian_jacobians.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
 #include <pendula/numeric/dual.hpp>
@@ -62,40 +63,38 @@ class ParameterSlopes {
 /// are varied by what is constant through the step; both in the order of their names.
 ///
 /// With C what the end of the step changes by with V, and A Newton's matrix, E = −C A⁻¹ is what it changes by with the
-/// residuals of the stages: everything else follows by products.
+/// residuals of the stages: everything else follows by products. A few tangents take less by themselves, each by a
+/// fixed point on what the stages of it are, all of them in the lanes of SIMD registers (lagrangian_direction.hpp).
 template <System S, int Width>
 class LagrangianTangent {
  public:
   using Real = double;
   using Stages = LagrangianStages<S, Width>;
 
-  LagrangianTangent(const SystemModel<S>& model, int stages)
-      : model_(model), jacobians_(stages), system_(K * stages), of_residuals_(K * stages, 2 * K), stages_(stages) {
-    state_.setIdentity();
-  }
+  explicit LagrangianTangent(const Stages& stages)
+      : model_(stages.model()),
+        columns_(stages.columns()),
+        jacobians_(stages.stages()),
+        system_(K * stages.stages()),
+        of_residuals_(K * stages.stages(), 2 * K) {}
 
   static constexpr int size() { return 2 * K; }
   static constexpr int parameters() { return ParameterSlopes<S>::count; }
 
   /// The derivative of the step whose stages are found and that was not accepted yet.
   void linearize(const Stages& stages) {
-    jacobians_.evaluate(stages);
-    find_response(stages);
-    state_.setIdentity();
-    for (int j = 0; j < stages_; ++j) state_.template block<K, K>(K, 0) += hb(j) * jacobians_[j].f_D_q;
-    for (int i = 0; i < stages_; ++i) {
-      Matrix of_position = jacobians_[i].p_D_q;
-      for (int j = 0; j < stages_; ++j) of_position -= ha(i, j) * jacobians_[j].f_D_q;
-      const auto response = of_residuals_.template middleRows<K>(K * i);
-      state_.template leftCols<K>() += response.transpose().lazyProduct(of_position);
-      state_.template rightCols<K>() -= response.transpose();
-    }
-    has_parameters_ = false;
-    for (int i = 0; i < stages_; ++i) times_[index(i)] = stages.time_of(i);
+    columns_.prepare(stages.columns().h(), 0);
+    direction_.linearize(stages);
+    for (int i = 0; i < columns_.stages(); ++i) times_[index(i)] = stages.time_of(i);
+    has_state_ = has_parameters_ = false;
   }
 
   /// Replaces tangents at the start of the step, (size x count) row by row, by those at its end.
-  void push(double* tangents, int count) { replace(tangents, count, state_); }
+  void push(double* tangents, int count) {
+    if (!has_state_ && count <= K && direction_.push(columns_, tangents, count)) return;
+    find_state();
+    replace(tangents, count, state_);
+  }
 
   /// The same where parameters are varied, too, by (parameters x count).
   void push(double* tangents, int count, const double* parameters) {
@@ -106,7 +105,10 @@ class LagrangianTangent {
 
   /// The transpose: replaces gradients with respect to the end of the step, (size x count), by those with respect to
   /// its start.
-  void pull(double* gradients, int count) { replace(gradients, count, state_.transpose()); }
+  void pull(double* gradients, int count) {
+    find_state();
+    replace(gradients, count, state_.transpose());
+  }
 
   /// Adds those with respect to the parameters, too, to (parameters x count).
   void pull(double* gradients, int count, double* parameters) {
@@ -121,23 +123,38 @@ class LagrangianTangent {
   using State = Eigen::Matrix<double, 2 * K, 2 * K>;
 
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
-  double hb(int j) const { return hb_[index(j)]; }
-  double ha(int i, int j) const { return ha_[index(i * stages_ + j)]; }
+  double hb(int j) const { return columns_.hb(index(j)); }
+  double ha(int i, int j) const { return columns_.ha(index(i), index(j)); }
+
+  // Only where a few tangents are not all that is asked for.
+  void find_state() {
+    if (has_state_) return;
+    has_state_ = true;
+    direction_.read(jacobians_);
+    find_response();
+    state_.setIdentity();
+    const int stages = columns_.stages();
+    for (int j = 0; j < stages; ++j) state_.template block<K, K>(K, 0) += hb(j) * jacobians_[j].f_D_q;
+    for (int i = 0; i < stages; ++i) {
+      Matrix of_position = jacobians_[i].p_D_q;
+      for (int j = 0; j < stages; ++j) of_position -= ha(i, j) * jacobians_[j].f_D_q;
+      const auto response = of_residuals_.template middleRows<K>(K * i);
+      state_.template leftCols<K>() += response.transpose().lazyProduct(of_position);
+      state_.template rightCols<K>() -= response.transpose();
+    }
+  }
 
   // Eᵀ, of Aᵀ Eᵀ = −Cᵀ: rows of stage i are what its residual does to (q, p) at the end.
-  void find_response(const Stages& stages) {
-    for (int i = 0; i < stages_; ++i) {
-      hb_[index(i)] = stages.columns().hb(index(i));
-      for (int j = 0; j < stages_; ++j) ha_[index(i * stages_ + j)] = stages.columns().ha(index(i), index(j));
-    }
-    for (int k = 0; k < stages_; ++k) {
+  void find_response() {
+    const int stages = columns_.stages();
+    for (int k = 0; k < stages; ++k) {
       Matrix pushed = hb(k) * jacobians_[k].f_D_v;
-      for (int j = 0; j < stages_; ++j) pushed += (hb(j) * ha(j, k)) * jacobians_[j].f_D_q;
+      for (int j = 0; j < stages; ++j) pushed += (hb(j) * ha(j, k)) * jacobians_[j].f_D_q;
       auto rows = of_residuals_.template middleRows<K>(K * k);
       rows.template leftCols<K>() = -hb(k) * Matrix::Identity();
       rows.template rightCols<K>() = -pushed.transpose();
-      for (int i = 0; i < stages_; ++i) {
-        system_.matrix.template block<K, K>(K * k, K * i) = jacobians_.block(stages, i, k).transpose();
+      for (int i = 0; i < stages; ++i) {
+        system_.matrix.template block<K, K>(K * k, K * i) = jacobians_.block(columns_, i, k).transpose();
       }
     }
     system_.solve(of_residuals_.data(), 2 * K);
@@ -146,15 +163,17 @@ class LagrangianTangent {
   // Only where somebody asks.
   void find_parameters() {
     if (has_parameters_) return;
+    find_state();
     has_parameters_ = true;
     of_parameters_.setZero();
-    for (int i = 0; i < stages_; ++i) {
+    const int stages = columns_.stages();
+    for (int i = 0; i < stages; ++i) {
       slopes_[index(i)].evaluate(model_, times_[index(i)], jacobians_[i].q, jacobians_[i].v);
       of_parameters_.template bottomRows<K>() += hb(i) * slopes_[index(i)].f;
     }
-    for (int i = 0; i < stages_; ++i) {
+    for (int i = 0; i < stages; ++i) {
       auto residual = slopes_[index(i)].p;
-      for (int j = 0; j < stages_; ++j) residual -= ha(i, j) * slopes_[index(j)].f;
+      for (int j = 0; j < stages; ++j) residual -= ha(i, j) * slopes_[index(j)].f;
       of_parameters_ += of_residuals_.template middleRows<K>(K * i).transpose().lazyProduct(residual);
     }
   }
@@ -187,15 +206,16 @@ class LagrangianTangent {
   static constexpr std::size_t held = static_cast<std::size_t>(2 * K) * together;
 
   SystemModel<S> model_;
+  typename Stages::Columns columns_;
+  LagrangianDirection<S, Width> direction_;
   LagrangianJacobians<S, Width> jacobians_;
   LinearSystem system_;
   Eigen::MatrixXd of_residuals_;
-  int stages_;
   State state_;
   Eigen::Matrix<double, 2 * K, ParameterSlopes<S>::count> of_parameters_;
   std::array<ParameterSlopes<S>, static_cast<std::size_t>(Width)> slopes_;
-  std::array<double, static_cast<std::size_t>(Width)> hb_{}, times_{};
-  std::array<double, static_cast<std::size_t>(Width* Width)> ha_{};
+  std::array<double, static_cast<std::size_t>(Width)> times_{};
+  bool has_state_ = false;
   bool has_parameters_ = false;
 };
 
