@@ -297,7 +297,7 @@ class ChainStages {
 
   /// Moves the state to the end of the step.
   void accept() {
-    if (turn_ > far_turn) follow_stages();
+    follow_turns();
     move();
     ++steps_;
     if (steps_ % restoring_interval_ == 0) {
@@ -341,21 +341,13 @@ class ChainStages {
   State<Space, N, Real> glance(double time, double x) const {
     State<Space, N, Real> state = empty_state(time);
     const Real h(last_h_);
-    const auto rate_at = columns_.rate_at(Real(x), h);
-    const int legs = 1 + static_cast<int>(turn_ * std::abs(x) / far_turn);
+    const auto rate_at = columns_.rate_at(Real(x), h), up_to = columns_.up_to(Real(x));
     for (int i = 0; i < links(); ++i) {
-      const Real* z = state_.remembered_free(i);
+      const Real *along = state_.remembered_along(i), *z = state_.remembered_free(i);
       const Numbers rate = components<D>([&](std::size_t k) { return z[k] + weighed(rate_at, stages_[i] + k * Z); });
+      const Numbers rod = rod_in_step(along, z, i, Real(h * Real(x)), up_to), low{};
       AngleAnchor<Space, Real> anchor = remembered_anchors_[i];
-      Numbers rod{}, low{};
-      for (int leg = 1; leg <= legs; ++leg) {
-        const Real at = Real(x) * Real(leg) / Real(legs);
-        const auto up_to = columns_.up_to(at);
-        for (std::size_t k = 0; k < D; ++k) {
-          rod[k] = state_.remembered_along(i)[k] + (h * at * z[k] + weighed(up_to, stages_[i] + k * Z));
-        }
-        anchor.follow(scaled(constants_[i].inverse_length, rod));
-      }
+      if (may_leave(anchor, i, along, turn_ * std::abs(x))) follow_turn(anchor, along, z, i, h, Real(x), rod);
       read_angles(i, RodState<Space, N, Real>::heading_of(rod.data(), low.data(), rate), anchor, state);
     }
     return state;
@@ -377,9 +369,6 @@ class ChainStages {
   static constexpr double farthest_extrapolation = 1.5;
   // (h ω)² from which on a step does not resolve the chain's swinging.
   static constexpr double unresolved_swing = 4;
-
-  // Radians in a step, from which on angles are followed from stage to stage.
-  static constexpr double far_turn = 0.5;
 
   // Where in the block of a link what stands; [number][stage].
   static constexpr std::size_t multiplier_at = D * Z, rod_at = (D + 1) * Z, freed_at = (2 * D + 1) * Z,
@@ -563,15 +552,59 @@ class ChainStages {
     return scale > 0 ? scale : 1;
   }
 
-  void follow_stages() {
+  // Of the step whose stages are known, from a rod on with z: the rod after some of the time, for which `up_to` is.
+  Numbers rod_in_step(const Real* along, const Real* z, int i, const Real& time, const Weights& up_to) const {
+    return components<D>([&](std::size_t k) { return along[k] + (time * z[k] + weighed(up_to, stages_[i] + k * Z)); });
+  }
+
+  // Whether a link may turn so far from where a step began that its anchor does not hold it.
+  bool may_leave(const AngleAnchor<Space, Real>& anchor, int i, const Real* along, double turn) const {
+    using std::sqrt;
+    const Numbers off =
+        components<D>([&](std::size_t k) { return along[k] * constants_[i].inverse_length - anchor.direction()[k]; });
+    const Real farthest = sqrt(dot(off, off)) + Real(1.5 * turn);
+    return farthest * farthest > anchor.reach_squared();
+  }
+
+  // Takes an anchor from a rod on through the stages to x of the step, where it is at `end`; where the stages are too
+  // far apart for that, by a pole, along the polynomial through them.
+  void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, const Real* z, int i, const Real& h,
+                   const Real& x, const Numbers& end) const {
+    const Real& inverse_length = constants_[i].inverse_length;
+    alignas(pack_alignment) Real u[D][2 * Z];
+    L squared(Real(0));
+    for (std::size_t k = 0; k < D; ++k) {
+      const L moved = columns_.integral(stages_[i] + k * Z, L(h * z[k]) * columns_.c());
+      const L direction = L(inverse_length) * (L(along[k]) + moved), off = direction - L(anchor.direction()[k]);
+      direction.store(u[k]);
+      squared = fma(off, off, squared);
+    }
+    std::size_t before = 0;
+    while (before < S && columns_.c(before) < x) ++before;
+    Real farthest(0);
+    for (std::size_t k = 0; k < D; ++k) {
+      u[k][before] = inverse_length * end[k];
+      const Real off = u[k][before] - anchor.direction()[k];
+      farthest += off * off;
+    }
+    alignas(pack_alignment) Real stored[Z];
+    squared.store(stored);
+    for (std::size_t j = 0; j < before; ++j) farthest = std::max(farthest, stored[j]);
+    if (farthest <= anchor.reach_squared() || anchor.follow_through(u, before + 1)) return;
+    const auto direction_at = [&](const Real& at) {
+      return scaled(inverse_length, rod_in_step(along, z, i, h * at, columns_.up_to(at)));
+    };
+    anchor.follow_path(direction_at, x);
+  }
+
+  // Of the step that is solved.
+  void follow_turns() {
     for (int i = 0; i < links(); ++i) {
-      alignas(pack_alignment) Real rod[D][Z];
-      const Vector placed = place(i).rod;
-      for (std::size_t k = 0; k < D; ++k) placed[k].store(rod[k]);
-      for (std::size_t j = 0; j < S; ++j) {
-        anchors_[i].follow(
-            components<D>([&](std::size_t k) { return Real(rod[k][j] * constants_[i].inverse_length); }));
-      }
+      const Real *along = state_.along(i), *z = state_.free(i);
+      if (!may_leave(anchors_[i], i, along, turn_)) continue;
+      Numbers end = totals(increments(i));
+      for (std::size_t k = 0; k < D; ++k) end[k] = along[k] + (columns_.h() * z[k] + end[k]);
+      follow_turn(anchors_[i], along, z, i, columns_.h(), Real(1), end);
     }
   }
 

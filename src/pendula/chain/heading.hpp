@@ -45,10 +45,16 @@ Real norm(const Real& x, const Real& y) {
   return sqrt(x * x + y * y);
 }
 
+/// What is the horizontal part of a vertical unit vector, at most: rounding.
+template <class Real>
+Real vertical() {
+  return 32 * std::numeric_limits<Real>::epsilon();
+}
+
 /// Whether a vector has no horizontal part, but for rounding.
 template <class Real>
 bool is_vertical(const std::array<Real, 3>& x) {
-  return norm(x[0], x[1]) < 32 * std::numeric_limits<Real>::epsilon();
+  return norm(x[0], x[1]) < vertical<Real>();
 }
 
 /// x moved by full turns to within half a turn of `near`.
@@ -160,15 +166,58 @@ class AngleAnchor {
 
   /// The link has moved on to u, not far from where it was last followed to.
   void follow(const Cartesian& u) {
-    Real squared(0);
-    for (std::size_t k = 0; k < u.size(); ++k) squared += (u[k] - u_[k]) * (u[k] - u_[k]);
-    if (squared <= reach_squared_) return;
-    Heading<Space, Real> heading;
-    heading.u = u;
-    heading.u_dot.fill(Real(0));
-    set(u, user_coordinates(heading, q_));
+    if (leaves(u)) move_to(u);
   }
 
+  /// The link has moved on through these directions, component after component. False, and it is where it was, where
+  /// one is farther about the axis from the one before than that only one way there could be.
+  template <std::size_t most>
+  bool follow_through(const Real (&directions)[Space::dimension][most], std::size_t count) {
+    Real x = u_[0], y = u_[1], turned(0);
+    for (std::size_t j = 0; j < count; ++j) {
+      const Real next_x = directions[0][j], next_y = directions[1][j];
+      const Real along = x * next_x + y * next_y, across = x * next_y - y * next_x;
+      if (!(along > 0 && across * across < 3 * along * along)) return false;  // a sixth of a turn
+      const Real slope = across / along;
+      turned += slope / (1 + Real(0.28) * slope * slope);  // arctangent to 0.005
+      x = next_x;
+      y = next_y;
+    }
+    Cartesian u;
+    for (std::size_t k = 0; k < u.size(); ++k) u[k] = directions[k][count - 1];
+    turn_to(u, turned);
+    return true;
+  }
+
+  /// The link has moved on to u, and turned by about so much in the plane, or about the axis  [rad].
+  void turn_to(const Cartesian& u, const Real& turned) {
+    q_.back() += turned;
+    move_to(u);
+  }
+
+  /// The link has moved along direction(share), share from 0, where the anchor holds it, to `end`: followed in parts so
+  /// short that angles near those before are the only ones. So which side of a pole it has come by, and how often, does
+  /// not depend on where steps end.
+  template <class Direction>
+  void follow_path(Direction direction, const Real& end) {
+    move_to(direction(Real(0)));
+    Real share(0), part(1);  // of the end
+    while (share < 1) {
+      const Real next = share + part < 1 ? share + part : Real(1);
+      const Cartesian u = direction(next * end);
+      if (leaves(u) && part > shortest_part) {
+        part /= 2;
+        continue;
+      }
+      move_to(u);
+      share = next;
+      part *= 2;
+    }
+  }
+
+  /// Where it was last followed to, and how far from there, squared, angles near its own are the only ones.
+  const Cartesian& direction() const { return u_; }
+  const Real& reach_squared() const { return reach_squared_; }
   const Angles& angles() const { return q_; }
 
   template <class Numbers>
@@ -177,12 +226,31 @@ class AngleAnchor {
   }
 
  private:
-  // Within it, angles near the anchor's are the only ones: in space a quarter of the distance from the axis.
+  // Of a path: a pole that is passed within less of it is passed through.
+  static constexpr double shortest_part = 1.0 / (1 << 20);
+
+  bool leaves(const Cartesian& u) const {
+    Real squared(0);
+    for (std::size_t k = 0; k < u.size(); ++k) squared += (u[k] - u_[k]) * (u[k] - u_[k]);
+    return squared > reach_squared_;
+  }
+
+  void move_to(const Cartesian& u) {
+    Heading<Space, Real> heading;
+    heading.u = u;
+    heading.u_dot.fill(Real(0));
+    set(u, user_coordinates(heading, q_));
+  }
+
+  // Within it, angles near the anchor's are the only ones: in space a quarter of the distance from the axis, and at the
+  // pole as far as directions are all vertical.
   void set_reach() {
     if constexpr (Space::dof == 1) {
       reach_squared_ = Real(1);
     } else {
-      reach_squared_ = (u_[0] * u_[0] + u_[1] * u_[1]) / 16;
+      const Real quarter = detail::norm(u_[0], u_[1]) / 4;
+      const Real reach = quarter < detail::vertical<Real>() ? detail::vertical<Real>() : quarter;
+      reach_squared_ = reach * reach;
     }
   }
 

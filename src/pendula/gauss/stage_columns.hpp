@@ -53,6 +53,7 @@ class StageColumns {
   Real hb(std::size_t j) const { return hb_[j]; }
   Real ha(std::size_t i, std::size_t j) const { return m_[j][i] * hb_[j]; }
 
+  L c() const { return L::load(c_); }
   L hb() const { return L::load(hb_); }          ///< h b
   L hc() const { return L::load(hc_); }          ///< h c
   L hc_low() const { return L::load(hc_low_); }  ///< what hc lost to rounding

@@ -134,7 +134,7 @@ class LaneQueue {
 
   void accept(const Mask& good) {
     stepper_.accept(good);
-    turns_.follow(good, along());
+    turns_.follow(good, good & !good, stepper_);
   }
 
   // Whose energy does not balance has come to stages that are not those of the motion.
@@ -149,9 +149,7 @@ class LaneQueue {
     chain.restore(wrong);
     stepper_.forget(wrong);
     const Mask right = good & !wrong;
-    const Mask far = right & stepper_.turns_far();
-    for (int j = 0; j < Stepper::stages; ++j) turns_.follow(far, [&](int i) { return chain.along(i, j); });
-    turns_.follow(right, along());
+    turns_.follow(right, right & stepper_.turns_far(), stepper_);
     return wrong;
   }
 

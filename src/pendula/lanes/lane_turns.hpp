@@ -33,21 +33,22 @@ class LaneTurns {
     }
   }
 
-  /// The rods of these members have moved on by less than half a turn.
-  template <class Along>
-  void follow(const Mask& which, Along along) {
+  /// These members have taken a step by which links have turned less than half a turn; `far` are those that may have
+  /// gone far and come back.
+  template <class Stepper>
+  void follow(const Mask& which, const Mask& far, Stepper& stepper) {
+    auto& chain = stepper.chain();
+    Mask any = far;
     for (int i = 0; i < links_; ++i) {
-      const std::array<L, D>& rod = along(i);
-      Turn& turn = turns_[i];
-      L squared(0.0), length(0.0);
-      for (std::size_t k = 0; k < D; ++k) {
-        const L moved = rod[k] - turn.at[k];
-        squared = fma(moved, moved, squared);
-        length = fma(rod[k], rod[k], length);
-      }
-      const Mask far = which & (squared > turn.reach * length);
-      if (xsimd::any(far)) [[unlikely]]
-        follow_far(far, turn, rod);
+      const Mask leaving = far | (which & leaves(turns_[i], chain.along(i)));
+      turns_[i].begin(leaving);
+      any = any | leaving;
+    }
+    if (!xsimd::any(any)) return;
+    go_through_step(stepper);
+    for (int i = 0; i < links_; ++i) {
+      turns_[i].pass(chain.along(i));
+      end_step(i, chain);
     }
   }
 
@@ -59,6 +60,28 @@ class LaneTurns {
     std::array<AngleAnchor<Space>, lanes> anchors;
     std::array<L, D> at{};  // where they were last followed to
     L reach{0.0};           // how far angles near the anchor's are the only ones, in lengths, squared
+    // Of a step: who leaves; the rod on the way and what it has turned about the axis; whether places on the way were
+    // so close that this is known.
+    L leaving{0.0}, x{0.0}, y{0.0}, turned{0.0}, known{1.0};
+
+    void begin(const Mask& leaves) {
+      leaving = select(leaves, L(1.0), L(0.0));
+      x = at[0];
+      y = at[1];
+      turned = L(0.0);
+      known = L(1.0);
+    }
+
+    // As AngleAnchor::follow_through.
+    void pass(const std::array<L, D>& rod) {
+      const L along = x * rod[0] + y * rod[1], across = x * rod[1] - y * rod[0];
+      const Mask close = (along > L(0.0)) & (across * across < 3 * (along * along));
+      known = select(close, known, L(0.0));
+      const L slope = across / along;
+      turned = turned + select(close, slope / fma(L(0.28), slope * slope, L(1.0)), L(0.0));
+      x = rod[0];
+      y = rod[1];
+    }
   };
 
   static std::array<double, D> direction(int lane, const std::array<L, D>& rod) {
@@ -74,22 +97,62 @@ class LaneTurns {
 
   static void note(Turn& turn, int lane, const std::array<L, D>& rod) {
     for (std::size_t k = 0; k < D; ++k) turn.at[k].set(lane, rod[k][lane]);
-    double reach = 1;
-    if constexpr (Space::dof == 2) {
-      const auto u = direction(lane, rod);
-      reach = (u[0] * u[0] + u[1] * u[1]) / 16;
-    }
-    turn.reach.set(lane, reach);
+    turn.reach.set(lane, turn.anchors[static_cast<std::size_t>(lane)].reach_squared());
   }
 
-  [[gnu::noinline]] void follow_far(const Mask& far, Turn& turn, const std::array<L, D>& rod) {
-    alignas(pack_alignment) double is_far[lanes];
-    select(far, L(1.0), L(0.0)).store(is_far);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      if (is_far[lane] == 0) continue;
-      turn.anchors[lane].follow(direction(static_cast<int>(lane), rod));
-      note(turn, static_cast<int>(lane), rod);
+  static Mask leaves(const Turn& turn, const std::array<L, D>& rod) {
+    L squared(0.0), length(0.0);
+    for (std::size_t k = 0; k < D; ++k) {
+      const L moved = rod[k] - turn.at[k];
+      squared = fma(moved, moved, squared);
+      length = fma(rod[k], rod[k], length);
     }
+    return squared > turn.reach * length;
+  }
+
+  template <class Stepper>
+  void go_through_step(Stepper& stepper) {
+    auto& chain = stepper.chain();
+    if constexpr (Stepper::is_implicit) {
+      for (int j = 0; j < Stepper::stages; ++j) {
+        for (int i = 0; i < links_; ++i) turns_[i].pass(chain.along(i, j));
+      }
+    } else {
+      for (const double share : {0.2, 0.4, 0.6, 0.8}) {
+        chain.for_each_glance(share, [&](int i, const std::array<L, D>& rod, const auto&) { turns_[i].pass(rod); });
+      }
+    }
+  }
+
+  template <class Chain>
+  void end_step(int i, Chain& chain) {
+    Turn& turn = turns_[i];
+    for (std::size_t at = 0; at < lanes; ++at) {
+      const int lane = static_cast<int>(at);
+      if (turn.leaving[lane] == 0) continue;
+      AngleAnchor<Space>& anchor = turn.anchors[at];
+      const std::array<double, D> u = direction(lane, chain.along(i));
+      if (turn.known[lane] != 0) {
+        anchor.turn_to(u, turn.turned[lane]);
+      } else {
+        follow_path(lane, i, chain);
+        anchor.follow(u);
+      }
+      note(turn, lane, chain.along(i));
+    }
+  }
+
+  // By a pole: along the polynomial of the member's step.
+  template <class Chain>
+  [[gnu::noinline]] void follow_path(int lane, int i, Chain& chain) {
+    const auto direction_at = [&](double share) {
+      std::array<double, D> u{};
+      chain.for_each_glance(share, [&](int link, const std::array<L, D>& rod, const auto&) {
+        if (link == i) u = direction(lane, rod);
+      });
+      return u;
+    };
+    turns_[i].anchors[static_cast<std::size_t>(lane)].follow_path(direction_at, 1.0);
   }
 
   int links_;
@@ -113,22 +176,17 @@ class LaneTurns<Planar, N, L> {
     }
   }
 
-  template <class Along>
-  void follow(const Mask& which, Along along) {
-    for (int i = 0; i < links_; ++i) {
-      const std::array<L, 2>& rod = along(i);
-      Turn& turn = turns_[i];
-      const auto [x, y] = turn.at;
-      // Not by ^, which xsimd 8.1 takes for | on the masks of AVX-512.
-      const Mask was_left = x < L(0.0), is_left = rod[0] < L(0.0),
-                 crosses = which & ((was_left & !is_left) | (is_left & !was_left));
-      if (xsimd::any(crosses)) {
-        const L side = y * rod[0] - rod[1] * x;  // of where it crosses the vertical, times the way to the right
-        turn.count = turn.count + select(crosses & is_left & (side < L(0.0)), L(1.0), L(0.0)) -
-                     select(crosses & was_left & (side > L(0.0)), L(1.0), L(0.0));
+  /// These members have taken a step by which links have turned less than half a turn; `far` are those whose stages
+  /// are looked at, too.
+  template <class Stepper>
+  void follow(const Mask& which, const Mask& far, Stepper& stepper) {
+    auto& chain = stepper.chain();
+    if constexpr (Stepper::is_implicit) {
+      if (xsimd::any(far)) {
+        for (int j = 0; j < Stepper::stages; ++j) pass(far, [&](int i) { return chain.along(i, j); });
       }
-      for (std::size_t k = 0; k < 2; ++k) turn.at[k] = select(which, rod[k], turn.at[k]);
     }
+    pass(which, [&](int i) { return chain.along(i); });
   }
 
   std::array<double, 1> angles(int lane, int i) const {
@@ -149,6 +207,24 @@ class LaneTurns<Planar, N, L> {
     std::array<L, 2> at{L(0.0), L(-1.0)};  // the rod when it was last followed
     L count{0.0};
   };
+
+  template <class Along>
+  void pass(const Mask& which, Along along) {
+    for (int i = 0; i < links_; ++i) {
+      const std::array<L, 2> rod = along(i);
+      Turn& turn = turns_[i];
+      const auto [x, y] = turn.at;
+      // Not by ^, which xsimd 8.1 takes for | on the masks of AVX-512.
+      const Mask was_left = x < L(0.0), is_left = rod[0] < L(0.0),
+                 crosses = which & ((was_left & !is_left) | (is_left & !was_left));
+      if (xsimd::any(crosses)) {
+        const L side = y * rod[0] - rod[1] * x;  // of where it crosses the vertical, times the way to the right
+        turn.count = turn.count + select(crosses & is_left & (side < L(0.0)), L(1.0), L(0.0)) -
+                     select(crosses & was_left & (side > L(0.0)), L(1.0), L(0.0));
+      }
+      for (std::size_t k = 0; k < 2; ++k) turn.at[k] = select(which, rod[k], turn.at[k]);
+    }
+  }
 
   static constexpr double full_turn = 2 * std::numbers::pi;
 
