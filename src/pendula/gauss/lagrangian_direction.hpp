@@ -77,7 +77,7 @@ class LagrangianDirection {
 
   static constexpr int most_iterations = 50;
   // Corrections, relative, of which the next is below rounding; and those that have stopped shrinking by rounding.
-  static constexpr double negligible = 4e-16, rounding = 1e-12;
+  static constexpr double negligible = 4e-16, rounding = 1e-14;
 
   static constexpr Eigen::Index at(std::size_t k) { return static_cast<Eigen::Index>(k); }
 
