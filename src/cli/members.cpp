@@ -59,6 +59,7 @@ struct MemberRuns::Member {
   std::string problem;
   std::optional<RunSetup> setup;  // of one that waits for others
   RunReport report;
+  std::optional<LyapunovSpectrum> exponent;  // where it is kept, and was found together with those of others
 };
 
 io::DoneChunk MemberRuns::run(const Chunk& members) const {
@@ -70,6 +71,7 @@ io::DoneChunk MemberRuns::run(const Chunk& members) const {
     if (all.back().setup) waiting.push_back(*all.back().setup);
   }
   std::vector<RunReport> reports = run_members(waiting, [&] { return guard_.interrupted(); });
+  if (kept_.chaos()) find_exponents(all);
   auto next = reports.begin();
   io::DoneChunk done;
   done.members = members;
@@ -133,6 +135,22 @@ RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpress
   return setup;
 }
 
+// Of the members that go in lanes with a tangent.
+void MemberRuns::find_exponents(std::vector<Member>& all) const {
+  std::vector<RunSetup> setups;
+  std::vector<Member*> members;
+  for (Member& member : all) {
+    if (!member.scenario) continue;
+    RunSetup setup = std::visit([](const auto& read) { return member_setup(read); }, *member.scenario);
+    if (plan_.chooses_method) setup.options = quickest_with_tangents(setup);
+    setups.push_back(std::move(setup));
+    members.push_back(&member);
+  }
+  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(setups, [&] { return guard_.interrupted(); });
+  if (found.size() < members.size()) throw Interrupted();
+  for (std::size_t k = 0; k < members.size(); ++k) members[k]->exponent = std::move(found[k]);
+}
+
 template <class Scenario>
 RunReport MemberRuns::run_alone(const Scenario& scenario, RunSetup setup) const {
   Run one = told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
@@ -150,7 +168,8 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
     events.reserve(scenario.events.size());
     for (const io::EventPlan& event : scenario.events) events.push_back(event.name);
     const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
-    const LyapunovSpectrum spectrum = kept_.chaos() ? leading_exponent(scenario) : LyapunovSpectrum();
+    LyapunovSpectrum spectrum;
+    if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
     rows.push_back(io::member_status(ending.status));
     kept_.append(*subject, report, spectrum, rows);
     return ending.message;

@@ -93,6 +93,7 @@ class MemberRuns {
   Member member(std::int64_t number, io::SharedExpressions& shared) const;
   Member member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const;
   RunSetup setup_of(const io::AnyScenario& scenario, io::SharedExpressions& shared) const;
+  void find_exponents(std::vector<Member>& all) const;
   template <class Scenario>
   RunReport run_alone(const Scenario& scenario, RunSetup setup) const;
   std::string append(const Member& member, std::vector<double>& rows) const;

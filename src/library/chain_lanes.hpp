@@ -13,4 +13,11 @@ MoveMembers* chain_lanes(const RunOptions& options);
 extern template MoveMembers* chain_lanes<Planar>(const RunOptions&);
 extern template MoveMembers* chain_lanes<Spatial>(const RunOptions&);
 
+/// The same with a tangent of each member, by explicit methods.
+template <class Space>
+MoveMembers* tangent_lanes(const RunOptions& options);
+
+extern template MoveMembers* tangent_lanes<Planar>(const RunOptions&);
+extern template MoveMembers* tangent_lanes<Spatial>(const RunOptions&);
+
 }  // namespace pendula

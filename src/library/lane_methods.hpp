@@ -65,22 +65,40 @@ MoveMembers* gauss_lanes(int stages) {
   }
 }
 
-template <class Space>
-MoveMembers* chain_lanes(const RunOptions& options) {
-  switch (options.method) {
-    case Method::gauss:
-      return gauss_lanes<Space>(options.stages);
+/// Queue<Method>: what moves members by an explicit method.
+template <class Space, template <class> class Queue>
+MoveMembers* explicit_lanes(Method method) {
+  switch (method) {
     case Method::dopri5:
-      return &move_members<Space, ExplicitLanes<Space, DormandPrince5>>;
+      return &move_members<Space, Queue<DormandPrince5>>;
 #ifndef PENDULA_FEW_LANES
     case Method::rk4:
-      return &move_members<Space, ExplicitLanes<Space, ClassicalRungeKutta>>;
+      return &move_members<Space, Queue<ClassicalRungeKutta>>;
     case Method::fehlberg78:
-      return &move_members<Space, ExplicitLanes<Space, Fehlberg8>>;
+      return &move_members<Space, Queue<Fehlberg8>>;
 #endif
     default:
       return nullptr;
   }
+}
+
+template <class Space>
+struct LanesOf {
+  template <class Method>
+  using Plain = ExplicitLanes<Space, Method>;
+  template <class Method>
+  using WithTangent = TangentLanes<Space, Method>;
+};
+
+template <class Space>
+MoveMembers* chain_lanes(const RunOptions& options) {
+  if (options.method == Method::gauss) return gauss_lanes<Space>(options.stages);
+  return explicit_lanes<Space, LanesOf<Space>::template Plain>(options.method);
+}
+
+template <class Space>
+MoveMembers* tangent_lanes(const RunOptions& options) {
+  return explicit_lanes<Space, LanesOf<Space>::template WithTangent>(options.method);
 }
 
 }  // namespace pendula

@@ -129,8 +129,8 @@ Real dot(const std::array<Real, D>& a, const std::array<Real, D>& b) {
 }
 
 /// a x.
-template <class Real, std::size_t D>
-std::array<Real, D> scaled(const Real& a, const std::array<Real, D>& x) {
+template <class Factor, class Real, std::size_t D>
+std::array<Real, D> scaled(const Factor& a, const std::array<Real, D>& x) {
   return components<D>([&](std::size_t k) { return a * x[k]; });
 }
 

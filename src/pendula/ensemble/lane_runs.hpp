@@ -62,12 +62,50 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
   return planar ? planar : detail::lane_kind_in<Spatial>(setup);
 }
 
+namespace detail {
+
+/// The members of runs of one kind, as the compiled library takes them, and what becomes of them.
+template <class Space>
+class PlainMembers {
+ public:
+  /// `setups` must outlive it.
+  explicit PlainMembers(std::span<const RunSetup* const> setups)
+      : q_(setups[0]->start.q.size(), static_cast<Eigen::Index>(setups.size())), v_(q_.rows(), q_.cols()) {
+    for (std::size_t k = 0; k < setups.size(); ++k) {
+      const Motion& start = setups[k]->start;
+      const Chain<Space>& chain = static_cast<const ChainSubject<Space>&>(*setups[k]->subject).chain();
+      const double end = start.time + setups[k]->duration;
+      members_.push_back({plain(chain, {}), start.time, end, start.q.data(), start.v.data()});
+      ends_.push_back({&q_(0, static_cast<Eigen::Index>(k)), &v_(0, static_cast<Eigen::Index>(k)), 0, {}, 0, 0, 0});
+    }
+  }
+
+  /// False where `watch` made it leave off.
+  bool move(MoveMembers& move_members, const RunOptions& options, std::int64_t every, LaneWatch& watch) {
+    return move_members(options, every, members_, ends_, watch);
+  }
+
+  const PlainMemberEnd& end(std::size_t k) const { return ends_[k]; }
+  Motion last(std::size_t k) const {
+    const auto column = static_cast<Eigen::Index>(k);
+    return {ends_[k].time, q_.col(column), v_.col(column)};
+  }
+
+ private:
+  Eigen::MatrixXd q_, v_;
+  std::vector<PlainMember> members_;
+  std::vector<PlainMemberEnd> ends_;
+};
+
+}  // namespace detail
+
 /// Runs of one kind, in lanes.
 template <class Space>
 class LaneRuns : private LaneWatch {
  public:
   /// `setups`, all of one lane_kind, must outlive it.
-  LaneRuns(std::span<const RunSetup* const> setups, const std::function<bool()>& stop) : setups_(setups), stop_(stop) {
+  LaneRuns(std::span<const RunSetup* const> setups, const std::function<bool()>& stop)
+      : setups_(setups), stop_(stop), members_(setups) {
     watches_.reserve(setups.size());
     for (const RunSetup* setup : setups) {
       watches_.emplace_back(setup->events, detail::glance_degree(setup->options));
@@ -91,34 +129,18 @@ class LaneRuns : private LaneWatch {
   }
 
  private:
-  const Chain<Space>& chain(std::size_t k) const {
-    return static_cast<const ChainSubject<Space>&>(*setups_[k]->subject).chain();
-  }
-
   void move() {
     const RunSetup& first = *setups_[0];
-    const Eigen::Index coordinates = Space::dof * chain(0).links();
-    Eigen::MatrixXd q(coordinates, static_cast<Eigen::Index>(setups_.size())), v = q;
-    std::vector<PlainMember> members;
+    stopped_ = !members_.move(*library_of<Space>().lanes(first.options), first.options, first.every, *this);
     for (std::size_t k = 0; k < setups_.size(); ++k) {
-      const RunSetup& setup = *setups_[k];
-      const Motion& start = setup.start;
-      members.push_back({plain(chain(k), {}), start.time, start.time + setup.duration, start.q.data(), start.v.data()});
-      ends_.push_back({&q(0, static_cast<Eigen::Index>(k)), &v(0, static_cast<Eigen::Index>(k)), 0, {}, 0, 0, 0});
-    }
-    MoveMembers* const move_members = library_of<Space>().lanes(first.options);
-    stopped_ = !move_members(first.options, first.every, members, ends_, *this);
-    for (std::size_t k = 0; k < setups_.size(); ++k) {
-      if (reports_[k].end == RunEnd::event) continue;
-      const auto column = static_cast<Eigen::Index>(k);
-      reports_[k].last = Motion(ends_[k].time, q.col(column), v.col(column));
+      if (reports_[k].end != RunEnd::event) reports_[k].last = members_.last(k);
     }
   }
 
   /// What a run would report; false where it did not come to its end.
   bool finish(std::size_t k) {
     const RunSetup& setup = *setups_[k];
-    const PlainMemberEnd& end = ends_[k];
+    const PlainMemberEnd& end = members_.end(k);
     RunReport& report = reports_[k];
     const Subject& subject = *setup.subject;
     const Observation before = subject.observe(setup.start), after = subject.observe(report.last);
@@ -225,7 +247,7 @@ class LaneRuns : private LaneWatch {
   std::span<const RunSetup* const> setups_;
   const std::function<bool()>& stop_;
   std::vector<EventWatch> watches_;
-  std::vector<PlainMemberEnd> ends_;
+  detail::PlainMembers<Space> members_;
   std::vector<RunReport> reports_;
   std::vector<Alone> alone_;  // of each lane
   bool wants_steps_ = false, stopped_ = false;

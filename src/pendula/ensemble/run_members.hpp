@@ -1,13 +1,16 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
 #include <map>
 #include <optional>
+#include <pendula/ensemble/lane_exponents.hpp>
 #include <pendula/ensemble/lane_runs.hpp>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/run_report.hpp>
 #include <span>
@@ -33,6 +36,23 @@ inline double natural_pace(const Subject& subject) {
   return planar ? *planar : natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
 }
 
+// Which of some runs can take lanes together.
+using RunsByKind = std::map<LaneKind, std::vector<std::size_t>>;
+
+inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, const std::vector<std::size_t>& numbers) {
+  std::vector<const RunSetup*> some;
+  some.reserve(numbers.size());
+  for (const std::size_t k : numbers) some.push_back(&setups[k]);
+  return some;
+}
+
+// Whether an explicit method loses no more energy in a run, step by step, than the motion's errors are, and how much
+// longer the run is.
+inline constexpr double short_run = 100;
+inline double run_length(const RunSetup& setup) {
+  return setup.duration * natural_pace(*setup.subject);
+}
+
 }  // namespace detail
 
 /// The options of a run, or those of an explicit method where lanes come to the same errors sooner by that: a Gauss run
@@ -42,11 +62,42 @@ inline double natural_pace(const Subject& subject) {
 inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   RunOptions options = setup.options;
   const bool fits = options.method == Method::gauss && options.step == 0 && options.tolerance >= 1e-9 &&
-                    setup.events.empty() && setup.duration * detail::natural_pace(*setup.subject) <= 100;
+                    setup.events.empty() && detail::run_length(setup) <= detail::short_run;
   if (!fits || !lane_kind(setup)) return options;
   options.method = Method::fehlberg78;
   options.tolerance *= 0.01;
   return options;
+}
+
+/// The same for the leading exponent of a run, however long that is: the longer, the smaller the tolerance, so that no
+/// more of the energy is lost in all.
+inline RunOptions quickest_with_tangents(const RunSetup& setup) {
+  RunOptions options = setup.options;
+  if (options.method != Method::gauss || options.step != 0 || !lane_kind(setup)) return options;
+  options.method = Method::fehlberg78;
+  const double longer = std::max(1.0, detail::run_length(setup) / detail::short_run);
+  options.tolerance = std::max(1e-13, 0.01 * options.tolerance / longer);
+  return options;
+}
+
+/// The leading Lyapunov exponents of those of the runs that explicit methods move in lanes, each over the whole of its
+/// duration, with one tangent; of others, and of those that could not be moved so, none. Empty where it was stopped.
+inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
+    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; }) {
+  detail::RunsByKind kinds;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    const auto kind = is_explicit(setups[k].options.method) ? lane_kind(setups[k]) : std::nullopt;
+    if (kind) kinds[*kind].push_back(k);
+  }
+  std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
+  for (const auto& [kind, numbers] : kinds) {
+    const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
+    auto found = kind.dimension == Planar::dimension ? detail::LaneExponents<Planar>(alike, stop).go()
+                                                     : detail::LaneExponents<Spatial>(alike, stop).go();
+    if (found.empty()) return {};
+    for (std::size_t k = 0; k < numbers.size(); ++k) exponents[numbers[k]] = std::move(found[k]);
+  }
+  return exponents;
 }
 
 /// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. A report
@@ -54,7 +105,7 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
 inline std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; }) {
   std::vector<RunReport> reports(setups.size());
-  std::map<LaneKind, std::vector<std::size_t>> kinds;
+  detail::RunsByKind kinds;
   for (std::size_t k = 0; k < setups.size(); ++k) {
     if (const auto kind = lane_kind(setups[k])) {
       kinds[*kind].push_back(k);
@@ -63,9 +114,7 @@ inline std::vector<RunReport> run_members(
     }
   }
   for (const auto& [kind, numbers] : kinds) {
-    std::vector<const RunSetup*> alike;
-    alike.reserve(numbers.size());
-    for (const std::size_t k : numbers) alike.push_back(&setups[k]);
+    const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
     std::vector<RunReport> found =
         kind.dimension == Planar::dimension ? LaneRuns<Planar>(alike, stop).go() : LaneRuns<Spatial>(alike, stop).go();
     for (std::size_t k = 0; k < numbers.size(); ++k) reports[numbers[k]] = std::move(found[k]);

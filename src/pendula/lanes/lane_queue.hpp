@@ -93,9 +93,7 @@ class LaneQueue {
   bool chooses() const { return Stepper::can_choose && options_.step == 0; }
   Mask running() const { return running_ > L(0.0); }
   auto along() const {
-    return [this](int i) -> const auto& {
-      return stepper_.chain().along(i);
-    };
+    return [this](int i) -> decltype(auto) { return stepper_.chain().along(i); };
   }
 
   // One step of all members.
@@ -157,6 +155,7 @@ class LaneQueue {
   Mask show(const Mask& good, const L& begin, const Mask& is_cut) {
     if (!sight_ || !xsimd::any(good)) return good & !good;
     sight_->set(good, begin, select(is_cut, end_, time_.value));
+    if constexpr (Stepper::has_tangent) sight_->set_growth(stepper_.take_growth(good));
     watch_->after_step(*sight_);
     return sight_->finished();
   }
@@ -289,6 +288,10 @@ using GaussLanes = LaneQueue<LaneStepper<Space, S, N, Register>>;
 
 /// By explicit steps.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
-using ExplicitLanes = LaneQueue<LaneExplicit<Space, Method, N, Register>>;
+using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register>, Method>>;
+
+/// The same with a tangent of each member, whose growth a watch is told of.
+template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
+using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register, true>, Method>>;
 
 }  // namespace pendula

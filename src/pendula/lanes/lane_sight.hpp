@@ -31,6 +31,8 @@ class LaneSight : public LaneSteps {
     now_.share = nothing;
     for (View& view : views_) view.share = nothing;
   }
+  /// What their tangents have grown by, as logarithms.
+  void set_growth(const L& growth) { growth.store(growth_); }
   void seat(int lane, std::size_t member) { members_[lane] = member; }
   Mask finished() const { return L::load(finished_) > L(0.0); }
 
@@ -40,6 +42,7 @@ class LaneSight : public LaneSteps {
   double begin(int lane) const override { return begin_[lane]; }
   double end(int lane) const override { return end_[lane]; }
   void finish(int lane) override { finished_[lane] = 1; }
+  double growth(int lane) const override { return growth_[lane]; }
 
   void state(int lane, double* q, double* v) override {
     look_now();
@@ -167,6 +170,7 @@ class LaneSight : public LaneSteps {
   typename Stepper::Chain& chain_;
   const Turns& turns_;
   alignas(pack_alignment) double took_[width] = {}, begin_[width] = {}, end_[width] = {}, finished_[width] = {};
+  alignas(pack_alignment) double growth_[width] = {};
   std::size_t members_[width] = {};
   View now_;  // the state
   std::vector<View> views_;

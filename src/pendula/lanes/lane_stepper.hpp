@@ -27,7 +27,7 @@ class LaneStepper {
   using Options = LaneStepperOptions;
   using SpaceType = Space;
   static constexpr int lanes = L::size, stages = S, links_known = N;
-  static constexpr bool is_implicit = true, can_choose = true;
+  static constexpr bool is_implicit = true, can_choose = true, has_tangent = false;
   using Controller = LaneController<L, S>;
 
   explicit LaneStepper(int links, LaneStepperOptions options = {})

@@ -33,6 +33,8 @@ class LaneSteps {
   virtual void glance(int lane, double share, double* q, double* v) = 0;
   /// The same at the full order of the method; false where that is for others to find.
   virtual bool look(int /*lane*/, double /*share*/, double* /*q*/, double* /*v*/) { return false; }
+  /// The logarithm of how its tangent has grown in the step; 0 where members are moved without.
+  virtual double growth(int lane) const = 0;
   /// Its motion is over, whatever its time.
   virtual void finish(int lane) = 0;
 };

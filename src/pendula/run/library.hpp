@@ -20,6 +20,8 @@ struct SpaceLibrary {
   std::span<const KernelEntry> kernels;
   /// Members in lanes; nullptr for methods and stages that move them one by one.
   MoveMembers* (*lanes)(const RunOptions&);
+  /// The same with a tangent of each; nullptr for methods that have none.
+  MoveMembers* (*tangent_lanes)(const RunOptions&);
 };
 
 /// The compiled library for one instruction set. There are several in one file, each compiled for itself; all that

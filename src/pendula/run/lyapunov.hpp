@@ -34,110 +34,52 @@ struct LyapunovSpectrum {
   RunResult result;           ///< how the run ended
 };
 
-/// The leading Lyapunov exponents of a motion: tangents are pushed by the exact derivatives of its steps, and made
-/// orthonormal again by QR before they fall into the leading directions (Benettin, Galgani, Giorgilli, Strelcyn 1980).
-/// Steps may have any sizes. The first tangent is never turned, so that FTLE and MEGNO (Cincotta, Simó 2000) are read
-/// off it on the way.
-///
-/// It is a value: a copy, and the integrator's member of the same instant, are all that goes on from there.
-class LyapunovTangents {
+/// How one tangent that is never turned grows along a motion: what its FTLE and MEGNO (Cincotta, Simó 2000) are.
+class TangentGrowth {
  public:
-  /// `rows` as Integrator::linearize tells; the tangents are random, by `seed`.
-  LyapunovTangents(int rows, int count, unsigned seed = 1) : tangents_(rows, count), sums_(count) {
-    std::mt19937 random(seed);
-    for (Eigen::Index i = 0; i < tangents_.size(); ++i) {
-      tangents_.data()[i] = static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5;
-    }
-    sums_.setZero();
-    history_.push_back({0, sums_});
+  /// By `growth`, a logarithm, in a step from `before` to `time` since the start.
+  void follow(double growth, double before, double time) {
+    grown_ += growth;
+    weighted_ += (before + time) / 2 * growth;
+    integral_ += (time - before) * 2 * weighted_ / time;  // of Y = 2/t ∫ s d ln|w|
   }
 
-  /// After a step of `integrator` to `time` since the start. Tells whether there is a new entry of the history.
-  bool follow(Integrator& integrator, double time) {
-    integrator.push(tangents_);
-    const double grown = std::log(tangents_.col(0).norm());
-    if (time_ > 0) follow_first(grown - grown_, time);
-    grown_ = grown;
-    time_ = time;
-    if (time - history_.back().time < interval_ && std::abs(grown_) < std::log(parted) / 2) return false;
-    make_orthonormal();
-    return counted() > 0;
-  }
-
-  /// Makes the last entry of the history.
-  void finish() {
-    if (time_ > history_.back().time) make_orthonormal();
-  }
-
-  LyapunovProgress progress() const { return {time_, (sums_ / std::max(counted(), smallest)).eval()}; }
-
-  /// The spectrum, when all is done.
-  LyapunovSpectrum spectrum() const {
-    LyapunovSpectrum spectrum;
-    spectrum.duration = time_;
-    spectrum.ftle = first_ / std::max(counted(), smallest);
-    spectrum.megno = time_ > 0 ? megno_ / time_ : 0;
-    average(spectrum);
-    sort(spectrum);
-    spectrum.sum = spectrum.exponents.sum();
-    return spectrum;
-  }
+  double grown() const { return grown_; }
+  double megno(double time) const { return time > 0 ? integral_ / time : 0; }
 
  private:
-  static constexpr double smallest = std::numeric_limits<double>::min();
-  // How much more the fastest tangent may have grown than the slowest: what QR tells has as many digits less.
-  static constexpr double parted = 1e3;
-  // Of the time, until tangents have found their directions.
-  static constexpr double settling = 0.1;
+  double grown_ = 0, weighted_ = 0, integral_ = 0;
+};
 
-  struct Sums {
-    double time;
-    Eigen::VectorXd logarithms;  // of what R's diagonal has multiplied to
-  };
+/// What tangents have grown by until now and then, and the exponents that come of it.
+class GrowthHistory {
+ public:
+  /// Of `count` tangents, from the time 0 on.
+  explicit GrowthHistory(Eigen::Index count) : sums_(Eigen::VectorXd::Zero(count)) { entries_.push_back({0, sums_}); }
 
-  // Of the first step only directions are kept: it takes tangents of any kind into the tangent space.
-  double counted() const { return history_.size() < 2 ? 0 : time_ - history_[1].time; }
-
-  // Y = 2/t ∫ s d ln|w|, and its mean.
-  void follow_first(double growth, double time) {
-    const double step = time - time_;
-    first_ += growth;
-    weighted_ += (time - step / 2) * growth;
-    megno_ += step * 2 * weighted_ / time;
+  /// Logarithms, since the last entry.
+  void add(double time, const Eigen::VectorXd& grown) {
+    sums_ += grown;
+    entries_.push_back({time, sums_});
   }
 
-  void make_orthonormal() {
-    const double span = time_ - history_.back().time;
-    Eigen::VectorXd grown(tangents_.cols());
-    library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
-    grown = grown.array().max(smallest).log().matrix().eval();
-    if (history_.size() > 1) {
-      sums_ += grown;
-      const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());
-      interval_ = span * std::clamp(std::log(parted) / std::max(parting, smallest), 0.25, 2.0);
-    }
-    history_.push_back({time_, sums_});
-    grown_ = 0;
-  }
+  double last_time() const { return entries_.back().time; }
+  std::size_t size() const { return entries_.size(); }
+  /// Of the first entry after the start; 0 where there is none.
+  double first_time() const { return entries_.size() < 2 ? 0 : entries_[1].time; }
+  const Eigen::VectorXd& sums() const { return sums_; }
 
-  Eigen::VectorXd sums_at(double time) const {
-    const auto after = std::ranges::lower_bound(history_, time, {}, &Sums::time);
-    if (after == history_.begin()) return after->logarithms;
-    if (after == history_.end()) return history_.back().logarithms;
-    const Sums& before = *(after - 1);
-    const double part = (time - before.time) / (after->time - before.time);
-    return before.logarithms + part * (after->logarithms - before.logarithms);
-  }
-
-  // Errors from means over blocks, of whichever number of blocks scatters most: blocks that are too short are alike by
-  // what they remember. Regular motions drift apart linearly, tangents of any motion swing by a factor: what a run of
-  // the time t cannot tell from zero is some 3/t.
-  void average(LyapunovSpectrum& spectrum) const {
-    const double from = history_.size() < 2 ? 0 : std::max(settling * time_, history_[1].time), span = time_ - from;
+  /// Exponents and their errors, of the time from `from` on.
+  ///
+  /// Errors from means over blocks, of whichever number of blocks scatters most: blocks that are too short are alike by
+  /// what they remember. Regular motions drift apart linearly, tangents of any motion swing by a factor: what a run of
+  /// the time t cannot tell from zero is some 3/t.
+  void average(double from, LyapunovSpectrum& spectrum) const {
+    const double end = last_time(), span = end - from;
     spectrum.exponents = sums_;
     spectrum.errors = Eigen::VectorXd::Constant(sums_.size(), std::numeric_limits<double>::infinity());
     if (!(span > 0)) return;
-    spectrum.exponents = (sums_at(time_) - sums_at(from)) / span;
+    spectrum.exponents = (sums_at(end) - sums_at(from)) / span;
     Eigen::VectorXd worst = Eigen::VectorXd::Zero(sums_.size());
     for (const int blocks : {8, 16, 32}) {
       Eigen::VectorXd squares = Eigen::VectorXd::Zero(sums_.size());
@@ -156,6 +98,97 @@ class LyapunovTangents {
     for (Eigen::Index i = 0; i < worst.size(); ++i) spectrum.errors[i] = std::sqrt(worst[i] + 9 / (span * span));
   }
 
+  /// Of the time, until tangents have found their directions.
+  static constexpr double settling = 0.1;
+
+ private:
+  struct Entry {
+    double time;
+    Eigen::VectorXd logarithms;
+  };
+
+  Eigen::VectorXd sums_at(double time) const {
+    const auto after = std::ranges::lower_bound(entries_, time, {}, &Entry::time);
+    if (after == entries_.begin()) return after->logarithms;
+    if (after == entries_.end()) return entries_.back().logarithms;
+    const Entry& before = *(after - 1);
+    const double part = (time - before.time) / (after->time - before.time);
+    return before.logarithms + part * (after->logarithms - before.logarithms);
+  }
+
+  Eigen::VectorXd sums_;
+  std::vector<Entry> entries_;
+};
+
+/// The leading Lyapunov exponents of a motion: tangents are pushed by the exact derivatives of its steps, and made
+/// orthonormal again by QR before they fall into the leading directions (Benettin, Galgani, Giorgilli, Strelcyn 1980).
+/// Steps may have any sizes. The first tangent is never turned, so that FTLE and MEGNO are read off it on the way.
+///
+/// It is a value: a copy, and the integrator's member of the same instant, are all that goes on from there.
+class LyapunovTangents {
+ public:
+  /// `rows` as Integrator::linearize tells; the tangents are random, by `seed`.
+  LyapunovTangents(int rows, int count, unsigned seed = 1) : tangents_(rows, count), history_(count) {
+    std::mt19937 random(seed);
+    for (Eigen::Index i = 0; i < tangents_.size(); ++i) {
+      tangents_.data()[i] = static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5;
+    }
+  }
+
+  /// After a step of `integrator` to `time` since the start. Tells whether there is a new entry of the history.
+  bool follow(Integrator& integrator, double time) {
+    integrator.push(tangents_);
+    const double grown = std::log(tangents_.col(0).norm());
+    if (time_ > 0) first_.follow(grown - grown_, time_, time);
+    grown_ = grown;
+    time_ = time;
+    if (time - history_.last_time() < interval_ && std::abs(grown_) < std::log(parted) / 2) return false;
+    make_orthonormal();
+    return counted() > 0;
+  }
+
+  /// Makes the last entry of the history.
+  void finish() {
+    if (time_ > history_.last_time()) make_orthonormal();
+  }
+
+  LyapunovProgress progress() const { return {time_, (history_.sums() / std::max(counted(), smallest)).eval()}; }
+
+  /// The spectrum, when all is done.
+  LyapunovSpectrum spectrum() const {
+    LyapunovSpectrum spectrum;
+    spectrum.duration = time_;
+    spectrum.ftle = first_.grown() / std::max(counted(), smallest);
+    spectrum.megno = first_.megno(time_);
+    history_.average(std::max(GrowthHistory::settling * time_, history_.first_time()), spectrum);
+    sort(spectrum);
+    spectrum.sum = spectrum.exponents.sum();
+    return spectrum;
+  }
+
+ private:
+  static constexpr double smallest = std::numeric_limits<double>::min();
+  // How much more the fastest tangent may have grown than the slowest: what QR tells has as many digits less.
+  static constexpr double parted = 1e3;
+
+  // Of the first step only directions are kept: it takes tangents of any kind into the tangent space.
+  double counted() const { return history_.size() < 2 ? 0 : time_ - history_.first_time(); }
+
+  void make_orthonormal() {
+    const double span = time_ - history_.last_time();
+    Eigen::VectorXd grown(tangents_.cols());
+    library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+    grown = grown.array().max(smallest).log().matrix().eval();
+    if (history_.size() > 1) {
+      const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());
+      interval_ = span * std::clamp(std::log(parted) / std::max(parting, smallest), 0.25, 2.0);
+    } else {
+      grown.setZero();
+    }
+    history_.add(time_, grown);
+    grown_ = 0;
+  }
+
   static void sort(LyapunovSpectrum& spectrum) {
     std::vector<Eigen::Index> order(static_cast<std::size_t>(spectrum.exponents.size()));
     for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<Eigen::Index>(k);
@@ -165,11 +198,10 @@ class LyapunovTangents {
   }
 
   Directions<> tangents_;
-  Eigen::VectorXd sums_;
-  std::vector<Sums> history_;
+  GrowthHistory history_;
+  TangentGrowth first_;
   double time_ = 0, interval_ = 0;
   double grown_ = 0;  // logarithm of the first tangent's length
-  double first_ = 0, weighted_ = 0, megno_ = 0;
 };
 
 /// Runs `integrator` from `start` over `duration` in steps of at most `step`, which may be infinite where it chooses

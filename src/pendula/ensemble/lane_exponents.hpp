@@ -1,0 +1,94 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <pendula/ensemble/lane_runs.hpp>
+#include <pendula/run/lyapunov.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+namespace detail {
+
+/// What the tangent of a member in a lane tells.
+class LaneExponent {
+ public:
+  explicit LaneExponent(double duration) : duration_(duration) {}
+
+  /// In a step to `time` since the start.
+  void follow(double growth, double time) {
+    tangent_.follow(growth, time_, time);
+    time_ = time;
+    if (time >= (history_.last_time() + duration_ / entries)) note();
+  }
+
+  LyapunovSpectrum spectrum() {
+    if (time_ > history_.last_time()) note();
+    LyapunovSpectrum spectrum;
+    spectrum.duration = time_;
+    spectrum.ftle = tangent_.grown() / time_;
+    spectrum.megno = tangent_.megno(time_);
+    history_.average(GrowthHistory::settling * time_, spectrum);
+    spectrum.sum = spectrum.exponents.sum();
+    return spectrum;
+  }
+
+ private:
+  static constexpr double entries = 320;  // ten of each of the shortest blocks that errors are read off
+
+  void note() {
+    history_.add(time_, Eigen::VectorXd::Constant(1, tangent_.grown() - noted_));
+    noted_ = tangent_.grown();
+  }
+
+  double duration_, time_ = 0, noted_ = 0;
+  TangentGrowth tangent_;
+  GrowthHistory history_{1};
+};
+
+/// The exponents of members that are moved in lanes, with one tangent each.
+template <class Space>
+class LaneExponents : private LaneWatch {
+ public:
+  LaneExponents(std::span<const RunSetup* const> setups, const std::function<bool()>& stop)
+      : setups_(setups), stop_(stop), members_(setups) {
+    exponents_.reserve(setups.size());
+    for (const RunSetup* setup : setups) exponents_.emplace_back(setup->duration);
+  }
+
+  /// None of those that lanes could not move. Empty where it was stopped.
+  std::vector<std::optional<LyapunovSpectrum>> go() {
+    const RunOptions& options = setups_[0]->options;
+    if (!members_.move(*library_of<Space>().tangent_lanes(options), options, 0, *this)) return {};
+    std::vector<std::optional<LyapunovSpectrum>> found(setups_.size());
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      if (members_.end(k).status == Status::ok) found[k] = exponents_[k].spectrum();
+    }
+    return found;
+  }
+
+ private:
+  bool wants_steps() const override { return true; }
+  bool stops() override { return stop_(); }
+
+  void after_step(LaneSteps& steps) override {
+    for (int lane = 0; lane < steps.lanes(); ++lane) {
+      if (!steps.took_step(lane)) continue;
+      const std::size_t k = steps.member(lane);
+      exponents_[k].follow(steps.growth(lane), steps.end(lane) - setups_[k]->start.time);
+    }
+  }
+
+  std::span<const RunSetup* const> setups_;
+  const std::function<bool()>& stop_;
+  PlainMembers<Space> members_;
+  std::vector<LaneExponent> exponents_;
+};
+
+}  // namespace detail
+
+}  // namespace pendula

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace pendula {
+
+/// One number of several members of an ensemble (LanePack) with its derivative along a tangent of each. What is
+/// computed of values is what would be computed without tangents, to the last bit.
+template <class L>
+struct LaneDual {
+  L value{0.0}, slope{0.0};
+
+  LaneDual() = default;
+  explicit LaneDual(double number) : value(number) {}
+  explicit LaneDual(const L& number) : value(number) {}
+  LaneDual(const L& number, const L& derivative) : value(number), slope(derivative) {}
+
+  friend LaneDual operator+(const LaneDual& a, const LaneDual& b) { return {a.value + b.value, a.slope + b.slope}; }
+  friend LaneDual operator-(const LaneDual& a, const LaneDual& b) { return {a.value - b.value, a.slope - b.slope}; }
+  friend LaneDual operator-(const LaneDual& a) { return {-a.value, -a.slope}; }
+  friend LaneDual operator*(const LaneDual& a, const LaneDual& b) {
+    return {a.value * b.value, fma(a.slope, b.value, a.value * b.slope)};
+  }
+  friend LaneDual operator*(const L& a, const LaneDual& b) { return {a * b.value, a * b.slope}; }
+  friend LaneDual operator*(const LaneDual& a, const L& b) { return {a.value * b, a.slope * b}; }
+  friend LaneDual operator/(const LaneDual& a, const LaneDual& b) {
+    const L inverse = L(1.0) / b.value, ratio = a.value / b.value;
+    return {ratio, fma(-ratio, b.slope, a.slope) * inverse};
+  }
+
+  friend LaneDual fma(const LaneDual& a, const LaneDual& b, const LaneDual& c) {
+    return {fma(a.value, b.value, c.value), fma(a.value, b.slope, fma(a.slope, b.value, c.slope))};
+  }
+  friend LaneDual fma(const L& a, const LaneDual& b, const LaneDual& c) {
+    return {fma(a, b.value, c.value), fma(a, b.slope, c.slope)};
+  }
+  friend LaneDual fma(const LaneDual& a, const L& b, const LaneDual& c) {
+    return {fma(a.value, b, c.value), fma(a.slope, b, c.slope)};
+  }
+
+  template <class Mask>
+  friend LaneDual select(const Mask& which, const LaneDual& yes, const LaneDual& no) {
+    return {select(which, yes.value, no.value), select(which, yes.slope, no.slope)};
+  }
+};
+
+namespace detail {
+
+/// What a number is without its derivative, and of the numbers of a vector.
+template <class L>
+const L& value_of(const L& x) {
+  return x;
+}
+template <class L>
+const L& value_of(const LaneDual<L>& x) {
+  return x.value;
+}
+template <class L, std::size_t D>
+const std::array<L, D>& values_of(const std::array<L, D>& x) {
+  return x;
+}
+template <class L, std::size_t D>
+std::array<L, D> values_of(const std::array<LaneDual<L>, D>& x) {
+  std::array<L, D> values;
+  for (std::size_t k = 0; k < D; ++k) values[k] = x[k].value;
+  return values;
+}
+
+}  // namespace detail
+
+}  // namespace pendula

@@ -1,0 +1,252 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/heading.hpp>
+#include <pendula/chain/multipliers.hpp>
+#include <pendula/lanes/lane_dual.hpp>
+#include <pendula/lanes/lane_links.hpp>
+#include <pendula/lanes/lane_pack.hpp>
+#include <random>
+#include <type_traits>
+
+namespace pendula {
+
+/// The forward dynamics of several chains at once, one in each lane: rods and their rates are what moves, ξ̈ being made
+/// of weight and multipliers that keep |ξ̇|² + ξ·ξ̈ = 0 (RodState::for_each_acceleration). Gravity is all that acts.
+///
+/// With a tangent, every number has its derivative along one tangent of each member's motion.
+template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister, bool with_tangent = false>
+class LaneRods {
+ public:
+  using SpaceType = Space;
+  using L = LanePack<Register>;
+  using Mask = typename L::Mask;
+  using Number = std::conditional_t<with_tangent, LaneDual<L>, L>;
+  static constexpr int links_known = N;
+  static constexpr bool has_tangent = with_tangent;
+  static constexpr std::size_t D = Space::dimension;
+
+  struct Rod {
+    std::array<Number, D> along, rate;  ///< ξ, ξ̇; of slopes ξ̇, ξ̈
+  };
+  using Rods = detail::PerLink<Rod, N>;
+
+  explicit LaneRods(int links) : links_(links), constants_(links), rows_(links) {}
+
+  int links() const {
+    if constexpr (N == Eigen::Dynamic) return links_;
+    return N;
+  }
+
+  /// body(0), body(1), … of all links, written out where they are few and their number is known.
+  template <class Body>
+  [[gnu::always_inline]] void for_links(Body body) const {
+    detail::for_links<N>(links(), body);
+  }
+  template <class Links>
+  static auto& at(Links& of, int link) {
+    return of[link];
+  }
+
+  static Rod zero() {
+    Rod rod;
+    rod.along.fill(Number(0.0));
+    rod.rate.fill(Number(0.0));
+    return rod;
+  }
+  static Rod resting() {
+    Rod rod = zero();
+    rod.along[D - 1] = Number(-1.0);
+    return rod;
+  }
+
+  /// A member comes into a lane, with its chain, at q and v  [rad, rad/s].
+  void start(int lane, const ChainLinks<Space, N, double>& chain, double gravity, const double* q, const double* v,
+             Rods& rods) {
+    gravity_.set(lane, gravity);
+    double length = 0;
+    for (int i = 0; i < links(); ++i) {
+      constants_[i].set(lane, chain[i]);
+      length += chain[i].length;
+      std::array<double, Space::dof> angles, rates;
+      for (std::size_t a = 0; a < angles.size(); ++a) {
+        angles[a] = q[static_cast<Eigen::Index>(a) * links() + i];
+        rates[a] = v[static_cast<Eigen::Index>(a) * links() + i];
+      }
+      const Heading<Space> heading(angles, rates);
+      for (std::size_t k = 0; k < D; ++k) {
+        set_value(lane, chain[i].length * heading.u[k], rods[i].along[k]);
+        set_value(lane, chain[i].length * heading.u_dot[k], rods[i].rate[k]);
+      }
+    }
+    slowest_pace_.set(lane, 0.15 * links() * links() * std::abs(gravity) / length);
+    if constexpr (has_tangent) start_tangent(lane, rods);
+  }
+
+  /// Direction of a member's link and its rate.
+  auto heading(int lane, int i, const Rods& rods) const {
+    Heading<Space, long double> heading;
+    for (std::size_t k = 0; k < D; ++k) {
+      heading.u[k] = detail::value_of(rods[i].along[k])[lane] / constants_[i].length[lane];
+      heading.u_dot[k] = detail::value_of(rods[i].rate[k])[lane] / constants_[i].length[lane];
+    }
+    return heading;
+  }
+
+  /// T + U  [J].
+  L energy(const Rods& rods) const {
+    L energy(0.0);
+    std::array<L, D> bob;
+    bob.fill(L(0.0));
+    for (int i = 0; i < links(); ++i) {
+      bob = sum(bob, detail::values_of(rods[i].rate));
+      energy = fma(0.5 * constants_[i].mass, dot(bob, bob), energy);
+      energy = fma(constants_[i].weight, detail::value_of(rods[i].along[D - 1]), energy);
+    }
+    return energy;
+  }
+
+  /// Fastest turning of a link, squared, and no less than the chain swings  [1/s²].
+  L pace_squared(const Rods& rods) const {
+    L largest = slowest_pace_;
+    for (int i = 0; i < links(); ++i) {
+      const auto& rate = detail::values_of(rods[i].rate);
+      largest = max(largest, dot(rate, rate) * constants_[i].inverse_square);
+    }
+    return largest;
+  }
+
+  /// What squares of changes of a rod are relative to: 1/l²  [1/m²].
+  const L& inverse_square(int i) const { return constants_[i].inverse_square; }
+
+  /// ξ̇ and ξ̈ of rods.
+  [[gnu::always_inline]] void slopes(const Rods& rods, Rods& found) {
+    MultiplierRow<Number> row;
+    Number beyond(0.0);
+    const auto inward = [&](auto i) PENDULA_WRITTEN_OUT {
+      const Rod& rod = at(rods, i);
+      Number right = -dot(rod.rate, rod.rate), before(0.0);
+      if (i == 0) {
+        right = fma(rod.along[D - 1], gravity_, right);
+      } else {
+        before = -at(constants_, i - 1).inverse_mass.value * dot(at(rods, i - 1).along, rod.along);
+      }
+      const Number square = at(constants_, i).inverse_masses * dot(rod.along, rod.along);
+      const Number inverse = Number(1.0) / fma(-beyond, row.coupling, square);
+      row = {fma(-beyond, row.offset, right) * inverse, before * inverse};
+      at(rows_, i) = row;
+      beyond = before;
+    };
+    for_links([&](auto i) PENDULA_WRITTEN_OUT {
+      if constexpr (is_short) {
+        inward(std::integral_constant<int, N - 1 - i>());
+      } else {
+        inward(links() - 1 - i);
+      }
+    });
+    Number tau = row.offset;
+    std::array<Number, D> bond_before;
+    bond_before.fill(Number(0.0));
+    bond_before[D - 1] = Number(gravity_);
+    for_links([&](auto i) PENDULA_WRITTEN_OUT {
+      const Rod& rod = at(rods, i);
+      std::array<Number, D> pull = scaled(tau, rod.along);
+      if (i + 1 < links()) {
+        tau = fma(-at(rows_, i + 1).coupling, tau, at(rows_, i + 1).offset);
+        for (std::size_t k = 0; k < D; ++k) pull[k] = fma(-tau, at(rods, i + 1).along[k], pull[k]);
+      }
+      const std::array<Number, D> bond = scaled(at(constants_, i).inverse_mass.value, pull);
+      at(found, i) = {rod.rate, difference(bond, bond_before)};
+      bond_before = bond;
+    });
+  }
+
+  /// |ξ| = l and ξ·ξ̇ = 0 again; what a step errs by in them is small.
+  [[gnu::always_inline]] void restore(Rods& rods) const {
+    for_links([&](auto i) PENDULA_WRITTEN_OUT {
+      const LaneLink<L>& link = at(constants_, i);
+      Rod& rod = at(rods, i);
+      const Number factor = fma(-0.5 * link.inverse_square, dot(rod.along, rod.along), Number(1.5));
+      rod.along = scaled(factor, rod.along);
+      const Number along = dot(rod.along, rod.rate) * link.inverse_square;
+      for (std::size_t k = 0; k < D; ++k) rod.rate[k] = fma(-along, rod.along[k], rod.rate[k]);
+    });
+  }
+
+  /// |δξ|²/l² + |δξ̇|²/(l ω)², of all rods, ω being how fast the member swung when it began.
+  L tangent_squared(const Rods& rods) const requires(with_tangent) {
+    L squared(0.0);
+    for (int i = 0; i < links(); ++i) {
+      L along(0.0), rate(0.0);
+      for (std::size_t k = 0; k < D; ++k) {
+        along = fma(rods[i].along[k].slope, rods[i].along[k].slope, along);
+        rate = fma(rods[i].rate[k].slope, rods[i].rate[k].slope, rate);
+      }
+      squared = fma(constants_[i].inverse_square, fma(inverse_pace_squared_, rate, along), squared);
+    }
+    return squared;
+  }
+
+ private:
+  static constexpr bool is_short = detail::is_short_chain<N>;
+
+  static void set_value(int lane, double value, Number& number) {
+    if constexpr (has_tangent) {
+      number.value.set(lane, value);
+    } else {
+      number.set(lane, value);
+    }
+  }
+
+  // Of length 1: every link turned by a random angle, about a random axis in space, and turning faster by another; the
+  // same ones for all members.
+  void start_tangent(int lane, Rods& rods) {
+    const double squared = pace_squared(rods)[lane], pace = squared > 0 ? std::sqrt(squared) : 1;
+    inverse_pace_squared_.set(lane, 1 / (pace * pace));
+    std::mt19937 random(1);
+    const auto drawn = [&] {
+      std::array<double, Space::dof == 1 ? 1 : 3> turn;
+      for (double& x : turn) x = static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5;
+      return turn;
+    };
+    double length = 0;
+    for (int i = 0; i < links(); ++i) {
+      const auto turned = drawn(), turning = drawn();
+      std::array<double, D> along, rate;
+      for (std::size_t k = 0; k < D; ++k) {
+        along[k] = rods[i].along[k].value[lane];
+        rate[k] = rods[i].rate[k].value[lane];
+      }
+      const auto moved = across(turned, along), sped = sum(across(turned, rate), scaled(pace, across(turning, along)));
+      for (std::size_t k = 0; k < D; ++k) {
+        rods[i].along[k].slope.set(lane, moved[k]);
+        rods[i].rate[k].slope.set(lane, sped[k]);
+      }
+      length += constants_[i].inverse_square[lane] * (dot(moved, moved) + dot(sped, sped) / (pace * pace));
+    }
+    length = std::sqrt(length);
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t k = 0; k < D; ++k) {
+        for (Number* x : {&rods[i].along[k], &rods[i].rate[k]}) x->slope.set(lane, x->slope[lane] / length);
+      }
+    }
+  }
+
+  static std::array<double, 2> across(const std::array<double, 1>& turn, const std::array<double, 2>& x) {
+    return {-turn[0] * x[1], turn[0] * x[0]};
+  }
+  static std::array<double, 3> across(const std::array<double, 3>& turn, const std::array<double, 3>& x) {
+    return {turn[1] * x[2] - turn[2] * x[1], turn[2] * x[0] - turn[0] * x[2], turn[0] * x[1] - turn[1] * x[0]};
+  }
+
+  int links_;
+  L gravity_{0.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0};
+  detail::PerLink<LaneLink<L>, N> constants_;
+  detail::PerLink<MultiplierRow<Number>, N> rows_;
+};
+
+}  // namespace pendula
