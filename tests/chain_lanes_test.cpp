@@ -300,12 +300,12 @@ using WithTangent = LaneRods<Space, 3, MemberRegister, true>;
 
 // Rods of members that have started, moved along their tangents.
 template <class Space>
-auto moved_rods(const typename WithTangent<Space>::Rods& rods, double by) {
+auto moved_rods(const typename WithTangent<Space>::Parts& rods, double by) {
   using L = typename WithTangent<Space>::L;
-  typename LaneRods<Space, 3>::Rods moved(3);
+  typename LaneRods<Space, 3>::Parts moved(3);
   for (int i = 0; i < 3; ++i) {
     for (std::size_t k = 0; k < WithTangent<Space>::D; ++k) {
-      moved[i].along[k] = rods[i].along[k].value + L(by) * rods[i].along[k].slope;
+      moved[i].place[k] = rods[i].place[k].value + L(by) * rods[i].place[k].slope;
       moved[i].rate[k] = rods[i].rate[k].value + L(by) * rods[i].rate[k].slope;
     }
   }
@@ -318,36 +318,36 @@ void expect_derivatives() {
   const auto chain = drawn_chain<Space, 3>(random, 3);
   const auto member = drawn_members<Space, 3>(random, 3, 1, 1)[0];
   WithTangent<Space> rods_with(3);
-  typename WithTangent<Space>::Rods rods(3), found(3), restored(3);
+  typename WithTangent<Space>::Parts rods(3), found(3), restored(3);
   LaneRods<Space, 3> plain(3);
-  typename LaneRods<Space, 3>::Rods unused(3);
+  typename LaneRods<Space, 3>::Parts unused(3);
   for (int i = 0; i < 3; ++i) rods[i] = WithTangent<Space>::resting();
   for (int i = 0; i < 3; ++i) unused[i] = LaneRods<Space, 3>::resting();
   const ChainLinks<Space, 3, double> links(chain);
   for (int lane = 0; lane < MemberRegister::size; ++lane) {
-    rods_with.start(lane, links, chain.gravity(), member.start.q.data(), member.start.v.data(), rods);
-    plain.start(lane, links, chain.gravity(), member.start.q.data(), member.start.v.data(), unused);
+    rods_with.start(lane, 0, links, chain.gravity(), member.start.q.data(), member.start.v.data(), rods);
+    plain.start(lane, 0, links, chain.gravity(), member.start.q.data(), member.start.v.data(), unused);
   }
   EXPECT_NEAR(rods_with.tangent_squared(rods)[0], 1, 1e-14);
-  rods_with.slopes(rods, found);
+  rods_with.slopes({}, rods, found);
   restored = rods;
   rods_with.restore(restored);
   const double by = 1e-6;
   auto ahead = moved_rods<Space>(rods, by), behind = moved_rods<Space>(rods, -by);
-  typename LaneRods<Space, 3>::Rods slopes_ahead(3), slopes_behind(3);
-  plain.slopes(ahead, slopes_ahead);
-  plain.slopes(behind, slopes_behind);
+  typename LaneRods<Space, 3>::Parts slopes_ahead(3), slopes_behind(3);
+  plain.slopes({}, ahead, slopes_ahead);
+  plain.slopes({}, behind, slopes_behind);
   plain.restore(ahead);
   plain.restore(behind);
   for (int i = 0; i < 3; ++i) {
     for (std::size_t k = 0; k < Space::dimension; ++k) {
       const auto difference = [&](const auto& a, const auto& b) { return (a[0] - b[0]) / (2 * by); };
       const double acceleration = found[i].rate[k].slope[0];
-      EXPECT_EQ(found[i].along[k].slope[0], rods[i].rate[k].slope[0]);
+      EXPECT_EQ(found[i].place[k].slope[0], rods[i].rate[k].slope[0]);
       EXPECT_NEAR(difference(slopes_ahead[i].rate[k], slopes_behind[i].rate[k]), acceleration, 1e-7);  // 4e-9
-      EXPECT_NEAR(difference(ahead[i].along[k], behind[i].along[k]), restored[i].along[k].slope[0], 1e-9);
+      EXPECT_NEAR(difference(ahead[i].place[k], behind[i].place[k]), restored[i].place[k].slope[0], 1e-9);
       EXPECT_NEAR(difference(ahead[i].rate[k], behind[i].rate[k]), restored[i].rate[k].slope[0], 1e-8);  // 2e-10
-      EXPECT_NEAR(restored[i].along[k].slope[0], rods[i].along[k].slope[0], 1e-15);  // it lies where it should already
+      EXPECT_NEAR(restored[i].place[k].slope[0], rods[i].place[k].slope[0], 1e-15);  // it lies where it should already
     }
   }
 }

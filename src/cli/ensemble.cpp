@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/ensemble/chunks.hpp>
-#include <pendula/ensemble/lane_runs.hpp>
+#include <pendula/ensemble/run_members.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
@@ -118,8 +118,11 @@ class Session {
 
  private:
   bool go_in_lanes() {
-    return std::visit([](const auto& scenario) { return lane_kind(member_setup(scenario)).has_value(); },
-                      scenarios_.base());
+    const auto goes = [&](const auto& scenario) {
+      const RunSetup setup = member_setup(scenario);
+      return lane_kind(setup).has_value() || (plan_.chooses_method && lane_kind(setup, quickest_in_lanes(setup)));
+    };
+    return std::visit(goes, scenarios_.base());
   }
 
   std::optional<io::NaturalUnits> natural_units() {

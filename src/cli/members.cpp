@@ -70,7 +70,8 @@ io::DoneChunk MemberRuns::run(const Chunk& members) const {
     all.push_back(member(number, shared));
     if (all.back().setup) waiting.push_back(*all.back().setup);
   }
-  std::vector<RunReport> reports = run_members(waiting, [&] { return guard_.interrupted(); });
+  std::vector<RunReport> reports = run_members(
+      waiting, [&] { return guard_.interrupted(); }, method());
   if (kept_.chaos()) find_exponents(all);
   auto next = reports.begin();
   io::DoneChunk done;
@@ -115,7 +116,7 @@ MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, io::SharedExp
   Member member;
   member.scenario = std::move(scenario);
   RunSetup setup = setup_of(*member.scenario, shared);
-  if (lane_kind(setup)) {
+  if (lane_kind(setup, lane_options(setup, method()))) {
     member.setup = std::move(setup);
   } else {
     member.report = std::visit([&](const auto& read) { return run_alone(read, std::move(setup)); }, *member.scenario);
@@ -131,7 +132,6 @@ RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpress
         return found;
       },
       scenario);
-  if (plan_.chooses_method) setup.options = quickest_in_lanes(setup);
   return setup;
 }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <pendula/ensemble/chunks.hpp>
+#include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <string>
@@ -90,6 +91,7 @@ class MemberRuns {
  private:
   struct Member;
 
+  MemberMethod method() const { return plan_.chooses_method ? MemberMethod::quickest : MemberMethod::asked; }
   Member member(std::int64_t number, io::SharedExpressions& shared) const;
   Member member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const;
   RunSetup setup_of(const io::AnyScenario& scenario, io::SharedExpressions& shared) const;

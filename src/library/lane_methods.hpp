@@ -1,9 +1,9 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/lanes/lane_queue.hpp>
+#include <pendula/lanes/plain_queue.hpp>
 #include <vector>
 
 #include "library/chain_lanes.hpp"
@@ -25,26 +25,7 @@ bool move_members(const RunOptions& options, std::int64_t every, std::span<const
     chains.push_back(chain_of<Space>(member.chain));
     starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
   }
-  LaneOptions asked;
-  asked.step = is_adaptive(options) ? 0 : options.step;
-  asked.tolerance = options.tolerance;
-  asked.energy_every = every;
-  Queue queue(chains.front(), asked);
-  queue.set_watch(watch);
-  std::vector<LaneEnd> reached(members.size());
-  const bool is_done = queue.run(starts, reached);
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    const LaneEnd& from = reached[k];
-    PlainMemberEnd& to = ends[k];
-    std::copy_n(from.motion.q.data(), from.motion.q.size(), to.q);
-    std::copy_n(from.motion.v.data(), from.motion.v.size(), to.v);
-    to.time = from.motion.time;
-    to.status = from.status;
-    to.steps = from.steps;
-    to.rejected_steps = from.rejected_steps;
-    to.energy_error = from.energy_error;
-  }
-  return is_done;
+  return detail::move_plainly<Queue>(chains.front(), options, every, starts, ends, watch);
 }
 
 template <class Space>
@@ -65,40 +46,31 @@ MoveMembers* gauss_lanes(int stages) {
   }
 }
 
-/// Queue<Method>: what moves members by an explicit method.
-template <class Space, template <class> class Queue>
-MoveMembers* explicit_lanes(Method method) {
-  switch (method) {
-    case Method::dopri5:
-      return &move_members<Space, Queue<DormandPrince5>>;
-#ifndef PENDULA_FEW_LANES
-    case Method::rk4:
-      return &move_members<Space, Queue<ClassicalRungeKutta>>;
-    case Method::fehlberg78:
-      return &move_members<Space, Queue<Fehlberg8>>;
-#endif
-    default:
-      return nullptr;
+template <class Space>
+struct PlainMoves {
+  template <class Method>
+  static MoveMembers* by() {
+    return &move_members<Space, ExplicitLanes<Space, Method>>;
   }
-}
+};
 
 template <class Space>
-struct LanesOf {
+struct TangentMoves {
   template <class Method>
-  using Plain = ExplicitLanes<Space, Method>;
-  template <class Method>
-  using WithTangent = TangentLanes<Space, Method>;
+  static MoveMembers* by() {
+    return &move_members<Space, TangentLanes<Space, Method>>;
+  }
 };
 
 template <class Space>
 MoveMembers* chain_lanes(const RunOptions& options) {
   if (options.method == Method::gauss) return gauss_lanes<Space>(options.stages);
-  return explicit_lanes<Space, LanesOf<Space>::template Plain>(options.method);
+  return detail::explicit_lanes<PlainMoves<Space>>(options.method);
 }
 
 template <class Space>
 MoveMembers* tangent_lanes(const RunOptions& options) {
-  return explicit_lanes<Space, LanesOf<Space>::template WithTangent>(options.method);
+  return detail::explicit_lanes<TangentMoves<Space>>(options.method);
 }
 
 }  // namespace pendula

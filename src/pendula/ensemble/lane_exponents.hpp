@@ -63,7 +63,7 @@ class LaneExponents : private LaneWatch {
   /// None of those that lanes could not move. Empty where it was stopped.
   std::vector<std::optional<LyapunovSpectrum>> go() {
     const RunOptions& options = setups_[0]->options;
-    if (!members_.move(*library_of<Space>().tangent_lanes(options), options, 0, *this)) return {};
+    if (!members_.move_with_tangents(options, *this)) return {};
     std::vector<std::optional<LyapunovSpectrum>> found(setups_.size());
     for (std::size_t k = 0; k < found.size(); ++k) {
       if (members_.end(k).status == Status::ok) found[k] = exponents_[k].spectrum();
@@ -85,7 +85,7 @@ class LaneExponents : private LaneWatch {
 
   std::span<const RunSetup* const> setups_;
   const std::function<bool()>& stop_;
-  PlainMembers<Space> members_;
+  PlainChains<Space> members_;
   std::vector<LaneExponent> exponents_;
 };
 

@@ -16,6 +16,7 @@
 #include <pendula/run/run.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
+#include <pendula/run/system_subject.hpp>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -24,65 +25,71 @@ namespace pendula {
 
 /// Runs that members in lanes can take together: all that their steps have in common.
 struct LaneKind {
-  int dimension = 0, links = 0, stages = 0;
+  int dimension = 0, links = 0;         // of chains
+  const SystemEntry* system = nullptr;  // of others
+  int stages = 0;
   Method method = Method::gauss;
   double step = 0, tolerance = 0;
   std::int64_t every = 0;
 
-  auto tied() const { return std::tie(dimension, links, stages, method, step, tolerance, every); }
+  auto tied() const { return std::tie(dimension, links, system, stages, method, step, tolerance, every); }
   bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
 };
 
 namespace detail {
 
+/// What is moved, where lanes are for it.
 template <class Space>
-std::optional<LaneKind> lane_kind_in(const RunSetup& setup) {
+bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
-  const RunOptions& options = setup.options;
-  if (chain == nullptr || chain->chain().loaded() || library_of<Space>().lanes(options) == nullptr) return {};
-  LaneKind kind{Space::dimension, chain->chain().links(), 0, options.method, 0, 0, setup.every};
-  if (options.method == Method::gauss) kind.stages = options.stages;
-  (is_adaptive(options) ? kind.tolerance : kind.step) = is_adaptive(options) ? options.tolerance : options.step;
-  return kind;
+  if (chain == nullptr || chain->chain().loaded() || library_of<Space>().lanes(options) == nullptr) return false;
+  kind.dimension = Space::dimension;
+  kind.links = chain->chain().links();
+  return true;
+}
+inline bool name_system(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
+  const auto* const found = dynamic_cast<const SystemSubject*>(setup.subject.get());
+  if (found == nullptr || library().system_lanes(options) == nullptr) return false;
+  kind.system = &found->entry();
+  return true;
 }
 
 }  // namespace detail
 
-/// The kind of a run that goes in lanes; none of others. Chains that gravity alone moves, by Gauss steps of the chain
-/// solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods. It depends on
-/// the run alone.
-inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
-  const RunOptions& options = setup.options;
+/// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps
+/// of the chain solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods; and
+/// systems of all other kinds, by the latter. It depends on the run alone.
+inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
-  const bool fits = options.form == Form::momentum && options.solver != Solver::dense &&
-                    options.iteration != Iteration::newton && chosen > 0 && std::isfinite(chosen) && setup.every >= 1 &&
-                    setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() && !setup.doubted;
-  if (!fits) return {};
-  const std::optional<LaneKind> planar = detail::lane_kind_in<Planar>(setup);
-  return planar ? planar : detail::lane_kind_in<Spatial>(setup);
+  const bool by_fixed_point =
+      options.form == Form::momentum && options.solver != Solver::dense && options.iteration != Iteration::newton;
+  const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
+                    setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
+                    !setup.doubted;
+  LaneKind kind;
+  if (!fits || !(detail::name_chain<Planar>(setup, options, kind) ||
+                 detail::name_chain<Spatial>(setup, options, kind) || detail::name_system(setup, options, kind))) {
+    return {};
+  }
+  if (options.method == Method::gauss) kind.stages = options.stages;
+  kind.method = options.method;
+  (is_adaptive(options) ? kind.tolerance : kind.step) = chosen;
+  kind.every = setup.every;
+  return kind;
+}
+inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
+  return lane_kind(setup, setup.options);
 }
 
 namespace detail {
 
-/// The members of runs of one kind, as the compiled library takes them, and what becomes of them.
-template <class Space>
-class PlainMembers {
+/// The ends of members, as the compiled library writes them.
+class PlainEnds {
  public:
-  /// `setups` must outlive it.
-  explicit PlainMembers(std::span<const RunSetup* const> setups)
+  explicit PlainEnds(std::span<const RunSetup* const> setups)
       : q_(setups[0]->start.q.size(), static_cast<Eigen::Index>(setups.size())), v_(q_.rows(), q_.cols()) {
-    for (std::size_t k = 0; k < setups.size(); ++k) {
-      const Motion& start = setups[k]->start;
-      const Chain<Space>& chain = static_cast<const ChainSubject<Space>&>(*setups[k]->subject).chain();
-      const double end = start.time + setups[k]->duration;
-      members_.push_back({plain(chain, {}), start.time, end, start.q.data(), start.v.data()});
-      ends_.push_back({&q_(0, static_cast<Eigen::Index>(k)), &v_(0, static_cast<Eigen::Index>(k)), 0, {}, 0, 0, 0});
-    }
-  }
-
-  /// False where `watch` made it leave off.
-  bool move(MoveMembers& move_members, const RunOptions& options, std::int64_t every, LaneWatch& watch) {
-    return move_members(options, every, members_, ends_, watch);
+    for (Eigen::Index k = 0; k < q_.cols(); ++k)
+      ends_.push_back({q_.col(k).data(), v_.col(k).data(), 0, {}, 0, 0, 0, 0});
   }
 
   const PlainMemberEnd& end(std::size_t k) const { return ends_[k]; }
@@ -91,27 +98,84 @@ class PlainMembers {
     return {ends_[k].time, q_.col(column), v_.col(column)};
   }
 
+ protected:
+  std::span<PlainMemberEnd> ends() { return ends_; }
+
  private:
   Eigen::MatrixXd q_, v_;
-  std::vector<PlainMember> members_;
   std::vector<PlainMemberEnd> ends_;
+};
+
+/// The members of runs of one kind, chains, as the compiled library takes them, and what becomes of them.
+template <class Space>
+class PlainChains : public PlainEnds {
+ public:
+  /// `setups` must outlive it.
+  explicit PlainChains(std::span<const RunSetup* const> setups) : PlainEnds(setups) {
+    for (const RunSetup* setup : setups) {
+      const Motion& start = setup->start;
+      const Chain<Space>& chain = static_cast<const ChainSubject<Space>&>(*setup->subject).chain();
+      members_.push_back({plain(chain, {}), start.time, start.time + setup->duration, start.q.data(), start.v.data()});
+    }
+  }
+
+  static constexpr bool of_systems = false;
+
+  /// False where `watch` made it leave off.
+  bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
+    return library_of<Space>().lanes(options)(options, every, members_, ends(), watch);
+  }
+  bool move_with_tangents(const RunOptions& options, LaneWatch& watch) {
+    return library_of<Space>().tangent_lanes(options)(options, 0, members_, ends(), watch);
+  }
+
+ private:
+  std::vector<PlainMember> members_;
+};
+
+/// The same of systems.
+class PlainSystems : public PlainEnds {
+ public:
+  explicit PlainSystems(std::span<const RunSetup* const> setups)
+      : PlainEnds(setups), dynamics_(subject_of(*setups[0]).entry().lanes()) {
+    for (const RunSetup* setup : setups) {
+      const Motion& start = setup->start;
+      members_.push_back({subject_of(*setup).numbers().plain(), start.time, start.time + setup->duration,
+                          start.q.data(), start.v.data()});
+    }
+  }
+
+  static constexpr bool of_systems = true;
+
+  bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
+    return library().system_lanes(options)(*dynamics_, options, every, members_, ends(), watch);
+  }
+
+ private:
+  static const SystemSubject& subject_of(const RunSetup& setup) {
+    return static_cast<const SystemSubject&>(*setup.subject);
+  }
+
+  std::unique_ptr<LaneDynamics> dynamics_;
+  std::vector<PlainSystemMember> members_;
 };
 
 }  // namespace detail
 
-/// Runs of one kind, in lanes.
-template <class Space>
+/// Runs of one kind, in lanes. `Members` is PlainChains or PlainSystems.
+template <class Members>
 class LaneRuns : private LaneWatch {
  public:
-  /// `setups`, all of one lane_kind, must outlive it.
-  LaneRuns(std::span<const RunSetup* const> setups, const std::function<bool()>& stop)
-      : setups_(setups), stop_(stop), members_(setups) {
+  /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they are run alone.
+  LaneRuns(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop)
+      : setups_(setups), options_(options), stop_(stop), members_(setups) {
     watches_.reserve(setups.size());
     for (const RunSetup* setup : setups) {
-      watches_.emplace_back(setup->events, detail::glance_degree(setup->options));
+      watches_.emplace_back(setup->events, detail::glance_degree(options));
       if (!setup->events.empty()) watches_.back().start(setup->start);
-      wants_steps_ |= !setup->events.empty();
+      wants_steps_ |= !setup->events.empty() || is_tried(*setup);
     }
+    steps_.resize(setups.size());
   }
 
   /// What came of each. One that lanes could not move, by steps of their own or at all, is run alone from its start.
@@ -130,8 +194,7 @@ class LaneRuns : private LaneWatch {
 
  private:
   void move() {
-    const RunSetup& first = *setups_[0];
-    stopped_ = !members_.move(*library_of<Space>().lanes(first.options), first.options, first.every, *this);
+    stopped_ = !members_.move(options_, setups_[0]->every, *this);
     for (std::size_t k = 0; k < setups_.size(); ++k) {
       if (reports_[k].end != RunEnd::event) reports_[k].last = members_.last(k);
     }
@@ -145,18 +208,31 @@ class LaneRuns : private LaneWatch {
     const Subject& subject = *setup.subject;
     const Observation before = subject.observe(setup.start), after = subject.observe(report.last);
     if (end.status != Status::ok || !std::isfinite(before.energy) || !std::isfinite(after.energy)) return false;
-    report.energy_error = {before.energy, detail::compared_with(subject.energy_scale(), before.energy), 0};
+    const auto sum = [](const Observation& seen) { return std::abs(seen.kinetic) + std::abs(seen.potential()); };
+    const double scale = Members::of_systems ? std::max({end.energy_sum, sum(before), sum(after)})
+                                             : detail::compared_with(subject.energy_scale(), before.energy);
+    report.energy_error = {before.energy, scale, 0};
     const double last = std::abs(after.energy - before.energy);
     report.energy_error.largest = report.energy_error.of(before.energy + std::max(last, end.energy_error));
+    if (is_tried(setup) && !is_good(k, report)) return false;
     report.energy_final = after.energy;
     report.rows = 1 + (end.steps + setup.every - 1) / setup.every;
     report.statistics.steps = end.steps;
     report.statistics.rejected_steps = end.rejected_steps;
-    if (!is_explicit(setup.options.method)) report.description = {"chain", "fixed-point", ""};
+    if (!is_explicit(options_.method)) report.description = {"chain", "fixed-point", ""};
     report.events = watches_[k].tallies();
     report.event_cost = watches_[k].cost();
     report.warnings = event_warnings(setup.events, report.events);
     return true;
+  }
+
+  // Of a system nothing is known before but what it does: a method that was not asked for has to keep the energy, where
+  // it is kept, and to be over soon.
+  bool is_tried(const RunSetup& setup) const { return Members::of_systems && options_.method != setup.options.method; }
+  bool is_good(std::size_t k, const RunReport& report) const {
+    const RunSetup& setup = *setups_[k];
+    return steps_[k] < most_steps &&
+           (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
   }
 
   // --- While they are moved ---
@@ -167,9 +243,8 @@ class LaneRuns : private LaneWatch {
     std::unique_ptr<Integrator> integrator = nullptr;
     double begin = std::numeric_limits<double>::quiet_NaN();  // of the step that it has taken
 
-    bool take(std::size_t of, const RunSetup& setup, const Motion& from, double end) {
+    bool take(std::size_t of, const RunSetup& setup, RunOptions options, const Motion& from, double end) {
       if (of != member) {
-        RunOptions options = setup.options;
         options.step = 1;  // of the size that it is told
         options.solver = Solver::chain;
         options.iteration = Iteration::fixed_point;
@@ -188,8 +263,8 @@ class LaneRuns : private LaneWatch {
   /// The last step of the member in a lane, as an EventWatch looks into it.
   class Step {
    public:
-    Step(LaneSteps& steps, int lane, const RunSetup& setup, Alone& alone)
-        : steps_(steps), lane_(lane), setup_(setup), alone_(alone) {}
+    Step(LaneSteps& steps, int lane, const RunSetup& setup, const RunOptions& options, Alone& alone)
+        : steps_(steps), lane_(lane), setup_(setup), options_(options), alone_(alone) {}
 
     void state(Motion& motion) const {
       prepare(steps_.end(lane_), motion);
@@ -203,7 +278,7 @@ class LaneRuns : private LaneWatch {
       prepare(time, motion);
       const double share = (time - begin.time) / (steps_.end(lane_) - begin.time);
       if (steps_.look(lane_, share, motion.q.data(), motion.v.data())) return true;
-      return alone_.take(steps_.member(lane_), setup_, begin, steps_.end(lane_)) &&
+      return alone_.take(steps_.member(lane_), setup_, options_, begin, steps_.end(lane_)) &&
              alone_.integrator->look(time, motion);
     }
 
@@ -217,6 +292,7 @@ class LaneRuns : private LaneWatch {
     LaneSteps& steps_;
     int lane_;
     const RunSetup& setup_;
+    const RunOptions& options_;
     Alone& alone_;
   };
 
@@ -226,7 +302,10 @@ class LaneRuns : private LaneWatch {
   void after_step(LaneSteps& steps) override {
     alone_.resize(static_cast<std::size_t>(steps.lanes()));
     for (int lane = 0; lane < steps.lanes(); ++lane) {
-      if (steps.took_step(lane)) look_into(steps, lane);
+      if (!steps.took_step(lane)) continue;
+      const std::size_t k = steps.member(lane);
+      if (++steps_[k] >= most_steps && is_tried(*setups_[k])) steps.finish(lane);
+      look_into(steps, lane);
     }
   }
 
@@ -235,7 +314,7 @@ class LaneRuns : private LaneWatch {
     const RunSetup& setup = *setups_[k];
     if (setup.events.empty()) return;
     for (const Occurrence& happened :
-         watches_[k].after_step(Step(steps, lane, setup, alone_[static_cast<std::size_t>(lane)]))) {
+         watches_[k].after_step(Step(steps, lane, setup, options_, alone_[static_cast<std::size_t>(lane)]))) {
       if (!setup.events[happened.event].stop) continue;
       reports_[k].end = RunEnd::event;
       reports_[k].ended_by = happened.event;
@@ -245,12 +324,16 @@ class LaneRuns : private LaneWatch {
   }
 
   std::span<const RunSetup* const> setups_;
+  RunOptions options_;
   const std::function<bool()>& stop_;
   std::vector<EventWatch> watches_;
-  detail::PlainMembers<Space> members_;
+  Members members_;
   std::vector<RunReport> reports_;
   std::vector<Alone> alone_;  // of each lane
+  static constexpr int most_steps = 2000;
+
   bool wants_steps_ = false, stopped_ = false;
+  std::vector<std::int64_t> steps_;  // that each member has taken
 };
 
 }  // namespace pendula

@@ -61,16 +61,19 @@ inline double run_length(const RunSetup& setup) {
 /// tolerance stands for what the motion makes of the errors of steps.
 inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   RunOptions options = setup.options;
-  const bool fits = options.method == Method::gauss && options.step == 0 && options.tolerance >= 1e-9 &&
-                    setup.events.empty() && detail::run_length(setup) <= detail::short_run;
-  if (!fits || !lane_kind(setup)) return options;
+  const bool fits =
+      options.method == Method::gauss && options.step == 0 && options.tolerance >= 1e-9 && setup.events.empty();
+  if (!fits) return options;
   options.method = Method::fehlberg78;
   options.tolerance *= 0.01;
-  return options;
+  const std::optional<LaneKind> kind = lane_kind(setup, options);
+  const bool is_system = kind && kind->system != nullptr;  // which LaneRuns tries
+  const bool is_short = lane_kind(setup) && detail::run_length(setup) <= detail::short_run;
+  return is_system || is_short ? options : setup.options;
 }
 
-/// The same for the leading exponent of a run, however long that is: the longer, the smaller the tolerance, so that no
-/// more of the energy is lost in all.
+/// The same for the leading exponent of a chain's run, however long that is: the longer, the smaller the tolerance, so
+/// that no more of the energy is lost in all.
 inline RunOptions quickest_with_tangents(const RunSetup& setup) {
   RunOptions options = setup.options;
   if (options.method != Method::gauss || options.step != 0 || !lane_kind(setup)) return options;
@@ -87,7 +90,7 @@ inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
   detail::RunsByKind kinds;
   for (std::size_t k = 0; k < setups.size(); ++k) {
     const auto kind = is_explicit(setups[k].options.method) ? lane_kind(setups[k]) : std::nullopt;
-    if (kind) kinds[*kind].push_back(k);
+    if (kind && kind->system == nullptr) kinds[*kind].push_back(k);
   }
   std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
   for (const auto& [kind, numbers] : kinds) {
@@ -100,14 +103,37 @@ inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
   return exponents;
 }
 
+/// How members are moved.
+enum class MemberMethod {
+  asked,    ///< as their options tell
+  quickest  ///< as quickest_in_lanes tells; who cannot be moved so, as their options tell
+};
+
+/// The options by which a run goes in lanes.
+inline RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
+  return method == MemberMethod::quickest ? quickest_in_lanes(setup) : setup.options;
+}
+
+namespace detail {
+
+inline std::vector<RunReport> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
+                                           const RunOptions& options, const std::function<bool()>& stop) {
+  if (kind.system != nullptr) return LaneRuns<PlainSystems>(alike, options, stop).go();
+  if (kind.dimension == Planar::dimension) return LaneRuns<PlainChains<Planar>>(alike, options, stop).go();
+  return LaneRuns<PlainChains<Spatial>>(alike, options, stop).go();
+}
+
+}  // namespace detail
+
 /// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. A report
 /// depends on its setup alone, to the last bit; of a run that was stopped it says that and nothing else. Throws as Run.
 inline std::vector<RunReport> run_members(
-    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; }) {
+    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
+    MemberMethod method = MemberMethod::asked) {
   std::vector<RunReport> reports(setups.size());
   detail::RunsByKind kinds;
   for (std::size_t k = 0; k < setups.size(); ++k) {
-    if (const auto kind = lane_kind(setups[k])) {
+    if (const auto kind = lane_kind(setups[k], lane_options(setups[k], method))) {
       kinds[*kind].push_back(k);
     } else {
       reports[k] = Run(setups[k]).go(stop);
@@ -115,8 +141,7 @@ inline std::vector<RunReport> run_members(
   }
   for (const auto& [kind, numbers] : kinds) {
     const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
-    std::vector<RunReport> found =
-        kind.dimension == Planar::dimension ? LaneRuns<Planar>(alike, stop).go() : LaneRuns<Spatial>(alike, stop).go();
+    std::vector<RunReport> found = detail::run_in_lanes(kind, alike, lane_options(*alike[0], method), stop);
     for (std::size_t k = 0; k < numbers.size(); ++k) reports[numbers[k]] = std::move(found[k]);
   }
   return reports;

@@ -18,6 +18,18 @@ struct ClassicalRungeKutta {
   static constexpr std::array<double, stages + 1> e = {};
 };
 
+namespace detail {
+
+/// When a stage is, in steps from the start: the sum of what it weighs the slopes with.
+template <std::size_t Count>
+constexpr double node_of(const double (&weights)[Count]) {
+  double sum = 0;
+  for (const double weight : weights) sum += weight;
+  return sum;
+}
+
+}  // namespace detail
+
 /// Order 5 with an estimate of order 4 (Dormand, Prince, J. Comput. Appl. Math. 6 (1980) 19).
 struct DormandPrince5 {
   static constexpr std::size_t stages = 6;

@@ -29,42 +29,45 @@ class LaneExplicit {
   using Vector = std::array<L, D>;
 
   struct Options {};
-  explicit LaneExplicit(int links, Options = {})
-      : dynamics_(links),
-        rods_(links),
-        trial_(links),
-        before_(links),
-        stages_(links),
-        slopes_(Method::stages + 1, Rods(links)),
-        before_slopes_(links) {
-    for (int i = 0; i < links; ++i) {
-      for (Rods* rods : {&rods_, &trial_, &before_, &stages_, &before_slopes_}) (*rods)[i] = Dynamics::resting();
-      for (Rods& slopes : slopes_) slopes[i] = Dynamics::zero();
+  explicit LaneExplicit(typename Dynamics::Subject subject, Options = {})
+      : dynamics_(subject),
+        parts_(dynamics_.parts()),
+        trial_(parts_),
+        before_(parts_),
+        stages_(parts_),
+        slopes_(Method::stages + 1, parts_),
+        before_slopes_(parts_),
+        errors_(dynamics_.parts()) {
+    for (int i = 0; i < dynamics_.parts(); ++i) {
+      for (Parts* all : {&parts_, &trial_, &before_, &stages_, &before_slopes_}) (*all)[i] = Dynamics::resting();
+      for (Parts& slopes : slopes_) slopes[i] = Part::zero();
     }
   }
 
   LaneExplicit& chain() { return *this; }
   const LaneExplicit& chain() const { return *this; }
-  int links() const { return dynamics_.links(); }
+  int links() const { return dynamics_.parts(); }
+  const auto& parts() const { return parts_; }
 
   /// A member comes into a lane: LaneRods::start.
   template <class... Start>
-  void start(int lane, const Start&... start) {
-    dynamics_.start(lane, start..., rods_);
+  void start(int lane, double time, const Start&... start) {
+    dynamics_.start(lane, time, start..., parts_);
+    now_.set(lane, time);
     fresh_.set(lane, 1);
   }
 
-  auto heading(int lane, int i) const { return dynamics_.heading(lane, i, rods_); }
+  auto heading(int lane, int i) const { return dynamics_.heading(lane, i, parts_); }
   void find_rates() const {}
-  decltype(auto) along(int i) const { return detail::values_of(rods_[i].along); }
+  decltype(auto) along(int i) const { return detail::values_of(parts_[i].place); }
 
   /// Rates of all rods; visit(i, ξ̇_i, …).
   template <class Visit>
   void for_each_rate(Visit visit) const {
-    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(rods_[i].rate), L(0.0));
+    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
   }
 
-  /// Rods and rates of the members whose step was accepted when `share` of it was done, by the polynomial of degree
+  /// Parts and rates of the members whose step was accepted when `share` of it was done, by the polynomial of degree
   /// five through both ends with rates and accelerations; visit(i, ξ, ξ̇).
   template <class Visit>
   void for_each_glance(double share, Visit visit) const {
@@ -76,14 +79,14 @@ class LaneExplicit {
         bend_off_rate(0.5 * u * u * w * (5 * u - 3));
     const L inverse_h = L(1.0) / step_;
     for (int i = 0; i < links(); ++i) {
-      const Rod &from = before_[i], &to = rods_[i];
+      const Part &from = before_[i], &to = parts_[i];
       const auto &bend = before_slopes_[i].rate, &bend_after = slopes_[0][i].rate;
       Vector rod, rate;
       for (std::size_t k = 0; k < D; ++k) {
-        const L moved = value(to.along[k]) - value(from.along[k]);
+        const L moved = value(to.place[k]) - value(from.place[k]);
         const L turning = step_ * value(from.rate[k]), turned = step_ * value(to.rate[k]);
         const L bending = step_ * (step_ * value(bend[k])), bent = step_ * (step_ * value(bend_after[k]));
-        rod[k] = value(from.along[k]) +
+        rod[k] = value(from.place[k]) +
                  (((rise * moved + turn_on * turning) + turn_off * turned) + (bend_on * bending + bend_off * bent));
         rate[k] = inverse_h * (((rise_rate * moved + turn_on_rate * turning) + turn_off_rate * turned) +
                                (bend_on_rate * bending + bend_off_rate * bent));
@@ -96,29 +99,32 @@ class LaneExplicit {
   template <class Visit>
   void for_each_look(double share, Visit visit) {
     go_back();
-    solve(L(share) * step_, step_ > L(0.0));
-    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(trial_[i].along), detail::values_of(trial_[i].rate));
+    solve(begin_, L(share) * step_, step_ > L(0.0));
+    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(trial_[i].place), detail::values_of(trial_[i].rate));
     go_back();
   }
 
-  L energy() const { return dynamics_.energy(rods_); }
-  L pace_squared() const { return dynamics_.pace_squared(rods_); }
+  L energy() { return dynamics_.energy(now_, parts_); }
+  const L& energy_sum() const requires requires(const Dynamics& dynamics) { dynamics.energy_sum(); }
+  { return dynamics_.energy_sum(); }
+  L pace_squared() const { return dynamics_.pace_squared(parts_); }
 
-  /// Tries a step of `h`; gives those of the members that are `wanted` to whom nothing happened that is not finite, and
-  /// whose links turn by less than half a turn. The state stays what it was.
-  PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& h, const Mask& wanted) {
-    refresh();
+  /// Tries a step of `h` from `time`; gives those of the members that are `wanted` to whom nothing happened that is not
+  /// finite, and who turn by less than half a turn. The state stays what it was.
+  PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
+    refresh(time);
     detail::unrolled<static_cast<int>(Method::stages) - 1>([&](auto s) PENDULA_WRITTEN_OUT {
       constexpr auto stage = static_cast<std::size_t>(s) + 1;
       weigh<stage>(h, Method::a[stage], stages_);
-      dynamics_.slopes(stages_, slopes_[stage]);
+      dynamics_.slopes(fma(h, L(detail::node_of(Method::a[stage])), time), stages_, slopes_[stage]);
     });
     weigh<Method::stages>(h, Method::b, trial_);
     dynamics_.restore(trial_);
-    dynamics_.slopes(trial_, slopes_[Method::stages]);
+    dynamics_.slopes(time + h, trial_, slopes_[Method::stages]);
     const L pace = dynamics_.pace_squared(trial_);
     if constexpr (can_choose) find_error(h, pace);
     tried_ = h;
+    tried_from_ = time;
     const L turned = max(pace, pace_squared()) * (h * h);
     return wanted & (turned < L(largest_turn * largest_turn));
   }
@@ -129,10 +135,12 @@ class LaneExplicit {
   /// Moves the members to the end of the step that was tried.
   void accept(const Mask& which) {
     step_ = select(which, tried_, step_);
-    dynamics_.for_links([&](auto i) PENDULA_WRITTEN_OUT {
-      assign(which, at(rods_, i), at(before_, i));
+    begin_ = select(which, tried_from_, begin_);
+    now_ = select(which, tried_from_ + tried_, now_);
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      assign(which, at(parts_, i), at(before_, i));
       assign(which, at(slopes_[0], i), at(before_slopes_, i));
-      assign(which, at(trial_, i), at(rods_, i));
+      assign(which, at(trial_, i), at(parts_, i));
       assign(which, at(slopes_[Method::stages], i), at(slopes_[0], i));
     });
   }
@@ -140,12 +148,12 @@ class LaneExplicit {
   /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
   /// again after this.
   L take_growth(const Mask& which) requires(Dynamics::has_tangent) {
-    const L squared = dynamics_.tangent_squared(rods_);
+    const L squared = dynamics_.tangent_squared(parts_);
     const L factor = select(which, L(1.0) / sqrt(squared), L(1.0));
     for (int i = 0; i < links(); ++i) {
-      for (Rod* rod : {&rods_[i], &slopes_[0][i]}) {
+      for (Part* rod : {&parts_[i], &slopes_[0][i]}) {
         for (std::size_t k = 0; k < D; ++k) {
-          rod->along[k].slope = factor * rod->along[k].slope;
+          rod->place[k].slope = factor * rod->place[k].slope;
           rod->rate[k].slope = factor * rod->rate[k].slope;
         }
       }
@@ -155,8 +163,9 @@ class LaneExplicit {
 
  private:
   using Number = typename Dynamics::Number;
-  using Rod = typename Dynamics::Rod;
-  using Rods = typename Dynamics::Rods;
+  using Part = typename Dynamics::Part;
+  using Parts = typename Dynamics::Parts;
+  using Error = LanePart<L, D>;
 
   static constexpr double largest_turn = 3;  // rad
 
@@ -166,83 +175,81 @@ class LaneExplicit {
   }
   static const L& value(const Number& number) { return detail::value_of(number); }
 
-  static void assign(const Mask& which, const Rod& from, Rod& to) {
+  static void assign(const Mask& which, const Part& from, Part& to) {
     for (std::size_t k = 0; k < D; ++k) {
-      to.along[k] = select(which, from.along[k], to.along[k]);
+      to.place[k] = select(which, from.place[k], to.place[k]);
       to.rate[k] = select(which, from.rate[k], to.rate[k]);
     }
   }
 
   // To where the last step began, and from there.
   void go_back() {
-    std::swap(rods_, before_);
+    std::swap(parts_, before_);
     std::swap(slopes_[0], before_slopes_);
   }
 
   // The first slopes of members that have come into lanes; of others they are those of the last step's end.
-  void refresh() {
+  void refresh(const L& time) {
     const Mask fresh = fresh_ > L(0.0);
     if (!xsimd::any(fresh)) return;
     fresh_ = L(0.0);
-    Rods& found = stages_;  // slopes are as large
-    dynamics_.slopes(rods_, found);
-    dynamics_.for_links([&](auto i) PENDULA_WRITTEN_OUT { assign(fresh, at(found, i), at(slopes_[0], i)); });
+    Parts& found = stages_;  // slopes are as large
+    dynamics_.slopes(time, parts_, found);
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { assign(fresh, at(found, i), at(slopes_[0], i)); });
   }
 
   // Where the first `Count` slopes lead to, weighed.
   template <std::size_t Count, class Weights>
-  [[gnu::always_inline]] void weigh(const L& h, const Weights& weights, Rods& to) {
-    dynamics_.for_links([&](auto i) PENDULA_WRITTEN_OUT {
-      Rod moved = Dynamics::zero();
+  [[gnu::always_inline]] void weigh(const L& h, const Weights& weights, Parts& to) {
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      Part moved = Part::zero();
       detail::unrolled<static_cast<int>(Count)>([&](auto j) PENDULA_WRITTEN_OUT {
         const double weight = weights[static_cast<std::size_t>(j)];
         if (weight == 0) return;
         add(L(weight), at(slopes_[static_cast<std::size_t>(j)], i), moved);
       });
-      const Rod& from = at(rods_, i);
-      Rod& there = at(to, i);
+      const Part& from = at(parts_, i);
+      Part& there = at(to, i);
       for (std::size_t k = 0; k < D; ++k) {
-        there.along[k] = fma(h, moved.along[k], from.along[k]);
+        there.place[k] = fma(h, moved.place[k], from.place[k]);
         there.rate[k] = fma(h, moved.rate[k], from.rate[k]);
       }
     });
   }
-  static void add(const L& weight, const Rod& slope, Rod& sum) {
+  static void add(const L& weight, const Part& slope, Part& sum) {
     for (std::size_t k = 0; k < D; ++k) {
-      sum.along[k] = fma(weight, slope.along[k], sum.along[k]);
+      sum.place[k] = fma(weight, slope.place[k], sum.place[k]);
       sum.rate[k] = fma(weight, slope.rate[k], sum.rate[k]);
     }
   }
 
-  // Of rods relative to their lengths, and of rates to those and the pace.
   [[gnu::always_inline]] void find_error(const L& h, const L& pace_squared) {
-    error_ = L(0.0);
-    const L inverse_pace = L(1.0) / pace_squared;
-    dynamics_.for_links([&](auto i) PENDULA_WRITTEN_OUT {
-      Vector along, rate;
-      along.fill(L(0.0));
-      rate.fill(L(0.0));
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      Error error = Error::zero();
       detail::unrolled<static_cast<int>(Method::stages) + 1>([&](auto j) PENDULA_WRITTEN_OUT {
         constexpr double weight = Method::e[static_cast<std::size_t>(j)];
         if constexpr (weight != 0) {
-          const Rod& slope = at(slopes_[static_cast<std::size_t>(j)], i);
+          const Part& slope = at(slopes_[static_cast<std::size_t>(j)], i);
           for (std::size_t k = 0; k < D; ++k) {
-            along[k] = fma(L(weight), value(slope.along[k]), along[k]);
-            rate[k] = fma(L(weight), value(slope.rate[k]), rate[k]);
+            error.place[k] = fma(L(weight), value(slope.place[k]), error.place[k]);
+            error.rate[k] = fma(L(weight), value(slope.rate[k]), error.rate[k]);
           }
         }
       });
-      const L squared = fma(dot(rate, rate), inverse_pace, dot(along, along));
-      error_ = max(error_, (h * h) * (squared * dynamics_.inverse_square(i)));
+      at(errors_, i) = error;
     });
+    error_ = dynamics_.error_squared(h, errors_, parts_, slopes_[0], trial_, pace_squared);
   }
 
   Dynamics dynamics_;
   L fresh_{0.0}, error_{0.0};
-  L tried_{0.0}, step_{1.0};             // the steps that were tried, and those that were taken last
-  Rods rods_, trial_, before_, stages_;  // before_: where the last step began
-  std::vector<Rods> slopes_;             // of the stages, and of the end
-  Rods before_slopes_;
+  L tried_{0.0}, step_{1.0};        // the steps that were tried, and those that were taken last
+  L tried_from_{0.0}, begin_{0.0};  // when they began
+  L now_{0.0};
+  Parts parts_, trial_, before_, stages_;  // before_: where the last step began
+  std::vector<Parts> slopes_;              // of the stages, and of the end
+  Parts before_slopes_;
+  typename Dynamics::Errors errors_;  // of the step, over its size
 };
 
 }  // namespace pendula

@@ -22,6 +22,7 @@ struct LaneEnd {
   std::int64_t steps = 0;      ///< that were accepted
   std::int64_t rejected_steps = 0;
   double energy_error = 0;  ///< the largest |H − H_0| where it was looked at  [J]
+  double energy_sum = 0;    ///< of systems, the largest |T| + |U| there  [J]
 };
 
 /// How members are moved.

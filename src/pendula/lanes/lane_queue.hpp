@@ -2,46 +2,48 @@
 
 #include <algorithm>
 #include <optional>
+#include <pendula/lanes/lane_chain_seats.hpp>
 #include <pendula/lanes/lane_explicit.hpp>
 #include <pendula/lanes/lane_member.hpp>
-#include <pendula/lanes/lane_sight.hpp>
+#include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_stepper.hpp>
-#include <pendula/lanes/lane_turns.hpp>
+#include <pendula/lanes/lane_system.hpp>
+#include <pendula/lanes/lane_system_seats.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>
 
 namespace pendula {
 
-/// Moves the members of an ensemble of chains to their ends by steps of a LaneStepper or LaneExplicit, as many at once
-/// as a register has lanes. A lane whose member has come to its end takes the next one: none is idle until the last
-/// have begun. What a member does depends on nothing but itself, to the last bit.
+/// Moves the members of an ensemble to their ends by steps of a LaneStepper or LaneExplicit, as many at once as a
+/// register has lanes; `Seats` brings them into lanes and out of them. A lane whose member has come to its end takes
+/// the next one: none is idle until the last have begun. What a member does depends on nothing but itself, to the last
+/// bit.
 ///
 /// A member that a fixed point cannot move ends where it is and says so; the others go on.
-template <class Stepper>
+template <class Stepper, class Seats = LaneChainSeats<Stepper>>
 class LaneQueue {
  public:
-  using Space = typename Stepper::SpaceType;
-  static constexpr int N = Stepper::links_known;
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
-  using Member = LaneMember<Space, N>;
+  using Member = typename Seats::Member;
+  using Common = typename Seats::Common;
   static constexpr int lanes = L::size, stages = Stepper::stages;
 
-  /// Throws std::invalid_argument for a chain with loads: gravity alone is known here; and where an explicit method is
-  /// not told its step.
-  LaneQueue(const Chain<Space, N>& chain, const LaneOptions& options)
-      : chain_(chain),
-        links_(links_of(chain)),
-        options_(options),
-        stepper_(chain.links(), stepper_options(options)),
+  /// `common`: what members share. Throws std::invalid_argument where they cannot sit in lanes, and where an explicit
+  /// method is not told its step.
+  LaneQueue(Common common, const LaneOptions& options)
+      : options_(options),
+        stepper_(Seats::subject_of(common), stepper_options(options)),
         controller_(options.tolerance),
-        turns_(chain.links()) {}
+        seats_(common, stepper_) {}
+  LaneQueue(const LaneQueue&) = delete;
+  LaneQueue& operator=(const LaneQueue&) = delete;
 
   /// Who sees every step from now on, and may end a member or all.
   void set_watch(LaneWatch& watch) {
     watch_ = &watch;
-    if (watch.wants_steps()) sight_.emplace(stepper_, turns_);
+    if (watch.wants_steps()) seats_.show(sight_);
   }
 
   /// Moves all members; ends[i] is what becomes of members[i]; false where the watch made it leave off. Throws
@@ -64,16 +66,11 @@ class LaneQueue {
   std::int64_t iterations() const requires(Stepper::is_implicit) { return stepper_.iterations(); }
 
  private:
-  using Sight = LaneSight<Stepper, LaneTurns<Space, N, L>>;
-
+  // Of systems nobody knows before what their energies are to be compared with.
+  static constexpr bool sums_energies = requires(const Stepper& stepper) { stepper.energy_sum(); };
   static constexpr double most_attempts = 40;  // at one step
   static constexpr double largest_energy_defect = 0.02;
   static constexpr double smallest_step = 1e-10;  // of the time that is left
-
-  static ChainLinks<Space, N, double> links_of(const Chain<Space, N>& chain) {
-    if (chain.loaded()) throw std::invalid_argument("ensemble: expected a chain without damping and torques");
-    return ChainLinks<Space, N, double>(chain);
-  }
 
   // What a ten-thousandth of the tolerance leaves out is not seen beside what the steps err by.
   static typename Stepper::Options stepper_options(const LaneOptions& options) {
@@ -92,9 +89,6 @@ class LaneQueue {
 
   bool chooses() const { return Stepper::can_choose && options_.step == 0; }
   Mask running() const { return running_ > L(0.0); }
-  auto along() const {
-    return [this](int i) -> decltype(auto) { return stepper_.chain().along(i); };
-  }
 
   // One step of all members.
   void step() {
@@ -102,7 +96,7 @@ class LaneQueue {
     const L wanted = chooses() ? controller_.step() : L(options_.step);
     const Mask is_cut = !(wanted * L(1 + 1e-9) < remaining);
     const L h = select(running() & is_cut, remaining, wanted);
-    const Mask found = stepper_.solve(h, running() & (h > smallest_step * remaining));
+    const Mask found = stepper_.solve(time_.value, h, running() & (h > smallest_step * remaining));
     Mask good = found, wrong = found & !found;
     if (chooses()) good = controller_.accepts(found, h, stepper_);
     if constexpr (Stepper::is_implicit) {
@@ -132,7 +126,7 @@ class LaneQueue {
 
   void accept(const Mask& good) {
     stepper_.accept(good);
-    turns_.follow(good, good & !good, stepper_);
+    seats_.follow(good, good & !good);
   }
 
   // Whose energy does not balance has come to stages that are not those of the motion.
@@ -147,7 +141,7 @@ class LaneQueue {
     chain.restore(wrong);
     stepper_.forget(wrong);
     const Mask right = good & !wrong;
-    turns_.follow(right, right & stepper_.turns_far(), stepper_);
+    seats_.follow(right, right & stepper_.turns_far());
     return wrong;
   }
 
@@ -166,6 +160,11 @@ class LaneQueue {
     if (!xsimd::any(due)) return;
     since_look_ = select(due, L(0.0), since_look_);
     energy_error_ = select(due, max(energy_error_, abs(stepper_.chain().energy() - energy_)), energy_error_);
+    watch_energy_sum(due);
+  }
+
+  void watch_energy_sum(const Mask& due) {
+    if constexpr (sums_energies) energy_sum_ = select(due, max(energy_sum_, stepper_.energy_sum()), energy_sum_);
   }
 
   // Members whose step was not taken try a shorter one, or give up; those that were solved know already how short.
@@ -183,7 +182,6 @@ class LaneQueue {
   void retire(const Mask& which, Status status) {
     alignas(pack_alignment) double is_over[L::width];
     select(which, L(1.0), L(0.0)).store(is_over);
-    stepper_.chain().find_rates();
     for (int lane = 0; lane < lanes; ++lane) {
       if (is_over[lane] == 0) continue;
       write_end(lane, status);
@@ -194,24 +192,13 @@ class LaneQueue {
 
   void write_end(int lane, Status status) {
     LaneEnd& end = ends_[static_cast<std::size_t>(member_[lane])];
-    const int links = stepper_.chain().links();
     end.status = status;
     end.steps = static_cast<std::int64_t>(steps_[lane]);
     end.rejected_steps = static_cast<std::int64_t>(rejected_[lane]);
     end.energy_error = energy_error_[lane];
+    end.energy_sum = energy_sum_[lane];
     end.motion.time = status == Status::ok ? end_[lane] : time_.value[lane];
-    end.motion.q.resize(Space::dof * links);
-    end.motion.v.resize(Space::dof * links);
-    for (int i = 0; i < links; ++i) {
-      std::array<long double, Space::dof> near;
-      for (std::size_t a = 0; a < near.size(); ++a) near[a] = turns_.angles(lane, i)[a];
-      const auto angles = user_angles(stepper_.chain().heading(lane, i), near);
-      for (std::size_t a = 0; a < near.size(); ++a) {
-        const auto entry = static_cast<Eigen::Index>(a) * links + i;
-        end.motion.q[entry] = static_cast<double>(angles.q[a]);
-        end.motion.v[entry] = static_cast<double>(angles.v[a]);
-      }
-    }
+    seats_.read(lane, end.motion);
   }
 
   // The next member comes into a lane that is free; members that are at their end already stay what they are.
@@ -231,15 +218,12 @@ class LaneQueue {
   }
 
   void take(int lane, std::size_t member, const Member& next) {
-    const bool own = next.chain != nullptr;
-    const double* q = next.start.q.data();
-    stepper_.start(lane, own ? links_of(*next.chain) : links_, (own ? *next.chain : chain_).gravity(), q,
-                   next.start.v.data());
-    turns_.start(lane, q, along());
+    seats_.take(lane, next);
     member_[lane] = static_cast<std::ptrdiff_t>(member);
     time_.value.set(lane, next.start.time);
     end_.set(lane, next.end);
-    for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &since_look_, &energy_error_}) zero->set(lane, 0);
+    for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &since_look_, &energy_error_, &energy_sum_})
+      zero->set(lane, 0);
     if (sight_) sight_->seat(lane, member);
     running_.set(lane, 1);
     begins_.set(lane, 1);
@@ -250,13 +234,15 @@ class LaneQueue {
     const Mask begins = begins_ > L(0.0);
     begins_ = L(0.0);
     if (chooses()) controller_.start(begins, stepper_);
-    if (options_.energy_every > 0) energy_ = select(begins, stepper_.chain().energy(), energy_);
+    if (options_.energy_every == 0) return;
+    energy_ = select(begins, stepper_.chain().energy(), energy_);
+    watch_energy_sum(begins);
   }
 
   void require(const Member& member, std::size_t number) const {
-    const auto coordinates = static_cast<Eigen::Index>(Space::dof) * stepper_.chain().links();
-    const bool fits = member.start.q.size() == coordinates && member.start.v.size() == coordinates &&
-                      (member.chain == nullptr || member.chain->links() == stepper_.chain().links());
+    const Eigen::Index coordinates = seats_.coordinates();
+    const bool fits =
+        member.start.q.size() == coordinates && member.start.v.size() == coordinates && seats_.fits(member);
     if (fits) return;
     throw std::invalid_argument("ensemble: member " + std::to_string(number + 1) + ": expected " +
                                 std::to_string(coordinates) + " coordinates and rates, got " +
@@ -264,12 +250,10 @@ class LaneQueue {
                                 std::to_string(member.start.v.size()));
   }
 
-  Chain<Space, N> chain_;
-  ChainLinks<Space, N, double> links_;
   LaneOptions options_;
   Stepper stepper_;
   typename Stepper::Controller controller_;
-  LaneTurns<Space, N, L> turns_;
+  Seats seats_;
   std::span<const Member> members_;
   std::span<LaneEnd> ends_;
   std::size_t next_ = 0;
@@ -277,9 +261,9 @@ class LaneQueue {
   Twofold<L> time_{L(0.0), L(0.0)};
   L end_{0.0}, running_{0.0}, begins_{0.0};
   L steps_{0.0}, rejected_{0.0}, attempts_{0.0};
-  L energy_{0.0}, energy_error_{0.0}, since_look_{0.0};
+  L energy_{0.0}, energy_error_{0.0}, energy_sum_{0.0}, since_look_{0.0};
   LaneWatch* watch_ = nullptr;
-  std::optional<Sight> sight_;
+  std::optional<typename Seats::Sight> sight_;
 };
 
 /// By Gauss steps of S stages, of chains of N links.
@@ -293,5 +277,10 @@ using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register>, Metho
 /// The same with a tangent of each member, whose growth a watch is told of.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register, true>, Method>>;
+
+/// By explicit steps, of systems of a generated kernel (LaneKernel).
+template <class Method, class Register = MemberRegister>
+using SystemLanes =
+    LaneQueue<LaneExplicit<LaneSystem<Register>, Method>, LaneSystemSeats<LaneExplicit<LaneSystem<Register>, Method>>>;
 
 }  // namespace pendula

@@ -10,6 +10,7 @@
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/lanes/lane_part.hpp>
 #include <random>
 #include <type_traits>
 
@@ -30,21 +31,22 @@ class LaneRods {
   static constexpr bool has_tangent = with_tangent;
   static constexpr std::size_t D = Space::dimension;
 
-  struct Rod {
-    std::array<Number, D> along, rate;  ///< ξ, ξ̇; of slopes ξ̇, ξ̈
-  };
-  using Rods = detail::PerLink<Rod, N>;
+  using Part = LanePart<Number, D>;  ///< ξ, ξ̇
+  using Parts = detail::PerLink<Part, N>;
+  using Errors = detail::PerLink<LanePart<L, D>, N>;
 
+  using Subject = int;  ///< how many links there are
   explicit LaneRods(int links) : links_(links), constants_(links), rows_(links) {}
 
   int links() const {
     if constexpr (N == Eigen::Dynamic) return links_;
     return N;
   }
+  int parts() const { return links(); }
 
   /// body(0), body(1), … of all links, written out where they are few and their number is known.
   template <class Body>
-  [[gnu::always_inline]] void for_links(Body body) const {
+  [[gnu::always_inline]] void for_parts(Body body) const {
     detail::for_links<N>(links(), body);
   }
   template <class Links>
@@ -52,21 +54,16 @@ class LaneRods {
     return of[link];
   }
 
-  static Rod zero() {
-    Rod rod;
-    rod.along.fill(Number(0.0));
-    rod.rate.fill(Number(0.0));
-    return rod;
-  }
-  static Rod resting() {
-    Rod rod = zero();
-    rod.along[D - 1] = Number(-1.0);
+  /// What lanes hold that are free.
+  static Part resting() {
+    Part rod = Part::zero();
+    rod.place[D - 1] = Number(-1.0);
     return rod;
   }
 
   /// A member comes into a lane, with its chain, at q and v  [rad, rad/s].
-  void start(int lane, const ChainLinks<Space, N, double>& chain, double gravity, const double* q, const double* v,
-             Rods& rods) {
+  void start(int lane, double /*time*/, const ChainLinks<Space, N, double>& chain, double gravity, const double* q,
+             const double* v, Parts& rods) {
     gravity_.set(lane, gravity);
     double length = 0;
     for (int i = 0; i < links(); ++i) {
@@ -79,7 +76,7 @@ class LaneRods {
       }
       const Heading<Space> heading(angles, rates);
       for (std::size_t k = 0; k < D; ++k) {
-        set_value(lane, chain[i].length * heading.u[k], rods[i].along[k]);
+        set_value(lane, chain[i].length * heading.u[k], rods[i].place[k]);
         set_value(lane, chain[i].length * heading.u_dot[k], rods[i].rate[k]);
       }
     }
@@ -88,30 +85,30 @@ class LaneRods {
   }
 
   /// Direction of a member's link and its rate.
-  auto heading(int lane, int i, const Rods& rods) const {
+  auto heading(int lane, int i, const Parts& rods) const {
     Heading<Space, long double> heading;
     for (std::size_t k = 0; k < D; ++k) {
-      heading.u[k] = detail::value_of(rods[i].along[k])[lane] / constants_[i].length[lane];
+      heading.u[k] = detail::value_of(rods[i].place[k])[lane] / constants_[i].length[lane];
       heading.u_dot[k] = detail::value_of(rods[i].rate[k])[lane] / constants_[i].length[lane];
     }
     return heading;
   }
 
   /// T + U  [J].
-  L energy(const Rods& rods) const {
+  L energy(const L& /*time*/, const Parts& rods) const {
     L energy(0.0);
     std::array<L, D> bob;
     bob.fill(L(0.0));
     for (int i = 0; i < links(); ++i) {
       bob = sum(bob, detail::values_of(rods[i].rate));
       energy = fma(0.5 * constants_[i].mass, dot(bob, bob), energy);
-      energy = fma(constants_[i].weight, detail::value_of(rods[i].along[D - 1]), energy);
+      energy = fma(constants_[i].weight, detail::value_of(rods[i].place[D - 1]), energy);
     }
     return energy;
   }
 
   /// Fastest turning of a link, squared, and no less than the chain swings  [1/s²].
-  L pace_squared(const Rods& rods) const {
+  L pace_squared(const Parts& rods) const {
     L largest = slowest_pace_;
     for (int i = 0; i < links(); ++i) {
       const auto& rate = detail::values_of(rods[i].rate);
@@ -120,28 +117,40 @@ class LaneRods {
     return largest;
   }
 
-  /// What squares of changes of a rod are relative to: 1/l²  [1/m²].
-  const L& inverse_square(int i) const { return constants_[i].inverse_square; }
+  /// What a step of `h` errs by, squared, from the errors of rods and rates that it is made of: of rods relative to
+  /// their lengths, of rates to those and the pace after it.
+  template <class Errors>
+  [[gnu::always_inline]] L error_squared(const L& h, const Errors& errors, const Parts& /*before*/,
+                                         const Parts& /*slopes*/, const Parts& /*after*/, const L& pace_squared) const {
+    L largest(0.0);
+    const L inverse_pace = L(1.0) / pace_squared;
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      const auto& error = at(errors, i);
+      const L squared = fma(dot(error.rate, error.rate), inverse_pace, dot(error.place, error.place));
+      largest = max(largest, (h * h) * (squared * at(constants_, i).inverse_square));
+    });
+    return largest;
+  }
 
-  /// ξ̇ and ξ̈ of rods.
-  [[gnu::always_inline]] void slopes(const Rods& rods, Rods& found) {
+  /// ξ̇ and ξ̈ of rods, at any time.
+  [[gnu::always_inline]] void slopes(const L& /*time*/, const Parts& rods, Parts& found) {
     MultiplierRow<Number> row;
     Number beyond(0.0);
     const auto inward = [&](auto i) PENDULA_WRITTEN_OUT {
-      const Rod& rod = at(rods, i);
+      const Part& rod = at(rods, i);
       Number right = -dot(rod.rate, rod.rate), before(0.0);
       if (i == 0) {
-        right = fma(rod.along[D - 1], gravity_, right);
+        right = fma(rod.place[D - 1], gravity_, right);
       } else {
-        before = -at(constants_, i - 1).inverse_mass.value * dot(at(rods, i - 1).along, rod.along);
+        before = -at(constants_, i - 1).inverse_mass.value * dot(at(rods, i - 1).place, rod.place);
       }
-      const Number square = at(constants_, i).inverse_masses * dot(rod.along, rod.along);
+      const Number square = at(constants_, i).inverse_masses * dot(rod.place, rod.place);
       const Number inverse = Number(1.0) / fma(-beyond, row.coupling, square);
       row = {fma(-beyond, row.offset, right) * inverse, before * inverse};
       at(rows_, i) = row;
       beyond = before;
     };
-    for_links([&](auto i) PENDULA_WRITTEN_OUT {
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       if constexpr (is_short) {
         inward(std::integral_constant<int, N - 1 - i>());
       } else {
@@ -152,12 +161,12 @@ class LaneRods {
     std::array<Number, D> bond_before;
     bond_before.fill(Number(0.0));
     bond_before[D - 1] = Number(gravity_);
-    for_links([&](auto i) PENDULA_WRITTEN_OUT {
-      const Rod& rod = at(rods, i);
-      std::array<Number, D> pull = scaled(tau, rod.along);
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      const Part& rod = at(rods, i);
+      std::array<Number, D> pull = scaled(tau, rod.place);
       if (i + 1 < links()) {
         tau = fma(-at(rows_, i + 1).coupling, tau, at(rows_, i + 1).offset);
-        for (std::size_t k = 0; k < D; ++k) pull[k] = fma(-tau, at(rods, i + 1).along[k], pull[k]);
+        for (std::size_t k = 0; k < D; ++k) pull[k] = fma(-tau, at(rods, i + 1).place[k], pull[k]);
       }
       const std::array<Number, D> bond = scaled(at(constants_, i).inverse_mass.value, pull);
       at(found, i) = {rod.rate, difference(bond, bond_before)};
@@ -166,24 +175,24 @@ class LaneRods {
   }
 
   /// |ξ| = l and ξ·ξ̇ = 0 again; what a step errs by in them is small.
-  [[gnu::always_inline]] void restore(Rods& rods) const {
-    for_links([&](auto i) PENDULA_WRITTEN_OUT {
+  [[gnu::always_inline]] void restore(Parts& rods) const {
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       const LaneLink<L>& link = at(constants_, i);
-      Rod& rod = at(rods, i);
-      const Number factor = fma(-0.5 * link.inverse_square, dot(rod.along, rod.along), Number(1.5));
-      rod.along = scaled(factor, rod.along);
-      const Number along = dot(rod.along, rod.rate) * link.inverse_square;
-      for (std::size_t k = 0; k < D; ++k) rod.rate[k] = fma(-along, rod.along[k], rod.rate[k]);
+      Part& rod = at(rods, i);
+      const Number factor = fma(-0.5 * link.inverse_square, dot(rod.place, rod.place), Number(1.5));
+      rod.place = scaled(factor, rod.place);
+      const Number along = dot(rod.place, rod.rate) * link.inverse_square;
+      for (std::size_t k = 0; k < D; ++k) rod.rate[k] = fma(-along, rod.place[k], rod.rate[k]);
     });
   }
 
   /// |δξ|²/l² + |δξ̇|²/(l ω)², of all rods, ω being how fast the member swung when it began.
-  L tangent_squared(const Rods& rods) const requires(with_tangent) {
+  L tangent_squared(const Parts& rods) const requires(with_tangent) {
     L squared(0.0);
     for (int i = 0; i < links(); ++i) {
       L along(0.0), rate(0.0);
       for (std::size_t k = 0; k < D; ++k) {
-        along = fma(rods[i].along[k].slope, rods[i].along[k].slope, along);
+        along = fma(rods[i].place[k].slope, rods[i].place[k].slope, along);
         rate = fma(rods[i].rate[k].slope, rods[i].rate[k].slope, rate);
       }
       squared = fma(constants_[i].inverse_square, fma(inverse_pace_squared_, rate, along), squared);
@@ -204,7 +213,7 @@ class LaneRods {
 
   // Of length 1: every link turned by a random angle, about a random axis in space, and turning faster by another; the
   // same ones for all members.
-  void start_tangent(int lane, Rods& rods) {
+  void start_tangent(int lane, Parts& rods) {
     const double squared = pace_squared(rods)[lane], pace = squared > 0 ? std::sqrt(squared) : 1;
     inverse_pace_squared_.set(lane, 1 / (pace * pace));
     std::mt19937 random(1);
@@ -218,12 +227,12 @@ class LaneRods {
       const auto turned = drawn(), turning = drawn();
       std::array<double, D> along, rate;
       for (std::size_t k = 0; k < D; ++k) {
-        along[k] = rods[i].along[k].value[lane];
+        along[k] = rods[i].place[k].value[lane];
         rate[k] = rods[i].rate[k].value[lane];
       }
       const auto moved = across(turned, along), sped = sum(across(turned, rate), scaled(pace, across(turning, along)));
       for (std::size_t k = 0; k < D; ++k) {
-        rods[i].along[k].slope.set(lane, moved[k]);
+        rods[i].place[k].slope.set(lane, moved[k]);
         rods[i].rate[k].slope.set(lane, sped[k]);
       }
       length += constants_[i].inverse_square[lane] * (dot(moved, moved) + dot(sped, sped) / (pace * pace));
@@ -231,7 +240,7 @@ class LaneRods {
     length = std::sqrt(length);
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
-        for (Number* x : {&rods[i].along[k], &rods[i].rate[k]}) x->slope.set(lane, x->slope[lane] / length);
+        for (Number* x : {&rods[i].place[k], &rods[i].rate[k]}) x->slope.set(lane, x->slope[lane] / length);
       }
     }
   }

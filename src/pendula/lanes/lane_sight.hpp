@@ -9,8 +9,9 @@
 
 namespace pendula {
 
-/// Looks into the last steps of all members of a LaneStepper at once, and hands out what it sees of one. What several
-/// lanes ask for is found for all of them the first time.
+/// Looks into the last steps of all members of a LaneStepper or LaneExplicit at once, and hands out what it sees of
+/// one. What several lanes ask for is found for all of them the first time. `Turns` is as LaneTurns; coordinates of
+/// systems, of one dimension, are what they are.
 template <class Stepper, class Turns>
 class LaneSight : public LaneSteps {
  public:
@@ -94,7 +95,10 @@ class LaneSight : public LaneSteps {
     if (now_.share != nothing) return;
     now_.share = 1;
     chain_.for_each_rate([&](int i, const Vector& rate, const L&) {
-      if constexpr (Space::dof == 1) {
+      if constexpr (D == 1) {
+        chain_.along(i)[0].store(now_.q[entry(i, 0)].numbers);
+        rate[0].store(now_.v[entry(i, 0)].numbers);
+      } else if constexpr (D == 2) {
         turns_.angles(i).store(now_.q[entry(i, 0)].numbers);
         turning(chain_.along(i), rate).store(now_.v[entry(i, 0)].numbers);
       } else {
@@ -124,7 +128,10 @@ class LaneSight : public LaneSteps {
   auto writer(View& view) const {
     return [this, &view](int i, const Vector& rod, const Vector& rate) {
       const std::size_t first = entry(i, 0);
-      if constexpr (Space::dof == 1) {
+      if constexpr (D == 1) {
+        rod[0].store(view.q[first].numbers);
+        rate[0].store(view.v[first].numbers);
+      } else if constexpr (D == 2) {
         Turns::near(rod, L::load(now_.q[first].numbers)).store(view.q[first].numbers);
         turning(rod, rate).store(view.v[first].numbers);
       } else {

@@ -38,7 +38,7 @@ class LaneStepper {
 
   /// A new member comes into a lane: LaneChain::start.
   template <class... Start>
-  void start(int lane, const Start&... start) {
+  void start(int lane, double /*time*/, const Start&... start) {
     chain_.start(lane, start...);
     known_.set(lane, cold);
     last_.set(lane, 0);
@@ -46,8 +46,9 @@ class LaneStepper {
     stop_.forget(lane);
   }
 
-  /// Solves steps of `h` of the members that are `wanted`; gives those where that worked. The state stays what it was.
-  Mask solve(const L& h, const Mask& wanted) {
+  /// Solves steps of `h`, at any time, of the members that are `wanted`; gives those where that worked. The state stays
+  /// what it was.
+  Mask solve(const L& /*time*/, const L& h, const Mask& wanted) {
     const L ratio = h / last_;
     const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));

@@ -3,8 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <pendula/chain/plain_chain.hpp>
+#include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/plain_system.hpp>
 #include <span>
 
 namespace pendula {
@@ -62,13 +64,21 @@ struct PlainMember {
   const double *q, *v;  ///< (dof·links)
 };
 
+/// A system of a generated kernel as such a member.
+struct PlainSystemMember {
+  PlainSystem system;
+  double start, end;    ///< s
+  const double *q, *v;  ///< (coordinates)
+};
+
 /// What became of it.
 struct PlainMemberEnd {
-  double *q, *v;  ///< (dof·links), of the caller, written
+  double *q, *v;  ///< (coordinates), of the caller, written
   double time;    ///< s
   Status status;  ///< otherwise the member came no further than here
   std::int64_t steps, rejected_steps;
   double energy_error;  ///< the largest |H − H_0| at every so many steps  [J]
+  double energy_sum;    ///< of systems, the largest |T| + |U| there  [J]
 };
 
 /// Moves chains of one number of links and without loads by the steps of `options`, a member in each lane; `every`
@@ -76,5 +86,10 @@ struct PlainMemberEnd {
 /// the last bit. False where `watch` made it leave off.
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                          std::span<PlainMemberEnd> ends, LaneWatch& watch);
+
+/// The same of systems whose accelerations `dynamics` tells.
+using MoveSystemMembers = bool(LaneDynamics& dynamics, const RunOptions& options, std::int64_t every,
+                               std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends,
+                               LaneWatch& watch);
 
 }  // namespace pendula

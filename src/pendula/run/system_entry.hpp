@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <pendula/explicit/system_forward_dynamics.hpp>
+#include <pendula/lanes/lane_kernel.hpp>
 #include <pendula/run/system_integrator.hpp>
 #include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_registry.hpp>
@@ -63,7 +64,8 @@ constexpr SystemEntry system_entry() {
           &check_kernel<S>,
           &detail::observe_system<S>,
           &detail::system_rates<S>,
-          &detail::system_is_loaded<S>};
+          &detail::system_is_loaded<S>,
+          &lane_kernel<S>};
 }
 
 }  // namespace pendula

@@ -29,6 +29,7 @@ class SystemSubject : public Subject {
   SystemSubject(std::shared_ptr<const SystemEntry> entry, SystemNumbers numbers)
       : entry_(std::move(entry)), numbers_(std::move(numbers)) {}
 
+  const SystemEntry& entry() const { return *entry_; }
   const SystemInfo& info() const { return entry_->info; }
   const SystemNumbers& numbers() const { return numbers_; }
 

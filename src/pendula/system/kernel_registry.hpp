@@ -11,6 +11,7 @@ namespace pendula {
 
 struct PlainChain;
 class ForwardDynamics;
+class LaneDynamics;
 
 /// What a generated kernel's self-test measured.
 struct KernelCheck {
@@ -57,9 +58,10 @@ struct SystemEntry {
   void (*rates)(const PlainSystem&, double time, const double* q, const double* p, double* v);
   /// Whether energy may come from outside, or go there.
   bool (*loaded)(const PlainSystem&);
+  std::unique_ptr<LaneDynamics> (*lanes)();  ///< its accelerations, of several members at once
 };
 
 /// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
-inline constexpr int system_interface = 2;
+inline constexpr int system_interface = 3;
 
 }  // namespace pendula

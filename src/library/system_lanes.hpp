@@ -1,0 +1,10 @@
+#pragma once
+
+#include <pendula/lanes/plain_lanes.hpp>
+
+namespace pendula {
+
+/// Members of generated kernels in lanes, by explicit methods; nullptr for others.
+MoveSystemMembers* system_lanes(const RunOptions& options);
+
+}  // namespace pendula

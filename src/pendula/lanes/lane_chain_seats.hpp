@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/heading.hpp>
+#include <pendula/lanes/lane_member.hpp>
+#include <pendula/lanes/lane_sight.hpp>
+#include <pendula/lanes/lane_turns.hpp>
+#include <stdexcept>
+
+namespace pendula {
+
+/// How chains come into the lanes of a stepper and out of them: by angles, whose full turns are counted on the way.
+template <class Stepper>
+class LaneChainSeats {
+  using Space = typename Stepper::SpaceType;
+  static constexpr int N = Stepper::links_known;
+  using L = typename Stepper::L;
+  using Mask = typename L::Mask;
+  using Turns = LaneTurns<Space, N, L>;
+
+ public:
+  using Common = const Chain<Space, N>&;  ///< the chain of members who have none of their own
+  using Member = LaneMember<Space, N>;
+  using Sight = LaneSight<Stepper, Turns>;
+
+  /// Throws std::invalid_argument for a chain with loads: gravity alone is known here.
+  LaneChainSeats(Common chain, Stepper& stepper)
+      : chain_(chain), links_(links_of(chain)), stepper_(stepper), turns_(chain.links()) {}
+
+  /// What a stepper of such members is made from.
+  static int subject_of(Common chain) { return chain.links(); }
+  void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }
+
+  /// Coordinates of a member that fits.
+  Eigen::Index coordinates() const { return static_cast<Eigen::Index>(Space::dof) * chain_.links(); }
+  bool fits(const Member& member) const { return member.chain == nullptr || member.chain->links() == chain_.links(); }
+
+  void take(int lane, const Member& next) {
+    const bool own = next.chain != nullptr;
+    const double* q = next.start.q.data();
+    stepper_.start(lane, next.start.time, own ? links_of(*next.chain) : links_, (own ? *next.chain : chain_).gravity(),
+                   q, next.start.v.data());
+    turns_.start(lane, q, [this](int i) -> decltype(auto) { return stepper_.chain().along(i); });
+  }
+
+  /// These members have taken steps; `far` are those that may have turned far and come back.
+  void follow(const Mask& which, const Mask& far) { turns_.follow(which, far, stepper_); }
+
+  /// Where the member in a lane is.
+  void read(int lane, Motion& motion) {
+    auto& chain = stepper_.chain();
+    const int links = chain_.links();
+    chain.find_rates();
+    motion.q.resize(coordinates());
+    motion.v.resize(coordinates());
+    for (int i = 0; i < links; ++i) {
+      std::array<long double, Space::dof> near;
+      for (std::size_t a = 0; a < near.size(); ++a) near[a] = turns_.angles(lane, i)[a];
+      const auto angles = user_angles(chain.heading(lane, i), near);
+      for (std::size_t a = 0; a < near.size(); ++a) {
+        const auto entry = static_cast<Eigen::Index>(a) * links + i;
+        motion.q[entry] = static_cast<double>(angles.q[a]);
+        motion.v[entry] = static_cast<double>(angles.v[a]);
+      }
+    }
+  }
+
+ private:
+  static ChainLinks<Space, N, double> links_of(Common chain) {
+    if (chain.loaded()) throw std::invalid_argument("ensemble: expected a chain without damping and torques");
+    return ChainLinks<Space, N, double>(chain);
+  }
+
+  Chain<Space, N> chain_;
+  ChainLinks<Space, N, double> links_;
+  Stepper& stepper_;
+  Turns turns_;
+};
+
+}  // namespace pendula

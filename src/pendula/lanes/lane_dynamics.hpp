@@ -1,0 +1,32 @@
+#pragma once
+
+#include <pendula/system/plain_system.hpp>
+
+namespace pendula {
+
+/// Accelerations of several systems of one kernel, one in each lane: what a kernel is for the steppers of the compiled
+/// library, which have no loop over stages of their own for each kernel. Numbers of all lanes lie side by side, those
+/// of a coordinate after those of the one before, all of them aligned as LanePack wants it.
+class LaneDynamics {
+ public:
+  LaneDynamics() = default;
+  LaneDynamics(const LaneDynamics&) = delete;
+  LaneDynamics& operator=(const LaneDynamics&) = delete;
+  virtual ~LaneDynamics() = default;
+
+  /// As many as those of the library that moves them.
+  virtual int lanes() const = 0;
+  virtual int coordinates() const = 0;
+  /// What kind of numbers coordinates are.
+  virtual bool is_angle(int coordinate) const = 0;
+  virtual bool of_one_unit(int coordinate, int other) const = 0;
+
+  /// A member's numbers come into a lane.
+  virtual void take(int lane, const PlainSystem& system) = 0;
+  /// q̈ at the times (lanes), of q and q̇ (coordinates, lanes).
+  virtual void accelerations(const double* times, const double* q, const double* v, double* a) = 0;
+  /// T, and T + U  (lanes)  [J].
+  virtual void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) = 0;
+};
+
+}  // namespace pendula

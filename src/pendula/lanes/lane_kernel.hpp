@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <pendula/lanes/lane_dynamics.hpp>
+#include <pendula/lanes/lane_functions.hpp>
+#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/system/system_model.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+/// A generated kernel in lanes; every member has parameters, inputs and times of its own.
+template <System S, class Register = MemberRegister>
+class LaneKernel : public LaneDynamics {
+ public:
+  using L = LanePack<Register>;
+
+  LaneKernel() { inputs_.fill(L(0.0)); }
+
+  int lanes() const override { return L::size; }
+  int coordinates() const override { return S::coordinates; }
+  bool is_angle(int i) const override { return S::coordinate_is_angle[static_cast<std::size_t>(i)]; }
+  bool of_one_unit(int i, int j) const override {
+    if constexpr (requires { S::coordinate_units[0]; }) {
+      return S::coordinate_units[static_cast<std::size_t>(i)] == S::coordinate_units[static_cast<std::size_t>(j)];
+    } else {
+      return true;  // of chains
+    }
+  }
+
+  void take(int lane, const PlainSystem& system) override {
+    if constexpr (parameter_count<S>() > 0) {
+      std::array<L*, static_cast<std::size_t>(parameter_count<S>())> places;
+      S::template parameter_places<L>(parameters_, places.data());
+      for (std::size_t k = 0; k < places.size(); ++k) places[k]->set(lane, system.parameters[k]);
+    }
+    for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k].set(lane, system.inputs[k]);
+    take_sines(lane, system.sines);
+  }
+
+  void accelerations(const double* times, const double* q, const double* v, double* a) override {
+    const L time = L::load(times);
+    set_time(time);
+    Vector acceleration;
+    S::acceleration(parameters_, read(q), read(v), inputs_at(time), acceleration);
+    for (int i = 0; i < S::coordinates; ++i) acceleration[i].store(a + i * L::size);
+  }
+
+  void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) override {
+    set_time(L::load(times));
+    L energy;
+    S::kinetic_energy(parameters_, read(q), read(v), energy);
+    energy.store(kinetic);
+    S::energy(parameters_, read(q), read(v), energy);
+    energy.store(total);
+  }
+
+ private:
+  using Vector = typename S::template Vector<L>;
+  using Inputs = typename S::template Inputs<L>;
+
+  static Vector read(const double* numbers) {
+    Vector x;
+    for (int i = 0; i < S::coordinates; ++i) x[i] = L::load(numbers + i * L::size);
+    return x;
+  }
+
+  void set_time(const L& time) {
+    if constexpr (holds_time<S>) parameters_.time = time;
+  }
+
+  // A sine that members add to an input; who has fewer of them than others has some without an amplitude.
+  struct Sine {
+    int input;
+    L amplitude{0.0}, frequency{0.0}, phase{0.0};
+  };
+
+  void take_sines(int lane, std::span<const InputSine> sines) {
+    for (Sine& sine : sines_) sine.amplitude.set(lane, 0);
+    std::vector<bool> taken(sines_.size());
+    for (const InputSine& from : sines) {
+      std::size_t k = 0;
+      while (k < sines_.size() && (taken[k] || sines_[k].input != from.input)) ++k;
+      if (k == sines_.size()) {
+        sines_.push_back({from.input});
+        taken.push_back(false);
+      }
+      taken[k] = true;
+      sines_[k].amplitude.set(lane, from.amplitude);
+      sines_[k].frequency.set(lane, from.frequency);
+      sines_[k].phase.set(lane, from.phase);
+    }
+  }
+
+  Inputs inputs_at(const L& time) const {
+    Inputs inputs;
+    for (std::size_t k = 0; k < inputs_.size(); ++k) inputs.data()[k] = inputs_[k];
+    for (const Sine& sine : sines_) {
+      L& input = inputs.data()[sine.input];
+      input = fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), input);
+    }
+    return inputs;
+  }
+
+  typename S::template Parameters<L> parameters_{};
+  std::array<L, static_cast<std::size_t>(Inputs::SizeAtCompileTime)> inputs_;  // their constant parts
+  std::vector<Sine> sines_;
+};
+
+template <System S>
+std::unique_ptr<LaneDynamics> lane_kernel() {
+  return std::make_unique<LaneKernel<S>>();
+}
+
+}  // namespace pendula

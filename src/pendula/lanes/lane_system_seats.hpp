@@ -1,0 +1,59 @@
+#pragma once
+
+#include <optional>
+#include <pendula/lanes/lane_dynamics.hpp>
+#include <pendula/lanes/lane_member.hpp>
+#include <pendula/lanes/lane_sight.hpp>
+#include <pendula/system/plain_system.hpp>
+
+namespace pendula {
+
+/// A member of an ensemble of systems of one kernel.
+struct LaneSystemMember {
+  Motion start;        ///< coordinates and rates
+  double end = 0;      ///< s
+  PlainSystem system;  ///< its numbers, which outlive it
+};
+
+/// How systems come into the lanes of a stepper and out of them.
+template <class Stepper>
+class LaneSystemSeats {
+  struct NoTurns {};
+  using Mask = typename Stepper::L::Mask;
+
+ public:
+  using Common = LaneDynamics&;
+  using Member = LaneSystemMember;
+  using Sight = LaneSight<Stepper, NoTurns>;
+
+  LaneSystemSeats(const LaneDynamics& dynamics, Stepper& stepper)
+      : coordinates_(dynamics.coordinates()), stepper_(stepper) {}
+
+  static LaneDynamics& subject_of(Common dynamics) { return dynamics; }
+  void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }
+
+  Eigen::Index coordinates() const { return coordinates_; }
+  bool fits(const Member& /*member*/) const { return true; }
+
+  void take(int lane, const Member& next) {
+    stepper_.start(lane, next.start.time, next.system, next.start.q.data(), next.start.v.data());
+  }
+
+  void follow(const Mask& /*which*/, const Mask& /*far*/) {}
+
+  void read(int lane, Motion& motion) {
+    motion.q.resize(coordinates_);
+    motion.v.resize(coordinates_);
+    for (int i = 0; i < coordinates_; ++i) {
+      motion.q[i] = stepper_.parts()[i].place[0][lane];
+      motion.v[i] = stepper_.parts()[i].rate[0][lane];
+    }
+  }
+
+ private:
+  int coordinates_;
+  Stepper& stepper_;
+  NoTurns turns_;
+};
+
+}  // namespace pendula

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <pendula/lanes/explicit_tableau.hpp>
+#include <pendula/lanes/lane_queue.hpp>
+#include <pendula/lanes/plain_lanes.hpp>
+#include <pendula/system/options.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula::detail {
+
+/// Moves members by a Queue, as MoveMembers and MoveSystemMembers tell.
+template <class Queue>
+bool move_plainly(typename Queue::Common common, const RunOptions& options, std::int64_t every,
+                  std::span<const typename Queue::Member> members, std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+  LaneOptions asked;
+  asked.step = is_adaptive(options) ? 0 : options.step;
+  asked.tolerance = options.tolerance;
+  asked.energy_every = every;
+  Queue queue(common, asked);
+  queue.set_watch(watch);
+  std::vector<LaneEnd> reached(members.size());
+  const bool is_done = queue.run(members, reached);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const LaneEnd& from = reached[k];
+    PlainMemberEnd& to = ends[k];
+    std::copy_n(from.motion.q.data(), from.motion.q.size(), to.q);
+    std::copy_n(from.motion.v.data(), from.motion.v.size(), to.v);
+    to.time = from.motion.time;
+    to.status = from.status;
+    to.steps = from.steps;
+    to.rejected_steps = from.rejected_steps;
+    to.energy_error = from.energy_error;
+    to.energy_sum = from.energy_sum;
+  }
+  return is_done;
+}
+
+/// What moves members by an explicit method, of Moves::by<Method>(); nullptr for others.
+template <class Moves>
+auto explicit_lanes(Method method) -> decltype(Moves::template by<DormandPrince5>()) {
+  switch (method) {
+    case Method::dopri5:
+      return Moves::template by<DormandPrince5>();
+#ifndef PENDULA_FEW_LANES  // where sanitizers make minutes of their compilation
+    case Method::rk4:
+      return Moves::template by<ClassicalRungeKutta>();
+    case Method::fehlberg78:
+      return Moves::template by<Fehlberg8>();
+#endif
+    default:
+      return nullptr;
+  }
+}
+
+}  // namespace pendula::detail

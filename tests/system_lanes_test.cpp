@@ -1,0 +1,159 @@
+// Systems of a generated kernel, one in each lane: each as if it were alone.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/kernels/planar_2.hpp>
+#include <pendula/lanes/lane_functions.hpp>
+#include <pendula/lanes/lane_kernel.hpp>
+#include <pendula/lanes/lane_queue.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/simulation.hpp>
+#include <vector>
+
+#include "support/random_chain.hpp"
+
+namespace pendula::test {
+namespace {
+
+using Kernel = kernels::Planar2;
+
+/// Random chains as systems, with damping and drives where they are loaded.
+struct Systems {
+  Systems(std::size_t count, bool loaded, double end) {
+    Random random(17);
+    for (std::size_t k = 0; k < count; ++k) {
+      Chain<Planar> chain = random_chain<Planar>(random, 2, loaded);
+      if (loaded) chain = driven(chain, 1 + k % 3);
+      chains.push_back(chain);
+    }
+    for (const Chain<Planar>& chain : chains) {
+      drives.push_back(plain_drives(chain));
+      numbers.emplace_back(plain(chain, drives.back()), 1);
+    }
+    for (const ChainSystem& system : numbers) {
+      const State<Planar> state = random_state<Planar>(random, 2);
+      members.push_back({Motion(0.25, state.q, state.v), end, system.plain()});
+    }
+  }
+
+  // By one to three sines, so that members differ in that.
+  static Chain<Planar> driven(const Chain<Planar>& chain, std::size_t sines) {
+    ChainParameters<Planar> parameters;
+    parameters.masses = chain.masses();
+    parameters.lengths = chain.lengths();
+    parameters.gravity = chain.gravity();
+    parameters.damping = chain.damping();
+    parameters.torque = chain.constant_torque();
+    for (std::size_t k = 0; k < sines; ++k) {
+      Drive<Planar> drive{static_cast<int>(k % 2), {}, 3.0 + static_cast<double>(k), 0.4};
+      drive.amplitude[0] = 0.7;
+      parameters.drives.push_back(drive);
+    }
+    return Chain<Planar>(std::move(parameters));
+  }
+
+  std::vector<Chain<Planar>> chains;
+  std::vector<std::vector<PlainChain::Drive>> drives;
+  std::vector<ChainSystem> numbers;
+  std::vector<LaneSystemMember> members;
+};
+
+template <class Method = DormandPrince5>
+std::vector<LaneEnd> ends_of(const std::vector<LaneSystemMember>& members, const LaneOptions& options) {
+  LaneKernel<Kernel> kernel;
+  std::vector<LaneEnd> ends(members.size());
+  SystemLanes<Method> queue(kernel, options);
+  queue.run(members, ends);
+  return ends;
+}
+
+double distance(const Motion& a, const Motion& b) {
+  return std::max((a.q - b.q).cwiseAbs().maxCoeff(), (a.v - b.v).cwiseAbs().maxCoeff());
+}
+
+Motion alone(const Chain<Planar>& chain, const LaneSystemMember& member) {
+  RunOptions options{.stages = 8, .solver = Solver::chain, .step = 0};
+  options.tolerance = 1e-13;
+  const auto integrator = make_integrator(chain, options);
+  const auto every = std::numeric_limits<std::int64_t>::max();
+  const Schedule schedule{std::numeric_limits<double>::infinity(), member.end - member.start.time, every};
+  EXPECT_TRUE(simulate(*integrator, member.start, schedule, [](const Motion&) {}).outcome);
+  return integrator->state();
+}
+
+class SystemLanesTest : public testing::TestWithParam<bool> {};
+
+// Largest differences seen: 3e-10 free, 3e-10 loaded.
+TEST_P(SystemLanesTest, MembersEndWhereTheChainSolverSays) {
+  const Systems systems(19, GetParam(), 1.5);
+  const std::vector<LaneEnd> ends = ends_of(systems.members, {.tolerance = 1e-12});
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    ASSERT_EQ(ends[k].status, Status::ok) << k;
+    EXPECT_EQ(ends[k].motion.time, 1.5);
+    EXPECT_LT(distance(ends[k].motion, alone(systems.chains[k], systems.members[k])), 3e-9) << k;
+  }
+}
+
+// Neither others, nor one that is so far from zero that its sines come from elsewhere.
+TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
+  Systems systems(23, GetParam(), 1);
+  systems.members[4].start.q[0] += 2e6 * std::numbers::pi;
+  const LaneOptions options{.tolerance = 1e-8, .energy_every = 3};
+  const std::vector<LaneEnd> together = ends_of(systems.members, options);
+  for (std::size_t k = 0; k < together.size(); ++k) {
+    const LaneEnd one = ends_of({systems.members[k]}, options)[0];
+    EXPECT_EQ(one.motion.q, together[k].motion.q) << k;
+    EXPECT_EQ(one.motion.v, together[k].motion.v) << k;
+    EXPECT_EQ(one.steps, together[k].steps) << k;
+    EXPECT_EQ(one.energy_error, together[k].energy_error) << k;
+    EXPECT_EQ(one.energy_sum, together[k].energy_sum) << k;
+    if (!GetParam()) {
+      EXPECT_LT(one.energy_error / one.energy_sum, 3e-8);  // seen: 3e-9
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Loads, SystemLanesTest, testing::Bool(),
+                         [](const auto& info) { return info.param ? "loaded" : "free"; });
+
+TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
+  Systems systems(11, false, 1);
+  const std::vector<LaneEnd> expected = ends_of(systems.members, {.tolerance = 1e-8});
+  systems.members[2].start.v[1] = std::numeric_limits<double>::quiet_NaN();
+  systems.members[6].start.q[0] = std::numeric_limits<double>::infinity();
+  const std::vector<LaneEnd> found = ends_of(systems.members, {.tolerance = 1e-8});
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    EXPECT_EQ(found[k].status == Status::ok, k != 2 && k != 6) << k;
+    if (found[k].status == Status::ok) {
+      EXPECT_EQ(found[k].motion.q, expected[k].motion.q) << k;
+    }
+  }
+}
+
+TEST(LaneFunctions, AreThoseOfTheStandardLibrary) {
+  using L = LanePack<MemberRegister>;
+  for (const double x : {0.3, -0.7, 0.99}) {
+    const L pack(x);
+    EXPECT_EQ(tan(pack)[0], std::tan(x));
+    EXPECT_EQ(asin(pack)[0], std::asin(x));
+    EXPECT_EQ(acos(pack)[0], std::acos(x));
+    EXPECT_EQ(atan(pack)[0], std::atan(x));
+    EXPECT_EQ(sinh(pack)[0], std::sinh(x));
+    EXPECT_EQ(cosh(pack)[0], std::cosh(x));
+    EXPECT_EQ(tanh(pack)[0], std::tanh(x));
+    EXPECT_EQ(cbrt(pack)[0], std::cbrt(x));
+    EXPECT_EQ(pow(abs(pack), L(-1.5))[0], std::pow(std::abs(x), -1.5));
+    EXPECT_NEAR(sin(pack)[0], std::sin(x), 2e-16);
+    EXPECT_NEAR(cos(pack)[0], std::cos(x), 2e-16);
+  }
+  EXPECT_EQ(sin(L(1e7))[0], std::sin(1e7));
+  EXPECT_EQ(cos(L(1e7))[0], std::cos(1e7));
+}
+
+}  // namespace
+}  // namespace pendula::test
