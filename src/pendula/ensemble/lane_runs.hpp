@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -26,13 +27,13 @@ namespace pendula {
 /// Runs that members in lanes can take together: all that their steps have in common.
 struct LaneKind {
   int dimension = 0, links = 0;         // of chains
-  const SystemEntry* system = nullptr;  // of others
+  MakeLaneDynamics* kernel = nullptr;  // of others, and of chains with loads
   int stages = 0;
   Method method = Method::gauss;
   double step = 0, tolerance = 0;
   std::int64_t every = 0;
 
-  auto tied() const { return std::tie(dimension, links, system, stages, method, step, tolerance, every); }
+  auto tied() const { return std::tie(dimension, links, kernel, stages, method, step, tolerance, every); }
   bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
 };
 
@@ -47,18 +48,27 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind
   kind.links = chain->chain().links();
   return true;
 }
-inline bool name_system(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
-  const auto* const found = dynamic_cast<const SystemSubject*>(setup.subject.get());
-  if (found == nullptr || library().system_lanes(options) == nullptr) return false;
-  kind.system = &found->entry();
-  return true;
+// What a generated kernel moves: in the plane chains, too. In space it cannot pass a pole.
+inline MakeLaneDynamics* kernel_of(const Subject& subject) {
+  if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) return system->entry().lanes;
+  const auto* const chain = dynamic_cast<const ChainSubject<Planar>*>(&subject);
+  if (chain == nullptr) return nullptr;
+  for (const KernelEntry& kernel : library().planar.kernels) {
+    if (kernel.info.links == chain->chain().links()) return kernel.lanes;
+  }
+  return nullptr;
+}
+inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
+  if (library().system_lanes(options) == nullptr) return false;
+  kind.kernel = kernel_of(*setup.subject);
+  return kind.kernel != nullptr;
 }
 
 }  // namespace detail
 
-/// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps
-/// of the chain solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods; and
-/// systems of all other kinds, by the latter. It depends on the run alone.
+/// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps of
+/// the chain solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods; and all
+/// that a generated kernel moves, by the latter. It depends on the run and the kernels of the build alone.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point =
@@ -68,7 +78,7 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions
                     !setup.doubted;
   LaneKind kind;
   if (!fits || !(detail::name_chain<Planar>(setup, options, kind) ||
-                 detail::name_chain<Spatial>(setup, options, kind) || detail::name_system(setup, options, kind))) {
+                 detail::name_chain<Spatial>(setup, options, kind) || detail::name_kernel(setup, options, kind))) {
     return {};
   }
   if (options.method == Method::gauss) kind.stages = options.stages;
@@ -133,15 +143,15 @@ class PlainChains : public PlainEnds {
   std::vector<PlainMember> members_;
 };
 
-/// The same of systems.
+/// The same of what generated kernels move.
 class PlainSystems : public PlainEnds {
  public:
   explicit PlainSystems(std::span<const RunSetup* const> setups)
-      : PlainEnds(setups), dynamics_(subject_of(*setups[0]).entry().lanes()) {
+      : PlainEnds(setups), dynamics_(kernel_of(*setups[0]->subject)()) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
-      members_.push_back({subject_of(*setup).numbers().plain(), start.time, start.time + setup->duration,
-                          start.q.data(), start.v.data()});
+      const double end = start.time + setup->duration;
+      members_.push_back({numbers_of(*setup->subject), start.time, end, start.q.data(), start.v.data()});
     }
   }
 
@@ -152,11 +162,15 @@ class PlainSystems : public PlainEnds {
   }
 
  private:
-  static const SystemSubject& subject_of(const RunSetup& setup) {
-    return static_cast<const SystemSubject&>(*setup.subject);
+  PlainSystem numbers_of(const Subject& subject) {
+    if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) return system->numbers().plain();
+    const Chain<Planar>& chain = static_cast<const ChainSubject<Planar>&>(subject).chain();
+    const std::vector<PlainChain::Drive> drives = plain_drives(chain);
+    return chains_.emplace_back(plain(chain, drives), Planar::torque_components).plain();
   }
 
   std::unique_ptr<LaneDynamics> dynamics_;
+  std::deque<ChainSystem> chains_;  // whose numbers stay where they are
   std::vector<PlainSystemMember> members_;
 };
 
@@ -209,8 +223,8 @@ class LaneRuns : private LaneWatch {
     const Observation before = subject.observe(setup.start), after = subject.observe(report.last);
     if (end.status != Status::ok || !std::isfinite(before.energy) || !std::isfinite(after.energy)) return false;
     const auto sum = [](const Observation& seen) { return std::abs(seen.kinetic) + std::abs(seen.potential()); };
-    const double scale = Members::of_systems ? std::max({end.energy_sum, sum(before), sum(after)})
-                                             : detail::compared_with(subject.energy_scale(), before.energy);
+    const double scale = subject.energy_scale() ? detail::compared_with(subject.energy_scale(), before.energy)
+                                                : std::max({end.energy_sum, sum(before), sum(after)});
     report.energy_error = {before.energy, scale, 0};
     const double last = std::abs(after.energy - before.energy);
     report.energy_error.largest = report.energy_error.of(before.energy + std::max(last, end.energy_error));

@@ -67,9 +67,9 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   options.method = Method::fehlberg78;
   options.tolerance *= 0.01;
   const std::optional<LaneKind> kind = lane_kind(setup, options);
-  const bool is_system = kind && kind->system != nullptr;  // which LaneRuns tries
+  const bool by_kernel = kind && kind->kernel != nullptr;  // which LaneRuns tries
   const bool is_short = lane_kind(setup) && detail::run_length(setup) <= detail::short_run;
-  return is_system || is_short ? options : setup.options;
+  return by_kernel || is_short ? options : setup.options;
 }
 
 /// The same for the leading exponent of a chain's run, however long that is: the longer, the smaller the tolerance, so
@@ -90,7 +90,7 @@ inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
   detail::RunsByKind kinds;
   for (std::size_t k = 0; k < setups.size(); ++k) {
     const auto kind = is_explicit(setups[k].options.method) ? lane_kind(setups[k]) : std::nullopt;
-    if (kind && kind->system == nullptr) kinds[*kind].push_back(k);
+    if (kind && kind->kernel == nullptr) kinds[*kind].push_back(k);
   }
   std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
   for (const auto& [kind, numbers] : kinds) {
@@ -118,7 +118,7 @@ namespace detail {
 
 inline std::vector<RunReport> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
                                            const RunOptions& options, const std::function<bool()>& stop) {
-  if (kind.system != nullptr) return LaneRuns<PlainSystems>(alike, options, stop).go();
+  if (kind.kernel != nullptr) return LaneRuns<PlainSystems>(alike, options, stop).go();
   if (kind.dimension == Planar::dimension) return LaneRuns<PlainChains<Planar>>(alike, options, stop).go();
   return LaneRuns<PlainChains<Spatial>>(alike, options, stop).go();
 }

@@ -13,6 +13,9 @@ struct PlainChain;
 class ForwardDynamics;
 class LaneDynamics;
 
+/// Makes a kernel's accelerations of several members at once (lane_dynamics.hpp).
+using MakeLaneDynamics = std::unique_ptr<LaneDynamics>();
+
 /// What a generated kernel's self-test measured.
 struct KernelCheck {
   /// One statement about the kernel, the largest relative error found in it, and what that may be.
@@ -38,6 +41,7 @@ struct KernelEntry {
   KernelInfo info;
   std::unique_ptr<PlainIntegrator> (*make)(const PlainChain&, const RunOptions&);
   KernelCheck (*check)(unsigned seed);
+  MakeLaneDynamics* lanes;
 };
 
 /// Energies of a system in one state  [J].
@@ -58,7 +62,7 @@ struct SystemEntry {
   void (*rates)(const PlainSystem&, double time, const double* q, const double* p, double* v);
   /// Whether energy may come from outside, or go there.
   bool (*loaded)(const PlainSystem&);
-  std::unique_ptr<LaneDynamics> (*lanes)();  ///< its accelerations, of several members at once
+  MakeLaneDynamics* lanes;
 };
 
 /// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
