@@ -1,13 +1,21 @@
-# The C++ tests in a build with sanitizers: cmake -D SOURCE=… -D BUILD=… -D CXX=… -D CTEST=… -P sanitizers.cmake
+# The C++ tests in a build with sanitizers: cmake [-D BUILD=…] [-D CXX=…] -P sanitizers.cmake
 cmake_minimum_required(VERSION 3.25)
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH source)
+if(NOT DEFINED BUILD)
+  set(BUILD "${source}/build/asan")
+endif()
+set(compiler "")
+if(DEFINED CXX)
+  set(compiler -D "CMAKE_CXX_COMPILER=${CXX}")
+endif()
 # Sanitized code is compiled once, for this machine: what the library around it is compiled for is another matter.
 unset(ENV{PENDULA_ARCHS})
-execute_process(COMMAND "${CMAKE_COMMAND}" --preset asan -B "${BUILD}" -D "CMAKE_CXX_COMPILER=${CXX}"
-                WORKING_DIRECTORY "${SOURCE}" COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND "${CMAKE_COMMAND}" --preset asan -B "${BUILD}" ${compiler}
+                WORKING_DIRECTORY "${source}" COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" --target cpp_tests --parallel 2
                 COMMAND_ERROR_IS_FATAL ANY)
 # The long runs repeat what the others do, millions of times: without sanitizers they take seconds, here many minutes.
 set(long_runs "EnergyAndAngularMomentumAreKept|RandomCrossings|OfAPublishedDoublePendulum|ComeInPairs")
-execute_process(COMMAND "${CTEST}" --test-dir "${BUILD}" --label-regex cpp --exclude-regex "${long_runs}"
+execute_process(COMMAND "${CMAKE_CTEST_COMMAND}" --test-dir "${BUILD}" --label-regex cpp --exclude-regex "${long_runs}"
                         --output-on-failure --parallel 2
                 COMMAND_ERROR_IS_FATAL ANY)
