@@ -26,7 +26,7 @@ namespace pendula {
 
 /// Runs that members in lanes can take together: all that their steps have in common.
 struct LaneKind {
-  int dimension = 0, links = 0;         // of chains
+  int dimension = 0, links = 0;        // of chains
   MakeLaneDynamics* kernel = nullptr;  // of others, and of chains with loads
   int stages = 0;
   Method method = Method::gauss;
@@ -66,9 +66,9 @@ inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKi
 
 }  // namespace detail
 
-/// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps of
-/// the chain solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods; and all
-/// that a generated kernel moves, by the latter. It depends on the run and the kernels of the build alone.
+/// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps
+/// of the chain solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods; and
+/// all that a generated kernel moves, by the latter. It depends on the run and the kernels of the build alone.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point =
