@@ -3,6 +3,7 @@
 import json
 from math import cos, hypot, pi, sin, sqrt
 
+import numpy as np
 import pytest
 from conftest import EXAMPLES
 
@@ -49,6 +50,21 @@ def test_spring_pendulum_is_where_others_find_it(simulate):
     assert summary["final"]["points"]["bob"] == pytest.approx(
         truth, abs=1e-7
     )  # measured 2.3e-8: they are seven digits
+
+
+@pytest.mark.parametrize("stages", (4, 6, 8))
+def test_spring_pendulum_errs_by_about_its_tolerance(stages, simulate):
+    """By the pivot, motion is nearly singular beside the stages: without a look at the energy 8 to 240 tolerances."""
+
+    def end(**options) -> np.ndarray:
+        summary = simulate("spring_pendulum.toml", run__duration=20, **options)
+        return np.array(summary["final"]["points"]["bob"])
+
+    exact = end(run__stages=8, run__tolerance=1e-13)
+    errors = [
+        np.abs(end(run__stages=stages, run__tolerance=x) - exact).max() / x for x in (1e-6, 1e-8, 1e-10)
+    ]
+    assert max(errors) < 60  # measured 30
 
 
 def test_swinging_atwood_keeps_its_second_invariant(rows):

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <pendula/gauss/iteration_choice.hpp>
 #include <pendula/gauss/lagrangian_fixed_point.hpp>
@@ -75,12 +76,22 @@ class LagrangianSolver {
 
   // Where inertia may vanish, coordinates may move faster than all else.
   static constexpr double largest_turn() { return S::constant_masses ? 3 : 0.25; }
+  // Where lengths change, motion may be singular beside the stages, which angles alone never are. What depends on time
+  // keeps no energy.
+  static constexpr bool may_miss = !holds_time<S> && !std::ranges::all_of(S::coordinate_is_angle, std::identity());
   double turn() const { return stages_.turn(); }
   int turning_part() const { return stages_.turning_coordinate(); }
   double defect() { return stages_.defect(); }
   double predictor_gain() const { return stages_.predictor_gain(); }
   Tempo tempo() const { return stages_.tempo(); }
-  StepShape shape() { return stages_.shape(); }
+  StepShape shape() {
+    StepShape shape = stages_.shape();
+    if (may_miss && !dissipates()) {
+      find_forces();
+      shape.imbalance = stages_.imbalance();
+    }
+    return shape;
+  }
   bool loaded() const { return stages_.model().loaded(); }
   bool damped() const { return stages_.model().damped(); }
   bool dissipates() const { return family_ == Family::radau; }

@@ -196,20 +196,19 @@ class LagrangianStages {
   /// Energy at the end of the step less that of its start and what loads bring, relative to the largest kinetic energy
   /// that was looked at.
   double energy_defect() {
-    const double brought = model_.loaded() ? work() : 0, end_time = time_ + step_;
-    const auto [q, p] = end();
-    Vector v, v_end;
-    double h = 0, h_end = 0, T = 0, T_end = 0;
-    const auto start = model_.parameters(time_), finish = model_.parameters(end_time);
-    S::velocity_from_momentum(start, position(), momentum(), v);
-    S::velocity_from_momentum(finish, q, p, v_end);
-    S::energy(start, position(), v, h);
-    S::energy(finish, q, v_end, h_end);
-    S::kinetic_energy(start, position(), v, T);
-    S::kinetic_energy(finish, q, v_end, T_end);
-    most_kinetic_ = std::max(most_kinetic_, T);
-    const double scale = std::max(most_kinetic_, T_end) + std::abs(brought);
-    return scale > 0 ? (h_end - h - brought) / scale : 0;
+    const double brought = model_.loaded() ? work() : 0;
+    const Energies start = energies(time_, position(), momentum()), finish = energies_at_end();
+    most_kinetic_ = std::max(most_kinetic_, start.kinetic);
+    const double scale = std::max(most_kinetic_, finish.kinetic) + std::abs(brought);
+    return scale > 0 ? (finish.total - start.total - brought) / scale : 0;
+  }
+
+  /// The same without its sign, relative to kinetic and potential energy.
+  double imbalance() {
+    const double brought = model_.loaded() ? work() : 0;
+    const Energies start = energies(time_, position(), momentum()), finish = energies_at_end();
+    const double scale = std::max(start.size(), finish.size()) + std::abs(brought);
+    return scale > 0 ? std::abs(finish.total - start.total - brought) / scale : 0;
   }
 
   /// How far, at the start of the step, the polynomial through the stages' rates is off, relative to the fastest motion
@@ -286,6 +285,25 @@ class LagrangianStages {
   void forget() { last_h_ = 0; }
 
  private:
+  struct Energies {
+    double kinetic = 0, total = 0;
+    double size() const { return std::abs(kinetic) + std::abs(total - kinetic); }
+  };
+
+  Energies energies(double time, const Vector& q, const Vector& p) const {
+    const auto parameters = model_.parameters(time);
+    Vector v;
+    Energies found;
+    S::velocity_from_momentum(parameters, q, p, v);
+    S::energy(parameters, q, v, found.total);
+    S::kinetic_energy(parameters, q, v, found.kinetic);
+    return found;
+  }
+  Energies energies_at_end() {
+    const auto [q, p] = end();
+    return energies(time_ + step_, q, p);
+  }
+
   using State = std::array<Compensated<double>, count>;
 
   struct Kept {

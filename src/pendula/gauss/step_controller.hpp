@@ -45,9 +45,12 @@ class StepController {
 
   /// Whether a step of size h that was solved is good enough; if not, the next one is smaller.
   bool accepts(const StepShape& shape, double h) {
-    error_ = shape.pace > 0 ? safety * shape.error(h, stages_, order_) / std::max(h * shape.pace, shortest) : 0;
-    if (error_ <= tolerance_) return true;
-    shrink(h, std::max(0.2, 0.9 * root(tolerance_ / error_)));
+    const double time = std::max(h * shape.pace, shortest);
+    error_ = shape.pace > 0 ? safety * shape.error(h, stages_, order_) / time : 0;
+    const double off = shape.imbalance / std::max(most_imbalance * tolerance_ * time, energy_rounding);
+    const double excess = std::max(error_ / tolerance_, off);
+    if (excess <= 1) return true;
+    shrink(h, std::max(0.2, 0.9 * root(1 / excess)));
     return false;
   }
 
@@ -117,6 +120,8 @@ class StepController {
   // Of a step, in the time in which motion changes: where it only begins, nothing says how fast it will be.
   static constexpr double shortest = 1e-3;
   static constexpr double aim = 0.2;  // of the tolerance, where c is set
+  // Of energy, in tolerances, as long as stages say that all is well: what they stand beside they do not see.
+  static constexpr double most_imbalance = 5, energy_rounding = 1e-13;
   static constexpr double greedy_aim = 0.03, greedy_growth = 1.5;
   static constexpr double most_growth = 4, worthwhile = 1.05;
   static constexpr double farthest = 2;  // of the density from the pace

@@ -19,7 +19,8 @@ struct Tempo {
 struct StepShape {
   /// Sizes of the Legendre coefficients of the rates on the step, times h, relative to the size of the motion  [rad].
   std::array<double, max_stages> decay{};
-  double pace = 0;  ///< R in the middle  [1/s]
+  double pace = 0;       ///< R in the middle  [1/s]
+  double imbalance = 0;  ///< of energy, relative to what there is; 0 where nobody looks
 
   /// A coefficient that is smaller, relative to its coordinate, may be what that is rounded by.
   static constexpr double visible = 8 * std::numeric_limits<double>::epsilon();
