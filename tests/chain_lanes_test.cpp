@@ -324,7 +324,7 @@ void expect_derivatives() {
   for (int i = 0; i < 3; ++i) rods[i] = WithTangent<Space>::resting();
   for (int i = 0; i < 3; ++i) unused[i] = LaneRods<Space, 3>::resting();
   const ChainLinks<Space, 3, double> links(chain);
-  for (int lane = 0; lane < MemberRegister::size; ++lane) {
+  for (int lane = 0; lane < LanePack<MemberRegister>::size; ++lane) {
     rods_with.start(lane, 0, links, chain.gravity(), member.start.q.data(), member.start.v.data(), rods);
     plain.start(lane, 0, links, chain.gravity(), member.start.q.data(), member.start.v.data(), unused);
   }

@@ -119,7 +119,7 @@ TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Loads, SystemLanesTest, testing::Bool(),
-                         [](const auto& info) { return info.param ? "loaded" : "free"; });
+                         [](const auto& each) { return each.param ? "loaded" : "free"; });
 
 TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
   Systems systems(11, false, 1);
