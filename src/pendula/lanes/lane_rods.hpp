@@ -187,7 +187,7 @@ class LaneRods {
   }
 
   /// |δξ|²/l² + |δξ̇|²/(l ω)², of all rods, ω being how fast the member swung when it began.
-  L tangent_squared(const Parts& rods) const requires(with_tangent) {
+  L tangent_squared(const Parts& rods) const requires with_tangent {
     L squared(0.0);
     for (int i = 0; i < links(); ++i) {
       L along(0.0), rate(0.0);
@@ -215,7 +215,8 @@ class LaneRods {
   // same ones for all members.
   void start_tangent(int lane, Parts& rods) {
     const double squared = pace_squared(rods)[lane], pace = squared > 0 ? std::sqrt(squared) : 1;
-    inverse_pace_squared_.set(lane, 1 / (pace * pace));
+    const double inverse_square = squared > 0 ? 1 / squared : 1;
+    inverse_pace_squared_.set(lane, inverse_square);
     std::mt19937 random(1);
     const auto drawn = [&] {
       std::array<double, Space::dof == 1 ? 1 : 3> turn;
@@ -235,7 +236,7 @@ class LaneRods {
         rods[i].place[k].slope.set(lane, moved[k]);
         rods[i].rate[k].slope.set(lane, sped[k]);
       }
-      length += constants_[i].inverse_square[lane] * (dot(moved, moved) + dot(sped, sped) / (pace * pace));
+      length += constants_[i].inverse_square[lane] * (dot(moved, moved) + dot(sped, sped) * inverse_square);
     }
     length = std::sqrt(length);
     for (int i = 0; i < links(); ++i) {

@@ -133,7 +133,10 @@ class LaneSystem {
   };
   double* times() { return buffer_.back().of; }
   // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈.
-  double* numbers(int which, int i) { return buffer_[static_cast<std::size_t>(which * parts() + i)].of; }
+  double* numbers(int which, int i) {
+    return buffer_[static_cast<std::size_t>(which) * static_cast<std::size_t>(parts()) + static_cast<std::size_t>(i)]
+        .of;
+  }
 
   void write(const L& time, const Parts& parts) {
     time.store(times());
