@@ -135,6 +135,41 @@ TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
   }
 }
 
+// A kernel compiled for other registers than the library.
+TEST(SystemLanes, ACompiledLibraryMovesItsOwnLanesOnly) {
+  const Systems systems(3, false, 1);
+  class Watch : public LaneWatch {
+    bool wants_steps() const override { return false; }
+    void after_step(LaneSteps& /*steps*/) override {}
+    bool stops() override { return false; }
+  } watch;
+  RunOptions options;
+  options.method = Method::dopri5;
+  options.tolerance = 1e-8;
+  MoveSystemMembers* const move = library().system_lanes(options);
+  ASSERT_NE(move, nullptr);
+  std::vector<PlainSystemMember> members;
+  for (const LaneSystemMember& from : systems.members) {
+    members.push_back({from.system, from.start.time, from.end, from.start.q.data(), from.start.v.data()});
+  }
+  Eigen::Matrix2Xd q(2, 3), v(2, 3);
+  const auto ends_by = [&](LaneDynamics& kernel) {
+    std::vector<PlainMemberEnd> ends;
+    for (Eigen::Index k = 0; k < 3; ++k) ends.push_back({&q(0, k), &v(0, k), 0, {}, 0, 0, 0, 0});
+    EXPECT_TRUE(move(kernel, options, 0, members, ends, watch));
+    return ends;
+  };
+  class Other : public LaneKernel<Kernel> {
+    int lanes() const override { return 3; }
+  } other;
+  const std::vector<PlainMemberEnd> left = ends_by(other);
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    EXPECT_EQ(left[k].status, Status::not_converged);
+    EXPECT_EQ(left[k].time, 0.25);
+    EXPECT_EQ(Eigen::Map<const Eigen::Vector2d>(left[k].q), systems.members[k].start.q);
+  }
+}
+
 TEST(LaneFunctions, AreThoseOfTheStandardLibrary) {
   using L = LanePack<MemberRegister>;
   for (const double x : {0.3, -0.7, 0.99}) {

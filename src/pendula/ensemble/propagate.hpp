@@ -33,6 +33,7 @@ struct EnsembleSchedule {
   std::int64_t every = 1;  ///< steps from one look at the energy to the next
   /// To look for in each.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
+  MemberMethod method = MemberMethod::asked;
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
 };
@@ -63,7 +64,8 @@ inline void propagate(std::span<const EnsembleMember> members, const EnsembleSch
                         .doubted = false,
                         .events = schedule.events});
     }
-    const std::vector<RunReport> reports = run_members(setups);
+    const std::vector<RunReport> reports = run_members(
+        setups, [] { return false; }, schedule.method);
     for (std::size_t k = 0; k < reports.size(); ++k) observe(first + k, reports[k]);
   });
 }

@@ -14,7 +14,7 @@ class LaneDynamics {
   LaneDynamics& operator=(const LaneDynamics&) = delete;
   virtual ~LaneDynamics() = default;
 
-  /// As many as those of the library that moves them.
+  /// A library that was compiled for others moves nobody.
   virtual int lanes() const = 0;
   virtual int coordinates() const = 0;
   /// What kind of numbers coordinates are.
