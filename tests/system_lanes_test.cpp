@@ -63,11 +63,11 @@ struct Systems {
   std::vector<LaneSystemMember> members;
 };
 
-template <class Method = DormandPrince5>
+template <class Register = MemberRegister>
 std::vector<LaneEnd> ends_of(const std::vector<LaneSystemMember>& members, const LaneOptions& options) {
-  LaneKernel<Kernel> kernel;
+  LaneKernel<Kernel, Register> kernel;
   std::vector<LaneEnd> ends(members.size());
-  SystemLanes<Method> queue(kernel, options);
+  SystemLanes<DormandPrince5, Register> queue(kernel, options);
   queue.run(members, ends);
   return ends;
 }
@@ -115,6 +115,19 @@ TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
     if (!GetParam()) {
       EXPECT_LT(one.energy_error / one.energy_sum, 3e-8);  // seen: 3e-9
     }
+  }
+}
+
+// Registers of two numbers, as of all: to the last bit.
+TEST_P(SystemLanesTest, WidthsAgree) {
+  const Systems systems(13, GetParam(), 1);
+  const LaneOptions options{.tolerance = 1e-8, .energy_every = 1};
+  const std::vector<LaneEnd> wide = ends_of(systems.members, options);
+  const std::vector<LaneEnd> narrow = ends_of<RegisterFor<2>>(systems.members, options);
+  for (std::size_t k = 0; k < wide.size(); ++k) {
+    EXPECT_EQ(wide[k].motion.q, narrow[k].motion.q) << k;
+    EXPECT_EQ(wide[k].motion.v, narrow[k].motion.v) << k;
+    EXPECT_EQ(wide[k].energy_error, narrow[k].energy_error) << k;
   }
 }
 

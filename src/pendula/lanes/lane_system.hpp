@@ -37,7 +37,8 @@ class LaneSystem {
 
   /// `dynamics` must outlive it.
   explicit LaneSystem(LaneDynamics& dynamics)
-      : dynamics_(dynamics), buffer_(3 * static_cast<std::size_t>(dynamics.coordinates()) + 1) {}
+      : dynamics_(dynamics),
+        buffer_((3 * static_cast<std::size_t>(dynamics.coordinates()) + 1) * L::width / most + 1) {}
 
   int parts() const { return dynamics_.coordinates(); }
   template <class Body>
@@ -128,15 +129,15 @@ class LaneSystem {
   // What has no size errs by nothing: it rests.
   static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
 
-  struct Numbers {
-    alignas(pack_alignment) double of[L::width];
+  // One register after the other, however wide they are.
+  static constexpr std::size_t most = pack_alignment / sizeof(double);
+  struct alignas(pack_alignment) Numbers {
+    double of[most];
   };
-  double* times() { return buffer_.back().of; }
+  double* buffer(int registers) { return buffer_.front().of + static_cast<std::ptrdiff_t>(registers) * L::size; }
+  double* times() { return buffer(3 * parts()); }
   // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈.
-  double* numbers(int which, int i) {
-    return buffer_[static_cast<std::size_t>(which) * static_cast<std::size_t>(parts()) + static_cast<std::size_t>(i)]
-        .of;
-  }
+  double* numbers(int which, int i) { return buffer(which * parts() + i); }
 
   void write(const L& time, const Parts& parts) {
     time.store(times());
