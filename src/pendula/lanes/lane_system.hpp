@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
@@ -36,9 +37,13 @@ class LaneSystem {
   using Errors = Parts;
 
   /// `dynamics` must outlive it.
-  explicit LaneSystem(LaneDynamics& dynamics)
-      : dynamics_(dynamics),
-        buffer_((3 * static_cast<std::size_t>(dynamics.coordinates()) + 1) * L::width / most + 1) {}
+  explicit LaneSystem(LaneDynamics& dynamics) : dynamics_(dynamics), buffer_(doubles_for(dynamics.coordinates())) {
+    void* first = buffer_.data();
+    std::size_t room = buffer_.size() * sizeof(double);
+    first_ = static_cast<double*>(std::align(pack_alignment, sizeof(double), first, room));
+  }
+  LaneSystem(const LaneSystem&) = delete;
+  LaneSystem& operator=(const LaneSystem&) = delete;
 
   int parts() const { return dynamics_.coordinates(); }
   template <class Body>
@@ -129,15 +134,14 @@ class LaneSystem {
   // What has no size errs by nothing: it rests.
   static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
 
-  // One register after the other, however wide they are.
-  static constexpr std::size_t most = pack_alignment / sizeof(double);
-  struct alignas(pack_alignment) Numbers {
-    double of[most];
-  };
-  double* buffer(int registers) { return buffer_.front().of + static_cast<std::ptrdiff_t>(registers) * L::size; }
-  double* times() { return buffer(3 * parts()); }
+  // q, q̇, q̈ and a time, of as many lanes as there are, from a place on that is aligned.
+  static std::size_t doubles_for(int coordinates) {
+    return (3 * static_cast<std::size_t>(coordinates) + 1) * L::width + pack_alignment / sizeof(double);
+  }
+  double* registers(int count) { return first_ + static_cast<std::ptrdiff_t>(count) * L::size; }
+  double* times() { return registers(3 * parts()); }
   // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈.
-  double* numbers(int which, int i) { return buffer(which * parts() + i); }
+  double* numbers(int which, int i) { return registers(which * parts() + i); }
 
   void write(const L& time, const Parts& parts) {
     time.store(times());
@@ -153,7 +157,8 @@ class LaneSystem {
   }
 
   LaneDynamics& dynamics_;
-  std::vector<Numbers> buffer_;
+  std::vector<double> buffer_;
+  double* first_ = nullptr;
   L pace_squared_{1.0}, energy_sum_{0.0};
 };
 
