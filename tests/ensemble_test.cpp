@@ -343,12 +343,12 @@ TEST(RunsOfLoadedChains, ChooseTheQuickestMethodThatWorks) {
                       .every = 1,
                       .doubted = false});
   }
-  if (!lane_kind(setups[0], quickest_in_lanes(setups[0]))) GTEST_SKIP() << "sanitized lanes are without";
+  const bool is_here = lane_kind(setups[0], quickest_in_lanes(setups[0])).has_value();  // not where lanes are few
   const auto never = [] { return false; };
   const std::vector<RunReport> found = run_members(setups, never, MemberMethod::quickest);
   const std::vector<RunReport> asked = run_members(setups, never);
   for (const std::size_t k : {0U, 2U}) {
-    EXPECT_NE(found[k].statistics.steps, asked[k].statistics.steps);
+    EXPECT_EQ(found[k].statistics.steps != asked[k].statistics.steps, is_here);
     EXPECT_LT((found[k].last.q - asked[k].last.q).cwiseAbs().maxCoeff(), 2e-7);  // seen: 8e-9
   }
   EXPECT_EQ(found[1].statistics.steps, asked[1].statistics.steps);
@@ -361,7 +361,10 @@ template <class Space>
 class ExponentsInLanes : public RunsInLanes<Space> {
  protected:
   static std::vector<RunSetup> explicitly(std::vector<RunSetup> setups) {
-    for (RunSetup& setup : setups) setup.options = quickest_with_tangents(setup);
+    for (RunSetup& setup : setups) {
+      setup.options = quickest_with_tangents(setup);
+      setup.options.method = Method::dopri5;  // which is there where lanes are few, too
+    }
     return setups;
   }
   static LyapunovSpectrum alone(const RunSetup& setup) {
@@ -379,7 +382,6 @@ TYPED_TEST_SUITE(ExponentsInLanes, Spaces);
 TYPED_TEST(ExponentsInLanes, AreThoseOfGaussSteps) {
   const std::vector<RunSetup> setups = this->setups(8, 2, chosen(1e-6), 100);
   const std::vector<RunSetup> asked = this->explicitly(setups);
-  if (!lane_kind(asked[0])) GTEST_SKIP() << "sanitized lanes are without";
   const auto found = exponents_in_lanes(asked);
   for (std::size_t k = 0; k < setups.size(); ++k) {
     const LyapunovSpectrum expected = this->alone(setups[k]);
@@ -399,7 +401,6 @@ TYPED_TEST(ExponentsInLanes, OfRegularMotionAreZero) {
     setup.start.v *= 0.05;
   }
   const std::vector<RunSetup> asked = this->explicitly(setups);
-  if (!lane_kind(asked[0])) GTEST_SKIP() << "sanitized lanes are without";
   for (const auto& found : exponents_in_lanes(asked)) {
     ASSERT_TRUE(found);
     EXPECT_LT(std::abs(found->exponents[0]), 2 * found->errors[0]);

@@ -4,19 +4,19 @@ import h5py
 import numpy as np
 import pytest
 
-WALL = '\n[[ensemble.axis]]\nkey = "{}"\nfrom = {}\nto = {}\ncount = 9\n'
+AXIS = '\n[[ensemble.axis]]\nkey = "{}"\nfrom = {}\nto = {}\ncount = 9\n'
 SCENARIOS = {
     "atwood": '[system]\nmodel = "swinging_atwood"\nparameters = { mu = 2.5 }\n[start]\nr = 1.0\ntheta = 1.5\n'
     + "[run]\nduration = 2.0\ntolerance = 1e-7\n"
     + '[ensemble]\nkeep = ["final", "energy_error", "steps"]\n'
-    + WALL.format("start.theta", 0.5, 2.5)
-    + WALL.format("system.parameters.mu", 1.5, 3.5),
+    + AXIS.format("start.theta", 0.5, 2.5)
+    + AXIS.format("system.parameters.mu", 1.5, 3.5),
     "furuta": '[system]\nmodel = "furuta"\nparameters = { arm_friction = 0.01, rod_friction = 0.0005 }\n'
     + '[[system.drive]]\ninput = "torque"\namplitude = 0.5\nfrequency = 6.0\n'
     + "[start]\nalpha = 0.1\ntheta = 1.0\n[run]\nduration = 2.0\ntolerance = 1e-7\n"
     + '[ensemble]\nkeep = ["final", "energy_error", "steps"]\n'
-    + WALL.format("start.theta", 0.5, 2.5)
-    + WALL.format("start.alpha_dot", -1, 1),
+    + AXIS.format("start.theta", 0.5, 2.5)
+    + AXIS.format("start.alpha_dot", -1, 1),
 }
 
 
@@ -67,7 +67,7 @@ def test_who_loses_energy_there_goes_as_the_scenario_says(moved):
         '[system]\nmodel = "spring_pendulum"\nparameters = { stiffness = 33.0, rest_length = 0.1 }\n'
         + "[start]\nx = 0.7\nz = -0.5\n[run]\nduration = 10.0\ntolerance = 1e-6\n"
         + '[ensemble]\nkeep = ["final", "energy_error", "steps"]\n'
-        + WALL.format("start.y", 0.3, 2.8)
+        + AXIS.format("start.y", 0.3, 2.8)
     )
     alone = moved(text)
     tried = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))

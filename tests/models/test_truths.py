@@ -67,6 +67,15 @@ def test_spring_pendulum_errs_by_about_its_tolerance(stages, simulate):
     assert max(errors) < 60  # measured 30
 
 
+def test_spring_pendulum_starts_where_it_has_no_energy(simulate):
+    """What little it gains in the first steps is rounding of what it comes to, not of what it has."""
+    start = {"start__x": 1.0, "start__y": 0.0, "start__z": 0.0, "start__z_dot": 0.0}
+    options = {"run__duration": 5, "run__stages": 4, "run__tolerance": 1e-14}
+    summary = simulate("spring_pendulum.toml", system__parameters__rest_length=1.0, **start, **options)
+    exact = (-1.084004236511821, 0, -0.17556007215172)  # with 8 stages, 1e-14 and 1e-15
+    assert summary["final"]["points"]["bob"] == pytest.approx(exact, abs=1e-12)  # measured 4e-14
+
+
 def test_swinging_atwood_keeps_its_second_invariant(rows):
     """At mu = 3 it is integrable: Tufillaro, Abbott, Griffiths, Am. J. Phys. 52, 895 (1984)."""
     run = rows("swinging_atwood.toml", run__tolerance=1e-14)

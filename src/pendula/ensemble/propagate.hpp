@@ -33,7 +33,7 @@ struct EnsembleSchedule {
   std::int64_t every = 1;  ///< steps from one look at the energy to the next
   /// To look for in each.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  MemberMethod method = MemberMethod::asked;
+  MemberMethod method = MemberMethod::asked;  ///< by what members move: options', or the quickest that serves
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
 };

@@ -203,11 +203,12 @@ class LagrangianStages {
     return scale > 0 ? (finish.total - start.total - brought) / scale : 0;
   }
 
-  /// The same without its sign, relative to kinetic and potential energy.
+  /// The same without its sign, relative to kinetic and potential energy, or to the energy that motion comes to from
+  /// rest where it starts without any.
   double imbalance() {
     const double brought = model_.loaded() ? work() : 0;
     const Energies start = energies(time_, position(), momentum()), finish = energies_at_end();
-    const double scale = std::max(start.size(), finish.size()) + std::abs(brought);
+    const double scale = std::max({start.size(), finish.size(), pace_.natural_speed_squared()}) + std::abs(brought);
     return scale > 0 ? std::abs(finish.total - start.total - brought) / scale : 0;
   }
 
