@@ -1,5 +1,6 @@
 // A run as a program of one's own makes it: who is told its rows, how it ends, what is left of it then.
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <pendula/run/chain_subject.hpp>
@@ -248,6 +249,84 @@ TEST(Run, DoubtsAnEndThatLongerStepsDoNotReach) {
   EXPECT_EQ(report.end, RunEnd::complete);
   ASSERT_EQ(report.warnings.size(), 1U);
   EXPECT_NE(report.warnings[0].find("with twice the step the motion ends elsewhere"), std::string::npos);
+}
+
+// Errors at the end of random chains over what was asked for, the reference being a tolerance of 1e-16: how many are
+// within ten times, and how many would be by a tolerance of that size.
+struct Reached {
+  int aimed = 0, plain = 0;
+};
+template <class Space>
+Reached reached(double accuracy, double duration, int count) {
+  Random random(1);
+  Reached reached;
+  for (int k = 0; k < count; ++k) {
+    const int links = 1 + static_cast<int>(random.uniform(0, 6.999));
+    RunSetup setup;
+    setup.subject = std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links));
+    setup.start = Motion(0, random.matrix<Eigen::VectorXd>(Space::dof * links, 1, -3, 3),
+                         random.matrix<Eigen::VectorXd>(Space::dof * links, 1, -2, 2));
+    setup.options.step = 0;
+    setup.duration = duration;
+    setup.doubted = false;
+    const auto end = [&](double tolerance, double error) {
+      setup.options.tolerance = tolerance;
+      setup.options.stages = stages_for(Method::gauss, tolerance);
+      setup.accuracy.error = error;
+      return pendula::Run(setup).go().last;
+    };
+    const Motion exact = end(1e-16, 0);
+    reached.aimed += setup.subject->distance(end(1e-3, accuracy), exact) < 10 * accuracy ? 1 : 0;
+    reached.plain += setup.subject->distance(end(accuracy, 0), exact) < 10 * accuracy ? 1 : 0;
+  }
+  return reached;
+}
+
+TEST(Run, ReachesTheAccuracyThatItIsAskedForWhereChaosAllows) {
+  for (const double accuracy : {1e-4, 1e-7}) {
+    const Reached planar = reached<Planar>(accuracy, 5, 100), spatial = reached<Spatial>(accuracy, 5, 100);
+    EXPECT_GE(planar.aimed, 95) << accuracy;   // measured 99, 97
+    EXPECT_GE(spatial.aimed, 95) << accuracy;  // measured 97
+    EXPECT_LT(planar.plain, 60) << accuracy;   // measured 37
+    EXPECT_LT(spatial.plain, 80) << accuracy;  // measured 65, 56
+  }
+}
+
+// What chaos makes of rounding is told beforehand, and nobody runs again to know.
+TEST(Run, SaysWhichAccuracyCannotBeReached) {
+  RunSetup setup = double_pendulum(20);
+  setup.options.step = 0;
+  setup.start.q = Eigen::Vector2d(3, 3);
+  setup.accuracy.error = 1e-12;
+  const RunReport rounded = pendula::Run(setup).go();
+  ASSERT_TRUE(rounded.aimed);
+  EXPECT_TRUE(std::isfinite(rounded.aimed->error));
+  ASSERT_EQ(rounded.warnings.size(), 1U);
+  EXPECT_EQ(rounded.warnings[0].find("an accuracy of 1e-12 cannot be reached"), 0U) << rounded.warnings[0];
+  setup.duration = 100;
+  const RunReport lost = pendula::Run(setup).go();
+  ASSERT_EQ(lost.warnings.size(), 1U);
+  EXPECT_EQ(lost.warnings[0].find("runs by the smallest tolerances end elsewhere"), 0U) << lost.warnings[0];
+}
+
+// By the tolerance that its first part was run by, whatever its new end is.
+TEST(Run, GoesOnByTheAccuracyItBeganWith) {
+  RunSetup setup = double_pendulum(5);
+  setup.options.step = 0;
+  setup.accuracy.error = 1e-6;
+  Keeper whole, parts;
+  const RunReport expected = run_on(setup, 5.0, 0, whole);
+  EXPECT_NE(expected.options.tolerance, setup.options.tolerance);
+  const auto tried = static_cast<int>(expected.statistics.steps * 2);  // trials are asked whether to stop, too
+  EXPECT_EQ(run_on(setup, 5.0, tried / 4, parts).end, RunEnd::stopped);
+  EXPECT_FALSE(parts.kept);
+  RunReport part;
+  for (int steps = tried; !parts.kept; steps += 5) part = run_on(setup, 5.0, steps, parts);
+  EXPECT_EQ(part.end, RunEnd::stopped);
+  const RunReport report = run_on(setup, 5.0, 0, parts);
+  EXPECT_TRUE(parts.rows == whole.rows);
+  EXPECT_EQ(report.options.tolerance, expected.options.tolerance);
+  EXPECT_EQ(report.last.q, expected.last.q);
 }
 
 TEST(Run, ExpectsTroubleWhereDampingOutrunsTheStep) {

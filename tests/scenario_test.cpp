@@ -206,7 +206,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
   const std::vector<BadInput> inputs = {
       // not the right tables
       {"[output]\nevery = 3", "output = 3",
-       "file.toml:32: run.output: expected one of method, stages, form, solver, iteration, step, tolerance, duration, "
+       "file.toml:32: run.output: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, duration, "
        "got "
        "the unknown key \"output\""},
       {"[output]", "[outputs]",
@@ -471,7 +471,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step=nan", "--set run.step=nan: run.step: expected a finite number > 0, got nan"},
       {"run.stpe=1",
        "--set run.stpe=1: run.stpe: expected one of method, stages, form, solver, iteration, step, "
-       "tolerance, duration, got the unknown key \"stpe\" (did you mean step?)"},
+       "tolerance, accuracy, duration, got the unknown key \"stpe\" (did you mean step?)"},
       {"step=1",
        "--set step=1: step: expected one of chain, system, start, run, output, event, ensemble, got the unknown key "
        "\"step\" "

@@ -117,7 +117,7 @@ TEST(Summary, PlanarStatesHaveNoPhi) {
 
 TEST(Summary, WhatDoesNotApplyIsNull) {
   Summary summary = summary_of_a_run();
-  summary.run.method = Method::dopri5;
+  summary.options.method = Method::dopri5;
   summary.description = {"", "", ""};
   const json read = json::parse(to_json(summary));
   for (const char* key : {"stages", "form", "solver", "iteration", "kernel", "step"}) {

@@ -93,6 +93,10 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
   const std::unique_ptr<Integrator> integrator = subject->make_integrator(scenario.run);
   const int all = 2 * static_cast<int>(scenario.start.q.size());
   integrator->linearize();
+  if (const auto accuracy = scenario.places.find("accuracy"); accuracy != scenario.places.end()) {
+    std::cerr << "pendula: warning: " << accuracy->second
+              << ": has no effect on exponents, which go by run.tolerance\n";
+  }
   std::optional<HistoryFile> history;
   if (options.output) history.emplace(*options.output, options.count == 0 ? all : options.count);
   const auto on_way = [&](const LyapunovProgress& progress) {

@@ -28,7 +28,7 @@ namespace pendula::cli {
 /// Thrown out of a member that was under way.
 struct Interrupted {};
 
-/// The run of a member, but for events.
+/// The run of a member, but for events. Trials for an accuracy are made where one is asked for, and not otherwise.
 template <class Scenario>
 RunSetup member_setup(const Scenario& scenario) {
   return {.subject = subject_of(scenario),
@@ -36,6 +36,7 @@ RunSetup member_setup(const Scenario& scenario) {
           .options = scenario.run,
           .duration = scenario.duration,
           .every = scenario.every,
+          .accuracy = scenario.places.contains("accuracy") ? scenario.accuracy : Accuracy{},
           .doubted = false};
 }
 

@@ -209,7 +209,7 @@ class Session {
     io::Summary summary;
     if (page_) page_->begin_run(options_.copies > 0 ? "start" : "");
     static_cast<RunReport&>(summary) = from_ ? run_.go_on(*from_, interrupted) : run_.go(interrupted);
-    summary.run = setup_.options;
+    summary.accuracy = setup_.accuracy.error;
     summary.duration = setup_.duration;
     summary.every = setup_.every;
     summary.at = setup_.rows;
@@ -235,7 +235,7 @@ class Session {
   /// Runs the copies, and writes the page.
   void finish_page(const std::function<bool()>& interrupted, io::Summary& summary) {
     page_->end_run(summary.energy_error);
-    for (int copy = 1; copy <= options_.copies && !interrupted(); ++copy) run_copy(copy, interrupted);
+    for (int copy = 1; copy <= options_.copies && !interrupted(); ++copy) run_copy(copy, summary.options, interrupted);
     if (summary.ending.ok() && options_.copies > 0 && interrupted()) {
       summary.ending = {"interrupted", "interrupted before all copies were run", {}, {}};
     }
@@ -281,9 +281,11 @@ class Session {
     summary.ending.message += "; to go on: pendula simulate --resume " + file;
   }
 
-  void run_copy(int copy, const std::function<bool()>& interrupted) {
+  void run_copy(int copy, const RunOptions& by, const std::function<bool()>& interrupted) {
     RunSetup setup = setup_;
     setup.start.q[0] += copy * options_.apart;
+    setup.options = by;
+    setup.accuracy.error = 0;
     setup.doubted = false;
     page_->begin_run("start + " + shortest(copy * options_.apart));
     Run run(setup);
@@ -349,6 +351,7 @@ ExitStatus simulate(const SimulateOptions& options) {
                              .duration = scenario.duration,
                              .every = scenario.every,
                              .rows = scenario.rows,
+                             .accuracy = scenario.accuracy,
                              .checkpoint = scenario.checkpoint,
                              .events = io::events_of(scenario.events, subject, scenario.start)};
         check_events(options, setup);

@@ -141,7 +141,7 @@ std::vector<std::string> EnsemblePlan::overrides(std::int64_t member) const {
 }
 
 std::string unit_of_key(std::string_view key) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 12> units = {{
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 13> units = {{
       {"start.theta_dot", "rad/s"},
       {"start.phi_dot", "rad/s"},
       {"start.theta", "rad"},
@@ -154,6 +154,7 @@ std::string unit_of_key(std::string_view key) {
       {"run.step", "s"},
       {"run.duration", "s"},
       {"run.tolerance", "1"},
+      {"run.accuracy", "1"},
   }};
   const std::string_view name = key.substr(0, key.find('['));
   for (const auto& [known, unit] : units) {

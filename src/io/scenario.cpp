@@ -31,12 +31,12 @@ constexpr std::array<std::string_view, 2> angle_keys = {"theta", "phi"};
 constexpr std::array<std::string_view, 2> rate_keys = {"theta_dot", "phi_dot"};
 constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
-constexpr std::array<std::string_view, 8> run_keys = {"method",    "stages", "form",      "solver",
-                                                      "iteration", "step",   "tolerance", "duration"};
+constexpr std::array<std::string_view, 9> run_keys = {"method", "stages",    "form",     "solver",  "iteration",
+                                                      "step",   "tolerance", "accuracy", "duration"};
 constexpr std::array<std::string_view, 4> output_keys = {"every", "interval", "times", "checkpoint"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 48> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 49> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -70,6 +70,7 @@ constexpr std::array<std::string_view, 48> all_keys = {"chain.space",
                                                        "run.iteration",
                                                        "run.step",
                                                        "run.tolerance",
+                                                       "run.accuracy",
                                                        "run.duration",
                                                        "output.every",
                                                        "output.interval",
@@ -337,6 +338,15 @@ RunOptions read_run(const Section& run) {
   return options;
 }
 
+/// Of the program's own choice where nothing says how long steps are. Throws InputError beside a tolerance, which
+/// follows from it.
+Accuracy read_accuracy(const Section& run, const RunOptions& options) {
+  const auto accuracy = run.find("accuracy");
+  if (accuracy && run.find("tolerance")) accuracy->fail("nothing beside run.tolerance, which follows from it");
+  const bool is_asked = !is_explicit(options.method) && !run.find("step") && !run.find("tolerance");
+  return {number(run, "accuracy", is_asked ? options.tolerance : 0, Sign::positive), !run.find("stages").has_value()};
+}
+
 double read_duration(const Section& run, const RunOptions& options) {
   const double duration = number(run, "duration", 10, Sign::not_negative);
   if (is_adaptive(options) || duration / options.step <= max_steps) return duration;
@@ -353,13 +363,14 @@ std::vector<std::string> unused_keys(const Section& run, const RunOptions& optio
   const auto check = [&](std::string_view key, bool used) {
     const std::optional<Entry> entry = run.find(key);
     if (!entry || used) return;
-    const bool steps_are_given = key == "tolerance" && !is_explicit(method);
+    const bool steps_are_given = (key == "tolerance" || key == "accuracy") && !is_explicit(method);
     warnings.push_back(entry->place() + ": has no effect with " +
                        (steps_are_given ? "run.step" : "method " + std::string(name_of(method))));
   };
   for (const std::string_view key : {"stages", "form", "solver", "iteration"}) check(key, !is_explicit(method));
   check("step", !is_adaptive(method));
   check("tolerance", is_adaptive(options));
+  check("accuracy", is_adaptive(options));
   return warnings;
 }
 
@@ -397,6 +408,7 @@ RowTimes read_row_times(const Section& section, double duration) {
 /// What [run] and [output] say.
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
+  plan.accuracy = read_accuracy(sections.run, plan.run);
   plan.duration = read_duration(sections.run, plan.run);
   const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());

@@ -8,6 +8,7 @@
 #include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/state.hpp>
+#include <pendula/run/accuracy.hpp>
 #include <pendula/run/row_times.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/system/kernel_registry.hpp>
@@ -35,6 +36,7 @@ inline constexpr double max_steps = 9e15;
 /// How a run goes, as its file describes it, checked.
 struct RunPlan {
   RunOptions run;
+  Accuracy accuracy;
   double duration = 10;
   std::int64_t every = 10;  ///< steps from row to row
   std::vector<EventPlan> events;

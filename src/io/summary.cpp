@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 bool has_stages(const Summary& summary) {
-  return !is_explicit(summary.run.method);
+  return !is_explicit(summary.options.method);
 }
 
 /// null for an empty name.
@@ -169,15 +169,19 @@ std::string what_was_moved(const ModelSummary& model) {
                            ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
 }
 
+std::string aim_text(const AccuracyAim& aim) {
+  return std::isfinite(aim.error) ? "expected at the end: " + rounded(aim.error, 1) : "";
+}
+
 std::string settings(const Summary& summary) {
   const ModelSummary& model = summary.model;
   const UnitNames unit = unit_names(model.natural);
   std::string text = what_was_moved(model);
-  std::string method(name_of(summary.run.method));
+  std::string method(name_of(summary.options.method));
   if (has_stages(summary)) {
-    method += ", " + plural(summary.run.stages, "stage") + " (order " +
-              std::to_string(2 * summary.run.stages - (summary.run.method == Method::radau ? 1 : 0)) + "), " +
-              std::string(name_of(summary.run.form)) + " form";
+    method += ", " + plural(summary.options.stages, "stage") + " (order " +
+              std::to_string(2 * summary.options.stages - (summary.options.method == Method::radau ? 1 : 0)) + "), " +
+              std::string(name_of(summary.options.form)) + " form";
   }
   text += line("method", method);
   const Description& description = summary.description;
@@ -185,8 +189,10 @@ std::string settings(const Summary& summary) {
   if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
-  text += is_adaptive(summary.run) ? line("tolerance", shortest(summary.run.tolerance))
-                                   : line("step", shortest(summary.run.step) + time);
+  if (summary.aimed) text += line("accuracy", shortest(summary.accuracy), aim_text(*summary.aimed));
+  text += is_adaptive(summary.options) ? line("tolerance", summary.aimed ? rounded(summary.options.tolerance, 3)
+                                                                         : shortest(summary.options.tolerance))
+                                       : line("step", shortest(summary.options.step) + time);
   text += line("duration", shortest(summary.duration) + time + ", " + rows_text(summary, time));
   if (model.natural) {
     text += line("units", "l_1 = " + rounded(model.natural->length) + " m, M_1 = " + rounded(model.natural->mass) +
@@ -358,17 +364,20 @@ SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion) {
 
 std::string to_json(const Summary& summary) {
   const bool staged = has_stages(summary);
-  const bool adaptive = is_adaptive(summary.run);
+  const bool adaptive = is_adaptive(summary.options);
   Json json{{"pendula", version}, {"scenario", summary.model.scenario}};
   json.update(to_json(summary.model));
-  json.update(Json{{"method", name_of(summary.run.method)},
-                   {"stages", where(staged, summary.run.stages)},
-                   {"form", where(staged, name_of(summary.run.form))},
+  json.update(Json{{"method", name_of(summary.options.method)},
+                   {"stages", where(staged, summary.options.stages)},
+                   {"form", where(staged, name_of(summary.options.form))},
                    {"solver", or_null(summary.description.solver)},
                    {"iteration", or_null(summary.description.iteration)},
                    {"kernel", or_null(summary.description.kernel)},
-                   {"step", where(!adaptive, summary.run.step)},
-                   {"tolerance", where(adaptive, summary.run.tolerance)},
+                   {"step", where(!adaptive, summary.options.step)},
+                   {"tolerance", where(adaptive, summary.options.tolerance)},
+                   {"accuracy", where(summary.aimed.has_value(), summary.accuracy)},
+                   {"expected_error", where(summary.aimed && std::isfinite(summary.aimed->error),
+                                            summary.aimed ? summary.aimed->error : 0)},
                    {"duration", summary.duration},
                    {"every", where(!summary.at.any(), summary.every)},
                    {"interval", where(summary.at.interval > 0, summary.at.interval)},

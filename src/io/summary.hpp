@@ -64,7 +64,7 @@ struct Ending {
 /// Everything that is told about a run; the text leaves warnings out, since they were told as they came.
 struct Summary : RunReport {
   ModelSummary model;
-  RunOptions run;       ///< as asked for
+  double accuracy = 0;  ///< as asked for
   double duration = 0;  ///< as asked for
   std::int64_t every = 0;
   RowTimes at;  ///< rows are there, where there are any

@@ -79,7 +79,7 @@ def test_text_that_is_no_toml_is_told_with_its_line(pendula, double):
         ("run.step=-1", "run.step: expected a finite number > 0", "-1"),
         (
             "run.stpe=1",
-            "run.stpe: expected one of method, stages, form, solver, iteration, step, tolerance, duration",
+            "run.stpe: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, duration",
             'the unknown key "stpe" (did you mean step?)',
         ),
         (

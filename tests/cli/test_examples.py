@@ -38,7 +38,8 @@ def test_examples_run_without_naming_a_step(file, pendula, tmp_path):
     summary = pendula("simulate", tmp_path / file.name, "--json").json
     assert summary["outcome"] == {"status": "ok"}
     assert summary["step"] is None and summary["smallest_step"] > 0
-    assert all("the last state cannot be trusted" in warning for warning in summary["warnings"])
+    for warning in summary["warnings"]:
+        assert "the last state cannot be trusted" in warning or "which is what it makes of rounding" in warning
 
 
 def test_double_pendulum_keeps_its_energy(example):
@@ -46,7 +47,9 @@ def test_double_pendulum_keeps_its_energy(example):
     assert summary["energy_error_max"] < 1e-9  # measured 3.1e-11
     bob = summary["final"]["bobs"][1]
     assert math.dist(bob, (-1.0407657832461712, -1.7073476624693271)) < 1e-7  # measured 1.0e-9
-    assert summary["step"] is None and summary["tolerance"] == 1e-9 and summary["stages"] == 8
+    assert summary["step"] is None and summary["stages"] == 8
+    assert (summary["accuracy"], summary["expected_error"]) == (1e-9, pytest.approx(1e-10, rel=9))
+    assert 1e-11 < summary["tolerance"] <= 1e-9
     assert 0 < summary["smallest_step"] < summary["largest_step"]
 
 

@@ -75,7 +75,7 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions
       options.form == Form::momentum && options.solver != Solver::dense && options.iteration != Iteration::newton;
   const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
                     setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
-                    !setup.doubted;
+                    !setup.doubted && setup.accuracy.error == 0;
   LaneKind kind;
   if (!fits || !(detail::name_chain<Planar>(setup, options, kind) ||
                  detail::name_chain<Spatial>(setup, options, kind) || detail::name_kernel(setup, options, kind))) {

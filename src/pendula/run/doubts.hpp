@@ -54,6 +54,18 @@ inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunRep
          " steps in parts; run.solver = \"chain\" knows no pole";
 }
 
+/// Of trials before the run.
+inline Doubt of_aim(double wanted, const AccuracyAim& aim) {
+  static constexpr double close = 10;  // what trials are off by
+  if (aim.error <= close * wanted) return {};
+  if (std::isfinite(aim.error)) {
+    return "an accuracy of " + pendula::rounded(wanted, 2) + " cannot be reached: the motion ends elsewhere by about " +
+           pendula::rounded(aim.error, 1) + " of its size, which is what it makes of rounding";
+  }
+  return "runs by the smallest tolerances end elsewhere, by more than 0.01 of the size: the last state cannot be "
+         "trusted";
+}
+
 /// Whether a second run is worth its time: none that was wrong had followed the motion so closely.
 inline bool is_doubtful(const RunOptions& run, const Statistics& statistics) {
   return run.method != Method::gauss || is_adaptive(run) || statistics.largest_defect > 2e-5;
@@ -99,7 +111,11 @@ inline std::vector<std::string> doubts(const RunSetup& setup, const RunReport& r
   add(detail::of_energy(*setup.subject, setup.options, balance));
   add(detail::of_defect(setup.options, report.statistics.largest_defect));
   add(detail::of_pole(*setup.subject, setup.options, report));
-  if (detail::is_doubtful(setup.options, report.statistics)) add(detail::of_step(setup, report, stop));
+  if (report.aimed && setup.accuracy.error > 0) {
+    add(detail::of_aim(setup.accuracy.error, *report.aimed));
+  } else if (detail::is_doubtful(setup.options, report.statistics)) {
+    add(detail::of_step(setup, report, stop));
+  }
   return doubts;
 }
 

@@ -128,6 +128,9 @@ class EventWatch {
   EventWatch(std::vector<Event> events, int degree)
       : events_(std::move(events)), tallies_(events_.size()), sides_(events_.size()), degree_(degree) {}
 
+  /// The same of another method.
+  void set_degree(int degree) { degree_ = degree; }
+
   const std::vector<Event>& events() const { return events_; }
   const std::vector<EventTally>& tallies() const { return tallies_; }
   const EventCost& cost() const { return cost_; }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <pendula/run/accuracy.hpp>
 #include <pendula/run/checkpoint.hpp>
 #include <pendula/run/doubts.hpp>
 #include <pendula/run/event.hpp>
@@ -62,6 +63,10 @@ class Run {
   struct NotFinite {};
 
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
+  std::optional<Motion> try_out(double tolerance, const std::function<bool()>& stop) const;
+  bool aim(const std::function<bool()>& stop);
+  void follow_aim();
+  bool is_aimed() const { return setup_.accuracy.error > 0 && is_adaptive(setup_.options); }
   void integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report);
   void take(const Motion& motion, double work);
   std::optional<Motion> take_events(RunReport& report);
@@ -69,17 +74,19 @@ class Run {
   Observation look_at(const Motion& motion, double work);
   void look_at_end(const RunResult& result);
   void come_by(const RowPlace& place, bool last);
+  void conclude(RunReport& report);
   void finish(RunReport& report);
-  void doubt(RunReport& report, const std::function<bool()>& stop) const;
+  void doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) const;
 
   /// What is kept of a run besides its observers, for checkpoints.
   struct Kept {
     RunRecord record;  // of the rows; where those are wanted at times, of the first and the last state, too
     EventWatch watch;
+    AccuracyAim aim;
 
     template <class Numbers>
     void member(Numbers& numbers) {
-      numbers(record, watch);
+      numbers(record, watch, aim);
     }
   };
 
@@ -97,25 +104,73 @@ inline Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration),
-            EventWatch(setup_.events, detail::glance_degree(setup_.options))} {}
+            EventWatch(setup_.events, detail::glance_degree(setup_.options)),
+            {}} {}
 
 inline RunReport Run::go(const std::function<bool()>& stop) {
-  return go(nullptr, stop);
+  if (!is_aimed() || aim(stop)) return go(nullptr, stop);
+  RunReport report;
+  report.end = RunEnd::stopped;
+  conclude(report);
+  return report;
 }
 
 inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
-  integrator_->resume(checkpoint.integrator);
   become(kept_, checkpoint.record);
+  if (is_aimed()) follow_aim();
+  integrator_->resume(checkpoint.integrator);
   return go(&checkpoint, stop);
+}
+
+// Where it ends, by an event perhaps; nothing where it does not.
+inline std::optional<Motion> Run::try_out(double tolerance, const std::function<bool()>& stop) const {
+  RunSetup trial = setup_;
+  trial.accuracy.error = 0;
+  trial.options.tolerance = tolerance;
+  if (trial.accuracy.chooses_stages) trial.options.stages = stages_for(trial.options.method, tolerance);
+  trial.every = std::numeric_limits<std::int64_t>::max();
+  trial.rows = {};
+  trial.doubted = false;
+  std::erase_if(trial.events, [](const Event& event) { return !event.stop; });
+  const RunReport report = Run(std::move(trial)).go(stop);
+  if (report.end != RunEnd::complete && report.end != RunEnd::event) return {};
+  return report.last;
+}
+
+// Whether the trials came to their ends.
+inline bool Run::aim(const std::function<bool()>& stop) {
+  bool stopped = false;
+  const auto stops = [&] { return stopped = stopped || stop(); };
+  const auto end = [&](double tolerance) { return try_out(tolerance, stops); };
+  const auto distance = [&](const Motion& a, const Motion& b) { return setup_.subject->distance(a, b); };
+  kept_.aim = detail::aim_at(setup_.accuracy.error, detail::finest_tolerance(setup_.options.method), end, distance);
+  follow_aim();
+  return !stopped;
+}
+
+inline void Run::follow_aim() {
+  RunOptions& options = setup_.options;
+  options.tolerance = kept_.aim.tolerance;
+  if (setup_.accuracy.chooses_stages) options.stages = stages_for(options.method, options.tolerance);
+  integrator_ = setup_.subject->make_integrator(options);
+  kept_.watch.set_degree(detail::glance_degree(options));
 }
 
 inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
   RunReport report;
   report.stepping_seconds = std::nan("");
   integrate(from, stop, report);
+  conclude(report);
+  doubt(report, from != nullptr, stop);
+  return report;
+}
+
+inline void Run::conclude(RunReport& report) {
   finish(report);
   report.last = kept_.record.last();
   report.rows = rows_;
+  report.options = setup_.options;
+  if (is_aimed()) report.aimed = kept_.aim;
   report.description = integrator_->describe();
   report.statistics = integrator_->statistics();
   report.energy_error = kept_.record.energy_error();
@@ -123,8 +178,6 @@ inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& st
   report.table = kept_.record.table();
   report.events = kept_.watch.tallies();
   report.event_cost = kept_.watch.cost();
-  doubt(report, stop);
-  return report;
 }
 
 inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
@@ -222,12 +275,13 @@ inline void Run::come_by(const RowPlace& place, bool last) {
   for (Observer* observer : observers_) observer->keep(checkpoint);
 }
 
-// Of a run that an event ended, up to there.
-inline void Run::doubt(RunReport& report, const std::function<bool()>& stop) const {
+// Of a run that an event ended, up to there. What trials told is not known of an end that came later.
+inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) const {
   report.warnings = event_warnings(setup_.events, report.events);
   if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
   RunSetup whole = setup_;
   if (report.end == RunEnd::event) whole.duration = report.last.time - setup_.start.time;
+  if (went_on) whole.accuracy.error = 0;
   for (std::string& sentence : doubts(whole, report, kept_.record.balance(), stop)) {
     report.warnings.push_back(std::move(sentence));
   }

@@ -5,6 +5,8 @@
 #include <exception>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <pendula/run/accuracy.hpp>
 #include <pendula/run/event.hpp>
 #include <pendula/run/row_times.hpp>
 #include <pendula/run/run_record.hpp>
@@ -25,6 +27,7 @@ struct RunSetup {
   double duration = 10;     ///< s
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
   RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
+  Accuracy accuracy = {};   ///< of runs by tolerance, which follows from it by trials where it has an error
   bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
   double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
   /// To look for.
@@ -48,6 +51,8 @@ struct RunReport {
   std::exception_ptr failure;  ///< of an observer
   Motion last;                 ///< the last state that is a row; the start where none is
   std::int64_t rows = 0;
+  RunOptions options;                ///< that it was run by
+  std::optional<AccuracyAim> aimed;  ///< of RunSetup::accuracy
   Description description;
   Statistics statistics;
   double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN where a row ended the run
