@@ -355,6 +355,27 @@ TEST(RunsOfLoadedChains, ChooseTheQuickestMethodThatWorks) {
   EXPECT_EQ(found[1].last.q, asked[1].last.q);
 }
 
+// θ'' = sin ωt. fehlberg78, which others go by, would not see it.
+TEST(RunsOfLoadedChains, SeeForcesThatDependOnTimeAlone) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(1);
+  parameters.gravity = 0;
+  const double frequency = 10, end = 10;
+  parameters.drives = {{.link = 0, .amplitude = Torque<Planar, 1>::Constant(1), .frequency = frequency, .phase = 0}};
+  const RunSetup setup{.subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
+                       .start = Motion(0, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1)),
+                       .options = chosen(1e-6),
+                       .duration = end,
+                       .every = 1,
+                       .doubted = false};
+  const double expected = end / frequency - std::sin(frequency * end) / (frequency * frequency);
+  for (const MemberMethod method : {MemberMethod::asked, MemberMethod::quickest}) {
+    const auto found = run_members(
+        std::vector{setup}, [] { return false; }, method);
+    EXPECT_NEAR(found[0].last.q[0], expected, 1e-6);  // measured 1.4e-9
+  }
+}
+
 // --- Exponents ---
 
 template <class Space>
@@ -402,6 +423,20 @@ TYPED_TEST(ExponentsInLanes, OfRegularMotionAreZero) {
   }
   const std::vector<RunSetup> asked = this->explicitly(setups);
   for (const auto& found : exponents_in_lanes(asked)) {
+    ASSERT_TRUE(found);
+    EXPECT_LT(std::abs(found->exponents[0]), 2 * found->errors[0]);
+    EXPECT_LT(found->megno, 2.5);
+  }
+}
+
+// The motion itself says nothing of how long steps may be.
+TYPED_TEST(ExponentsInLanes, OfChainsThatHangStillAreZero) {
+  std::vector<RunSetup> setups = this->setups(5, 2, chosen(1e-6), 100);
+  for (RunSetup& setup : setups) {
+    setup.start.q.setZero();
+    setup.start.v.setZero();
+  }
+  for (const auto& found : exponents_in_lanes(this->explicitly(setups))) {
     ASSERT_TRUE(found);
     EXPECT_LT(std::abs(found->exponents[0]), 2 * found->errors[0]);
     EXPECT_LT(found->megno, 2.5);

@@ -206,7 +206,8 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
   const std::vector<BadInput> inputs = {
       // not the right tables
       {"[output]\nevery = 3", "output = 3",
-       "file.toml:32: run.output: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, duration, "
+       "file.toml:32: run.output: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, "
+       "duration, "
        "got "
        "the unknown key \"output\""},
       {"[output]", "[outputs]",

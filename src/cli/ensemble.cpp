@@ -145,6 +145,9 @@ class Session {
     std::error_code unknown;
     if (options_.output == "-") io::reject_output(options_.output, "standard output");
     if (fs::is_directory(options_.output, unknown)) io::reject_output(options_.output, "a folder");
+    if (fs::exists(options_.output, unknown) && !fs::is_regular_file(options_.output, unknown)) {
+      io::reject_output(options_.output, "a device, a pipe or a socket, whose place a file would take");
+    }
     if (fs::exists(options_.output, unknown) && access(options_.output.c_str(), W_OK) != 0) {
       io::reject_output(options_.output, options_.output, errno);
     }

@@ -106,11 +106,13 @@ bool are_panels(const std::string& text) {
 
 CommandLine::CommandLine() {
   const CLI::Validator not_empty = expect("the name of a file", [](const std::string& text) { return !text.empty(); });
-  const CLI::Validator one_or_more = expect("a whole number of links, 1 or more", [](const std::string& text) {
-    int links = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), links);
-    return error == std::errc() && end == text.data() + text.size() && links >= 1;
-  });
+  const auto number_from_one = [](const std::string& text) {
+    int number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size() && number >= 1;
+  };
+  const CLI::Validator one_or_more = expect("a whole number of links, 1 or more", number_from_one);
+  const CLI::Validator some_threads = expect("a whole number of threads, 1 or more", number_from_one);
   app.set_version_flag(
       "--version", [] { return "pendula " + std::string(version) + " (" + instruction_set() + ")"; },
       "Print the version and the instruction set in use, and end");
@@ -254,7 +256,7 @@ CommandLine::CommandLine() {
       ->allow_extra_args(false);
   ensemble->add_option("--threads", ensemble_options.threads, "Of each process; else all cores, of mpirun's ranks one")
       ->type_name("N")
-      ->check(one_or_more);
+      ->check(some_threads);
   ensemble->add_option("--shard", shard, "Only the I-th of N parts, which share the file: for job arrays")
       ->type_name("I/N")
       ->check(expect("I/N with 1 <= I <= N, such as 2/8", is_shard));

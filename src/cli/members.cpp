@@ -1,11 +1,13 @@
 #include "cli/members.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <limits>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run.hpp>
+#include <string_view>
 #include <variant>
 
 #include "io/ensemble_file.hpp"
@@ -24,7 +26,17 @@ MemberScenarios::MemberScenarios(const std::string& file, std::vector<std::strin
 io::AnyScenario MemberScenarios::of_member(const io::EnsemblePlan& plan, std::int64_t member) {
   std::vector<std::string> overrides = overrides_;
   for (std::string& change : plan.overrides(member)) overrides.push_back(std::move(change));
-  return parse(overrides);
+  try {
+    return parse(overrides);
+  } catch (const io::InputError& error) {
+    // What is told as a change on the command line was none.
+    const std::string_view told = error.what(), sign = "--set ";
+    const bool is_of_member = told.starts_with(sign) && std::ranges::any_of(plan.keys(), [&](const std::string& key) {
+                                return told.substr(sign.size()).starts_with(key + '=');
+                              });
+    if (!is_of_member) throw;
+    throw io::InputError(text_.name + ": ensemble: " + std::string(told.substr(sign.size())));
+  }
 }
 
 io::AnyScenario MemberScenarios::quickly_of_member(const io::EnsemblePlan& plan, std::int64_t member) {

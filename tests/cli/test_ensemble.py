@@ -356,7 +356,10 @@ def test_a_member_that_cannot_be_moved_loses_nobody_else(tmp_path):
     )
     done = run(tmp_path, scenario=scenario)
     assert done.status == 0
-    assert "warning: 279 of 527 members failed; the first, member 0: --set chain.masses[2]=-2.9" in done.err
+    assert (
+        "warning: 279 of 527 members failed; the first, member 0: scenario.toml: ensemble: chain.masses[2]=-2.9"
+        in done.err
+    )
     with h5py.File(tmp_path / "out.h5") as opened:
         mass, status = opened["chain.masses[2]"][...], opened["status"][...]
         names = opened["status"].attrs["flag_meanings"].split()
@@ -395,6 +398,7 @@ def test_exponents_are_kept(pendula, tmp_path):
         (("[[ensemble.axis]]", "[[ensemble.axes]]"), 'got the unknown key "axes"'),
         (("[run]", "[ensemble]\ncount = 5\n[run]"), "ensemble.count: expected a count of each axis"),
         (("[run]", "[ensemble]\nkeep = [\"all\"]\n[run]"), 'expected some of final, points'),
+        (("start.theta[1]", "start.thetas[1]"), "scenario.toml: ensemble: start.thetas[1]="),
     ],
 )  # fmt: skip
 def test_wrong_tables_are_told(tmp_path, change, message):
@@ -414,6 +418,16 @@ def test_files_that_cannot_be_written(tmp_path):
     )  # fmt: skip
     assert done.returncode == 2
     assert "nowhere/ does not exist" in done.stderr
+
+
+def test_what_is_no_file_is_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "out.h5")
+    assert "expected a file that can be written, got: a device, a pipe or a socket" in run(tmp_path).err
+    assert (tmp_path / "out.h5").is_fifo()
+
+
+def test_threads_are_counted(tmp_path):
+    assert "expected a whole number of threads, 1 or more" in run(tmp_path, "--threads", "0").err
 
 
 def test_a_full_disk_loses_nothing(whole, tmp_path):

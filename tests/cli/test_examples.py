@@ -39,7 +39,9 @@ def test_examples_run_without_naming_a_step(file, pendula, tmp_path):
     assert summary["outcome"] == {"status": "ok"}
     assert summary["step"] is None and summary["smallest_step"] > 0
     for warning in summary["warnings"]:
-        assert "the last state cannot be trusted" in warning or "which is what it makes of rounding" in warning
+        assert (
+            "the last state cannot be trusted" in warning or "which is what it makes of rounding" in warning
+        )
 
 
 def test_double_pendulum_keeps_its_energy(example):
@@ -90,6 +92,12 @@ def test_natural_units_tell_their_scale(example):
     summary, _ = example("natural_units")
     units = {"length": 0.8, "mass": 2.0, "time": math.sqrt(0.8 / 9.81)}
     assert summary["natural_units"] == pytest.approx(units, rel=1e-15)  # measured 0
+
+
+def test_a_blind_error_estimate_is_told(pendula):
+    file = FOLDER / "driven_damped.toml"
+    run = pendula("simulate", file, "--set", "run.method=fehlberg78", "--json")
+    assert "fehlberg78 does not see forces that depend on time" in run.json["warnings"][0]
 
 
 def test_loads_change_the_energy(example):

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <pendula/chain/space.hpp>
 #include <stdexcept>
@@ -64,6 +65,15 @@ class Chain {
 
   /// Whether the torque depends on time.
   bool driven() const { return !parameters_.drives.empty(); }
+
+  /// Highest frequency of a drive; 0 where there is none  [rad/s].
+  double fastest_drive() const {
+    double fastest = 0;
+    for (const Drive<Space>& drive : drives()) {
+      if (drive.amplitude.any()) fastest = std::max(fastest, std::abs(drive.frequency));
+    }
+    return fastest;
+  }
 
   /// Whether anything but gravity acts: damping, torque or a drive.
   bool loaded() const { return loaded_; }

@@ -47,10 +47,15 @@ inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, con
 }
 
 // Whether an explicit method loses no more energy in a run, step by step, than the motion's errors are, and how much
-// longer the run is.
+// longer the run is: by what swings, and by what turns where it starts.
 inline constexpr double short_run = 100;
 inline double run_length(const RunSetup& setup) {
-  return setup.duration * natural_pace(*setup.subject);
+  return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
+}
+
+// The estimate of fehlberg78 is blind where forces depend on time.
+inline Method quickest_method(const Subject& subject) {
+  return subject.driven() ? Method::dopri5 : Method::fehlberg78;
 }
 
 }  // namespace detail
@@ -64,7 +69,7 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   const bool fits =
       options.method == Method::gauss && options.step == 0 && options.tolerance >= 1e-9 && setup.events.empty();
   if (!fits) return options;
-  options.method = Method::fehlberg78;
+  options.method = detail::quickest_method(*setup.subject);
   options.tolerance *= 0.01;
   const std::optional<LaneKind> kind = lane_kind(setup, options);
   const bool by_kernel = kind && kind->kernel != nullptr;  // which LaneRuns tries

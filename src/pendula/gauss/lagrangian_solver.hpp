@@ -94,6 +94,7 @@ class LagrangianSolver {
   }
   bool loaded() const { return stages_.model().loaded(); }
   bool damped() const { return stages_.model().damped(); }
+  double fastest_drive() const { return stages_.model().fastest_drive(); }
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return stages_.stages(); }
   static constexpr int parts() { return S::coordinates; }

@@ -76,6 +76,7 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
   { fixed.loaded() } -> std::convertible_to<bool>;
   { fixed.damped() } -> std::convertible_to<bool>;
   { fixed.dissipates() } -> std::convertible_to<bool>;
+  { fixed.fastest_drive() } -> std::convertible_to<double>;
 };
 
 }  // namespace pendula

@@ -104,6 +104,7 @@ class VelocityNewton {
   static constexpr double largest_turn() { return S::constant_masses ? 3 : 0.25; }
   bool loaded() const { return model_.loaded(); }
   bool damped() const { return model_.damped(); }
+  double fastest_drive() const { return model_.fastest_drive(); }
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return coefficients_.stages(); }
   static constexpr int parts() { return S::coordinates; }

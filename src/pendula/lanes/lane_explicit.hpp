@@ -165,9 +165,9 @@ class LaneExplicit {
   using Number = typename Dynamics::Number;
   using Part = typename Dynamics::Part;
   using Parts = typename Dynamics::Parts;
-  using Error = LanePart<L, D>;
 
-  static constexpr double largest_turn = 3;  // rad
+  static constexpr double largest_turn = 3;      // rad
+  static constexpr double tangent_share = 0.01;  // of what a tangent errs by, relative to itself
 
   template <class Links>
   static auto& at(Links& of, int link) {
@@ -225,20 +225,25 @@ class LaneExplicit {
 
   [[gnu::always_inline]] void find_error(const L& h, const L& pace_squared) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      Error error = Error::zero();
+      Part error = Part::zero();
       detail::unrolled<static_cast<int>(Method::stages) + 1>([&](auto j) PENDULA_WRITTEN_OUT {
         constexpr double weight = Method::e[static_cast<std::size_t>(j)];
         if constexpr (weight != 0) {
           const Part& slope = at(slopes_[static_cast<std::size_t>(j)], i);
           for (std::size_t k = 0; k < D; ++k) {
-            error.place[k] = fma(L(weight), value(slope.place[k]), error.place[k]);
-            error.rate[k] = fma(L(weight), value(slope.rate[k]), error.rate[k]);
+            error.place[k] = fma(L(weight), slope.place[k], error.place[k]);
+            error.rate[k] = fma(L(weight), slope.rate[k], error.rate[k]);
           }
         }
       });
       at(errors_, i) = error;
     });
     error_ = dynamics_.error_squared(h, errors_, parts_, slopes_[0], trial_, pace_squared);
+    // Where the motion stands still, or almost, nothing but its tangent tells which steps are too long.
+    if constexpr (has_tangent) {
+      const L tangent = (h * h) * (dynamics_.tangent_squared(errors_) / dynamics_.tangent_squared(parts_));
+      error_ = max(error_, L(tangent_share * tangent_share) * tangent);
+    }
   }
 
   Dynamics dynamics_;
@@ -249,7 +254,7 @@ class LaneExplicit {
   Parts parts_, trial_, before_, stages_;  // before_: where the last step began
   std::vector<Parts> slopes_;              // of the stages, and of the end
   Parts before_slopes_;
-  typename Dynamics::Errors errors_;  // of the step, over its size
+  Parts errors_;  // of the step, over its size
 };
 
 }  // namespace pendula

@@ -33,7 +33,6 @@ class LaneRods {
 
   using Part = LanePart<Number, D>;  ///< ξ, ξ̇
   using Parts = detail::PerLink<Part, N>;
-  using Errors = detail::PerLink<LanePart<L, D>, N>;
 
   using Subject = int;  ///< how many links there are
   explicit LaneRods(int links) : links_(links), constants_(links), rows_(links) {}
@@ -119,14 +118,14 @@ class LaneRods {
 
   /// What a step of `h` errs by, squared, from the errors of rods and rates that it is made of: of rods relative to
   /// their lengths, of rates to those and the pace after it.
-  template <class Errors>
-  [[gnu::always_inline]] L error_squared(const L& h, const Errors& errors, const Parts& /*before*/,
+  [[gnu::always_inline]] L error_squared(const L& h, const Parts& errors, const Parts& /*before*/,
                                          const Parts& /*slopes*/, const Parts& /*after*/, const L& pace_squared) const {
     L largest(0.0);
     const L inverse_pace = L(1.0) / pace_squared;
     for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       const auto& error = at(errors, i);
-      const L squared = fma(dot(error.rate, error.rate), inverse_pace, dot(error.place, error.place));
+      const auto &place = detail::values_of(error.place), &rate = detail::values_of(error.rate);
+      const L squared = fma(dot(rate, rate), inverse_pace, dot(place, place));
       largest = max(largest, (h * h) * (squared * at(constants_, i).inverse_square));
     });
     return largest;

@@ -34,7 +34,6 @@ class LaneSystem {
   static constexpr std::size_t D = 1;
   using Part = LanePart<L, D>;  ///< q, q̇ of a coordinate
   using Parts = detail::PerLink<Part, links_known>;
-  using Errors = Parts;
 
   /// `dynamics` must outlive it.
   explicit LaneSystem(LaneDynamics& dynamics) : dynamics_(dynamics), buffer_(doubles_for(dynamics.coordinates())) {
@@ -100,7 +99,7 @@ class LaneSystem {
   /// What a step of `h` errs by, squared, from the errors of coordinates and rates that it is made of: of angles
   /// relative to a radian, of others to the largest coordinate of the same unit; of rates to the fastest, and to what
   /// they come to where they fall that far.
-  L error_squared(const L& h, const Errors& errors, const Parts& before, const Parts& slopes, const Parts& after,
+  L error_squared(const L& h, const Parts& errors, const Parts& before, const Parts& slopes, const Parts& after,
                   const L& /*pace_squared*/) const {
     L largest(0.0);
     const L size = abs(h);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/library.hpp>
@@ -39,9 +40,12 @@ class TangentGrowth {
  public:
   /// By `growth`, a logarithm, in a step from `before` to `time` since the start.
   void follow(double growth, double before, double time) {
+    // Of Y = 2/t ∫ s d ln|w|, where w grows by the same rate all through the step.
+    const double rate = growth / (time - before);
+    const double offset = weighted_ - rate * before * before / 2;
+    integral_ += (before > 0 ? 2 * offset * std::log(time / before) : 0) + rate * (time * time - before * before) / 2;
     grown_ += growth;
     weighted_ += (before + time) / 2 * growth;
-    integral_ += (time - before) * 2 * weighted_ / time;  // of Y = 2/t ∫ s d ln|w|
   }
 
   double grown() const { return grown_; }
@@ -120,6 +124,57 @@ class GrowthHistory {
   std::vector<Entry> entries_;
 };
 
+/// What tangents are measured by, of a motion's start and all along: Σ (m ω² δq² + δp²/m)/ω, an energy, so that neither
+/// units nor the sizes of masses matter, and pairs of exponents stay pairs.
+struct TangentScale {
+  Eigen::VectorXd rows;  ///< that each is multiplied with
+  double rate = 1;       ///< that the motion changes by where it starts, or what is beside it  [1/s]
+};
+
+/// From the derivative of a step that is next to nothing, which `integrator` then has taken; none where it cannot.
+/// `rows` as Integrator::linearize tells.
+inline std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& start, int rows,
+                                                 double duration) {
+  const double h = std::max(1e-10 * duration, 1e-12 * std::abs(start.time));
+  TangentScale scale{Eigen::VectorXd::Ones(rows), 1};
+  integrator.start(start);
+  if (!(h > 0) || !integrator.step(h)) return {};
+  const Eigen::Index half = rows / 2;
+  // Of a momentum's unit, what coordinates are moved by: the inverse mass. In space there are three a link, of which
+  // the one along it moves nothing.
+  Eigen::VectorXd mobility(half), stiffness(half), loss(half);
+  constexpr Eigen::Index at_once = 64;
+  for (Eigen::Index first = 0; first < rows; first += at_once) {
+    const Eigen::Index count = std::min(at_once, rows - first);
+    Directions<> units = Directions<>::Zero(rows, count);
+    for (Eigen::Index k = 0; k < count; ++k) units(first + k, k) = 1;
+    integrator.push(units);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const Eigen::Index of = (first + k) % half;
+      if (first + k < half) {
+        stiffness[of] = units.col(k).tail(half).cwiseAbs().maxCoeff() / h;
+      } else {
+        mobility[of] = units.col(k).head(half).cwiseAbs().maxCoeff() / h;
+        loss[of] = std::abs(1 - units(first + k, k)) / h;
+      }
+    }
+  }
+  const Eigen::Index group = rows == 2 * start.q.size() ? 1 : 3;
+  for (Eigen::Index first = 0; first < half; first += group) {
+    mobility.segment(first, group).setConstant(mobility.segment(first, group).maxCoeff());
+    if (group > 1) loss.segment(first, group).setZero();
+  }
+  const Motion moved = integrator.state();
+  const double turning = start.v.cwiseAbs().maxCoeff(), pushed = (moved.v - start.v).cwiseAbs().maxCoeff() / h;
+  const double swing = stiffness.cwiseProduct(mobility).maxCoeff();
+  const double squared = std::max({swing, pushed, turning * turning, std::pow(loss.maxCoeff(), 2)});
+  if (std::isfinite(squared) && squared > 0) scale.rate = std::sqrt(squared);
+  if (mobility.allFinite() && (mobility.array() > 0).all()) {
+    scale.rows << (scale.rate / mobility.array()).sqrt(), (mobility.array() / scale.rate).sqrt();
+  }
+  return scale;
+}
+
 /// The leading Lyapunov exponents of a motion: tangents are pushed by the exact derivatives of its steps, and made
 /// orthonormal again by QR before they fall into the leading directions (Benettin, Galgani, Giorgilli, Strelcyn 1980).
 /// Steps may have any sizes. The first tangent is never turned, so that FTLE and MEGNO are read off it on the way.
@@ -135,11 +190,21 @@ class LyapunovTangents {
     }
   }
 
+  /// Tangents of the motion's start, measured by `scale`, which `integrator` has just made a step for. Without it they
+  /// are whatever the first step makes of them, and what that adds to them is not known.
+  void begin(Integrator& integrator, const TangentScale& scale) {
+    scale_ = scale.rows;
+    push(integrator);
+    Eigen::VectorXd grown(tangents_.cols());
+    library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+    has_begun_ = true;
+  }
+
   /// After a step of `integrator` to `time` since the start. Tells whether there is a new entry of the history.
   bool follow(Integrator& integrator, double time) {
-    integrator.push(tangents_);
+    push(integrator);
     const double grown = std::log(tangents_.col(0).norm());
-    if (time_ > 0) first_.follow(grown - grown_, time_, time);
+    if (has_begun_ || time_ > 0) first_.follow(grown - grown_, time_, time);
     grown_ = grown;
     time_ = time;
     if (time - history_.last_time() < interval_ && std::abs(grown_) < std::log(parted) / 2) return false;
@@ -160,7 +225,7 @@ class LyapunovTangents {
     spectrum.duration = time_;
     spectrum.ftle = first_.grown() / std::max(counted(), smallest);
     spectrum.megno = first_.megno(time_);
-    history_.average(std::max(GrowthHistory::settling * time_, history_.first_time()), spectrum);
+    history_.average(std::max(GrowthHistory::settling * time_, has_begun_ ? 0 : history_.first_time()), spectrum);
     sort(spectrum);
     spectrum.sum = spectrum.exponents.sum();
     return spectrum;
@@ -171,15 +236,25 @@ class LyapunovTangents {
   // How much more the fastest tangent may have grown than the slowest: what QR tells has as many digits less.
   static constexpr double parted = 1e3;
 
-  // Of the first step only directions are kept: it takes tangents of any kind into the tangent space.
-  double counted() const { return history_.size() < 2 ? 0 : time_ - history_.first_time(); }
+  // Of tangents that have not begun only directions are kept of the first step, which takes them into the tangent
+  // space.
+  double counted() const {
+    if (has_begun_) return time_;
+    return history_.size() < 2 ? 0 : time_ - history_.first_time();
+  }
+
+  void push(Integrator& integrator) {
+    if (scale_.size() > 0) tangents_.array().colwise() /= scale_.array();
+    integrator.push(tangents_);
+    if (scale_.size() > 0) tangents_.array().colwise() *= scale_.array();
+  }
 
   void make_orthonormal() {
     const double span = time_ - history_.last_time();
     Eigen::VectorXd grown(tangents_.cols());
     library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
     grown = grown.array().max(smallest).log().matrix().eval();
-    if (history_.size() > 1) {
+    if (has_begun_ || history_.size() > 1) {
       const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());
       interval_ = span * std::clamp(std::log(parted) / std::max(parting, smallest), 0.25, 2.0);
     } else {
@@ -198,6 +273,8 @@ class LyapunovTangents {
   }
 
   Directions<> tangents_;
+  Eigen::VectorXd scale_;  // TangentScale::rows; none where they are measured as they are
+  bool has_begun_ = false;
   GrowthHistory history_;
   TangentGrowth first_;
   double time_ = 0, interval_ = 0;
@@ -217,9 +294,14 @@ LyapunovSpectrum find_lyapunov_spectrum(Integrator& integrator, const Motion& st
     throw std::invalid_argument("count: expected 1 to " + std::to_string(all) + " exponents, got " +
                                 std::to_string(count));
   }
-  LyapunovTangents tangents(integrator.linearize(), count == 0 ? all : count);
+  const int rows = integrator.linearize();
+  LyapunovTangents tangents(rows, count == 0 ? all : count);
+  const std::optional<TangentScale> scale = tangent_scale(integrator, start, rows, duration);
+  if (scale) tangents.begin(integrator, *scale);
   Schedule schedule;
-  schedule.step = step;
+  // Steps that follow the motion are as long as they like where that has come to rest; tangents have not.
+  static constexpr double resolved = 2;
+  schedule.step = scale ? std::min(step, std::isinf(step) ? resolved / scale->rate : step) : step;
   schedule.duration = duration;
   schedule.every = std::numeric_limits<std::int64_t>::max();
   double before = start.time;

@@ -62,10 +62,12 @@ struct SystemEntry {
   void (*rates)(const PlainSystem&, double time, const double* q, const double* p, double* v);
   /// Whether energy may come from outside, or go there.
   bool (*loaded)(const PlainSystem&);
+  /// Whether anything depends on time.
+  bool (*driven)(const PlainSystem&);
   MakeLaneDynamics* lanes;
 };
 
 /// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
-inline constexpr int system_interface = 3;
+inline constexpr int system_interface = 4;
 
 }  // namespace pendula

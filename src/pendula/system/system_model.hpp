@@ -62,6 +62,15 @@ class SystemModel {
   /// Whether anything depends on time.
   bool driven() const { return holds_time<S> || !sines_.empty(); }
 
+  /// Highest frequency of a sine that is added to an input; 0 where there is none  [rad/s].
+  double fastest_drive() const {
+    double fastest = 0;
+    for (const InputSine& sine : sines_) {
+      if (sine.amplitude != 0) fastest = std::max(fastest, std::abs(sine.frequency));
+    }
+    return fastest;
+  }
+
   /// Whether energy may come from outside, or go there.
   bool loaded() const { return loaded_; }
 
