@@ -306,7 +306,23 @@ TEST(Run, SaysWhichAccuracyCannotBeReached) {
   setup.duration = 100;
   const RunReport lost = pendula::Run(setup).go();
   ASSERT_EQ(lost.warnings.size(), 1U);
-  EXPECT_EQ(lost.warnings[0].find("runs by the smallest tolerances end elsewhere"), 0U) << lost.warnings[0];
+  EXPECT_EQ(lost.warnings[0].find("runs by the smallest tolerances that are of use end elsewhere"), 0U)
+      << lost.warnings[0];
+}
+
+// Few stages would take steps without end by tolerances that many stages reach.
+TEST(Run, TriesNoToleranceThatItsOrderIsTooLowFor) {
+  RunSetup setup = double_pendulum(20);
+  setup.options.step = 0;
+  setup.start.q = Eigen::Vector2d(3, 3);
+  setup.accuracy = {1e-6, false};
+  for (const auto& [stages, finest] : {std::pair(1, 1e-7), std::pair(2, 1e-8), std::pair(8, 1e-16)}) {
+    setup.options.stages = stages;
+    const RunReport report = pendula::Run(setup).go();
+    EXPECT_GE(report.options.tolerance, finest);
+    EXPECT_EQ(report.options.stages, stages);
+    EXPECT_EQ(report.warnings.empty(), stages == 8) << stages;
+  }
 }
 
 // By the tolerance that its first part was run by, whatever its new end is.

@@ -40,7 +40,7 @@ def test_examples_run_without_naming_a_step(file, pendula, tmp_path):
     assert summary["step"] is None and summary["smallest_step"] > 0
     for warning in summary["warnings"]:
         assert (
-            "the last state cannot be trusted" in warning or "which is what it makes of rounding" in warning
+            "the last state cannot be trusted" in warning or "the smallest that is of use" in warning
         )
 
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <pendula/system/motion.hpp>
@@ -29,9 +30,27 @@ struct AccuracyAim {
 
 namespace detail {
 
-/// The smallest tolerance that steps can be chosen by.
-constexpr double finest_tolerance(Method method) {
-  return is_explicit(method) ? 1e-14 : 1e-16;
+/// Order of steps of a method that does not choose it.
+inline int order_of(const RunOptions& options) {
+  switch (options.method) {
+    case Method::dopri5:
+      return 5;
+    case Method::fehlberg78:
+      return 8;
+    case Method::radau:
+      return 2 * options.stages - 1;
+    default:
+      return 2 * options.stages;
+  }
+}
+
+/// The smallest tolerance that steps are chosen by: one that rounding allows, and where the order is given, one that
+/// takes no more than some steps for each of a run by the accuracy itself.
+inline double finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
+  constexpr double most_steps = 4;
+  const double rounding = is_explicit(options.method) ? 1e-14 : 1e-16;
+  if (accuracy.chooses_stages || options.method == Method::bulirsch_stoer) return rounding;
+  return std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
 }
 
 /// Motion makes of the errors of its steps what it does: a factor that grows with chaos, and is nearly the same for all
@@ -47,7 +66,7 @@ AccuracyAim aim_at(double wanted, double finest, End end, Distance distance) {
   double last = 0;
   std::optional<Motion> near;
   for (const double coarse : {first, first / apart, apart * finest}) {
-    if (coarse < apart * finest) continue;
+    if (coarse < apart * finest || coarse / apart == last) continue;
     const std::optional<Motion> far = coarse == last ? std::move(near) : end(coarse);
     last = coarse / apart;
     near = end(last);

@@ -59,11 +59,12 @@ inline Doubt of_aim(double wanted, const AccuracyAim& aim) {
   static constexpr double close = 10;  // what trials are off by
   if (aim.error <= close * wanted) return {};
   if (std::isfinite(aim.error)) {
-    return "an accuracy of " + pendula::rounded(wanted, 2) + " cannot be reached: the motion ends elsewhere by about " +
-           pendula::rounded(aim.error, 1) + " of its size, which is what it makes of rounding";
+    return "an accuracy of " + pendula::rounded(wanted, 2) + " cannot be reached: by a tolerance of " +
+           pendula::rounded(aim.tolerance, 2) + ", the smallest that is of use, the motion ends elsewhere by about " +
+           pendula::rounded(aim.error, 1) + " of its size";
   }
-  return "runs by the smallest tolerances end elsewhere, by more than 0.01 of the size: the last state cannot be "
-         "trusted";
+  return "runs by the smallest tolerances that are of use end elsewhere, by more than 0.01 of the size: the last state "
+         "cannot be trusted";
 }
 
 /// Whether a second run is worth its time: none that was wrong had followed the motion so closely.

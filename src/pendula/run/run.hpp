@@ -19,6 +19,7 @@
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/simulation.hpp>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -117,6 +118,7 @@ inline RunReport Run::go(const std::function<bool()>& stop) {
 
 inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
   become(kept_, checkpoint.record);
+  if (is_aimed() != (kept_.aim.tolerance > 0)) throw std::invalid_argument("checkpoint: it is of another accuracy");
   if (is_aimed()) follow_aim();
   integrator_->resume(checkpoint.integrator);
   return go(&checkpoint, stop);
@@ -143,7 +145,8 @@ inline bool Run::aim(const std::function<bool()>& stop) {
   const auto stops = [&] { return stopped = stopped || stop(); };
   const auto end = [&](double tolerance) { return try_out(tolerance, stops); };
   const auto distance = [&](const Motion& a, const Motion& b) { return setup_.subject->distance(a, b); };
-  kept_.aim = detail::aim_at(setup_.accuracy.error, detail::finest_tolerance(setup_.options.method), end, distance);
+  const double finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
+  kept_.aim = detail::aim_at(setup_.accuracy.error, finest, end, distance);
   follow_aim();
   return !stopped;
 }
