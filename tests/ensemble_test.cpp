@@ -378,6 +378,13 @@ TEST(RunsOfLoadedChains, SeeForcesThatDependOnTimeAlone) {
 
 // --- Exponents ---
 
+LyapunovSpectrum exponent_alone(const RunSetup& setup) {
+  const auto integrator = setup.subject->make_integrator(setup.options);
+  return find_lyapunov_spectrum(
+      *integrator, setup.start, std::numeric_limits<double>::infinity(), setup.duration, 1,
+      [](const LyapunovProgress&) {}, [] { return false; });
+}
+
 template <class Space>
 class ExponentsInLanes : public RunsInLanes<Space> {
  protected:
@@ -387,12 +394,6 @@ class ExponentsInLanes : public RunsInLanes<Space> {
       setup.options.method = Method::dopri5;  // which is there where lanes are few, too
     }
     return setups;
-  }
-  static LyapunovSpectrum alone(const RunSetup& setup) {
-    const auto integrator = setup.subject->make_integrator(setup.options);
-    return find_lyapunov_spectrum(
-        *integrator, setup.start, std::numeric_limits<double>::infinity(), setup.duration, 1,
-        [](const LyapunovProgress&) {}, [] { return false; });
   }
 };
 
@@ -405,7 +406,7 @@ TYPED_TEST(ExponentsInLanes, AreThoseOfGaussSteps) {
   const std::vector<RunSetup> asked = this->explicitly(setups);
   const auto found = exponents_in_lanes(asked);
   for (std::size_t k = 0; k < setups.size(); ++k) {
-    const LyapunovSpectrum expected = this->alone(setups[k]);
+    const LyapunovSpectrum expected = exponent_alone(setups[k]);
     ASSERT_TRUE(found[k]);
     const double error = std::hypot(found[k]->errors[0], expected.errors[0]);
     EXPECT_NEAR(found[k]->exponents[0], expected.exponents[0], 4 * error) << k;
@@ -451,6 +452,45 @@ TYPED_TEST(ExponentsInLanes, OfOthersThereAreNone) {
   const auto found = exponents_in_lanes(setups);
   for (std::size_t k = 0; k < setups.size(); ++k) EXPECT_EQ(found[k].has_value(), k == 3) << k;
   EXPECT_TRUE(exponents_in_lanes(setups, [] { return true; }).empty());
+}
+
+// θ'' = −g/l sin θ − b/(m l²) θ̇: that comes to rest, where its exponent is half the damping, and a chain of two links
+// that is shaken, which comes to what Gauss steps say. One that is damped faster than steps are long is no exception.
+TEST(ExponentsOfLoadedChains, AreFoundInLanesByTheirKernels) {
+  const auto hung = [](const Eigen::VectorXd& damping, double frequency) {
+    ChainParameters<Planar> parameters;
+    parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(damping.size());
+    parameters.damping = damping;
+    if (frequency > 0) {
+      parameters.drives = {
+          {.link = 0, .amplitude = Torque<Planar, 1>::Constant(3), .frequency = frequency, .phase = 0}};
+    }
+    return RunSetup{
+        .subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
+        .start = Motion(0, Eigen::VectorXd::Constant(damping.size(), 1), Eigen::VectorXd::Zero(damping.size())),
+        .options = chosen(1e-6),
+        .duration = 100,
+        .every = 1,
+        .doubted = false};
+  };
+  std::vector<RunSetup> setups = {hung(Eigen::VectorXd::Constant(1, 0.3), 0),
+                                  hung(Eigen::VectorXd::Constant(1, 2.0), 0), hung(Eigen::Vector2d(0.2, 0.1), 3),
+                                  hung(Eigen::Vector2d(0.2, 0.1), 5), hung(Eigen::VectorXd::Constant(1, 300.0), 0)};
+  setups[4].start.q.setConstant(0.01);
+  const auto never = [] { return false; };
+  const auto found = exponents_in_lanes(setups, never, MemberMethod::quickest);
+  if (!lane_kind(setups[0], quickest_with_tangents(setups[0]))) return;  // lanes are few
+  const auto exponent = [&](std::size_t k) { return found[k]->exponents[0]; };
+  for (const auto& each : found) ASSERT_TRUE(each);
+  EXPECT_NEAR(exponent(0), -0.15, 1e-3);        // seen: 5.2e-4
+  EXPECT_NEAR(exponent(1), -1, 2e-3);           // seen: 8.0e-4
+  EXPECT_NEAR(exponent(4), -0.03270357, 2e-6);  // seen: 1.5e-7
+  for (const std::size_t k : {2U, 3U}) {
+    const LyapunovSpectrum expected = exponent_alone(setups[k]);
+    const double error = std::hypot(found[k]->errors[0], expected.errors[0]);
+    EXPECT_NEAR(exponent(k), expected.exponents[0], 3 * error) << k;  // seen: 0.2 error
+    EXPECT_NEAR(found[k]->ftle, expected.ftle, 3 * error) << k;
+  }
 }
 
 TYPED_TEST(RunsInLanes, LeaveOffWhenAsked) {

@@ -8,9 +8,11 @@
 #include <numbers>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/kernels/planar_2.hpp>
+#include <pendula/lanes/lane_dual_functions.hpp>
 #include <pendula/lanes/lane_functions.hpp>
 #include <pendula/lanes/lane_kernel.hpp>
 #include <pendula/lanes/lane_queue.hpp>
+#include <pendula/numeric/dual.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/simulation.hpp>
 #include <vector>
@@ -180,6 +182,88 @@ TEST(SystemLanes, ACompiledLibraryMovesItsOwnLanesOnly) {
     EXPECT_EQ(left[k].status, Status::not_converged);
     EXPECT_EQ(left[k].time, 0.25);
     EXPECT_EQ(Eigen::Map<const Eigen::Vector2d>(left[k].q), systems.members[k].start.q);
+  }
+}
+
+// Accelerations are those without tangents, their derivatives those of dual numbers.
+TEST(SystemLanes, AccelerationsHaveTheirDerivatives) {
+  using Slopes = Dual<1>;
+  const Systems systems(MemberRegister::size, true, 1);
+  constexpr auto lanes = static_cast<std::size_t>(MemberRegister::size);
+  LaneKernel<Kernel> kernel;
+  struct Numbers {
+    alignas(pack_alignment) double of[2 * lanes] = {};
+  } q, v, dq, dv, a, expected, da;
+  alignas(pack_alignment) double times[lanes];
+  for (std::size_t k = 0; k < lanes; ++k) {
+    kernel.take(static_cast<int>(k), systems.members[k].system);
+    times[k] = 0.1 * static_cast<double>(k);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::size_t at = i * lanes + k;
+      q.of[at] = systems.members[k].start.q[static_cast<Eigen::Index>(i)];
+      v.of[at] = systems.members[k].start.v[static_cast<Eigen::Index>(i)];
+      dq.of[at] = 0.3 + static_cast<double>(at);
+      dv.of[at] = 1.7 - static_cast<double>(k);
+    }
+  }
+  kernel.accelerations(times, q.of, v.of, expected.of);
+  kernel.variations(times, q.of, v.of, dq.of, dv.of, a.of, da.of);
+  for (std::size_t k = 0; k < lanes; ++k) {
+    const Chain<Planar>& chain = systems.chains[k];
+    Kernel::Parameters<Slopes> parameters;
+    Kernel::Vector<Slopes> angles, rates, found;
+    Kernel::Inputs<Slopes> torque;
+    Torque<Planar, Eigen::Dynamic> acting;
+    chain.torque(times[k], acting);
+    parameters.gravity = Slopes(chain.gravity());
+    for (Eigen::Index i = 0; i < 2; ++i) {
+      const std::size_t at = static_cast<std::size_t>(i) * lanes + k;
+      parameters.masses[i] = Slopes(chain.masses()[i]);
+      parameters.lengths[i] = Slopes(chain.lengths()[i]);
+      parameters.damping[i] = Slopes(chain.damping()[i]);
+      angles[i] = Slopes(q.of[at]);
+      angles[i].slopes[0] = dq.of[at];
+      rates[i] = Slopes(v.of[at]);
+      rates[i].slopes[0] = dv.of[at];
+      torque(0, i) = Slopes(acting(0, i));
+    }
+    Kernel::acceleration(parameters, angles, rates, torque, found);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::size_t at = i * lanes + k;
+      EXPECT_EQ(a.of[at], expected.of[at]);
+      const double slope = found[static_cast<Eigen::Index>(i)].slopes[0];
+      EXPECT_NEAR(da.of[at], slope, 1e-13 * (1 + std::abs(slope)));  // seen: 3e-15
+    }
+  }
+}
+
+TEST(LaneFunctions, HaveTheirDerivatives) {
+  using L = LaneDual<LanePack<MemberRegister>>;
+  for (const double number : {0.3, -0.7, 0.99}) {
+    const auto expect = [&](auto function, double at) {
+      L x(at);
+      x.slope = LanePack<MemberRegister>(-1.5);
+      Dual<1> same(at);
+      same.slopes[0] = -1.5;
+      const double slope = function(same).slopes[0];
+      EXPECT_NEAR(function(x).slope[0], slope, 4e-15 * (1 + std::abs(slope))) << at;  // seen: 3e-16
+      EXPECT_NEAR(function(x).value[0], function(same).value, 4e-16 * std::abs(function(same).value)) << at;
+    };
+    expect([](const auto& x) { return sin(x); }, number);
+    expect([](const auto& x) { return cos(x); }, number);
+    expect([](const auto& x) { return tan(x); }, number);
+    expect([](const auto& x) { return asin(x); }, number);
+    expect([](const auto& x) { return acos(x); }, number);
+    expect([](const auto& x) { return atan(x); }, number);
+    expect([](const auto& x) { return sinh(x); }, number);
+    expect([](const auto& x) { return cosh(x); }, number);
+    expect([](const auto& x) { return tanh(x); }, number);
+    expect([](const auto& x) { return exp(x); }, number);
+    expect([](const auto& x) { return cbrt(x); }, number);
+    expect([](const auto& x) { return x / (x * x - x); }, number);
+    expect([](const auto& x) { return log(x); }, std::abs(number));
+    expect([](const auto& x) { return sqrt(x); }, std::abs(number));
+    expect([](const auto& x) { return pow(x, std::decay_t<decltype(x)>(-1.5)); }, std::abs(number));
   }
 }
 

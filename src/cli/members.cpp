@@ -153,12 +153,11 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<Member*> members;
   for (Member& member : all) {
     if (!member.scenario) continue;
-    RunSetup setup = std::visit([](const auto& read) { return member_setup(read); }, *member.scenario);
-    if (plan_.chooses_method) setup.options = quickest_with_tangents(setup);
-    setups.push_back(std::move(setup));
+    setups.push_back(std::visit([](const auto& read) { return member_setup(read); }, *member.scenario));
     members.push_back(&member);
   }
-  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(setups, [&] { return guard_.interrupted(); });
+  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(
+      setups, [&] { return guard_.interrupted(); }, method());
   if (found.size() < members.size()) throw Interrupted();
   for (std::size_t k = 0; k < members.size(); ++k) members[k]->exponent = std::move(found[k]);
 }

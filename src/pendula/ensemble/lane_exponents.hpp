@@ -50,28 +50,38 @@ class LaneExponent {
   GrowthHistory history_{1};
 };
 
-/// The exponents of members that are moved in lanes, with one tangent each.
-template <class Space>
+/// The exponents of members that are moved in lanes, with one tangent each. `Members` is PlainChains or PlainSystems.
+template <class Members>
 class LaneExponents : private LaneWatch {
  public:
-  LaneExponents(std::span<const RunSetup* const> setups, const std::function<bool()>& stop)
-      : setups_(setups), stop_(stop), members_(setups) {
+  /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they would be run alone.
+  LaneExponents(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop)
+      : setups_(setups), options_(options), stop_(stop), members_(setups) {
     exponents_.reserve(setups.size());
     for (const RunSetup* setup : setups) exponents_.emplace_back(setup->duration);
   }
 
   /// None of those that lanes could not move. Empty where it was stopped.
   std::vector<std::optional<LyapunovSpectrum>> go() {
-    const RunOptions& options = setups_[0]->options;
-    if (!members_.move_with_tangents(options, *this)) return {};
+    if (!members_.move_with_tangents(options_, *this)) return {};
     std::vector<std::optional<LyapunovSpectrum>> found(setups_.size());
     for (std::size_t k = 0; k < found.size(); ++k) {
-      if (members_.end(k).status == Status::ok) found[k] = exponents_[k].spectrum();
+      if (members_.end(k).status == Status::ok && is_good(k)) found[k] = exponents_[k].spectrum();
     }
     return found;
   }
 
  private:
+  // As LaneRuns: of systems, a method that was not asked for has to keep the energy, where it is kept.
+  bool is_good(std::size_t k) const {
+    const RunSetup& setup = *setups_[k];
+    const Subject& subject = *setup.subject;
+    if (!Members::of_systems || options_.method == setup.options.method || subject.loaded()) return true;
+    const Observation before = subject.observe(setup.start), after = subject.observe(members_.last(k));
+    const double scale = energy_scale(subject, before, after, 0);
+    return std::abs(after.energy - before.energy) <= setup.options.tolerance * scale;
+  }
+
   bool wants_steps() const override { return true; }
   bool stops() override { return stop_(); }
 
@@ -84,8 +94,9 @@ class LaneExponents : private LaneWatch {
   }
 
   std::span<const RunSetup* const> setups_;
+  RunOptions options_;
   const std::function<bool()>& stop_;
-  PlainChains<Space> members_;
+  Members members_;
   std::vector<LaneExponent> exponents_;
 };
 

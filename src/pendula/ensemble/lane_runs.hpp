@@ -93,6 +93,13 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
 
 namespace detail {
 
+/// What energies of a member are compared with; `sum`: the largest |T| + |U| that was seen on the way.
+inline double energy_scale(const Subject& subject, const Observation& before, const Observation& after, double sum) {
+  if (subject.energy_scale()) return compared_with(subject.energy_scale(), before.energy);
+  const auto sizes = [](const Observation& seen) { return std::abs(seen.kinetic) + std::abs(seen.potential()); };
+  return std::max({sum, sizes(before), sizes(after)});
+}
+
 /// The ends of members, as the compiled library writes them.
 class PlainEnds {
  public:
@@ -160,6 +167,9 @@ class PlainSystems : public PlainEnds {
   bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
     return library().system_lanes(options)(*dynamics_, options, every, members_, ends(), watch);
   }
+  bool move_with_tangents(const RunOptions& options, LaneWatch& watch) {
+    return library().system_tangent_lanes(options)(*dynamics_, options, 0, members_, ends(), watch);
+  }
 
  private:
   PlainSystem numbers_of(const Subject& subject) {
@@ -222,10 +232,7 @@ class LaneRuns : private LaneWatch {
     const Subject& subject = *setup.subject;
     const Observation before = subject.observe(setup.start), after = subject.observe(report.last);
     if (end.status != Status::ok || !std::isfinite(before.energy) || !std::isfinite(after.energy)) return false;
-    const auto sum = [](const Observation& seen) { return std::abs(seen.kinetic) + std::abs(seen.potential()); };
-    const double scale = subject.energy_scale() ? detail::compared_with(subject.energy_scale(), before.energy)
-                                                : std::max({end.energy_sum, sum(before), sum(after)});
-    report.energy_error = {before.energy, scale, 0};
+    report.energy_error = {before.energy, detail::energy_scale(subject, before, after, end.energy_sum), 0};
     const double last = std::abs(after.energy - before.energy);
     report.energy_error.largest = report.energy_error.of(before.energy + std::max(last, end.energy_error));
     if (is_tried(setup) && !is_good(k, report)) return false;

@@ -77,35 +77,17 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   return by_kernel || is_short ? options : setup.options;
 }
 
-/// The same for the leading exponent of a chain's run, however long that is: the longer, the smaller the tolerance, so
-/// that no more of the energy is lost in all.
+/// The same for the leading exponent of a run, however long that is: the longer, the smaller the tolerance, so that no
+/// more of the energy is lost in all. How much longer is known of chains.
 inline RunOptions quickest_with_tangents(const RunSetup& setup) {
   RunOptions options = setup.options;
-  if (options.method != Method::gauss || options.step != 0 || !lane_kind(setup)) return options;
-  options.method = Method::fehlberg78;
-  const double longer = std::max(1.0, detail::run_length(setup) / detail::short_run);
+  if (options.method != Method::gauss || options.step != 0) return options;
+  options.method = detail::quickest_method(*setup.subject);
+  const double length = detail::run_length(setup);
+  const double longer = std::isfinite(length) ? std::max(1.0, length / detail::short_run) : 1;
   options.tolerance = std::max(1e-13, 0.01 * options.tolerance / longer);
-  return options;
-}
-
-/// The leading Lyapunov exponents of those of the runs that explicit methods move in lanes, each over the whole of its
-/// duration, with one tangent; of others, and of those that could not be moved so, none. Empty where it was stopped.
-inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
-    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; }) {
-  detail::RunsByKind kinds;
-  for (std::size_t k = 0; k < setups.size(); ++k) {
-    const auto kind = is_explicit(setups[k].options.method) ? lane_kind(setups[k]) : std::nullopt;
-    if (kind && kind->kernel == nullptr) kinds[*kind].push_back(k);
-  }
-  std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
-  for (const auto& [kind, numbers] : kinds) {
-    const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
-    auto found = kind.dimension == Planar::dimension ? detail::LaneExponents<Planar>(alike, stop).go()
-                                                     : detail::LaneExponents<Spatial>(alike, stop).go();
-    if (found.empty()) return {};
-    for (std::size_t k = 0; k < numbers.size(); ++k) exponents[numbers[k]] = std::move(found[k]);
-  }
-  return exponents;
+  const std::optional<LaneKind> kind = lane_kind(setup, options);
+  return kind && (kind->kernel != nullptr || lane_kind(setup)) ? options : setup.options;
 }
 
 /// How members are moved.
@@ -150,6 +132,49 @@ inline std::vector<RunReport> run_members(
     for (std::size_t k = 0; k < numbers.size(); ++k) reports[numbers[k]] = std::move(found[k]);
   }
   return reports;
+}
+
+namespace detail {
+
+inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(const LaneKind& kind,
+                                                                       std::span<const RunSetup* const> alike,
+                                                                       const RunOptions& options,
+                                                                       const std::function<bool()>& stop) {
+  if (kind.kernel != nullptr) return LaneExponents<PlainSystems>(alike, options, stop).go();
+  if (kind.dimension == Planar::dimension) return LaneExponents<PlainChains<Planar>>(alike, options, stop).go();
+  return LaneExponents<PlainChains<Spatial>>(alike, options, stop).go();
+}
+
+}  // namespace detail
+
+/// The leading Lyapunov exponents of those of the runs that explicit methods move in lanes, each over the whole of its
+/// duration, with one tangent; of others, and of those that could not be moved so, none. Empty where it was stopped.
+/// Who loses too much energy by a method that was not asked for tries once more, by a hundredth of the tolerance.
+inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
+    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
+    MemberMethod method = MemberMethod::asked) {
+  std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
+  const bool is_asked = method == MemberMethod::asked;
+  for (const double finer : is_asked ? std::vector{1.0} : std::vector{1.0, 0.01}) {
+    const auto options_of = [&](const RunSetup& setup) {
+      RunOptions options = is_asked ? setup.options : quickest_with_tangents(setup);
+      if (finer < 1) options.tolerance = std::max(1e-13, finer * options.tolerance);
+      return options;
+    };
+    detail::RunsByKind kinds;
+    for (std::size_t k = 0; k < setups.size(); ++k) {
+      const RunOptions options = options_of(setups[k]);
+      const auto kind = is_explicit(options.method) ? lane_kind(setups[k], options) : std::nullopt;
+      if (kind && !exponents[k]) kinds[*kind].push_back(k);
+    }
+    for (const auto& [kind, numbers] : kinds) {
+      const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
+      auto found = detail::exponents_in_lanes(kind, alike, options_of(*alike[0]), stop);
+      if (found.empty()) return {};
+      for (std::size_t k = 0; k < numbers.size(); ++k) exponents[numbers[k]] = std::move(found[k]);
+    }
+  }
+  return exponents;
 }
 
 }  // namespace pendula

@@ -67,6 +67,16 @@ std::array<L, D> values_of(const std::array<LaneDual<L>, D>& x) {
   return values;
 }
 
+/// Sets a member's, and leaves its derivative.
+template <class L>
+void set_value(int lane, double value, L& x) {
+  x.set(lane, value);
+}
+template <class L>
+void set_value(int lane, double value, LaneDual<L>& x) {
+  x.value.set(lane, value);
+}
+
 }  // namespace detail
 
 }  // namespace pendula

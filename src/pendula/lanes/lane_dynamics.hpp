@@ -25,6 +25,9 @@ class LaneDynamics {
   virtual void take(int lane, const PlainSystem& system) = 0;
   /// q̈ at the times (lanes), of q and q̇ (coordinates, lanes).
   virtual void accelerations(const double* times, const double* q, const double* v, double* a) = 0;
+  /// The same, and its derivative along tangents (dq, dv) of the motions.
+  virtual void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv,
+                          double* a, double* da) = 0;
   /// T, and T + U  (lanes)  [J].
   virtual void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) = 0;
 };

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <pendula/lanes/lane_dual_functions.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_functions.hpp>
 #include <pendula/lanes/lane_pack.hpp>
@@ -35,7 +36,12 @@ class LaneKernel : public LaneDynamics {
     if constexpr (parameter_count<S>() > 0) {
       std::array<L*, static_cast<std::size_t>(parameter_count<S>())> places;
       S::template parameter_places<L>(parameters_, places.data());
-      for (std::size_t k = 0; k < places.size(); ++k) places[k]->set(lane, system.parameters[k]);
+      std::array<Varied*, places.size()> varied;
+      S::template parameter_places<Varied>(varied_parameters_, varied.data());
+      for (std::size_t k = 0; k < places.size(); ++k) {
+        places[k]->set(lane, system.parameters[k]);
+        *varied[k] = Varied(*places[k]);
+      }
     }
     for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k].set(lane, system.inputs[k]);
     take_sines(lane, system.sines);
@@ -44,9 +50,24 @@ class LaneKernel : public LaneDynamics {
   void accelerations(const double* times, const double* q, const double* v, double* a) override {
     const L time = L::load(times);
     set_time(time);
-    Vector acceleration;
+    Vector<L> acceleration;
     S::acceleration(parameters_, read(q), read(v), inputs_at(time), acceleration);
     for (int i = 0; i < S::coordinates; ++i) acceleration[i].store(a + i * L::size);
+  }
+
+  void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv, double* a,
+                  double* da) override {
+    const L time = L::load(times);
+    if constexpr (holds_time<S>) varied_parameters_.time = Varied(time);
+    const Inputs<L> inputs = inputs_at(time);
+    Inputs<Varied> varied_inputs;
+    for (Eigen::Index k = 0; k < inputs.size(); ++k) varied_inputs.data()[k] = Varied(inputs.data()[k]);
+    Vector<Varied> acceleration;
+    S::acceleration(varied_parameters_, read(q, dq), read(v, dv), varied_inputs, acceleration);
+    for (int i = 0; i < S::coordinates; ++i) {
+      acceleration[i].value.store(a + i * L::size);
+      acceleration[i].slope.store(da + i * L::size);
+    }
   }
 
   void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) override {
@@ -59,12 +80,22 @@ class LaneKernel : public LaneDynamics {
   }
 
  private:
-  using Vector = typename S::template Vector<L>;
-  using Inputs = typename S::template Inputs<L>;
+  using Varied = LaneDual<L>;
+  template <class Number>
+  using Vector = typename S::template Vector<Number>;
+  template <class Number>
+  using Inputs = typename S::template Inputs<Number>;
 
-  static Vector read(const double* numbers) {
-    Vector x;
+  static Vector<L> read(const double* numbers) {
+    Vector<L> x;
     for (int i = 0; i < S::coordinates; ++i) x[i] = L::load(numbers + i * L::size);
+    return x;
+  }
+  static Vector<Varied> read(const double* numbers, const double* slopes) {
+    Vector<Varied> x;
+    for (int i = 0; i < S::coordinates; ++i) {
+      x[i] = {L::load(numbers + i * L::size), L::load(slopes + i * L::size)};
+    }
     return x;
   }
 
@@ -95,8 +126,8 @@ class LaneKernel : public LaneDynamics {
     }
   }
 
-  Inputs inputs_at(const L& time) const {
-    Inputs inputs;
+  Inputs<L> inputs_at(const L& time) const {
+    Inputs<L> inputs;
     for (std::size_t k = 0; k < inputs_.size(); ++k) inputs.data()[k] = inputs_[k];
     for (const Sine& sine : sines_) {
       L& input = inputs.data()[sine.input];
@@ -106,7 +137,8 @@ class LaneKernel : public LaneDynamics {
   }
 
   typename S::template Parameters<L> parameters_{};
-  std::array<L, static_cast<std::size_t>(Inputs::SizeAtCompileTime)> inputs_;  // their constant parts
+  typename S::template Parameters<Varied> varied_parameters_{};                   // the same
+  std::array<L, static_cast<std::size_t>(Inputs<L>::SizeAtCompileTime)> inputs_;  // their constant parts
   std::vector<Sine> sines_;
 };
 

@@ -283,4 +283,9 @@ template <class Method, class Register = MemberRegister>
 using SystemLanes =
     LaneQueue<LaneExplicit<LaneSystem<Register>, Method>, LaneSystemSeats<LaneExplicit<LaneSystem<Register>, Method>>>;
 
+/// The same with a tangent of each member.
+template <class Method, class Register = MemberRegister>
+using SystemTangentLanes = LaneQueue<LaneExplicit<LaneSystem<Register, true>, Method>,
+                                     LaneSystemSeats<LaneExplicit<LaneSystem<Register, true>, Method>>>;
+
 }  // namespace pendula

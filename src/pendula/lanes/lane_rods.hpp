@@ -75,8 +75,8 @@ class LaneRods {
       }
       const Heading<Space> heading(angles, rates);
       for (std::size_t k = 0; k < D; ++k) {
-        set_value(lane, chain[i].length * heading.u[k], rods[i].place[k]);
-        set_value(lane, chain[i].length * heading.u_dot[k], rods[i].rate[k]);
+        detail::set_value(lane, chain[i].length * heading.u[k], rods[i].place[k]);
+        detail::set_value(lane, chain[i].length * heading.u_dot[k], rods[i].rate[k]);
       }
     }
     slowest_pace_.set(lane, 0.15 * links() * links() * std::abs(gravity) / length);
@@ -201,14 +201,6 @@ class LaneRods {
 
  private:
   static constexpr bool is_short = detail::is_short_chain<N>;
-
-  static void set_value(int lane, double value, Number& number) {
-    if constexpr (has_tangent) {
-      number.value.set(lane, value);
-    } else {
-      number.set(lane, value);
-    }
-  }
 
   // Of length 1: every link turned by a random angle, about a random axis in space, and turning faster by another; the
   // same ones for all members.

@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <memory>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <random>
 #include <type_traits>
 #include <vector>
 
@@ -21,22 +23,25 @@ struct CoordinateSpace {
 };
 
 /// The forward dynamics of several systems at once, one in each lane, by whatever tells their accelerations.
-template <class Register = MemberRegister>
+///
+/// With a tangent, every number has its derivative along one tangent of each member's motion.
+template <class Register = MemberRegister, bool with_tangent = false>
 class LaneSystem {
  public:
   using SpaceType = CoordinateSpace;
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
-  using Number = L;
+  using Number = std::conditional_t<with_tangent, LaneDual<L>, L>;
   using Subject = LaneDynamics&;
   static constexpr int links_known = Eigen::Dynamic;
-  static constexpr bool has_tangent = false;
+  static constexpr bool has_tangent = with_tangent;
   static constexpr std::size_t D = 1;
-  using Part = LanePart<L, D>;  ///< q, q̇ of a coordinate
+  using Part = LanePart<Number, D>;  ///< q, q̇ of a coordinate
   using Parts = detail::PerLink<Part, links_known>;
 
   /// `dynamics` must outlive it.
-  explicit LaneSystem(LaneDynamics& dynamics) : dynamics_(dynamics), buffer_(doubles_for(dynamics.coordinates())) {
+  explicit LaneSystem(LaneDynamics& dynamics)
+      : dynamics_(dynamics), buffer_(doubles_for(dynamics.coordinates())), inverse_sizes_(dynamics.coordinates()) {
     void* first = buffer_.data();
     std::size_t room = buffer_.size() * sizeof(double);
     first_ = static_cast<double*>(std::align(pack_alignment, sizeof(double), first, room));
@@ -59,8 +64,8 @@ class LaneSystem {
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v, Parts& parts) {
     dynamics_.take(lane, system);
     for (int i = 0; i < this->parts(); ++i) {
-      parts[i].place[0].set(lane, q[i]);
-      parts[i].rate[0].set(lane, v[i]);
+      detail::set_value(lane, q[i], parts[i].place[0]);
+      detail::set_value(lane, v[i], parts[i].rate[0]);
     }
     find_accelerations(L(time), parts);
     double squared = 0;
@@ -70,6 +75,7 @@ class LaneSystem {
       squared = std::max(squared, fast * fast + push);
     }
     pace_squared_.set(lane, squared);
+    if constexpr (has_tangent) start_tangent(lane, time, parts);
   }
 
   /// T + U  [J].
@@ -89,7 +95,7 @@ class LaneSystem {
   L pace_squared(const Parts& parts) const {
     L largest = pace_squared_, none(0.0);
     for_parts([&](int i) {
-      const L &q = parts[i].place[0], &v = parts[i].rate[0];
+      const L &q = value(parts[i].place[0]), &v = value(parts[i].rate[0]);
       none = none + ((q - q) + (v - v));
       if (dynamics_.is_angle(i)) largest = max(largest, v * v);
     });
@@ -108,14 +114,15 @@ class LaneSystem {
       L place(is_angle ? 1.0 : 0.0), rate(0.0), push(0.0);
       for_parts([&](int j) {
         if (!dynamics_.of_one_unit(i, j)) return;
-        push = max(push, abs(slopes[j].rate[0]));
-        rate = max(rate, max(abs(before[j].rate[0]), abs(after[j].rate[0])));
-        if (!is_angle) place = max(place, max(abs(before[j].place[0]), abs(after[j].place[0])));
+        const auto larger = [](const Number& a, const Number& b) { return max(abs(value(a)), abs(value(b))); };
+        push = max(push, abs(value(slopes[j].rate[0])));
+        rate = max(rate, larger(before[j].rate[0], after[j].rate[0]));
+        if (!is_angle) place = max(place, larger(before[j].place[0], after[j].place[0]));
       });
       rate = max(rate, size * push);
       if (!is_angle) place = max(place, size * rate);
       const L fallen = max(rate * rate, push * place);
-      const L squared = relative(errors[i].place[0], place * place) + relative(errors[i].rate[0], fallen);
+      const L squared = relative(value(errors[i].place[0]), place * place) + relative(value(errors[i].rate[0]), fallen);
       largest = max(largest, (h * h) * squared);
     });
     return largest;
@@ -124,41 +131,131 @@ class LaneSystem {
   /// q̇ and q̈ at `time`.
   void slopes(const L& time, const Parts& parts, Parts& found) {
     find_accelerations(time, parts);
-    for_parts([&](int i) { found[i] = {parts[i].rate, {L::load(numbers(2, i))}}; });
+    for_parts([&](int i) { found[i] = {parts[i].rate, {acceleration(i)}}; });
   }
 
   void restore(Parts& /*parts*/) const {}
+
+  /// Σ (δq/size)² + (δq̇/(size ω))², size being 1 of angles, and of others the largest coordinate of the same unit where
+  /// the member began; ω how fast it moved then, and what is a little beside it.
+  L tangent_squared(const Parts& parts) const requires with_tangent {
+    L squared(0.0);
+    for_parts([&](int i) {
+      const L along = inverse_sizes_[i] * parts[i].place[0].slope, rate = inverse_sizes_[i] * parts[i].rate[0].slope;
+      squared = fma(along, along, fma(inverse_pace_squared_ * rate, rate, squared));
+    });
+    return squared;
+  }
 
  private:
   // What has no size errs by nothing: it rests.
   static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
 
-  // q, q̇, q̈ and a time, of as many lanes as there are, from a place on that is aligned.
+  static const L& value(const Number& number) { return detail::value_of(number); }
+
+  // --- Numbers as they cross ---
+
+  // q, q̇, q̈, with their derivatives, and a time, of as many lanes as there are, from a place on that is aligned.
+  static constexpr int kinds = with_tangent ? 6 : 3;
   static std::size_t doubles_for(int coordinates) {
-    return (3 * static_cast<std::size_t>(coordinates) + 1) * L::width + pack_alignment / sizeof(double);
+    const auto registers = static_cast<std::size_t>(kinds * coordinates + 1);
+    return registers * L::width + pack_alignment / sizeof(double);
   }
   double* registers(int count) { return first_ + static_cast<std::ptrdiff_t>(count) * L::size; }
-  double* times() { return registers(3 * parts()); }
-  // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈.
+  double* times() { return registers(kinds * parts()); }
+  // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈; 3, 4, 5: their derivatives.
   double* numbers(int which, int i) { return registers(which * parts() + i); }
 
   void write(const L& time, const Parts& parts) {
     time.store(times());
     for_parts([&](int i) {
-      parts[i].place[0].store(numbers(0, i));
-      parts[i].rate[0].store(numbers(1, i));
+      value(parts[i].place[0]).store(numbers(0, i));
+      value(parts[i].rate[0]).store(numbers(1, i));
+      if constexpr (with_tangent) {
+        parts[i].place[0].slope.store(numbers(3, i));
+        parts[i].rate[0].slope.store(numbers(4, i));
+      }
     });
   }
 
   void find_accelerations(const L& time, const Parts& parts) {
     write(time, parts);
-    dynamics_.accelerations(times(), numbers(0, 0), numbers(1, 0), numbers(2, 0));
+    if constexpr (with_tangent) {
+      dynamics_.variations(times(), numbers(0, 0), numbers(1, 0), numbers(3, 0), numbers(4, 0), numbers(2, 0),
+                           numbers(5, 0));
+    } else {
+      dynamics_.accelerations(times(), numbers(0, 0), numbers(1, 0), numbers(2, 0));
+    }
+  }
+  Number acceleration(int i) {
+    if constexpr (with_tangent) {
+      return {L::load(numbers(2, i)), L::load(numbers(5, i))};
+    } else {
+      return L::load(numbers(2, i));
+    }
+  }
+
+  // --- Tangents ---
+
+  // Of length 1, drawn at random, the same one for all members. Where a member rests, its tangent tells how fast it
+  // swings, or is damped.
+  void start_tangent(int lane, double time, Parts& parts) {
+    const int count = this->parts();
+    std::vector<double> sizes, drawn;
+    std::mt19937 random(1);
+    for (int i = 0; i < count; ++i) sizes.push_back(size_at_start(lane, i, parts));
+    for (int i = 0; i < 2 * count; ++i) {
+      drawn.push_back(static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5);
+    }
+    const auto set_tangent = [&](double place, double rate) {
+      for (int i = 0; i < count; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        parts[i].place[0].slope.set(lane, place * sizes[k] * drawn[k]);
+        parts[i].rate[0].slope.set(lane, rate * sizes[k] * drawn[k + sizes.size()]);
+      }
+    };
+    const auto largest = [&](int which) {
+      find_accelerations(L(time), parts);
+      double pushed = 0, moved = 0;
+      for (int i = 0; i < count; ++i) {
+        const double size = sizes[static_cast<std::size_t>(i)];
+        pushed = std::max(pushed, std::abs(numbers(5, i)[lane]) / size);
+        moved = std::max(moved, std::abs(numbers(which, i)[lane]) / size);
+      }
+      return pushed / moved;
+    };
+    double squared = 0;
+    for (int i = 0; i < count; ++i) {
+      const double turning = value(parts[i].rate[0])[lane] / sizes[static_cast<std::size_t>(i)];
+      squared = std::max(squared, turning * turning);
+    }
+    set_tangent(1, 0);
+    squared = std::max(squared, largest(3));
+    set_tangent(0, 1);
+    squared = std::max(squared, std::pow(largest(4), 2));
+    if (!(squared > 0) || !std::isfinite(squared)) squared = 1;
+    inverse_pace_squared_.set(lane, 1 / squared);
+    for (int i = 0; i < count; ++i) inverse_sizes_[i].set(lane, 1 / sizes[static_cast<std::size_t>(i)]);
+    set_tangent(1, std::sqrt(squared));
+    const double length = std::sqrt(tangent_squared(parts)[lane]);
+    set_tangent(1 / length, std::sqrt(squared) / length);
+  }
+
+  double size_at_start(int lane, int i, const Parts& parts) const {
+    if (dynamics_.is_angle(i)) return 1;
+    double size = 0;
+    for_parts([&](int j) {
+      if (dynamics_.of_one_unit(i, j)) size = std::max(size, std::abs(value(parts[j].place[0])[lane]));
+    });
+    return size > 0 ? size : 1;
   }
 
   LaneDynamics& dynamics_;
   std::vector<double> buffer_;
   double* first_ = nullptr;
   L pace_squared_{1.0}, energy_sum_{0.0};
+  L inverse_pace_squared_{1.0};  // of tangents
+  detail::PerLink<L, links_known> inverse_sizes_;
 };
 
 }  // namespace pendula

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_member.hpp>
 #include <pendula/lanes/lane_sight.hpp>
@@ -45,8 +46,8 @@ class LaneSystemSeats {
     motion.q.resize(coordinates_);
     motion.v.resize(coordinates_);
     for (int i = 0; i < coordinates_; ++i) {
-      motion.q[i] = stepper_.parts()[i].place[0][lane];
-      motion.v[i] = stepper_.parts()[i].rate[0][lane];
+      motion.q[i] = detail::value_of(stepper_.parts()[i].place[0])[lane];
+      motion.v[i] = detail::value_of(stepper_.parts()[i].rate[0])[lane];
     }
   }
 

@@ -34,6 +34,8 @@ struct Library {
   std::span<const SystemEntry* const> systems;  ///< kernels of this build that are no chains
   /// Members of these, and of any other kernel, in lanes; nullptr for methods that move them one by one.
   MoveSystemMembers* (*system_lanes)(const RunOptions&);
+  /// The same with a tangent of each; nullptr for methods that have none.
+  MoveSystemMembers* (*system_tangent_lanes)(const RunOptions&);
   /// Makes directions, (rows, count) numbers row by row, an orthonormal basis of what the first of them span, for any
   /// number of them; `lengths`, (count), gets |R_kk| of the QR decomposition, by Householder reflections.
   void (*make_orthonormal)(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
