@@ -158,8 +158,8 @@ class LaneSystem {
   // q, q̇, q̈, with their derivatives, and a time, of as many lanes as there are, from a place on that is aligned.
   static constexpr int kinds = with_tangent ? 6 : 3;
   static std::size_t doubles_for(int coordinates) {
-    const auto registers = static_cast<std::size_t>(kinds * coordinates + 1);
-    return registers * L::width + pack_alignment / sizeof(double);
+    return (std::size_t(kinds) * static_cast<std::size_t>(coordinates) + 1) * L::width +
+           pack_alignment / sizeof(double);
   }
   double* registers(int count) { return first_ + static_cast<std::ptrdiff_t>(count) * L::size; }
   double* times() { return registers(kinds * parts()); }
