@@ -288,19 +288,21 @@ TYPED_TEST(RunsInLanes, OfSeveralKindsEachGoesWithItsOwn) {
   }
 }
 
-// Chains with damping and drives, which a generated kernel moves in lanes; who has none of a kernel goes alone. Against
-// a Gauss run to round-off. Largest differences seen: 1.2e-11 of bobs, 1e-11 s of times.
-TEST(RunsOfLoadedChains, GoInLanesByTheirKernels) {
+// Chains with damping, torques and drives, one of which is free among them. Against a Gauss run to round-off. Largest
+// differences seen: 1e-11 of bobs, 2e-12 s of times.
+TYPED_TEST(RunsInLanes, OfLoadedChainsGoByExplicitMethods) {
+  using Space = TypeParam;
   Random random(23);
   std::vector<RunSetup> setups;
   for (int k = 0; k < 21; ++k) {
     const int links = 1 + k % 5;
-    const auto subject = std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, links, true));
+    const auto subject = std::make_shared<ChainSubject<Space>>(k % 7 == 3 ? random_chain<Space>(random, links)
+                                                                          : driven_chain<Space>(random, links));
     RunOptions options;
     options.method = Method::dopri5;
     options.tolerance = 1e-11;
     setups.push_back({.subject = subject,
-                      .start = random_state<Planar>(random, links),
+                      .start = random_state<Space>(random, links),
                       .options = options,
                       .duration = 1,
                       .doubted = false});
@@ -308,10 +310,7 @@ TEST(RunsOfLoadedChains, GoInLanesByTheirKernels) {
   }
   const std::vector<RunReport> found = run_members(setups);
   for (std::size_t k = 0; k < setups.size(); ++k) {
-    const auto has_as_many = [&](const KernelEntry& kernel) {
-      return kernel.info.links == 1 + static_cast<int>(k % 5);
-    };
-    EXPECT_EQ(lane_kind(setups[k]).has_value(), std::ranges::any_of(library().planar.kernels, has_as_many)) << k;
+    EXPECT_TRUE(lane_kind(setups[k])) << k;
     RunSetup exact = setups[k];
     exact.options = {.stages = 8, .solver = Solver::chain, .step = 0, .tolerance = 1e-13};
     const RunReport expected = pendula::Run(exact).go();
@@ -319,6 +318,8 @@ TEST(RunsOfLoadedChains, GoInLanesByTheirKernels) {
     const auto points = [&](const RunReport& report) { return setups[k].subject->observe(report.last).points; };
     EXPECT_LT((points(found[k]) - points(expected)).cwiseAbs().maxCoeff(), 1e-10) << k;
     ASSERT_EQ(found[k].events[0].count, expected.events[0].count) << k;
+    const RunReport one = run_members({&setups[k], 1})[0];
+    EXPECT_EQ(found[k].last.q, one.last.q) << k;
     if (expected.events[0].count == 0) continue;
     EXPECT_NEAR(found[k].events[0].first, expected.events[0].first, 1e-10);
   }
@@ -456,7 +457,7 @@ TYPED_TEST(ExponentsInLanes, OfOthersThereAreNone) {
 
 // θ'' = −g/l sin θ − b/(m l²) θ̇: that comes to rest, where its exponent is half the damping, and a chain of two links
 // that is shaken, which comes to what Gauss steps say. One that is damped faster than steps are long is no exception.
-TEST(ExponentsOfLoadedChains, AreFoundInLanesByTheirKernels) {
+TEST(ExponentsOfLoadedChains, AreFoundInLanes) {
   const auto hung = [](const Eigen::VectorXd& damping, double frequency) {
     ChainParameters<Planar> parameters;
     parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(damping.size());
@@ -482,8 +483,8 @@ TEST(ExponentsOfLoadedChains, AreFoundInLanesByTheirKernels) {
   if (!lane_kind(setups[0], quickest_with_tangents(setups[0]))) return;  // lanes are few
   const auto exponent = [&](std::size_t k) { return found[k]->exponents[0]; };
   for (const auto& each : found) ASSERT_TRUE(each);
-  EXPECT_NEAR(exponent(0), -0.15, 1e-3);        // seen: 5.2e-4
-  EXPECT_NEAR(exponent(1), -1, 2e-3);           // seen: 8.0e-4
+  EXPECT_NEAR(exponent(0), -0.15, 1e-2);        // seen: 4.5e-3
+  EXPECT_NEAR(exponent(1), -1, 5e-3);           // seen: 1.7e-3
   EXPECT_NEAR(exponent(4), -0.03270357, 2e-6);  // seen: 1.5e-7
   for (const std::size_t k : {2U, 3U}) {
     const LyapunovSpectrum expected = exponent_alone(setups[k]);

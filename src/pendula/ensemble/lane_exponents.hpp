@@ -72,11 +72,12 @@ class LaneExponents : private LaneWatch {
   }
 
  private:
-  // As LaneRuns: of systems, a method that was not asked for has to keep the energy, where it is kept.
+  // As LaneRuns: a method that was not asked for has to keep the energy, where it is kept.
   bool is_good(std::size_t k) const {
     const RunSetup& setup = *setups_[k];
     const Subject& subject = *setup.subject;
-    if (!Members::of_systems || options_.method == setup.options.method || subject.loaded()) return true;
+    const bool is_tried = options_.method != setup.options.method && has_to_be_tried(subject);
+    if (!is_tried || subject.loaded()) return true;
     const Observation before = subject.observe(setup.start), after = subject.observe(members_.last(k));
     const double scale = energy_scale(subject, before, after, 0);
     return std::abs(after.energy - before.energy) <= setup.options.tolerance * scale;

@@ -27,7 +27,7 @@ namespace pendula {
 /// Runs that members in lanes can take together: all that their steps have in common.
 struct LaneKind {
   int dimension = 0, links = 0;        // of chains
-  MakeLaneDynamics* kernel = nullptr;  // of others, and of chains with loads
+  MakeLaneDynamics* kernel = nullptr;  // of others
   int stages = 0;
   Method method = Method::gauss;
   double step = 0, tolerance = 0;
@@ -39,36 +39,34 @@ struct LaneKind {
 
 namespace detail {
 
+/// Of a system, and of chains with loads, nothing is known before but what they do: a method that was not asked for has
+/// to keep the energy, where it is kept, and to be over soon.
+inline bool has_to_be_tried(const Subject& subject) {
+  return subject.loaded() || dynamic_cast<const SystemSubject*>(&subject) != nullptr;
+}
+
 /// What is moved, where lanes are for it.
 template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
-  if (chain == nullptr || chain->chain().loaded() || library_of<Space>().lanes(options) == nullptr) return false;
+  if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
+  if (chain->chain().loaded() && !is_explicit(options.method)) return false;
   kind.dimension = Space::dimension;
   kind.links = chain->chain().links();
   return true;
 }
-// What a generated kernel moves: in the plane chains, too. In space it cannot pass a pole.
-inline MakeLaneDynamics* kernel_of(const Subject& subject) {
-  if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) return system->entry().lanes;
-  const auto* const chain = dynamic_cast<const ChainSubject<Planar>*>(&subject);
-  if (chain == nullptr) return nullptr;
-  for (const KernelEntry& kernel : library().planar.kernels) {
-    if (kernel.info.links == chain->chain().links()) return kernel.lanes;
-  }
-  return nullptr;
-}
 inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
-  if (library().system_lanes(options) == nullptr) return false;
-  kind.kernel = kernel_of(*setup.subject);
-  return kind.kernel != nullptr;
+  const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
+  if (system == nullptr || library().system_lanes(options) == nullptr) return false;
+  kind.kernel = system->entry().lanes;
+  return true;
 }
 
 }  // namespace detail
 
 /// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps
-/// of the chain solver, and as many of their stages as lanes were compiled for, or by explicit Runge–Kutta methods; and
-/// all that a generated kernel moves, by the latter. It depends on the run and the kernels of the build alone.
+/// of the chain solver, and as many of their stages as lanes were compiled for; all chains, and all that a generated
+/// kernel moves, by explicit Runge–Kutta methods.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point =
@@ -132,11 +130,11 @@ class PlainChains : public PlainEnds {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const Chain<Space>& chain = static_cast<const ChainSubject<Space>&>(*setup->subject).chain();
-      members_.push_back({plain(chain, {}), start.time, start.time + setup->duration, start.q.data(), start.v.data()});
+      const std::vector<PlainChain::Drive>& drives = drives_.emplace_back(plain_drives(chain));
+      const double end = start.time + setup->duration;
+      members_.push_back({plain(chain, drives), start.time, end, start.q.data(), start.v.data()});
     }
   }
-
-  static constexpr bool of_systems = false;
 
   /// False where `watch` made it leave off.
   bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
@@ -147,6 +145,7 @@ class PlainChains : public PlainEnds {
   }
 
  private:
+  std::deque<std::vector<PlainChain::Drive>> drives_;  // which stay where they are
   std::vector<PlainMember> members_;
 };
 
@@ -154,15 +153,13 @@ class PlainChains : public PlainEnds {
 class PlainSystems : public PlainEnds {
  public:
   explicit PlainSystems(std::span<const RunSetup* const> setups)
-      : PlainEnds(setups), dynamics_(kernel_of(*setups[0]->subject)()) {
+      : PlainEnds(setups), dynamics_(system(*setups[0]).entry().lanes()) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const double end = start.time + setup->duration;
-      members_.push_back({numbers_of(*setup->subject), start.time, end, start.q.data(), start.v.data()});
+      members_.push_back({system(*setup).numbers().plain(), start.time, end, start.q.data(), start.v.data()});
     }
   }
-
-  static constexpr bool of_systems = true;
 
   bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
     return library().system_lanes(options)(*dynamics_, options, every, members_, ends(), watch);
@@ -172,15 +169,11 @@ class PlainSystems : public PlainEnds {
   }
 
  private:
-  PlainSystem numbers_of(const Subject& subject) {
-    if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) return system->numbers().plain();
-    const Chain<Planar>& chain = static_cast<const ChainSubject<Planar>&>(subject).chain();
-    const std::vector<PlainChain::Drive> drives = plain_drives(chain);
-    return chains_.emplace_back(plain(chain, drives), Planar::torque_components).plain();
+  static const SystemSubject& system(const RunSetup& setup) {
+    return static_cast<const SystemSubject&>(*setup.subject);
   }
 
   std::unique_ptr<LaneDynamics> dynamics_;
-  std::deque<ChainSystem> chains_;  // whose numbers stay where they are
   std::vector<PlainSystemMember> members_;
 };
 
@@ -247,9 +240,9 @@ class LaneRuns : private LaneWatch {
     return true;
   }
 
-  // Of a system nothing is known before but what it does: a method that was not asked for has to keep the energy, where
-  // it is kept, and to be over soon.
-  bool is_tried(const RunSetup& setup) const { return Members::of_systems && options_.method != setup.options.method; }
+  bool is_tried(const RunSetup& setup) const {
+    return options_.method != setup.options.method && detail::has_to_be_tried(*setup.subject);
+  }
   bool is_good(std::size_t k, const RunReport& report) const {
     const RunSetup& setup = *setups_[k];
     return steps_[k] < most_steps &&

@@ -71,10 +71,9 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   if (!fits) return options;
   options.method = detail::quickest_method(*setup.subject);
   options.tolerance *= 0.01;
-  const std::optional<LaneKind> kind = lane_kind(setup, options);
-  const bool by_kernel = kind && kind->kernel != nullptr;  // which LaneRuns tries
+  const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
   const bool is_short = lane_kind(setup) && detail::run_length(setup) <= detail::short_run;
-  return by_kernel || is_short ? options : setup.options;
+  return is_tried || is_short ? options : setup.options;
 }
 
 /// The same for the leading exponent of a run, however long that is: the longer, the smaller the tolerance, so that no
@@ -86,8 +85,8 @@ inline RunOptions quickest_with_tangents(const RunSetup& setup) {
   const double length = detail::run_length(setup);
   const double longer = std::isfinite(length) ? std::max(1.0, length / detail::short_run) : 1;
   options.tolerance = std::max(1e-13, 0.01 * options.tolerance / longer);
-  const std::optional<LaneKind> kind = lane_kind(setup, options);
-  return kind && (kind->kernel != nullptr || lane_kind(setup)) ? options : setup.options;
+  const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
+  return is_tried || lane_kind(setup) ? options : setup.options;
 }
 
 /// How members are moved.

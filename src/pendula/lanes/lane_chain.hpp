@@ -41,7 +41,9 @@ class LaneChain {
   // --- One member ---
 
   /// A member comes into a lane, with its chain, at q and v  [rad, rad/s]; its next step starts cold.
-  void start(int lane, const ChainLinks<Space, N, double>& chain, double gravity, const double* q, const double* v) {
+  void start(int lane, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain, const double* q,
+             const double* v) {
+    const double gravity = given.gravity();
     gravity_.set(lane, gravity);
     double length = 0;
     for (int i = 0; i < links(); ++i) {

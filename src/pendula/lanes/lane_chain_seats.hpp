@@ -26,7 +26,7 @@ class LaneChainSeats {
   using Member = LaneMember<Space, N>;
   using Sight = LaneSight<Stepper, Turns>;
 
-  /// Throws std::invalid_argument for a chain with loads: gravity alone is known here.
+  /// Throws std::invalid_argument for a chain with loads, where Gauss steps are taken: gravity alone is known to them.
   LaneChainSeats(Common chain, Stepper& stepper)
       : chain_(chain), links_(links_of(chain)), stepper_(stepper), turns_(chain.links()) {}
 
@@ -41,8 +41,8 @@ class LaneChainSeats {
   void take(int lane, const Member& next) {
     const bool own = next.chain != nullptr;
     const double* q = next.start.q.data();
-    stepper_.start(lane, next.start.time, own ? links_of(*next.chain) : links_, (own ? *next.chain : chain_).gravity(),
-                   q, next.start.v.data());
+    stepper_.start(lane, next.start.time, own ? *next.chain : chain_, own ? links_of(*next.chain) : links_, q,
+                   next.start.v.data());
     turns_.start(lane, q, [this](int i) -> decltype(auto) { return stepper_.chain().along(i); });
   }
 
@@ -70,7 +70,9 @@ class LaneChainSeats {
 
  private:
   static ChainLinks<Space, N, double> links_of(Common chain) {
-    if (chain.loaded()) throw std::invalid_argument("ensemble: expected a chain without damping and torques");
+    if (Stepper::is_implicit && chain.loaded()) {
+      throw std::invalid_argument("ensemble: expected a chain without damping and torques");
+    }
     return ChainLinks<Space, N, double>(chain);
   }
 

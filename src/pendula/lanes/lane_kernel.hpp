@@ -6,10 +6,9 @@
 #include <pendula/lanes/lane_dual_functions.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_functions.hpp>
+#include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/system/system_model.hpp>
-#include <span>
-#include <vector>
 
 namespace pendula {
 
@@ -18,8 +17,6 @@ template <System S, class Register = MemberRegister>
 class LaneKernel : public LaneDynamics {
  public:
   using L = LanePack<Register>;
-
-  LaneKernel() { inputs_.fill(L(0.0)); }
 
   int lanes() const override { return L::size; }
   int coordinates() const override { return S::coordinates; }
@@ -43,8 +40,7 @@ class LaneKernel : public LaneDynamics {
         *varied[k] = Varied(*places[k]);
       }
     }
-    for (std::size_t k = 0; k < inputs_.size(); ++k) inputs_[k].set(lane, system.inputs[k]);
-    take_sines(lane, system.sines);
+    inputs_.take(lane, system.inputs, system.sines);
   }
 
   void accelerations(const double* times, const double* q, const double* v, double* a) override {
@@ -103,43 +99,15 @@ class LaneKernel : public LaneDynamics {
     if constexpr (holds_time<S>) parameters_.time = time;
   }
 
-  // A sine that members add to an input; who has fewer of them than others has some without an amplitude.
-  struct Sine {
-    int input;
-    L amplitude{0.0}, frequency{0.0}, phase{0.0};
-  };
-
-  void take_sines(int lane, std::span<const InputSine> sines) {
-    for (Sine& sine : sines_) sine.amplitude.set(lane, 0);
-    std::vector<bool> taken(sines_.size());
-    for (const InputSine& from : sines) {
-      std::size_t k = 0;
-      while (k < sines_.size() && (taken[k] || sines_[k].input != from.input)) ++k;
-      if (k == sines_.size()) {
-        sines_.push_back({from.input});
-        taken.push_back(false);
-      }
-      taken[k] = true;
-      sines_[k].amplitude.set(lane, from.amplitude);
-      sines_[k].frequency.set(lane, from.frequency);
-      sines_[k].phase.set(lane, from.phase);
-    }
-  }
-
   Inputs<L> inputs_at(const L& time) const {
     Inputs<L> inputs;
-    for (std::size_t k = 0; k < inputs_.size(); ++k) inputs.data()[k] = inputs_[k];
-    for (const Sine& sine : sines_) {
-      L& input = inputs.data()[sine.input];
-      input = fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), input);
-    }
+    inputs_.at(time, inputs.data());
     return inputs;
   }
 
   typename S::template Parameters<L> parameters_{};
-  typename S::template Parameters<Varied> varied_parameters_{};                   // the same
-  std::array<L, static_cast<std::size_t>(Inputs<L>::SizeAtCompileTime)> inputs_;  // their constant parts
-  std::vector<Sine> sines_;
+  typename S::template Parameters<Varied> varied_parameters_{};  // the same
+  LaneInputs<L> inputs_{static_cast<std::size_t>(Inputs<L>::SizeAtCompileTime)};
 };
 
 template <System S>

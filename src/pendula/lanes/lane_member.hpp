@@ -12,7 +12,7 @@ template <class Space, int N = Eigen::Dynamic>
 struct LaneMember {
   Motion start;                            ///< angles and rates, (dof·n)  rad, rad/s
   double end = 0;                          ///< s
-  const Chain<Space, N>* chain = nullptr;  ///< with as many links and no loads; nullptr: that of the ensemble
+  const Chain<Space, N>* chain = nullptr;  ///< with as many links; nullptr: that of the ensemble
 };
 
 /// What became of it.

@@ -9,6 +9,7 @@
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_links.hpp>
+#include <pendula/lanes/lane_loads.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <random>
@@ -17,7 +18,7 @@
 namespace pendula {
 
 /// The forward dynamics of several chains at once, one in each lane: rods and their rates are what moves, ξ̈ being made
-/// of weight and multipliers that keep |ξ̇|² + ξ·ξ̈ = 0 (RodState::for_each_acceleration). Gravity is all that acts.
+/// of weight, loads and multipliers that keep |ξ̇|² + ξ·ξ̈ = 0 (ChainForwardDynamics).
 ///
 /// With a tangent, every number has its derivative along one tangent of each member's motion.
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister, bool with_tangent = false>
@@ -35,7 +36,7 @@ class LaneRods {
   using Parts = detail::PerLink<Part, N>;
 
   using Subject = int;  ///< how many links there are
-  explicit LaneRods(int links) : links_(links), constants_(links), rows_(links) {}
+  explicit LaneRods(int links) : links_(links), constants_(links), rows_(links), loads_(links), freed_(links) {}
 
   int links() const {
     if constexpr (N == Eigen::Dynamic) return links_;
@@ -61,9 +62,11 @@ class LaneRods {
   }
 
   /// A member comes into a lane, with its chain, at q and v  [rad, rad/s].
-  void start(int lane, double /*time*/, const ChainLinks<Space, N, double>& chain, double gravity, const double* q,
-             const double* v, Parts& rods) {
+  void start(int lane, double /*time*/, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain,
+             const double* q, const double* v, Parts& rods) {
+    const double gravity = given.gravity();
     gravity_.set(lane, gravity);
+    loads_.take(lane, given, chain);
     double length = 0;
     for (int i = 0; i < links(); ++i) {
       constants_[i].set(lane, chain[i]);
@@ -131,8 +134,10 @@ class LaneRods {
     return largest;
   }
 
-  /// ξ̇ and ξ̈ of rods, at any time.
-  [[gnu::always_inline]] void slopes(const L& /*time*/, const Parts& rods, Parts& found) {
+  /// ξ̇ and ξ̈ of rods.
+  [[gnu::always_inline]] void slopes(const L& time, const Parts& rods, Parts& found) {
+    const bool loaded = loads_.any();
+    if (loaded) find_freed(time, rods);
     MultiplierRow<Number> row;
     Number beyond(0.0);
     const auto inward = [&](auto i) PENDULA_WRITTEN_OUT {
@@ -143,6 +148,7 @@ class LaneRods {
       } else {
         before = -at(constants_, i - 1).inverse_mass.value * dot(at(rods, i - 1).place, rod.place);
       }
+      if (loaded) right = right - dot(rod.place, at(freed_, i));
       const Number square = at(constants_, i).inverse_masses * dot(rod.place, rod.place);
       const Number inverse = Number(1.0) / fma(-beyond, row.coupling, square);
       row = {fma(-beyond, row.offset, right) * inverse, before * inverse};
@@ -169,6 +175,7 @@ class LaneRods {
       }
       const std::array<Number, D> bond = scaled(at(constants_, i).inverse_mass.value, pull);
       at(found, i) = {rod.rate, difference(bond, bond_before)};
+      if (loaded) at(found, i).rate = sum(at(found, i).rate, at(freed_, i));
       bond_before = bond;
     });
   }
@@ -201,6 +208,23 @@ class LaneRods {
 
  private:
   static constexpr bool is_short = detail::is_short_chain<N>;
+
+  // What loads accelerate rods by, were there no tensions.
+  [[gnu::noinline]] void find_freed(const L& time, const Parts& rods) {
+    loads_.set_time(time);
+    const auto load = [&](int i) { return loads_.of_rod(i, constants_[i], rods[i].place, rods[i].rate); };
+    std::array<Number, D> before{}, here = load(0);
+    for (int i = 0; i < links(); ++i) {
+      std::array<Number, D> freed = scaled(constants_[i].inverse_masses, here);
+      if (i > 0) freed = difference(freed, scaled(constants_[i - 1].inverse_mass.value, before));
+      before = here;
+      if (i + 1 < links()) {
+        here = load(i + 1);
+        freed = difference(freed, scaled(constants_[i].inverse_mass.value, here));
+      }
+      freed_[i] = freed;
+    }
+  }
 
   // Of length 1: every link turned by a random angle, about a random axis in space, and turning faster by another; the
   // same ones for all members.
@@ -248,6 +272,8 @@ class LaneRods {
   L gravity_{0.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0};
   detail::PerLink<LaneLink<L>, N> constants_;
   detail::PerLink<MultiplierRow<Number>, N> rows_;
+  LaneLoads<Space, N, L> loads_;
+  detail::PerLink<std::array<Number, D>, N> freed_;
 };
 
 }  // namespace pendula

@@ -81,7 +81,7 @@ struct PlainMemberEnd {
   double energy_sum;    ///< of systems, the largest |T| + |U| there  [J]
 };
 
-/// Moves chains of one number of links and without loads by the steps of `options`, a member in each lane; `every`
+/// Moves chains of one number of links, without loads where steps are Gauss's, a member in each lane; `every`
 /// how many steps from one look at the energy to the next. What becomes of a member depends on that member alone, to
 /// the last bit. False where `watch` made it leave off.
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <pendula/lanes/lane_functions.hpp>
+#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/system/plain_system.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+/// The inputs of several systems, one in each lane: what is constant of them, and sines of time.
+template <class L>
+class LaneInputs {
+ public:
+  explicit LaneInputs(std::size_t count) : constant_(count, L(0.0)) {}
+
+  /// A member's come into a lane; `constant`: (count).
+  void take(int lane, const double* constant, std::span<const InputSine> sines) {
+    for (L& input : constant_) input.set(lane, *constant++);
+    for (Sine& sine : sines_) sine.amplitude.set(lane, 0);
+    std::vector<bool> taken(sines_.size());
+    for (const InputSine& from : sines) {
+      std::size_t k = 0;
+      while (k < sines_.size() && (taken[k] || sines_[k].input != from.input)) ++k;
+      if (k == sines_.size()) {
+        sines_.push_back({from.input});
+        taken.push_back(false);
+      }
+      taken[k] = true;
+      sines_[k].amplitude.set(lane, from.amplitude);
+      sines_[k].frequency.set(lane, from.frequency);
+      sines_[k].phase.set(lane, from.phase);
+    }
+  }
+
+  /// What they are at `time`, (count).
+  void at(const L& time, L* inputs) const {
+    std::copy(constant_.begin(), constant_.end(), inputs);
+    for (const Sine& sine : sines_) {
+      L& input = inputs[sine.input];
+      input = fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), input);
+    }
+  }
+
+ private:
+  // A sine that members add to an input; who has fewer of them than others has some without an amplitude.
+  struct Sine {
+    int input;
+    L amplitude{0.0}, frequency{0.0}, phase{0.0};
+  };
+
+  std::vector<L> constant_;
+  std::vector<Sine> sines_;
+};
+
+}  // namespace pendula

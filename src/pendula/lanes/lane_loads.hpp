@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/lanes/lane_inputs.hpp>
+#include <pendula/lanes/lane_links.hpp>
+#include <vector>
+
+namespace pendula {
+
+/// What acts on the chains of several members, one in each lane, beside gravity: damping, and torques of their times.
+template <class Space, int N, class L>
+class LaneLoads {
+  static constexpr std::size_t components = Space::torque_components;
+
+ public:
+  explicit LaneLoads(int links)
+      : links_(links), torques_(components * static_cast<std::size_t>(links), L(0.0)), inputs_(torques_.size()) {}
+
+  /// Whether any member that came has some.
+  bool any() const { return any_; }
+
+  void take(int lane, const Chain<Space, N>& chain, const ChainLinks<Space, N, double>& links) {
+    if (!chain.loaded() && !any_) return;
+    if (!any_) drag_.assign(static_cast<std::size_t>(links_), L(0.0));
+    any_ = true;
+    const std::vector<PlainChain::Drive> drives = plain_drives(chain);
+    const ChainSystem system(plain(chain, drives), Space::torque_components);
+    inputs_.take(lane, system.plain().inputs, system.plain().sines);
+    for (int i = 0; i < links_; ++i) drag_[static_cast<std::size_t>(i)].set(lane, links[i].drag);
+  }
+
+  void set_time(const L& time) { inputs_.at(time, torques_.data()); }
+
+  /// (torque_i × ξ_i − λ_i ξ̇_i)/l_i² of a rod.
+  template <class Number, std::size_t D>
+  std::array<Number, D> of_rod(int i, const LaneLink<L>& link, const std::array<Number, D>& rod,
+                               const std::array<Number, D>& rate) const {
+    typename Space::Link::template Torque<Number> torque;
+    for (std::size_t k = 0; k < components; ++k) {
+      torque[k] = Number(link.inverse_square * torques_[static_cast<std::size_t>(i) * components + k]);
+    }
+    std::array<Number, D> load;
+    Space::Link::torque_load(torque, rod, load);
+    const L& drag = drag_[static_cast<std::size_t>(i)];
+    for (std::size_t k = 0; k < D; ++k) load[k] = fma(-drag, rate[k], load[k]);
+    return load;
+  }
+
+ private:
+  int links_;
+  bool any_ = false;
+  std::vector<L> torques_;  // now
+  LaneInputs<L> inputs_;    // the same at any time
+  std::vector<L> drag_;     // λ_i/l_i²
+};
+
+}  // namespace pendula
