@@ -21,10 +21,11 @@ struct AccuracyAim {
   double tolerance = 0;
   /// Error at the end by that tolerance; infinite where trials by the smallest ones do not end together.
   double error = std::numeric_limits<double>::infinity();
+  Motion near;  ///< where the last trial ended, which went by that tolerance too, from all but the same start
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(tolerance, error);
+    numbers(tolerance, error, near.time, near.q, near.v);
   }
 };
 
@@ -53,31 +54,32 @@ inline double finest_tolerance(const RunOptions& options, const Accuracy& accura
   return std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
 }
 
-/// Motion makes of the errors of its steps what it does: a factor that grows with chaos, and is nearly the same for all
-/// tolerances under which runs end close to each other. So two trials tell it, by tolerances 100 apart: they end apart
-/// by the error of the first. Where that is too far for a factor, the next two are finer, and then the finest that
-/// there are. `end(tolerance)` is the last state by that tolerance, nothing where a run does not come there; `distance`
-/// that of two states. Constants: measured on random chains, docs/time.md.
+/// What a motion makes of the errors of its steps is a factor that grows with chaos. Trials tell it: `end(tolerance)`
+/// is the last state by that, nothing where a run does not come there. Two of them end apart by the error of the
+/// coarser one; `distance` is that of two states. Where the finer one is not expected to be good enough, or they end
+/// too far apart for a factor, the next is finer, and is compared with it. Errors scatter about what tolerances ask for
+/// by factors of ten and more, so that aims lie below what is wanted.
 template <class End, class Distance>
 AccuracyAim aim_at(double wanted, double finest, End end, Distance distance) {
-  constexpr double apart = 100, coarsest = 1e-3, together = 0.01, margin = 0.3;
+  constexpr double apart = 100, coarsest = 1e-3, together = 0.01, enough = 0.3, aimed = 0.1;
   constexpr double rounding = 2e-16;  // errs as a tolerance of that size would
-  const double first = std::max(std::min(apart * apart * wanted, coarsest), apart * finest);
-  double last = 0;
-  std::optional<Motion> near;
-  for (const double coarse : {first, first / apart, apart * finest}) {
-    if (coarse < apart * finest || coarse / apart == last) continue;
-    const std::optional<Motion> far = coarse == last ? std::move(near) : end(coarse);
-    last = coarse / apart;
-    near = end(last);
+  double coarse = std::max(std::min(apart * wanted, coarsest), apart * finest), fine = coarse / apart;
+  std::optional<Motion> far = end(coarse);
+  for (;;) {
+    std::optional<Motion> near = end(fine);
     const double off = far && near ? distance(*far, *near) : std::numeric_limits<double>::infinity();
-    if (!(off <= together)) continue;
-    const double factor = off / coarse;
-    // Not larger than what is wanted, however much of its errors the motion forgets: there are rows on its way.
-    const double tolerance = factor > 1 ? std::max(margin * wanted / factor, finest) : wanted;
-    return {tolerance, factor * std::max(tolerance, rounding)};
+    double next = fine / (10 * apart);
+    if (off <= together) {
+      const double factor = off / coarse, error = factor * std::max(fine, rounding);
+      if (error <= enough * wanted || fine <= finest) return {fine, error, *std::move(near)};
+      next = std::min(aimed * wanted / factor, fine / 10);
+    } else if (fine <= finest) {
+      return {wanted, std::numeric_limits<double>::infinity(), {}};
+    }
+    coarse = fine;
+    fine = std::max(next, finest);
+    far = std::move(near);
   }
-  return {wanted};
 }
 
 }  // namespace detail

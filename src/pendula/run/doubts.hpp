@@ -59,8 +59,8 @@ inline Doubt of_aim(double wanted, const AccuracyAim& aim) {
   static constexpr double close = 10;  // what trials are off by
   if (aim.error <= close * wanted) return {};
   if (std::isfinite(aim.error)) {
-    return "an accuracy of " + pendula::rounded(wanted, 2) + " cannot be reached: by a tolerance of " +
-           pendula::rounded(aim.tolerance, 2) + ", the smallest that is of use, the motion ends elsewhere by about " +
+    return "an accuracy of " + pendula::rounded(wanted, 2) + " is not reached: by a tolerance of " +
+           pendula::rounded(aim.tolerance, 2) + " the motion ends elsewhere by about " +
            pendula::rounded(aim.error, 1) + " of its size";
   }
   return "runs by the smallest tolerances that are of use end elsewhere, by more than 0.01 of the size: the last state "
@@ -87,7 +87,9 @@ inline Doubt of_step(const RunSetup& setup, const RunReport& report, const std::
   const RunResult result = simulate(
       *integrator, setup.start, {step, setup.duration, std::numeric_limits<std::int64_t>::max()},
       [&](const Motion& motion) { other = motion; }, stop);
-  if (result.stopped) return {};
+  if (result.stopped) {
+    return "it was interrupted while it ran again to see how far the last state can be trusted: that is not known";
+  }
   const double off =
       result.outcome ? setup.subject->distance(report.last, other) : std::numeric_limits<double>::infinity();
   if (off <= trusted) return {};

@@ -64,9 +64,11 @@ class Run {
   struct NotFinite {};
 
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
-  std::optional<Motion> try_out(double tolerance, const std::function<bool()>& stop) const;
+  std::optional<Motion> try_out(double tolerance, double share, const std::function<bool()>& stop) const;
+  void choose_stages(RunOptions& options) const;
   bool aim(const std::function<bool()>& stop);
   void follow_aim();
+  AccuracyAim reached_aim(const RunReport& report) const;
   bool is_aimed() const { return setup_.accuracy.error > 0 && is_adaptive(setup_.options); }
   void integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report);
   void take(const Motion& motion, double work);
@@ -106,7 +108,7 @@ inline Run::Run(RunSetup setup)
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
-            {}} {}
+            {.near = setup_.start}} {}
 
 inline RunReport Run::go(const std::function<bool()>& stop) {
   if (!is_aimed() || aim(stop)) return go(nullptr, stop);
@@ -124,12 +126,15 @@ inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bo
   return go(&checkpoint, stop);
 }
 
-// Where it ends, by an event perhaps; nothing where it does not.
-inline std::optional<Motion> Run::try_out(double tolerance, const std::function<bool()>& stop) const {
+// Where it ends, by an event perhaps; nothing where it does not. Its start is off by `share` of itself: what a motion
+// makes of that, errors of steps do not show where they vanish with it, as beside an equilibrium.
+inline std::optional<Motion> Run::try_out(double tolerance, double share, const std::function<bool()>& stop) const {
   RunSetup trial = setup_;
   trial.accuracy.error = 0;
   trial.options.tolerance = tolerance;
-  if (trial.accuracy.chooses_stages) trial.options.stages = stages_for(trial.options.method, tolerance);
+  choose_stages(trial.options);
+  trial.start.q *= 1 + share;
+  trial.start.v *= 1 + share;
   trial.every = std::numeric_limits<std::int64_t>::max();
   trial.rows = {};
   trial.doubted = false;
@@ -143,18 +148,29 @@ inline std::optional<Motion> Run::try_out(double tolerance, const std::function<
 inline bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
   const auto stops = [&] { return stopped = stopped || stop(); };
-  const auto end = [&](double tolerance) { return try_out(tolerance, stops); };
+  double sign = 1;
+  const auto end = [&](double tolerance) {
+    sign = -sign;  // so that no two begin alike
+    return try_out(tolerance, sign * std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), stops);
+  };
   const auto distance = [&](const Motion& a, const Motion& b) { return setup_.subject->distance(a, b); };
   const double finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
   kept_.aim = detail::aim_at(setup_.accuracy.error, finest, end, distance);
+  if (kept_.aim.near.q.size() == 0) kept_.aim.near = setup_.start;  // as large as any, for checkpoints
   follow_aim();
   return !stopped;
+}
+
+// The same for all trials and the run: errors of few and of many stages are not of one size.
+inline void Run::choose_stages(RunOptions& options) const {
+  const Accuracy& accuracy = setup_.accuracy;
+  if (accuracy.chooses_stages) options.stages = stages_for(options.method, 0.01 * accuracy.error);
 }
 
 inline void Run::follow_aim() {
   RunOptions& options = setup_.options;
   options.tolerance = kept_.aim.tolerance;
-  if (setup_.accuracy.chooses_stages) options.stages = stages_for(options.method, options.tolerance);
+  choose_stages(options);
   integrator_ = setup_.subject->make_integrator(options);
   kept_.watch.set_degree(detail::glance_degree(options));
 }
@@ -168,12 +184,21 @@ inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& st
   return report;
 }
 
+// How far from the last trial it ended tells how errors scatter.
+inline AccuracyAim Run::reached_aim(const RunReport& report) const {
+  AccuracyAim aim = kept_.aim;
+  if (report.end == RunEnd::complete && std::isfinite(aim.error) && report.last.time == aim.near.time) {
+    aim.error = std::max(aim.error, setup_.subject->distance(report.last, aim.near));
+  }
+  return aim;
+}
+
 inline void Run::conclude(RunReport& report) {
   finish(report);
   report.last = kept_.record.last();
   report.rows = rows_;
   report.options = setup_.options;
-  if (is_aimed()) report.aimed = kept_.aim;
+  if (is_aimed()) report.aimed = reached_aim(report);
   report.description = integrator_->describe();
   report.statistics = integrator_->statistics();
   report.energy_error = kept_.record.energy_error();
