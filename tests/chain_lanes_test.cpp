@@ -325,8 +325,8 @@ void expect_derivatives() {
   for (int i = 0; i < 3; ++i) unused[i] = LaneRods<Space, 3>::resting();
   const ChainLinks<Space, 3, double> links(chain);
   for (int lane = 0; lane < LanePack<MemberRegister>::size; ++lane) {
-    rods_with.start(lane, 0, links, chain.gravity(), member.start.q.data(), member.start.v.data(), rods);
-    plain.start(lane, 0, links, chain.gravity(), member.start.q.data(), member.start.v.data(), unused);
+    rods_with.start(lane, 0, chain, links, member.start.q.data(), member.start.v.data(), rods);
+    plain.start(lane, 0, chain, links, member.start.q.data(), member.start.v.data(), unused);
   }
   EXPECT_NEAR(rods_with.tangent_squared(rods)[0], 1, 1e-14);
   rods_with.slopes({}, rods, found);

@@ -27,13 +27,15 @@ struct StepShape {
 
   /// The error of a step h by a method of this order and so many stages, relative to the size of the motion.
   /// Coefficients of analytic motion decay geometrically, and the quadrature misses those from a degree of `order` on:
-  /// the last ones go on as they have come from h R, or, where that is worse, as from those before them.
+  /// the last ones go on as they have come from h R, or, of swings that are small beside a radian, from what the
+  /// coefficients begin with; or, where that is worse, as from those before them.
   double error(double h, int stages, int order) const {
-    const double size = std::abs(h) * pace;
-    if (stages == 1) return size * size * size;
+    const double moved = std::abs(h) * pace;
+    if (stages == 1) return moved * moved * moved;
+    const double size = std::min(moved, small * std::max(at(0), at(1)));
     double error = 0;
     for (int k = std::max(1, stages - 2); k < stages; ++k) {
-      if (at(k) > rounding * size) error = std::max(error, at(k) * std::pow(at(k) / size, (order - k) / double(k)));
+      if (at(k) > rounding * moved) error = std::max(error, at(k) * std::pow(at(k) / size, (order - k) / double(k)));
     }
     if (stages < 4 || error == 0) return error;
     const double last = std::hypot(at(stages - 1), at(stages - 2)), before = std::hypot(at(stages - 3), at(stages - 4));
@@ -42,6 +44,7 @@ struct StepShape {
   }
 
  private:
+  static constexpr double small = 10;  // h R over the largest coefficient
   // Coefficients that are smaller, relative to h R, may be rounding; what follows from them would not show.
   static constexpr double rounding = 1e-13;
 

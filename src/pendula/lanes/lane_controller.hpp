@@ -92,13 +92,15 @@ class LaneController {
     length_ = select(seen, 2.0 * length_, length_);
   }
 
-  // StepShape::error, from the squares of the coefficients; size: log h R.
+  // StepShape::error, from the squares of the coefficients; moved: log h R.
   template <class Decay>
-  static L log_error(Decay decay, const L& size) {
+  static L log_error(Decay decay, const L& moved) {
     if constexpr (S == 1) {
-      return 3.0 * size;
+      return 3.0 * moved;
     } else {
-      const L noise = size + L(std::log(rounding));
+      const L noise = moved + L(std::log(rounding));
+      const L largest_squared = max(max(decay(0), decay(1)), L(tiny));
+      const L size = min(moved, 0.5 * log(largest_squared) + L(std::log(small)));
       const L last = max(decay(S - 1), L(tiny)), log_last = 0.5 * log(last);
       L error = extended(log_last, size, noise, S - 1);
       if constexpr (S >= 3) {
@@ -121,7 +123,7 @@ class LaneController {
 
   // StepController's.
   static constexpr double safety = 4, shortest = 1e-3, aim = 0.2, most_growth = 4, worthwhile = 1.05, farthest = 2;
-  static constexpr double rounding = 1e-13;
+  static constexpr double rounding = 1e-13, small = 10;
   static constexpr double never = -700, tiny = 1e-300;  // a logarithm below all errors; in place of zero
 
   double log_tolerance_, first_scale_;
