@@ -140,34 +140,41 @@ inline std::optional<TangentScale> tangent_scale(Integrator& integrator, const M
   integrator.start(start);
   if (!(h > 0) || !integrator.step(h)) return {};
   const Eigen::Index half = rows / 2;
-  // Of a momentum's unit, what coordinates are moved by: the inverse mass. In space there are three a link, of which
-  // the one along it moves nothing.
-  Eigen::VectorXd mobility(half), stiffness(half), loss(half);
-  constexpr Eigen::Index at_once = 64;
-  for (Eigen::Index first = 0; first < rows; first += at_once) {
-    const Eigen::Index count = std::min(at_once, rows - first);
-    Directions<> units = Directions<>::Zero(rows, count);
-    for (Eigen::Index k = 0; k < count; ++k) units(first + k, k) = 1;
-    integrator.push(units);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const Eigen::Index of = (first + k) % half;
-      if (first + k < half) {
-        stiffness[of] = units.col(k).tail(half).cwiseAbs().maxCoeff() / h;
-      } else {
-        mobility[of] = units.col(k).head(half).cwiseAbs().maxCoeff() / h;
-        loss[of] = std::abs(1 - units(first + k, k)) / h;
-      }
-    }
-  }
+  // Of a momentum's unit, what coordinates are moved by: the inverse mass; then the pushes of coordinates, which
+  // compare by that. In space there are three a link, of which the one along it moves nothing.
   const Eigen::Index group = rows == 2 * start.q.size() ? 1 : 3;
+  Eigen::VectorXd mobility(half), kept(half);
+  const auto pushed_columns = [&](Eigen::Index begin, Eigen::Index end, auto take) {
+    constexpr Eigen::Index at_once = 64;
+    for (Eigen::Index first = begin; first < end; first += at_once) {
+      Directions<> units = Directions<>::Zero(rows, std::min(at_once, end - first));
+      for (Eigen::Index k = 0; k < units.cols(); ++k) units(first + k, k) = 1;
+      integrator.push(units);
+      for (Eigen::Index k = 0; k < units.cols(); ++k) take(first - begin + k, units.col(k));
+    }
+  };
+  pushed_columns(half, rows, [&](Eigen::Index of, const auto& column) {
+    mobility[of] = std::abs(column[of]) / h;
+    kept[of] = column[half + of];
+  });
+  double loss = 0;  // of momenta, by damping; how many directions of a group there are, their sum tells
   for (Eigen::Index first = 0; first < half; first += group) {
     mobility.segment(first, group).setConstant(mobility.segment(first, group).maxCoeff());
-    if (group > 1) loss.segment(first, group).setZero();
+    const double sum = kept.segment(first, group).sum(), whole = std::max(1.0, std::round(sum));
+    loss = std::max(loss, std::abs(whole - sum) / (whole * h));
   }
+  const Eigen::VectorXd lightness = mobility.cwiseSqrt();
+  double swing = 0;  // squared, of one coordinate by another's push
+  pushed_columns(0, half, [&](Eigen::Index of, const auto& column) {
+    const double push = column.tail(half).cwiseAbs().cwiseProduct(lightness).maxCoeff();
+    swing = std::max(swing, push * lightness[of] / h);
+  });
+  // Beside a radian; lengths that are larger beside themselves.
+  const Eigen::ArrayXd sizes = start.q.array().abs().max(1);
   const Motion moved = integrator.state();
-  const double turning = start.v.cwiseAbs().maxCoeff(), pushed = (moved.v - start.v).cwiseAbs().maxCoeff() / h;
-  const double swing = stiffness.cwiseProduct(mobility).maxCoeff();
-  const double squared = std::max({swing, pushed, turning * turning, std::pow(loss.maxCoeff(), 2)});
+  const double turning = (start.v.array().abs() / sizes).maxCoeff();
+  const double pushed = ((moved.v - start.v).array().abs() / sizes).maxCoeff() / h;
+  const double squared = std::max({swing, pushed, turning * turning, loss * loss});
   if (std::isfinite(squared) && squared > 0) scale.rate = std::sqrt(squared);
   if (mobility.allFinite() && (mobility.array() > 0).all()) {
     scale.rows << (scale.rate / mobility.array()).sqrt(), (mobility.array() / scale.rate).sqrt();

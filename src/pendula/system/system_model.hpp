@@ -84,7 +84,8 @@ class SystemModel {
     return inputs;
   }
 
-  // Forces are loads where they bring power somewhere: looked for in a few states, none of which is special.
+  // Forces are loads where they bring power somewhere: looked for in a few states, none of which is special. What
+  // depends on time may bring it at others.
   void sample_power() {
     for (int k = 1; k <= samples; ++k) {
       Vector q, v;
@@ -105,7 +106,7 @@ class SystemModel {
   Parameters parameters_;
   Inputs constant_;
   std::vector<InputSine> sines_;
-  bool loaded_ = false, damped_ = false;
+  bool loaded_ = holds_time<S>, damped_ = false;
 };
 
 /// Coordinates and rates of a system at one time.
