@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <pendula/lanes/lane_functions.hpp>
 #include <pendula/lanes/lane_pack.hpp>
@@ -35,11 +34,11 @@ class LaneInputs {
     }
   }
 
-  /// What they are at `time`, (count).
-  void at(const L& time, L* inputs) const {
-    std::copy(constant_.begin(), constant_.end(), inputs);
+  /// What they are at `time`; `inputs`: (count).
+  void at(const L& time, std::span<L> inputs) const {
+    for (std::size_t k = 0; k < inputs.size(); ++k) inputs[k] = constant_[k];
     for (const Sine& sine : sines_) {
-      L& input = inputs[sine.input];
+      L& input = inputs[static_cast<std::size_t>(sine.input)];
       input = fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), input);
     }
   }

@@ -101,7 +101,7 @@ class LaneKernel : public LaneDynamics {
 
   Inputs<L> inputs_at(const L& time) const {
     Inputs<L> inputs;
-    inputs_.at(time, inputs.data());
+    inputs_.at(time, {inputs.data(), static_cast<std::size_t>(Inputs<L>::SizeAtCompileTime)});
     return inputs;
   }
 

@@ -33,7 +33,7 @@ class LaneLoads {
     for (int i = 0; i < links_; ++i) drag_[static_cast<std::size_t>(i)].set(lane, links[i].drag);
   }
 
-  void set_time(const L& time) { inputs_.at(time, torques_.data()); }
+  void set_time(const L& time) { inputs_.at(time, torques_); }
 
   /// (torque_i × ξ_i − λ_i ξ̇_i)/l_i² of a rod.
   template <class Number, std::size_t D>
