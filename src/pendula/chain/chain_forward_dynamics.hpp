@@ -46,6 +46,8 @@ class ChainForwardDynamics : public ForwardDynamics {
     }
   }
 
+  double fastest_drive() const override { return chain_.fastest_drive(); }
+
  private:
   struct Motion {
     Trig trig;

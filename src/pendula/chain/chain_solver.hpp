@@ -97,7 +97,7 @@ class ChainSolver {
   StepShape shape() const { return stages_.shape(); }
   bool loaded() const { return stages_.loaded(); }
   bool damped() const { return stages_.chain().damped(); }
-  double fastest_drive() const { return stages_.chain().fastest_drive(); }
+  double followed(double, double h, double) const { return std::min(h, stages() / stages_.chain().fastest_drive()); }
   bool dissipates() const { return family_ == Family::radau; }
   static constexpr int stages() { return S; }
   int parts() const { return stages_.links(); }

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <functional>
 #include <pendula/explicit/explicit_integrator.hpp>
+#include <pendula/explicit/forced_steps.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <stdexcept>
 #include <string>
@@ -107,6 +108,7 @@ class ExplicitIntegrator : public PlainIntegrator {
 
  protected:
   RightHandSide& right_hand_side() { return right_hand_side_; }
+  ForwardDynamics& dynamics() { return *dynamics_; }
 
   /// Moves x on by h, which is part of a step that was accepted.
   virtual void advance(Vector& x, double time, double h) = 0;
@@ -218,12 +220,28 @@ class FixedStepIntegrator : public ExplicitIntegrator {
 /// Steps of its own size; h is only an upper bound.
 class AdaptiveIntegrator : public ExplicitIntegrator {
  public:
-  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel)
-      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel), next_(x_.size()), next_rate_(x_.size()) {}
+  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
+                     ForcedSteps forcing)
+      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
+        next_(x_.size()),
+        next_rate_(x_.size()),
+        forcing_(std::move(forcing)) {}
+
+  Outcome start(double time, const double* q, const double* v) override {
+    const Outcome outcome = ExplicitIntegrator::start(time, q, v);
+    if (outcome) forcing_.start(dynamics(), time, q, v);
+    return outcome;
+  }
+
+  void member(MemberNumbers& numbers) override {
+    ExplicitIntegrator::member(numbers);
+    numbers(forcing_);
+  }
 
   Outcome step(double h) override {
     const bool cut = proposed_ > h;  // a step that is cut short says nothing about the size of the next one
     double tried = proposed_ == 0 ? std::min(h, first_step) : std::min(h, proposed_);
+    tried = forcing_.followed(dynamics(), time(), x_.data(), x_.data() + x_.size() / 2, tried);
     for (int attempt = 0; attempt < max_attempts && tried > smallest_step(); ++attempt) {
       const double size = tried;
       const bool accepted = try_step(tried);
@@ -251,19 +269,22 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   Vector next_, next_rate_;
 
  private:
+  ForcedSteps forcing_;
+
   double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
 
   static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
   static constexpr int max_attempts = 100;
 };
 
-/// An embedded pair with odeint's step control.
-template <class Stepper>
+/// An embedded pair with odeint's step control, as good as a quadrature.
+template <class Stepper, class Gauss>
 class PairIntegrator : public AdaptiveIntegrator {
  public:
   PairIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                  double tolerance)
-      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel),
+      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
+                           ForcedSteps(Gauss(), coordinates, tolerance)),
         stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
 
  private:
@@ -298,7 +319,9 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
  public:
   ExtrapolationIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts,
                           std::string_view kernel, double tolerance)
-      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel), tolerance_(tolerance) {
+      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
+                           ForcedSteps(kernels::GaussTableau<8>(), coordinates, tolerance)),
+        tolerance_(tolerance) {
     table_.fill(Vector(x_.size()));
   }
 
@@ -411,8 +434,8 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
 std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates,
                                                           int parts, const RunOptions& options,
                                                           std::string_view kernel) {
-  using Dopri5 = PairIntegrator<odeint::runge_kutta_dopri5<Vector>>;
-  using Fehlberg78 = PairIntegrator<odeint::runge_kutta_fehlberg78<Vector>>;
+  using Dopri5 = PairIntegrator<odeint::runge_kutta_dopri5<Vector>, kernels::GaussTableau<3>>;
+  using Fehlberg78 = PairIntegrator<odeint::runge_kutta_fehlberg78<Vector>, kernels::GaussTableau<4>>;
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
     throw std::invalid_argument("tolerance: expected a positive number, got " + std::to_string(options.tolerance));
   }

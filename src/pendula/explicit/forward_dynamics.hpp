@@ -2,7 +2,7 @@
 
 namespace pendula {
 
-/// Accelerations of a chain, as explicit methods need them. Nothing of Eigen, because it crosses between a program and
+/// Accelerations, as explicit methods need them. Nothing of Eigen, because it crosses between a program and
 /// the compiled library (library.hpp).
 class ForwardDynamics {
  public:
@@ -13,6 +13,11 @@ class ForwardDynamics {
 
   /// q̈ at `time`, from A(q) q̈ = B q̇² − C[q̇ q̇] − g + Q (paper eq. 27, corrected); all (dof·n).
   virtual void acceleration(double time, const double* q, const double* v, double* acceleration) = 0;
+
+  /// Highest frequency of what drives it  [rad/s].
+  virtual double fastest_drive() const { return 0; }
+  /// Whether it depends on time in other ways.
+  virtual bool depends_on_time() const { return false; }
 };
 
 }  // namespace pendula

@@ -22,6 +22,9 @@ class SystemForwardDynamics : public ForwardDynamics {
     result = fixed_acceleration;
   }
 
+  double fastest_drive() const override { return model_.fastest_drive(); }
+  bool depends_on_time() const override { return holds_time<S>; }
+
  private:
   SystemModel<S> model_;
 };

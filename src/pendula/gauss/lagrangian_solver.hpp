@@ -10,10 +10,12 @@
 #include <pendula/gauss/lagrangian_tangent.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
+#include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/system/options.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace pendula {
 
@@ -33,6 +35,7 @@ class LagrangianSolver {
       : family_(family),
         stages_(model, checked(stages), family),
         newton_(stages),
+        forcing_(family, stages),
         choice_(iteration, newton_cost(stages)) {}
 
   Status start(const State& state) { return stages_.start(state.time, state.q, state.v); }
@@ -94,7 +97,11 @@ class LagrangianSolver {
   }
   bool loaded() const { return stages_.model().loaded(); }
   bool damped() const { return stages_.model().damped(); }
-  double fastest_drive() const { return stages_.model().fastest_drive(); }
+  double followed(double time, double h, double tolerance) {
+    return forcing_.followed(stages_.model(), h, tolerance, [&] {
+      return std::pair(State{time, stages_.position(), stages_.velocity(time)}, stages_.tempo().pace);
+    });
+  }
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return stages_.stages(); }
   static constexpr int parts() { return S::coordinates; }
@@ -157,6 +164,7 @@ class LagrangianSolver {
   LagrangianStages<S, Width> stages_;
   LagrangianNewton<S, Width> newton_;
   LagrangianFixedPoint<S, Width> fixed_point_;
+  SystemForcing<S> forcing_;
   IterationChoice choice_;
   Correction last_;
   int count_ = 0;

@@ -18,7 +18,7 @@ struct Correction {
 /// name: the links of a chain, the coordinates of any other system.
 template <class S>
 concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, double time, double h,
-                               double x) {
+                               double x, double tolerance) {
   typename S::Model;  // what it is built from, with the number of stages and options of its own
   typename S::Real;   // what it computes in: round-off is that of this type
   { fixed.parts() } -> std::convertible_to<int>;
@@ -76,7 +76,8 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
   { fixed.loaded() } -> std::convertible_to<bool>;
   { fixed.damped() } -> std::convertible_to<bool>;
   { fixed.dissipates() } -> std::convertible_to<bool>;
-  { fixed.fastest_drive() } -> std::convertible_to<double>;
+  // The longest step up to h from here in which stages see what depends on time.
+  { solver.followed(time, h, tolerance) } -> std::convertible_to<double>;
 };
 
 }  // namespace pendula

@@ -40,8 +40,7 @@ class GaussStepper {
         at_roundoff_(solver_.parts(), epsilon()),
         controller_(stages, solver_.dissipates() ? 2 * stages - 1 : 2 * stages, options.tolerance,
                     options.steering.value_or(solver_.loaded() || solver_.dissipates() ? Steering::greedy
-                                                                                       : Steering::symmetric)),
-        longest_(stages / solver_.fastest_drive()) {}
+                                                                                       : Steering::symmetric)) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
@@ -181,10 +180,11 @@ class GaussStepper {
   /// One step of the controller's choice. One that errs too much is taken again, shorter, from what it has found.
   Outcome chosen_step(double most) {
     const StepController before = controller_;
+    const double longest = solver_.followed(time(), std::min(controller_.step(), most), options_.tolerance);
     int shorter = fixed_point_worth;
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
-      const double chosen = std::min(controller_.step(), longest_);
+      const double chosen = std::min(controller_.step(), longest);
       const bool is_cut = !(chosen * (1 + 1e-9) < most);
       const double h = is_cut ? most : chosen;
       is_found ? solver_.prepare_again(time(), h) : solver_.prepare(time(), h);
@@ -373,8 +373,6 @@ class GaussStepper {
   StepperOptions options_;
   RoundoffStop at_roundoff_;
   StepController controller_;
-  // That a drive is followed in: one that is weak and turns often within a step shows in no stage what it does.
-  double longest_;
   Compensated<double> time_{};
   double defect_ = 0;  // of the last solution
   Statistics statistics_;

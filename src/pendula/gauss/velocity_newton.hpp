@@ -10,6 +10,7 @@
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/stage_system.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/mass_scale.hpp>
@@ -41,6 +42,7 @@ class VelocityNewton {
         coefficients_(tableau_of<Eigen::Dynamic>(family, stages)),
         polynomials_(tableau_of<Eigen::Dynamic>(family, stages)),
         system_(stages),
+        forcing_(family, stages),
         at_(static_cast<std::size_t>(stages)) {
     for (Stage& stage : at_) stage.last_a.setZero();
   }
@@ -104,7 +106,11 @@ class VelocityNewton {
   static constexpr double largest_turn() { return S::constant_masses ? 3 : 0.25; }
   bool loaded() const { return model_.loaded(); }
   bool damped() const { return model_.damped(); }
-  double fastest_drive() const { return model_.fastest_drive(); }
+  double followed(double time, double h, double tolerance) {
+    return forcing_.followed(model_, h, tolerance, [&] {
+      return std::pair(State{time, q_.value, v_.value}, tempo().pace);
+    });
+  }
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return coefficients_.stages(); }
   static constexpr int parts() { return S::coordinates; }
@@ -344,6 +350,7 @@ class VelocityNewton {
   StepCoefficients<Eigen::Dynamic> coefficients_;
   detail::NodePolynomials<Eigen::Dynamic, double> polynomials_;
   detail::StageSystem<S::coordinates> system_;
+  SystemForcing<S> forcing_;
   std::vector<Stage> at_;
   Compensated<Vector> q_, v_;
   std::array<Compensated<Vector>, 2> saved_, remembered_;

@@ -28,6 +28,10 @@ class LaneDynamics {
   /// The same, and its derivative along tangents (dq, dv) of the motions.
   virtual void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv,
                           double* a, double* da) = 0;
+  /// Highest frequency of what drives each of them  (lanes)  [rad/s].
+  virtual void fastest_drives(double* frequencies) const = 0;
+  /// Whether they depend on time in other ways.
+  virtual bool depends_on_time() const = 0;
   /// T, and T + U  (lanes)  [J].
   virtual void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) = 0;
 };

@@ -21,10 +21,11 @@ class LaneErrorController {
   void start(const Mask& which, Stepper& stepper) {
     const L pace = sqrt(stepper.pace_squared());
     next_ = select(which, L(first_) / select(pace > L(0.0), pace, L(1.0)), next_);
+    longest_ = select(which, stepper.longest_step(), longest_);
   }
 
   /// Of the next step, unless the run ends before.
-  L step() const { return next_; }
+  L step() const { return min(next_, longest_); }
 
   /// Which of the steps `h` that were tried are good enough; those that are not get a shorter one.
   template <class Stepper>
@@ -51,7 +52,7 @@ class LaneErrorController {
   static constexpr double cautious = 0.9, least = 0.2, most_growth = 5, tiny = 1e-300;
 
   double log_tolerance_, first_;
-  L next_{1.0}, grown_{1.0};
+  L next_{1.0}, grown_{1.0}, longest_{1.0};
 };
 
 }  // namespace pendula

@@ -109,6 +109,9 @@ class LaneExplicit {
   { return dynamics_.energy_sum(); }
   L pace_squared() const { return dynamics_.pace_squared(parts_); }
 
+  /// In which stages see what drives turn: one that is weak and turns often within a step shows in none what it does.
+  L longest_step() const { return dynamics_.template longest_step<nodes>(); }
+
   /// Tries a step of `h` from `time`; gives those of the members that are `wanted` to whom nothing happened that is not
   /// finite, and who turn by less than half a turn. The state stays what it was.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
@@ -122,7 +125,7 @@ class LaneExplicit {
     dynamics_.restore(trial_);
     dynamics_.slopes(time + h, trial_, slopes_[Method::stages]);
     const L pace = dynamics_.pace_squared(trial_);
-    if constexpr (can_choose) find_error(h, pace);
+    if constexpr (can_choose) find_error(time, h, pace);
     tried_ = h;
     tried_from_ = time;
     const L turned = max(pace, pace_squared()) * (h * h);
@@ -166,8 +169,9 @@ class LaneExplicit {
   using Part = typename Dynamics::Part;
   using Parts = typename Dynamics::Parts;
 
-  static constexpr double largest_turn = 3;      // rad
-  static constexpr double tangent_share = 0.01;  // of what a tangent errs by, relative to itself
+  static constexpr int nodes = (Method::error_order + 2) / 2;  // of the quadrature that is as good
+  static constexpr double largest_turn = 3;                    // rad
+  static constexpr double tangent_share = 0.01;                // of what a tangent errs by, relative to itself
 
   template <class Links>
   static auto& at(Links& of, int link) {
@@ -223,7 +227,7 @@ class LaneExplicit {
     }
   }
 
-  [[gnu::always_inline]] void find_error(const L& h, const L& pace_squared) {
+  [[gnu::always_inline]] void find_error(const L& time, const L& h, const L& pace_squared) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       Part error = Part::zero();
       detail::unrolled<static_cast<int>(Method::stages) + 1>([&](auto j) PENDULA_WRITTEN_OUT {
@@ -239,6 +243,11 @@ class LaneExplicit {
       at(errors_, i) = error;
     });
     error_ = dynamics_.error_squared(h, errors_, parts_, slopes_[0], trial_, pace_squared);
+    if constexpr (requires { dynamics_.depends_on_time(); }) {
+      if (dynamics_.depends_on_time()) {
+        error_ = max(error_, dynamics_.template unseen_forcing_squared<nodes>(time, h, parts_));
+      }
+    }
     // Where the motion stands still, or almost, nothing but its tangent tells which steps are too long.
     if constexpr (has_tangent) {
       const L tangent = (h * h) * (dynamics_.tangent_squared(errors_) / dynamics_.tangent_squared(parts_));

@@ -34,6 +34,15 @@ class LaneInputs {
     }
   }
 
+  /// The highest frequency that a member's are driven with; 0 where there is none.
+  L fastest() const {
+    L fastest(0.0);
+    for (const Sine& sine : sines_) {
+      fastest = max(fastest, select(abs(sine.amplitude) > L(0.0), abs(sine.frequency), L(0.0)));
+    }
+    return fastest;
+  }
+
   /// What they are at `time`; `inputs`: (count).
   void at(const L& time, std::span<L> inputs) const {
     for (std::size_t k = 0; k < inputs.size(); ++k) inputs[k] = constant_[k];

@@ -66,6 +66,9 @@ class LaneKernel : public LaneDynamics {
     }
   }
 
+  void fastest_drives(double* frequencies) const override { inputs_.fastest().store(frequencies); }
+  bool depends_on_time() const override { return holds_time<S>; }
+
   void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) override {
     set_time(L::load(times));
     L energy;

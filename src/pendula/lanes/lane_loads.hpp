@@ -35,6 +35,9 @@ class LaneLoads {
 
   void set_time(const L& time) { inputs_.at(time, torques_); }
 
+  /// The highest frequency that a member is driven with; 0 where there is none.
+  L fastest_drive() const { return inputs_.fastest(); }
+
   /// (torque_i × ξ_i − λ_i ξ̇_i)/l_i² of a rod.
   template <class Number, std::size_t D>
   std::array<Number, D> of_rod(int i, const LaneLink<L>& link, const std::array<Number, D>& rod,

@@ -44,6 +44,12 @@ class LaneRods {
   }
   int parts() const { return links(); }
 
+  /// The longest step that a quadrature of so many nodes follows drives in.
+  template <int nodes>
+  L longest_step() const {
+    return L(double(nodes)) / loads_.fastest_drive();
+  }
+
   /// body(0), body(1), … of all links, written out where they are few and their number is known.
   template <class Body>
   [[gnu::always_inline]] void for_parts(Body body) const {

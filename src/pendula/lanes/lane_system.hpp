@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <memory>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/kernels/gauss_tableaux.hpp>
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/system/forcing_look.hpp>
 #include <random>
 #include <type_traits>
 #include <vector>
@@ -136,6 +138,44 @@ class LaneSystem {
 
   void restore(Parts& /*parts*/) const {}
 
+  /// The longest step that a quadrature of so many nodes follows drives in, and in which unseen_forcing_squared looks
+  /// as closely as ForcingLook does.
+  template <int nodes>
+  L longest_step() const {
+    alignas(pack_alignment) double fastest[L::width];
+    dynamics_.fastest_drives(fastest);
+    const L longest = L(double(nodes)) / L::load(fastest);
+    if (!depends_on_time()) return longest;
+    const double looks = ForcingLook::least_parts * nodes / ForcingLook::looks;
+    return min(longest, L(looks) / natural_pace());
+  }
+
+  /// Whether accelerations depend on time other than by drives.
+  bool depends_on_time() const { return dynamics_.depends_on_time(); }
+
+  /// What a quadrature of so many nodes in the step makes of accelerations of a state that stands still, less what it
+  /// makes of them in parts of the step; relative to rates and to what comes to them, squared (ForcingLook).
+  template <int nodes>
+  L unseen_forcing_squared(const L& time, const L& h, const Parts& parts) {
+    write(time, parts);
+    for (Sums* sums : {&coarse_, &fine_})
+      sum_forcing<nodes>(time, h, sums == &coarse_ ? 1 : ForcingLook::least_parts, *sums);
+    const L share = ForcingLook::share_of(abs(h) * natural_pace());
+    L largest(0.0);
+    for (std::size_t k = 0; k < coarse_.push.size(); ++k) {
+      const Part& part = parts[static_cast<int>(k)];
+      const L place = max(abs(value(part.place[0])), L(dynamics_.is_angle(static_cast<int>(k)) ? 1.0 : 0.0));
+      const L least = max(L(ForcingLook::rounding) * (natural_pace() * place), L(ForcingLook::negligible));
+      const L size = max(max(abs(value(part.rate[0])), fine_.size[k]), least);
+      const L unknown = L(ForcingLook::invisible) * least +
+                        L(ForcingLook::rounding) * fma(abs(time) + abs(h), fine_.change[k], fine_.size[k]);
+      const L off = max(abs(coarse_.push[k] - fine_.push[k]) - unknown, L(0.0));
+      const L missed = off / (size * share);
+      largest = max(largest, missed * missed);
+    }
+    return largest;
+  }
+
   /// Σ (δq/size)² + (δq̇/(size ω))², size being 1 of angles, and of others the largest coordinate of the same unit where
   /// the member began; ω how fast it moved then, and what is a little beside it.
   L tangent_squared(const Parts& parts) const requires with_tangent {
@@ -148,6 +188,37 @@ class LaneSystem {
   }
 
  private:
+  // What accelerations come to in a step: ∫ a dt, ∫ |a| dt, and by how much they went up and down.
+  struct Sums {
+    std::vector<L> push, size, change, last;
+  };
+
+  template <int nodes>
+  void sum_forcing(const L& time, const L& h, int count, Sums& sums) {
+    using Gauss = kernels::GaussTableau<nodes>;
+    for (std::vector<L>* each : {&sums.push, &sums.size, &sums.change, &sums.last}) {
+      each->assign(static_cast<std::size_t>(parts()), L(0.0));
+    }
+    const L part = L(1.0 / count) * h;
+    for (int p = 0; p < count; ++p) {
+      for (std::size_t i = 0; i < nodes; ++i) {
+        fma(L(p + Gauss::c[i]), part, time).store(times());
+        dynamics_.accelerations(times(), numbers(0, 0), numbers(1, 0), numbers(2, 0));
+        const L weight = L(Gauss::b[i]) * part;
+        for (std::size_t k = 0; k < sums.push.size(); ++k) {
+          const L a = L::load(numbers(2, static_cast<int>(k)));
+          sums.push[k] = fma(weight, a, sums.push[k]);
+          sums.size[k] = fma(abs(weight), abs(a), sums.size[k]);
+          if (p > 0 || i > 0) sums.change[k] = sums.change[k] + abs(a - sums.last[k]);
+          sums.last[k] = a;
+        }
+      }
+    }
+  }
+
+  // 1/s where nothing moves or pushes yet.
+  L natural_pace() const { return sqrt(select(pace_squared_ > L(0.0), pace_squared_, L(1.0))); }
+
   // What has no size errs by nothing: it rests.
   static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
 
@@ -254,6 +325,7 @@ class LaneSystem {
   std::vector<double> buffer_;
   double* first_ = nullptr;
   L pace_squared_{1.0}, energy_sum_{0.0};
+  Sums coarse_, fine_;
   L inverse_pace_squared_{1.0};  // of tangents
   detail::PerLink<L, links_known> inverse_sizes_;
 };

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/kernels/gauss_tableaux.hpp>
+#include <pendula/system/forcing_look.hpp>
+
+namespace pendula {
+
+/// How long the steps of an explicit method may be for its stages to see what depends on time.
+class ForcedSteps {
+ public:
+  /// For a method that is as good as the quadrature `Gauss`, a kernels::GaussTableau.
+  template <class Gauss>
+  ForcedSteps(Gauss, int coordinates, double tolerance)
+      : nodes_(Gauss::stages),
+        tolerance_(tolerance),
+        look_(Gauss::c, Gauss::b, coordinates),
+        moved_(coordinates),
+        a_(coordinates) {}
+
+  /// A run starts.
+  void start(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
+    if (dynamics.depends_on_time()) pace_ = pace_of(dynamics, time, q, v);
+  }
+
+  /// The longest step up to h from q and v. Drives turn by a radian a node at most: one that is weak and turns often
+  /// within a step shows in no stage what it does.
+  double followed(ForwardDynamics& dynamics, double time, const double* q, const double* v, double h) {
+    h = std::min(h, nodes_ / dynamics.fastest_drive());
+    if (!dynamics.depends_on_time()) return h;
+    const Eigen::Map<const Eigen::VectorXd> place(q, a_.size()), rates(v, a_.size());
+    rates_ = rates;
+    sizes_ = place.cwiseAbs().cwiseMax(1.0);
+    return look_.resolved(time, h, pace_, tolerance_, rates_, sizes_, [&](double at) -> const Eigen::VectorXd& {
+      dynamics.acceleration(at, q, v, a_.data());
+      return a_;
+    });
+  }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(pace_);
+  }
+
+ private:
+  // The fastest that a coordinate alone would swing with where it is; 1/s where nothing tells.
+  double pace_of(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
+    const Eigen::Map<const Eigen::VectorXd> place(q, a_.size());
+    double squared = 0;
+    dynamics.acceleration(time, q, v, a_.data());
+    const Eigen::VectorXd here = a_;
+    for (Eigen::Index k = 0; k < a_.size(); ++k) {
+      const double small = 1e-6 * std::max(1.0, std::abs(q[k]));
+      moved_ = place;
+      moved_[k] += small;
+      dynamics.acceleration(time, moved_.data(), v, a_.data());
+      const double swing = std::abs(a_[k] - here[k]) / small;
+      if (std::isfinite(swing)) squared = std::max(squared, swing);
+    }
+    return squared > 0 ? std::sqrt(squared) : 1;
+  }
+
+  int nodes_;
+  double tolerance_, pace_ = 1;
+  ForcingLook look_;
+  Eigen::VectorXd moved_, a_, rates_, sizes_;
+};
+
+}  // namespace pendula

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <pendula/gauss/tableau.hpp>
+#include <pendula/system/forcing_look.hpp>
+#include <pendula/system/system_model.hpp>
+
+namespace pendula {
+
+/// How long the steps of a system may be for their stages to see what depends on time.
+template <System S>
+class SystemForcing {
+ public:
+  SystemForcing(Family family, int stages) : SystemForcing(tableau_of<Eigen::Dynamic>(family, stages)) {}
+
+  /// The longest step up to h from where `look` says that the system is: by a pair of state and pace, the motion
+  /// changing in 1/pace. Inputs that are sines turn by a radian a stage at most: one that is weak and turns often
+  /// within a step shows in no stage what it does.
+  template <class Look>
+  double followed(const SystemModel<S>& model, double h, double tolerance, Look&& look) {
+    h = std::min(h, stages_ / model.fastest_drive());
+    if constexpr (holds_time<S>) {
+      const auto [state, pace] = look();
+      return look_.resolved(state.time, h, pace, tolerance, state.v, sizes_of(state.q), [&](double time) {
+        typename S::template Vector<double> a;
+        S::acceleration(model.parameters(time), state.q, state.v, model.inputs(time), a);
+        return a;
+      });
+    }
+    return h;
+  }
+
+ private:
+  using Vector = typename S::template Vector<double>;
+
+  // Of angles a radian at least.
+  static Vector sizes_of(const Vector& q) {
+    Vector sizes = q.cwiseAbs();
+    for (Eigen::Index k = 0; k < q.size(); ++k) {
+      if (S::coordinate_is_angle[static_cast<std::size_t>(k)]) sizes[k] = std::max(1.0, sizes[k]);
+    }
+    return sizes;
+  }
+
+  explicit SystemForcing(const Tableau<Eigen::Dynamic, double>& tableau)
+      : stages_(tableau.stages()),
+        look_({tableau.c.data(), static_cast<std::size_t>(stages_)},
+              {tableau.b.data(), static_cast<std::size_t>(stages_)}, S::coordinates) {}
+
+  int stages_;
+  ForcingLook look_;
+};
+
+}  // namespace pendula

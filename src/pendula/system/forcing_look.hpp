@@ -1,0 +1,112 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+/// How far a step may go so that its nodes see what forces do that depend on time: a pulse between them, or what turns
+/// many times in the step, no error estimate shows.
+///
+/// Accelerations of a state that stands still are summed over the step by the nodes of a quadrature, and again by the
+/// same nodes in many parts of it. Steps are halved until both agree.
+class ForcingLook {
+ public:
+  /// By a quadrature of these nodes and weights on (0, 1), of a system of so many coordinates.
+  ForcingLook(std::span<const double> nodes, std::span<const double> weights, Eigen::Index coordinates)
+      : nodes_(nodes.begin(), nodes.end()),
+        weights_(weights.begin(), weights.end()),
+        coarse_(coordinates),
+        fine_(coordinates),
+        speeds_(coordinates),
+        least_speeds_(coordinates) {}
+
+  /// The longest of h, h/2, h/4 … from `time` on in which forces are seen to a tolerance, relative to rates v, to what
+  /// forces make of them, and to what would round a coordinate by that goes `sizes` in the time in which the motion
+  /// changes, 1/pace; `acceleration(time)` is that of the state.
+  /// What lasts for less than a hundredth of that time, and of h/8, may be missed.
+  template <class Vector, class Acceleration>
+  double resolved(double time, double h, double pace, double tolerance, const Vector& v, const Vector& sizes,
+                  Acceleration&& acceleration) {
+    h = std::min(h, most_parts * static_cast<double>(nodes_.size()) / (looks * pace));
+    const double least = smallest * std::max(std::abs(time), h);
+    least_speeds_ = rounding * pace * sizes;
+    speeds_ = v.cwiseAbs().cwiseMax(least_speeds_);
+    while (h > least && !is_seen(time, h, pace, tolerance, acceleration)) h /= 2;
+    return h;
+  }
+
+  /// Of a tolerance, for a step in which the motion goes on by so much.
+  template <class Number>
+  static Number share_of(const Number& moved) {
+    using std::max, std::min;
+    return min(max(moved, Number(shortest)), Number(1.0));
+  }
+
+  static constexpr double looks = 100;       ///< in the time in which motion changes
+  static constexpr int least_parts = 8;      ///< of a step
+  static constexpr double invisible = 1e-3;  ///< of a rounding error: what forces are rounded by themselves
+  static constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();  ///< of sums, and of times
+  static constexpr double negligible = 1e-280;  ///< speed: smaller numbers lose digits
+
+ private:
+  // What accelerations are summed to.
+  struct Sums {
+    explicit Sums(Eigen::Index coordinates)
+        : push(coordinates), size(coordinates), change(coordinates), last(coordinates) {}
+    Eigen::VectorXd push, size;    // ∫ a dt, ∫ |a| dt
+    Eigen::VectorXd change, last;  // by how much they went up and down, and where from
+
+    void clear() {
+      push.setZero();
+      size.setZero();
+      change.setZero();
+    }
+  };
+
+  template <class Acceleration>
+  bool is_seen(double time, double h, double pace, double tolerance, Acceleration& acceleration) {
+    sum(time, h, 1, acceleration, coarse_);
+    const double share = share_of(h * pace);
+    const double parts = std::ceil(
+        std::clamp(looks * h * pace / static_cast<double>(nodes_.size()), double(least_parts), double(most_parts)));
+    sum(time, h, static_cast<int>(parts), acceleration, fine_);
+    for (Eigen::Index k = 0; k < fine_.push.size(); ++k) {
+      const double size = std::max({speeds_[k], fine_.size[k], negligible});
+      const double of_times = (std::abs(time) + h) * fine_.change[k];
+      const double unknown = invisible * least_speeds_[k] + rounding * (of_times + fine_.size[k]);
+      if (std::abs(coarse_.push[k] - fine_.push[k]) > tolerance * share * size + unknown) return false;
+    }
+    return true;
+  }
+
+  template <class Acceleration>
+  void sum(double time, double h, int parts, Acceleration& acceleration, Sums& sums) const {
+    sums.clear();
+    const double part = h / parts;
+    for (int p = 0; p < parts; ++p) {
+      for (std::size_t i = 0; i < nodes_.size(); ++i) {
+        const auto& a = acceleration(time + (p + nodes_[i]) * part);
+        sums.push += weights_[i] * part * a;
+        sums.size += weights_[i] * part * a.cwiseAbs();
+        if (p > 0 || i > 0) sums.change += (a - sums.last).cwiseAbs();
+        sums.last = a;
+      }
+    }
+  }
+
+  static constexpr double most_parts = 4096;
+  static constexpr double smallest = 1e-13;  // step, of the time so far
+  static constexpr double shortest = 1e-3;   // where forces jump, no step is short enough to see that they do
+
+  std::vector<double> nodes_, weights_;
+  Sums coarse_, fine_;
+  Eigen::VectorXd speeds_, least_speeds_;  // that errors are compared with, at least
+};
+
+}  // namespace pendula
