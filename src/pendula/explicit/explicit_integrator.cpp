@@ -284,7 +284,7 @@ class PairIntegrator : public AdaptiveIntegrator {
   PairIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                  double tolerance)
       : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
-                           ForcedSteps(Gauss(), coordinates, tolerance)),
+                           ForcedSteps(Gauss(), static_cast<std::size_t>(coordinates), tolerance)),
         stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
 
  private:
@@ -320,7 +320,7 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
   ExtrapolationIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts,
                           std::string_view kernel, double tolerance)
       : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
-                           ForcedSteps(kernels::GaussTableau<8>(), coordinates, tolerance)),
+                           ForcedSteps(kernels::GaussTableau<8>(), static_cast<std::size_t>(coordinates), tolerance)),
         tolerance_(tolerance) {
     table_.fill(Vector(x_.size()));
   }

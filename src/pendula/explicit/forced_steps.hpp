@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +7,8 @@
 #include <pendula/explicit/forward_dynamics.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <pendula/system/forcing_look.hpp>
+#include <span>
+#include <vector>
 
 namespace pendula {
 
@@ -16,12 +17,13 @@ class ForcedSteps {
  public:
   /// For a method that is as good as the quadrature `Gauss`, a kernels::GaussTableau.
   template <class Gauss>
-  ForcedSteps(Gauss, int coordinates, double tolerance)
+  ForcedSteps(Gauss, std::size_t coordinates, double tolerance)
       : nodes_(Gauss::stages),
         tolerance_(tolerance),
         look_(Gauss::c, Gauss::b, coordinates),
         moved_(coordinates),
-        a_(coordinates) {}
+        a_(coordinates),
+        sizes_(coordinates) {}
 
   /// A run starts.
   void start(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
@@ -33,10 +35,9 @@ class ForcedSteps {
   double followed(ForwardDynamics& dynamics, double time, const double* q, const double* v, double h) {
     h = std::min(h, nodes_ / dynamics.fastest_drive());
     if (!dynamics.depends_on_time()) return h;
-    const Eigen::Map<const Eigen::VectorXd> place(q, a_.size()), rates(v, a_.size());
-    rates_ = rates;
-    sizes_ = place.cwiseAbs().cwiseMax(1.0);
-    return look_.resolved(time, h, pace_, tolerance_, rates_, sizes_, [&](double at) -> const Eigen::VectorXd& {
+    for (std::size_t k = 0; k < a_.size(); ++k) sizes_[k] = std::max(1.0, std::abs(q[k]));
+    const std::span<const double> rates(v, a_.size());
+    return look_.resolved(time, h, pace_, tolerance_, rates, sizes_, [&](double at) -> const std::vector<double>& {
       dynamics.acceleration(at, q, v, a_.data());
       return a_;
     });
@@ -50,13 +51,12 @@ class ForcedSteps {
  private:
   // The fastest that a coordinate alone would swing with where it is; 1/s where nothing tells.
   double pace_of(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
-    const Eigen::Map<const Eigen::VectorXd> place(q, a_.size());
     double squared = 0;
     dynamics.acceleration(time, q, v, a_.data());
-    const Eigen::VectorXd here = a_;
-    for (Eigen::Index k = 0; k < a_.size(); ++k) {
+    const std::vector<double> here = a_;
+    for (std::size_t k = 0; k < a_.size(); ++k) {
       const double small = 1e-6 * std::max(1.0, std::abs(q[k]));
-      moved_ = place;
+      moved_.assign(q, q + a_.size());
       moved_[k] += small;
       dynamics.acceleration(time, moved_.data(), v, a_.data());
       const double swing = std::abs(a_[k] - here[k]) / small;
@@ -68,7 +68,7 @@ class ForcedSteps {
   int nodes_;
   double tolerance_, pace_ = 1;
   ForcingLook look_;
-  Eigen::VectorXd moved_, a_, rates_, sizes_;
+  std::vector<double> moved_, a_, sizes_;
 };
 
 }  // namespace pendula

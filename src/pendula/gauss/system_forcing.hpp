@@ -46,7 +46,7 @@ class SystemForcing {
   explicit SystemForcing(const Tableau<Eigen::Dynamic, double>& tableau)
       : stages_(tableau.stages()),
         look_({tableau.c.data(), static_cast<std::size_t>(stages_)},
-              {tableau.b.data(), static_cast<std::size_t>(stages_)}, S::coordinates) {}
+              {tableau.b.data(), static_cast<std::size_t>(stages_)}, static_cast<std::size_t>(S::coordinates)) {}
 
   int stages_;
   ForcingLook look_;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -14,11 +13,12 @@ namespace pendula {
 /// many times in the step, no error estimate shows.
 ///
 /// Accelerations of a state that stands still are summed over the step by the nodes of a quadrature, and again by the
-/// same nodes in many parts of it. Steps are halved until both agree.
+/// same nodes in many parts of it. Steps are halved until both agree. Nothing of Eigen, because explicit methods, which
+/// are compiled for any processor, and programs that are not, have the same.
 class ForcingLook {
  public:
   /// By a quadrature of these nodes and weights on (0, 1), of a system of so many coordinates.
-  ForcingLook(std::span<const double> nodes, std::span<const double> weights, Eigen::Index coordinates)
+  ForcingLook(std::span<const double> nodes, std::span<const double> weights, std::size_t coordinates)
       : nodes_(nodes.begin(), nodes.end()),
         weights_(weights.begin(), weights.end()),
         coarse_(coordinates),
@@ -30,13 +30,15 @@ class ForcingLook {
   /// forces make of them, and to what would round a coordinate by that goes `sizes` in the time in which the motion
   /// changes, 1/pace; `acceleration(time)` is that of the state.
   /// What lasts for less than a hundredth of that time, and of h/8, may be missed.
-  template <class Vector, class Acceleration>
-  double resolved(double time, double h, double pace, double tolerance, const Vector& v, const Vector& sizes,
+  template <class Rates, class Sizes, class Acceleration>
+  double resolved(double time, double h, double pace, double tolerance, const Rates& v, const Sizes& sizes,
                   Acceleration&& acceleration) {
     h = std::min(h, most_parts * static_cast<double>(nodes_.size()) / (looks * pace));
     const double least = smallest * std::max(std::abs(time), h);
-    least_speeds_ = rounding * pace * sizes;
-    speeds_ = v.cwiseAbs().cwiseMax(least_speeds_);
+    for (std::size_t k = 0; k < speeds_.size(); ++k) {
+      least_speeds_[k] = rounding * pace * at(sizes, k);
+      speeds_[k] = std::max(std::abs(at(v, k)), least_speeds_[k]);
+    }
     while (h > least && !is_seen(time, h, pace, tolerance, acceleration)) h /= 2;
     return h;
   }
@@ -57,17 +59,20 @@ class ForcingLook {
  private:
   // What accelerations are summed to.
   struct Sums {
-    explicit Sums(Eigen::Index coordinates)
+    explicit Sums(std::size_t coordinates)
         : push(coordinates), size(coordinates), change(coordinates), last(coordinates) {}
-    Eigen::VectorXd push, size;    // ∫ a dt, ∫ |a| dt
-    Eigen::VectorXd change, last;  // by how much they went up and down, and where from
+    std::vector<double> push, size;    // ∫ a dt, ∫ |a| dt
+    std::vector<double> change, last;  // by how much they went up and down, and where from
 
     void clear() {
-      push.setZero();
-      size.setZero();
-      change.setZero();
+      for (std::vector<double>* sums : {&push, &size, &change}) std::fill(sums->begin(), sums->end(), 0.0);
     }
   };
+
+  template <class Numbers>
+  static double at(const Numbers& numbers, std::size_t k) {
+    return numbers.data()[k];
+  }
 
   template <class Acceleration>
   bool is_seen(double time, double h, double pace, double tolerance, Acceleration& acceleration) {
@@ -76,7 +81,7 @@ class ForcingLook {
     const double parts = std::ceil(
         std::clamp(looks * h * pace / static_cast<double>(nodes_.size()), double(least_parts), double(most_parts)));
     sum(time, h, static_cast<int>(parts), acceleration, fine_);
-    for (Eigen::Index k = 0; k < fine_.push.size(); ++k) {
+    for (std::size_t k = 0; k < fine_.push.size(); ++k) {
       const double size = std::max({speeds_[k], fine_.size[k], negligible});
       const double of_times = (std::abs(time) + h) * fine_.change[k];
       const double unknown = invisible * least_speeds_[k] + rounding * (of_times + fine_.size[k]);
@@ -92,10 +97,12 @@ class ForcingLook {
     for (int p = 0; p < parts; ++p) {
       for (std::size_t i = 0; i < nodes_.size(); ++i) {
         const auto& a = acceleration(time + (p + nodes_[i]) * part);
-        sums.push += weights_[i] * part * a;
-        sums.size += weights_[i] * part * a.cwiseAbs();
-        if (p > 0 || i > 0) sums.change += (a - sums.last).cwiseAbs();
-        sums.last = a;
+        for (std::size_t k = 0; k < sums.push.size(); ++k) {
+          sums.push[k] += weights_[i] * part * at(a, k);
+          sums.size[k] += weights_[i] * part * std::abs(at(a, k));
+          if (p > 0 || i > 0) sums.change[k] += std::abs(at(a, k) - sums.last[k]);
+          sums.last[k] = at(a, k);
+        }
       }
     }
   }
@@ -106,7 +113,7 @@ class ForcingLook {
 
   std::vector<double> nodes_, weights_;
   Sums coarse_, fine_;
-  Eigen::VectorXd speeds_, least_speeds_;  // that errors are compared with, at least
+  std::vector<double> speeds_, least_speeds_;  // that errors are compared with, at least
 };
 
 }  // namespace pendula
