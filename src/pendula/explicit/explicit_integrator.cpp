@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
-#include <boost/numeric/odeint/stepper/generation.hpp>
 #include <boost/numeric/odeint/stepper/modified_midpoint.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
@@ -277,6 +276,61 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   static constexpr int max_attempts = 100;
 };
 
+/// What the errors of a step are compared with: coordinates and rates themselves, and beside them a radian and one a
+/// second, or the whole motion where that is smaller, so that swings of 1e-9 rad are followed as others are. The end of
+/// the step counts, too: forces may begin at nothing.
+class ErrorSize {
+ public:
+  /// Of a step from x, whose derivative is `rate`, to `end`.
+  ErrorSize(const Vector& x, const Vector& rate, const Vector& end, double h, double tolerance)
+      : x_(x), half_(x.size() / 2) {
+    const double q = std::max(largest(x, 0), largest(end, 0)), v = std::max(largest(x, half_), largest(end, half_));
+    const double a = largest(rate, half_);
+    const double rounding = rounded * q / (tolerance * h);  // what is left of rates at rest
+    place_ = std::clamp(std::max(q, h * v), nothing, 1.0);
+    turn_ = std::clamp(std::max({v, h * a, rounding}), nothing, 1.0);
+  }
+
+  double operator[](std::size_t i) const { return (i < half_ ? place_ : turn_) + std::abs(x_[i]); }
+
+ private:
+  double largest(const Vector& x, std::size_t from) const {
+    double largest = 0;
+    for (std::size_t i = from; i < from + half_; ++i) largest = std::max(largest, std::abs(x[i]));
+    return largest;
+  }
+
+  static constexpr double rounded = 1e-14, nothing = 1e-30;
+
+  const Vector& x_;
+  std::size_t half_;
+  double place_, turn_;
+};
+
+/// ErrorSize and what a step adds to a coordinate or rate, as odeint asks for it.
+class ErrorChecker {
+ public:
+  using value_type = double;
+
+  /// Steps are tried to `end`.
+  ErrorChecker(double tolerance, const Vector& end) : tolerance_(tolerance), end_(end) {}
+
+  template <class Algebra>
+  double error(Algebra& /*algebra*/, const Vector& x, const Vector& rate, const Vector& errors, double h) const {
+    const ErrorSize size(x, rate, end_, h, tolerance_);
+    double largest = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double error = std::abs(errors[i]) / (tolerance_ * (size[i] + h * std::abs(rate[i])));
+      if (!(error <= largest)) largest = error;
+    }
+    return largest;
+  }
+
+ private:
+  double tolerance_;
+  const Vector& end_;
+};
+
 /// An embedded pair with odeint's step control, as good as a quadrature.
 template <class Stepper, class Gauss>
 class PairIntegrator : public AdaptiveIntegrator {
@@ -285,7 +339,7 @@ class PairIntegrator : public AdaptiveIntegrator {
                  double tolerance)
       : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
                            ForcedSteps(Gauss(), static_cast<std::size_t>(coordinates), tolerance)),
-        stepper_(odeint::make_controlled<Stepper>(tolerance, tolerance)) {}
+        stepper_(ErrorChecker(tolerance, next_)) {}
 
  private:
   // The rate is kept here, not in the stepper, whose memory is no part of the member.
@@ -309,7 +363,7 @@ class PairIntegrator : public AdaptiveIntegrator {
   static constexpr bool hands_on_rate =
       std::is_same_v<typename Stepper::stepper_category, odeint::explicit_error_stepper_fsal_tag>;
 
-  typename odeint::result_of::make_controlled<Stepper>::type stepper_;
+  odeint::controlled_runge_kutta<Stepper, ErrorChecker> stepper_;
 };
 
 /// Bulirsch–Stoer: odeint's modified midpoints in 2, 4, 6, … substeps, extrapolated to infinitely many. Order and step
@@ -355,7 +409,7 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
     for (std::size_t row = 0; row <= row_ + 1; ++row) {
       add_row(row, x_, time(), h);
       if (row == 0) continue;
-      const double error = largest_error();
+      const double error = largest_error(h);
       if (!std::isfinite(error)) break;
       best_[row] = best_step(h, error, row);
       if (row + 1 < row_ || error > 1) continue;
@@ -395,10 +449,11 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
   }
 
   /// Of the last two columns of a row, relative to what is tolerated.
-  double largest_error() const {
+  double largest_error(double h) const {
+    const ErrorSize size(x_, rate_, table_[0], h, tolerance_);
     double largest = 0;
     for (std::size_t i = 0; i < x_.size(); ++i) {
-      const double error = std::abs(table_[0][i] - table_[1][i]) / (tolerance_ * (1 + std::abs(x_[i])));
+      const double error = std::abs(table_[0][i] - table_[1][i]) / (tolerance_ * size[i]);
       if (!(error <= largest)) largest = error;
     }
     return largest;

@@ -71,6 +71,10 @@ class GaussIntegrator : public PlainIntegrator {
     }
     return 0;
   }
+  double resolved_decay(double error) const override {
+    const Solver& solver = stepper_.solver();
+    return pendula::resolved_decay(solver.dissipates() ? Family::radau : Family::gauss, solver.stages(), error);
+  }
   void push([[maybe_unused]] double* tangents, [[maybe_unused]] int count) override {
     if constexpr (LinearizingSolver<Solver>) stepper_.linearization().push(tangents, count);
   }

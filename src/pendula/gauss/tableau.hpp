@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <stdexcept>
@@ -43,6 +44,15 @@ struct Tableau {
 
   int stages() const { return static_cast<int>(c.size()); }
 };
+
+/// The largest z up to which a step makes e^(−z) of what decays, but for `error` of z: the stability function is the
+/// Padé approximant of e^(−z) by degrees k = s (Radau: s − 1) over s, off by k! s!/((k+s)! (k+s+1)!) z^(k+s+1).
+inline double resolved_decay(Family family, int stages, double error) {
+  const int above = family == Family::gauss ? stages : stages - 1;
+  const double constant = std::tgamma(above + 1) * std::tgamma(stages + 1) /
+                          (std::tgamma(above + stages + 1) * std::tgamma(above + stages + 2));
+  return std::pow(error / constant, 1.0 / (above + stages));
+}
 
 namespace detail {
 

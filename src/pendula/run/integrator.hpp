@@ -98,6 +98,10 @@ class Integrator {
     throw std::invalid_argument("tangents: expected method = gauss or radau in momentum form, other steps have none");
   }
 
+  /// The largest z for which a step makes e^(−z) of a tangent that decays, but for `error` of z, once `linearize` has
+  /// asked for derivatives.
+  double resolved_decay(double error) const { return integrator_->resolved_decay(error); }
+
   /// Replaces tangents at the start of the last step, (rows x any), by those at its end: by the exact derivative of the
   /// step. Coordinates are the integrator's own: of a chain those of chain_tangent.hpp, of a generated kernel (δq, δp).
   void push(Directions<>& tangents) { integrator_->push(tangents.data(), static_cast<int>(tangents.cols())); }

@@ -307,8 +307,8 @@ LyapunovSpectrum find_lyapunov_spectrum(Integrator& integrator, const Motion& st
   if (scale) tangents.begin(integrator, *scale);
   Schedule schedule;
   // Steps that follow the motion are as long as they like where that has come to rest; tangents have not.
-  static constexpr double resolved = 2;
-  schedule.step = scale ? std::min(step, std::isinf(step) ? resolved / scale->rate : step) : step;
+  if (scale && std::isinf(step)) step = std::min(2.0, integrator.resolved_decay(1e-6)) / scale->rate;
+  schedule.step = step;
   schedule.duration = duration;
   schedule.every = std::numeric_limits<std::int64_t>::max();
   double before = start.time;

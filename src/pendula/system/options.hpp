@@ -61,7 +61,8 @@ struct RunOptions {
   Iteration iteration = Iteration::automatic;  ///< gauss
   double step = 1e-3;       ///< gauss, radau, rk4  [s]; 0, of gauss and radau: of their own choice, by tolerance
   double tolerance = 1e-9;  ///< gauss, radau: of the motion, relative to its size, but for what chaos makes of it;
-                            ///< explicit adaptive ones: error a step, relative and absolute
+                            ///< explicit adaptive ones: error a step, relative to coordinates and
+                            ///< rates, at least to 1 or all the motion
 };
 
 /// Whether steps follow from the tolerance.

@@ -44,6 +44,10 @@ class PlainIntegrator {
   /// (δq, δp).
   virtual int linearize() { return 0; }
 
+  /// The largest z for which a step makes e^(−z) of a tangent that decays, but for `error` of z; of methods that have a
+  /// derivative.
+  virtual double resolved_decay(double /*error*/) const { return 0; }
+
   /// Replaces tangents at the start of the last step, (rows x count) row by row, by those at its end, once `linearize`
   /// has asked for that.
   virtual void push(double* /*tangents*/, int /*count*/) {}
