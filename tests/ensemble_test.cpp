@@ -356,7 +356,7 @@ TEST(RunsOfLoadedChains, ChooseTheQuickestMethodThatWorks) {
   EXPECT_EQ(found[1].last.q, asked[1].last.q);
 }
 
-// θ'' = sin ωt. fehlberg78, which others go by, would not see it.
+// θ'' = sin ωt. The error estimate of fehlberg78 does not see it.
 TEST(RunsOfLoadedChains, SeeForcesThatDependOnTimeAlone) {
   ChainParameters<Planar> parameters;
   parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(1);

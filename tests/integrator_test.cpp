@@ -116,7 +116,7 @@ TEST(ExplicitMethods, ExtrapolationTakesFewStepsWhateverTheTolerance) {
     const auto integrator = make_integrator(chain, options);
     ASSERT_TRUE(integrator->start(swinging(2)));
     while (integrator->time() < 4) ASSERT_TRUE(integrator->step(4 - integrator->time()));
-    EXPECT_LT(integrator->statistics().steps, 60) << tolerance;            // measured 16 to 33
+    EXPECT_LT(integrator->statistics().steps, 60) << tolerance;  // measured 16 to 33
     // It scatters: measured 108 for 1e-7, in the median of many tolerances 18, of which the largest is 108, too.
     EXPECT_LT(distance(integrator->state(), reference), 300 * tolerance);
   }
@@ -176,6 +176,25 @@ TEST(ExplicitMethods, FollowSmallSwings) {
     const auto [other, as_many] = swung(method, 1e-3);
     EXPECT_NEAR(static_cast<double>(steps), static_cast<double>(as_many), 0.1 * static_cast<double>(as_many)) << method;
     EXPECT_LE(swung(method, 0).second, as_many) << method;
+  }
+}
+
+// The estimate of Fehlberg's pair does not see what depends on time alone: steps of half a minute came of this drive.
+TEST(ExplicitMethods, FollowDrives) {
+  for (const double frequency : {1.0, 10.0, 300.0}) {
+    ChainParameters<Planar> parameters;
+    parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(1);
+    parameters.gravity = 0;
+    parameters.drives = {{.link = 0, .amplitude = Torque<Planar, 1>::Constant(1), .frequency = frequency, .phase = 0}};
+    const double theta = (10 - std::sin(10 * frequency) / frequency) / frequency;
+    for (const Method method : {Method::dopri5, Method::fehlberg78, Method::bulirsch_stoer}) {
+      RunOptions options;
+      options.method = method;
+      const State<Planar> start = State<Planar>::from_angles(Eigen::VectorXd::Zero(1));
+      const double any = std::numeric_limits<double>::infinity();
+      const State<Planar> end = final_state(Chain<Planar>(parameters), start, options, any, 10);
+      EXPECT_NEAR(end.q[0], theta, 1e-6 * theta) << method << ", " << frequency;
+    }
   }
 }
 

@@ -92,12 +92,6 @@ def test_natural_units_tell_their_scale(example):
     assert summary["natural_units"] == pytest.approx(units, rel=1e-15)  # measured 0
 
 
-def test_a_blind_error_estimate_is_told(pendula):
-    file = FOLDER / "driven_damped.toml"
-    run = pendula("simulate", file, "--set", "run.method=fehlberg78", "--json")
-    assert "fehlberg78 does not see forces that depend on time" in run.json["warnings"][0]
-
-
 def test_loads_change_the_energy(example):
     for name in ("driven_damped", "spatial_chain"):
         summary, _ = example(name)

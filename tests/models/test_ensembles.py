@@ -41,13 +41,24 @@ def test_members_in_lanes_end_where_others_do(name, moved):
     text = SCENARIOS[name]
     alone = moved(text)
     lanes = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
-    method = "dopri5" if "drive" in text else "fehlberg78"  # which does not see forces that depend on time
-    asked = moved(text, f'--set=run.method="{method}"', "--set=run.tolerance=1e-9")
+    asked = moved(text, '--set=run.method="fehlberg78"', "--set=run.tolerance=1e-9")
     assert not (alone["steps"] == lanes["steps"]).all()  # so they went by another method
     for key in alone.keys() - {"steps"}:
         if (name, key) != ("furuta", "energy_error"):  # a drive's, as seen at other times
             assert np.abs(lanes[key] - alone[key]).max() < 2e-4, key
         assert (lanes[key] == asked[key]).all(), key
+
+
+def test_long_runs_of_models_stay_in_lanes(moved):
+    """As long as they keep the energy: more than 2000 steps."""
+    text = SCENARIOS["atwood"].replace("mu = 2.5", "mu = 3.0").replace("duration = 2.0", "duration = 200.0")
+    text = text[: text.rindex("\n[[ensemble.axis]]")].replace("to = 2.5", "to = 1.5")  # regular ones
+    alone = moved(text)
+    lanes = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
+    assert (lanes["steps"] > 2000).all()  # measured 4090 at least
+    assert not (alone["steps"] == lanes["steps"]).any()
+    assert lanes["energy_error"].max() < 1e-7  # measured 5.6e-8
+    assert np.abs(lanes["theta"] - alone["theta"]).max() < 1e-3  # measured 1.9e-5
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

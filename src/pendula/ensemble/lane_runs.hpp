@@ -193,6 +193,7 @@ class LaneRuns : private LaneWatch {
       wants_steps_ |= !setup->events.empty() || is_tried(*setup);
     }
     steps_.resize(setups.size());
+    takes_too_long_.resize(setups.size());
   }
 
   /// What came of each. One that lanes could not move, by steps of their own or at all, is run alone from its start.
@@ -245,8 +246,14 @@ class LaneRuns : private LaneWatch {
   }
   bool is_good(std::size_t k, const RunReport& report) const {
     const RunSetup& setup = *setups_[k];
-    return steps_[k] < most_steps &&
-           (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
+    return !takes_too_long_[k] && (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
+  }
+  // By how far it has come.
+  bool takes_too_long(std::size_t k, double time) const {
+    const RunSetup& setup = *setups_[k];
+    const int most = setup.subject->loaded() ? most_unchecked_steps : most_steps;
+    const double share = (time - setup.start.time) / setup.duration;
+    return steps_[k] >= most || (steps_[k] == tried_steps && tried_steps > 2 * share * most);
   }
 
   // --- While they are moved ---
@@ -318,7 +325,11 @@ class LaneRuns : private LaneWatch {
     for (int lane = 0; lane < steps.lanes(); ++lane) {
       if (!steps.took_step(lane)) continue;
       const std::size_t k = steps.member(lane);
-      if (++steps_[k] >= most_steps && is_tried(*setups_[k])) steps.finish(lane);
+      ++steps_[k];
+      if (is_tried(*setups_[k]) && takes_too_long(k, steps.end(lane))) {
+        takes_too_long_[k] = true;
+        steps.finish(lane);
+      }
       look_into(steps, lane);
     }
   }
@@ -344,10 +355,13 @@ class LaneRuns : private LaneWatch {
   Members members_;
   std::vector<RunReport> reports_;
   std::vector<Alone> alone_;  // of each lane
-  static constexpr int most_steps = 2000;
+  // Of a method that was not asked for: where it is over soon, or where the energy tells what many steps have lost; and
+  // after how many that is looked at for the first time.
+  static constexpr int most_unchecked_steps = 2000, most_steps = 20000, tried_steps = 200;
 
   bool wants_steps_ = false, stopped_ = false;
   std::vector<std::int64_t> steps_;  // that each member has taken
+  std::vector<bool> takes_too_long_;
 };
 
 }  // namespace pendula

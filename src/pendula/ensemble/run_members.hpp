@@ -53,11 +53,6 @@ inline double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
 }
 
-// The estimate of fehlberg78 is blind where forces depend on time.
-inline Method quickest_method(const Subject& subject) {
-  return subject.driven() ? Method::dopri5 : Method::fehlberg78;
-}
-
 }  // namespace detail
 
 /// The options of a run, or those of an explicit method where lanes come to the same errors sooner by that: a Gauss run
@@ -69,7 +64,7 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   const bool fits =
       options.method == Method::gauss && options.step == 0 && options.tolerance >= 1e-9 && setup.events.empty();
   if (!fits) return options;
-  options.method = detail::quickest_method(*setup.subject);
+  options.method = Method::fehlberg78;
   options.tolerance *= 0.01;
   const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
   const bool is_short = lane_kind(setup) && detail::run_length(setup) <= detail::short_run;
@@ -81,7 +76,7 @@ inline RunOptions quickest_in_lanes(const RunSetup& setup) {
 inline RunOptions quickest_with_tangents(const RunSetup& setup) {
   RunOptions options = setup.options;
   if (options.method != Method::gauss || options.step != 0) return options;
-  options.method = detail::quickest_method(*setup.subject);
+  options.method = Method::fehlberg78;
   const double length = detail::run_length(setup);
   const double longer = std::isfinite(length) ? std::max(1.0, length / detail::short_run) : 1;
   options.tolerance = std::max(1e-13, 0.01 * options.tolerance / longer);

@@ -331,14 +331,15 @@ class ErrorChecker {
   const Vector& end_;
 };
 
-/// An embedded pair with odeint's step control, as good as a quadrature.
-template <class Stepper, class Gauss>
+/// An embedded pair with odeint's step control, as good as a quadrature. Pairs of which one part differs from the other
+/// by slopes at the ends alone are blind to what depends on time.
+template <class Stepper, class Gauss, bool is_blind = false>
 class PairIntegrator : public AdaptiveIntegrator {
  public:
   PairIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                  double tolerance)
       : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
-                           ForcedSteps(Gauss(), static_cast<std::size_t>(coordinates), tolerance)),
+                           ForcedSteps(Gauss(), static_cast<std::size_t>(coordinates), tolerance, is_blind)),
         stepper_(ErrorChecker(tolerance, next_)) {}
 
  private:
@@ -490,7 +491,7 @@ std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<Forwar
                                                           int parts, const RunOptions& options,
                                                           std::string_view kernel) {
   using Dopri5 = PairIntegrator<odeint::runge_kutta_dopri5<Vector>, kernels::GaussTableau<3>>;
-  using Fehlberg78 = PairIntegrator<odeint::runge_kutta_fehlberg78<Vector>, kernels::GaussTableau<4>>;
+  using Fehlberg78 = PairIntegrator<odeint::runge_kutta_fehlberg78<Vector>, kernels::GaussTableau<4>, true>;
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
     throw std::invalid_argument("tolerance: expected a positive number, got " + std::to_string(options.tolerance));
   }

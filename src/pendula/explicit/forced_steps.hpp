@@ -15,10 +15,11 @@ namespace pendula {
 /// How long the steps of an explicit method may be for its stages to see what depends on time.
 class ForcedSteps {
  public:
-  /// For a method that is as good as the quadrature `Gauss`, a kernels::GaussTableau.
+  /// For a method that is as good as the quadrature `Gauss`, a kernels::GaussTableau; `is_blind` where its estimate of
+  /// errors does not see what depends on time alone.
   template <class Gauss>
-  ForcedSteps(Gauss, std::size_t coordinates, double tolerance)
-      : nodes_(Gauss::stages),
+  ForcedSteps(Gauss, std::size_t coordinates, double tolerance, bool is_blind = false)
+      : turn_(is_blind ? followed_turn(Gauss::stages, tolerance) : Gauss::stages),
         tolerance_(tolerance),
         look_(Gauss::c, Gauss::b, coordinates),
         moved_(coordinates),
@@ -33,7 +34,7 @@ class ForcedSteps {
   /// The longest step up to h from q and v. Drives turn by a radian a node at most: one that is weak and turns often
   /// within a step shows in no stage what it does.
   double followed(ForwardDynamics& dynamics, double time, const double* q, const double* v, double h) {
-    h = std::min(h, nodes_ / dynamics.fastest_drive());
+    h = std::min(h, turn_ / dynamics.fastest_drive());
     if (!dynamics.depends_on_time()) return h;
     for (std::size_t k = 0; k < a_.size(); ++k) sizes_[k] = std::max(1.0, std::abs(q[k]));
     const std::span<const double> rates(v, a_.size());
@@ -65,7 +66,7 @@ class ForcedSteps {
     return squared > 0 ? std::sqrt(squared) : 1;
   }
 
-  int nodes_;
+  double turn_;  // of drives in a step, at most  [rad]
   double tolerance_, pace_ = 1;
   ForcingLook look_;
   std::vector<double> moved_, a_, sizes_;

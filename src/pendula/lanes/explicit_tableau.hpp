@@ -7,7 +7,7 @@ namespace pendula {
 
 // Explicit Runge–Kutta methods: stage i is at y + h Σ_j a_ij k_j, the end at y + h Σ_i b_i k_i, and what the step errs
 // by is h Σ_i e_i k_i, the last of them being the slopes at the end. A method without `error_order` has no such
-// estimate.
+// estimate; that of one that is blind compares slopes at the ends alone, and does not see what depends on time.
 
 /// The classical method.
 struct ClassicalRungeKutta {
@@ -34,6 +34,7 @@ constexpr double node_of(const double (&weights)[Count]) {
 struct DormandPrince5 {
   static constexpr std::size_t stages = 6;
   static constexpr int error_order = 4;
+  static constexpr bool is_blind = false;
   static constexpr double a[stages][stages] = {
       {},
       {1.0 / 5},
@@ -50,6 +51,7 @@ struct DormandPrince5 {
 struct Fehlberg8 {
   static constexpr std::size_t stages = 13;
   static constexpr int error_order = 7;
+  static constexpr bool is_blind = true;
   static constexpr double a[stages][stages] = {
       {},
       {2.0 / 27},

@@ -14,14 +14,16 @@ class LaneErrorController {
   using Mask = typename L::Mask;
 
   explicit LaneErrorController(double tolerance)
-      : log_tolerance_(std::log(tolerance)), first_(0.5 * std::min(1.0, std::exp(log_tolerance_ * exponent))) {}
+      : tolerance_(tolerance),
+        log_tolerance_(std::log(tolerance)),
+        first_(0.5 * std::min(1.0, std::exp(log_tolerance_ * exponent))) {}
 
   /// Members that start.
   template <class Stepper>
   void start(const Mask& which, Stepper& stepper) {
     const L pace = sqrt(stepper.pace_squared());
     next_ = select(which, L(first_) / select(pace > L(0.0), pace, L(1.0)), next_);
-    longest_ = select(which, stepper.longest_step(), longest_);
+    longest_ = select(which, stepper.longest_step(tolerance_), longest_);
   }
 
   /// Of the next step, unless the run ends before.
@@ -51,7 +53,7 @@ class LaneErrorController {
   static constexpr double exponent = 1.0 / (Order + 1);
   static constexpr double cautious = 0.9, least = 0.2, most_growth = 5, tiny = 1e-300;
 
-  double log_tolerance_, first_;
+  double tolerance_, log_tolerance_, first_;
   L next_{1.0}, grown_{1.0}, longest_{1.0};
 };
 

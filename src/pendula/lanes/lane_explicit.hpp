@@ -5,6 +5,7 @@
 #include <pendula/lanes/explicit_tableau.hpp>
 #include <pendula/lanes/lane_error_controller.hpp>
 #include <pendula/lanes/lane_rods.hpp>
+#include <pendula/system/forcing_look.hpp>
 #include <utility>
 #include <vector>
 
@@ -110,7 +111,13 @@ class LaneExplicit {
   L pace_squared() const { return dynamics_.pace_squared(parts_); }
 
   /// In which stages see what drives turn: one that is weak and turns often within a step shows in none what it does.
-  L longest_step() const { return dynamics_.template longest_step<nodes>(); }
+  L longest_step(double tolerance) const {
+    double turn = nodes;
+    if constexpr (can_choose) {
+      if (Method::is_blind) turn = followed_turn(nodes, tolerance);
+    }
+    return dynamics_.template longest_step<nodes>(turn);
+  }
 
   /// Tries a step of `h` from `time`; gives those of the members that are `wanted` to whom nothing happened that is not
   /// finite, and who turn by less than half a turn. The state stays what it was.

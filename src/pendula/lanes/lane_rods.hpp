@@ -44,10 +44,11 @@ class LaneRods {
   }
   int parts() const { return links(); }
 
-  /// The longest step that a quadrature of so many nodes follows drives in.
+  /// The longest step in which drives turn by no more than `turn`  [rad], for a method that is as good as a quadrature
+  /// of so many nodes.
   template <int nodes>
-  L longest_step() const {
-    return L(double(nodes)) / loads_.fastest_drive();
+  L longest_step(double turn) const {
+    return L(turn) / loads_.fastest_drive();
   }
 
   /// body(0), body(1), … of all links, written out where they are few and their number is known.

@@ -138,13 +138,13 @@ class LaneSystem {
 
   void restore(Parts& /*parts*/) const {}
 
-  /// The longest step that a quadrature of so many nodes follows drives in, and in which unseen_forcing_squared looks
-  /// as closely as ForcingLook does.
+  /// The longest step in which drives turn by no more than `turn`  [rad], and in which unseen_forcing_squared looks as
+  /// closely as ForcingLook does, for a method that is as good as a quadrature of so many nodes.
   template <int nodes>
-  L longest_step() const {
+  L longest_step(double turn) const {
     alignas(pack_alignment) double fastest[L::width];
     dynamics_.fastest_drives(fastest);
-    const L longest = L(double(nodes)) / L::load(fastest);
+    const L longest = L(turn) / L::load(fastest);
     if (!depends_on_time()) return longest;
     const double looks = ForcingLook::least_parts * nodes / ForcingLook::looks;
     return min(longest, L(looks) / natural_pace());

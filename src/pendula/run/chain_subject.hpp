@@ -30,12 +30,10 @@ class ChainSubject : public Subject {
   std::optional<double> energy_scale() const override { return pendula::energy_scale(chain_); }
   bool loaded() const override { return chain_.loaded(); }
   bool damped() const override { return chain_.damped(); }
-  bool driven() const override { return chain_.driven(); }
 
   /// Damping so strong that a Gauss step does not follow it: Gauss methods are A-stable, but do not damp what they do
   /// not resolve. The rate is that of a link alone, λ/l² (1/m_i + 1/m_{i−1}).
   std::vector<std::string> expected_trouble(const RunOptions& options) const override {
-    if (options.method == Method::fehlberg78 && driven()) return {std::string(fehlberg_is_blind)};
     if (options.method != Method::gauss) return {};
     static constexpr double followed = 5;  // of one step, where e^{-x} is 0.7 %
     for (int i = 0; i < chain_.links(); ++i) {

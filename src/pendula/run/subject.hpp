@@ -14,12 +14,6 @@
 
 namespace pendula {
 
-/// What fehlberg78 does not know of forces that depend on time: its two solutions have the same nodes at both ends of
-/// the step, so that they do not differ in what is a function of time alone.
-inline constexpr std::string_view fehlberg_is_blind =
-    "the error estimate of fehlberg78 does not see forces that depend on time alone: its steps may be far too long; "
-    "gauss, dopri5 and bulirsch-stoer see them";
-
 /// What one state shows.
 struct Observation {
   Eigen::VectorXd points;  ///< components of all points, one after the other  [m]
@@ -47,8 +41,6 @@ class Subject {
   /// Whether energy may come from outside or go there, and whether it may go by damping.
   virtual bool loaded() const = 0;
   virtual bool damped() const = 0;
-  /// Whether forces depend on time.
-  virtual bool driven() const = 0;
 
   /// Why a run with these options would be wrong, known beforehand: one sentence each.
   virtual std::vector<std::string> expected_trouble(const RunOptions& options) const = 0;

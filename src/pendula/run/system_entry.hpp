@@ -44,11 +44,6 @@ bool system_is_loaded(const PlainSystem& plain) {
 }
 
 template <System S>
-bool system_is_driven(const PlainSystem& plain) {
-  return SystemModel<S>(plain).driven();
-}
-
-template <System S>
 std::unique_ptr<PlainIntegrator> make_system(const PlainSystem& plain, const RunOptions& options) {
   return make_system_integrator<S>(plain, options);
 }
@@ -70,7 +65,6 @@ constexpr SystemEntry system_entry() {
           &detail::observe_system<S>,
           &detail::system_rates<S>,
           &detail::system_is_loaded<S>,
-          &detail::system_is_driven<S>,
           &lane_kernel<S>};
 }
 

@@ -68,11 +68,7 @@ class SystemSubject : public Subject {
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return entry_->loaded(numbers_.plain()); }
   bool damped() const override { return loaded(); }
-  bool driven() const override { return entry_->driven(numbers_.plain()); }
-  std::vector<std::string> expected_trouble(const RunOptions& options) const override {
-    if (options.method == Method::fehlberg78 && driven()) return {std::string(fehlberg_is_blind)};
-    return {};
-  }
+  std::vector<std::string> expected_trouble(const RunOptions& /*options*/) const override { return {}; }
   bool has_poles() const override { return false; }
 
   /// `t`, coordinates, their rates, components of the points, `energy`.

@@ -9,6 +9,14 @@
 
 namespace pendula {
 
+/// How far a sine may turn in a step for the Gauss quadrature of so many nodes to sum it up to a tolerance, but no more
+/// than a radian a node  [rad]. Its error is n!⁴/((2n + 1) (2n)!³) of the 2n-th power of the turn.
+inline double followed_turn(int nodes, double tolerance) {
+  const double n = std::tgamma(nodes + 1), m = std::tgamma(2 * nodes + 1);
+  const double constant = n * n * n * n / ((2 * nodes + 1) * m * m * m);
+  return std::min(static_cast<double>(nodes), std::pow(tolerance / constant, 0.5 / nodes));
+}
+
 /// How far a step may go so that its nodes see what forces do that depend on time: a pulse between them, or what turns
 /// many times in the step, no error estimate shows.
 ///

@@ -62,8 +62,6 @@ struct SystemEntry {
   void (*rates)(const PlainSystem&, double time, const double* q, const double* p, double* v);
   /// Whether energy may come from outside, or go there.
   bool (*loaded)(const PlainSystem&);
-  /// Whether anything depends on time.
-  bool (*driven)(const PlainSystem&);
   MakeLaneDynamics* lanes;
 };
 
