@@ -38,9 +38,8 @@ class ForcedSteps {
     if (!dynamics.depends_on_time()) return h;
     for (std::size_t k = 0; k < a_.size(); ++k) sizes_[k] = std::max(1.0, std::abs(q[k]));
     const std::span<const double> rates(v, a_.size());
-    return look_.resolved(time, h, pace_, tolerance_, rates, sizes_, [&](double at) -> const std::vector<double>& {
-      dynamics.acceleration(at, q, v, a_.data());
-      return a_;
+    return look_.resolved(time, h, pace_, tolerance_, rates, sizes_, [&](std::span<const double> times, double* found) {
+      dynamics.accelerations(times.data(), times.size(), q, v, found);
     });
   }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 namespace pendula {
 
 /// Accelerations, as explicit methods need them. Nothing of Eigen, because it crosses between a program and
@@ -18,6 +20,9 @@ class ForwardDynamics {
   virtual double fastest_drive() const { return 0; }
   /// Whether it depends on time in other ways.
   virtual bool depends_on_time() const { return false; }
+  /// Then, of one state at each of `count` times, (count, dof·n).
+  virtual void accelerations(const double* /*times*/, std::size_t /*count*/, const double* /*q*/, const double* /*v*/,
+                             double* /*found*/) {}
 };
 
 }  // namespace pendula

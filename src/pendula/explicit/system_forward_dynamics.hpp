@@ -1,8 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/system/accelerations_in_time.hpp>
 #include <pendula/system/system_model.hpp>
+#include <span>
 
 namespace pendula {
 
@@ -24,6 +27,12 @@ class SystemForwardDynamics : public ForwardDynamics {
 
   double fastest_drive() const override { return model_.fastest_drive(); }
   bool depends_on_time() const override { return holds_time<S>; }
+  void accelerations(const double* times, std::size_t count, const double* q, const double* v, double* found) override {
+    if constexpr (holds_time<S>) {
+      accelerations_in_time(model_, std::span(times, count), Eigen::Map<const Vector>(q), Eigen::Map<const Vector>(v),
+                            found);
+    }
+  }
 
  private:
   SystemModel<S> model_;

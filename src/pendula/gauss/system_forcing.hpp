@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <pendula/gauss/tableau.hpp>
+#include <pendula/system/accelerations_in_time.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <pendula/system/system_model.hpp>
+#include <span>
 
 namespace pendula {
 
@@ -22,11 +24,10 @@ class SystemForcing {
     h = std::min(h, stages_ / model.fastest_drive());
     if constexpr (holds_time<S>) {
       const auto [state, pace] = look();
-      return look_.resolved(state.time, h, pace, tolerance, state.v, sizes_of(state.q), [&](double time) {
-        typename S::template Vector<double> a;
-        S::acceleration(model.parameters(time), state.q, state.v, model.inputs(time), a);
-        return a;
-      });
+      return look_.resolved(state.time, h, pace, tolerance, state.v, sizes_of(state.q),
+                            [&](std::span<const double> times, double* found) {
+                              accelerations_in_time(model, times, state.q, state.v, found);
+                            });
     }
     return h;
   }

@@ -36,18 +36,18 @@ class ForcingLook {
 
   /// The longest of h, h/2, h/4 … from `time` on in which forces are seen to a tolerance, relative to rates v, to what
   /// forces make of them, and to what would round a coordinate by that goes `sizes` in the time in which the motion
-  /// changes, 1/pace; `acceleration(time)` is that of the state.
+  /// changes, 1/pace; accelerations(times, found) are those of the state, (times, coordinates).
   /// What lasts for less than a hundredth of that time, and of h/8, may be missed.
-  template <class Rates, class Sizes, class Acceleration>
+  template <class Rates, class Sizes, class Accelerations>
   double resolved(double time, double h, double pace, double tolerance, const Rates& v, const Sizes& sizes,
-                  Acceleration&& acceleration) {
+                  Accelerations&& accelerations) {
     h = std::min(h, most_parts * static_cast<double>(nodes_.size()) / (looks * pace));
     const double least = smallest * std::max(std::abs(time), h);
     for (std::size_t k = 0; k < speeds_.size(); ++k) {
       least_speeds_[k] = rounding * pace * at(sizes, k);
       speeds_[k] = std::max(std::abs(at(v, k)), least_speeds_[k]);
     }
-    while (h > least && !is_seen(time, h, pace, tolerance, acceleration)) h /= 2;
+    while (h > least && !is_seen(time, h, pace, tolerance, accelerations)) h /= 2;
     return h;
   }
 
@@ -82,13 +82,13 @@ class ForcingLook {
     return numbers.data()[k];
   }
 
-  template <class Acceleration>
-  bool is_seen(double time, double h, double pace, double tolerance, Acceleration& acceleration) {
-    sum(time, h, 1, acceleration, coarse_);
+  template <class Accelerations>
+  bool is_seen(double time, double h, double pace, double tolerance, Accelerations& accelerations) {
+    sum(time, h, 1, accelerations, coarse_);
     const double share = share_of(h * pace);
     const double parts = std::ceil(
         std::clamp(looks * h * pace / static_cast<double>(nodes_.size()), double(least_parts), double(most_parts)));
-    sum(time, h, static_cast<int>(parts), acceleration, fine_);
+    sum(time, h, static_cast<int>(parts), accelerations, fine_);
     for (std::size_t k = 0; k < fine_.push.size(); ++k) {
       const double size = std::max({speeds_[k], fine_.size[k], negligible});
       const double of_times = (std::abs(time) + h) * fine_.change[k];
@@ -98,19 +98,25 @@ class ForcingLook {
     return true;
   }
 
-  template <class Acceleration>
-  void sum(double time, double h, int parts, Acceleration& acceleration, Sums& sums) const {
-    sums.clear();
+  template <class Accelerations>
+  void sum(double time, double h, int parts, Accelerations& accelerations, Sums& sums) {
     const double part = h / parts;
+    times_.clear();
     for (int p = 0; p < parts; ++p) {
-      for (std::size_t i = 0; i < nodes_.size(); ++i) {
-        const auto& a = acceleration(time + (p + nodes_[i]) * part);
-        for (std::size_t k = 0; k < sums.push.size(); ++k) {
-          sums.push[k] += weights_[i] * part * at(a, k);
-          sums.size[k] += weights_[i] * part * std::abs(at(a, k));
-          if (p > 0 || i > 0) sums.change[k] += std::abs(at(a, k) - sums.last[k]);
-          sums.last[k] = at(a, k);
-        }
+      for (const double node : nodes_) times_.push_back(time + (p + node) * part);
+    }
+    const std::size_t count = sums.push.size();
+    found_.resize(times_.size() * count);
+    accelerations(std::span<const double>(times_), found_.data());
+    sums.clear();
+    for (std::size_t i = 0; i < times_.size(); ++i) {
+      const double weight = weights_[i % weights_.size()] * part;
+      for (std::size_t k = 0; k < count; ++k) {
+        const double a = found_[i * count + k];
+        sums.push[k] += weight * a;
+        sums.size[k] += weight * std::abs(a);
+        if (i > 0) sums.change[k] += std::abs(a - sums.last[k]);
+        sums.last[k] = a;
       }
     }
   }
@@ -122,6 +128,7 @@ class ForcingLook {
   std::vector<double> nodes_, weights_;
   Sums coarse_, fine_;
   std::vector<double> speeds_, least_speeds_;  // that errors are compared with, at least
+  std::vector<double> times_, found_;
 };
 
 }  // namespace pendula
