@@ -238,9 +238,11 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   }
 
   Outcome step(double h) override {
-    const bool cut = proposed_ > h;  // a step that is cut short says nothing about the size of the next one
-    double tried = proposed_ == 0 ? std::min(h, first_step) : std::min(h, proposed_);
-    tried = forcing_.followed(dynamics(), time(), x_.data(), x_.data() + x_.size() / 2, tried);
+    // As if nothing cut it, so that a run that goes on takes the steps of one that was not cut.
+    const double longest = forcing_.followed(dynamics(), time(), x_.data(), x_.data() + x_.size() / 2,
+                                             proposed_ == 0 ? first_step : proposed_);
+    const bool cut = longest > h;  // a step that is cut short says nothing about the size of the next one
+    double tried = std::min(h, longest);
     for (int attempt = 0; attempt < max_attempts && tried > smallest_step(); ++attempt) {
       const double size = tried;
       const bool accepted = try_step(tried);

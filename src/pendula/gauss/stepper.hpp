@@ -180,7 +180,8 @@ class GaussStepper {
   /// One step of the controller's choice. One that errs too much is taken again, shorter, from what it has found.
   Outcome chosen_step(double most) {
     const StepController before = controller_;
-    const double longest = solver_.followed(time(), std::min(controller_.step(), most), options_.tolerance);
+    // Looked at as if nothing cut it, so that a run that goes on takes the steps of one that was not cut.
+    const double longest = solver_.followed(time(), controller_.step(), options_.tolerance);
     int shorter = fixed_point_worth;
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
