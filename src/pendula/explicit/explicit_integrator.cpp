@@ -302,7 +302,7 @@ class ErrorSize {
     return largest;
   }
 
-  static constexpr double rounded = 1e-14, nothing = 1e-30;
+  static constexpr double rounded = 1e-14, nothing = 1e-16;
 
   const Vector& x_;
   std::size_t half_;

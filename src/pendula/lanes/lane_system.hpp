@@ -173,7 +173,7 @@ class LaneSystem {
       const L missed = off / (size * share);
       largest = max(largest, missed * missed);
     }
-    return largest;
+    return select(abs(h) * natural_pace() > L(ForcingLook::finest), largest, L(0.0));
   }
 
   /// Σ (δq/size)² + (δq̇/(size ω))², size being 1 of angles, and of others the largest coordinate of the same unit where

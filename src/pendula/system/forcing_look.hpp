@@ -42,7 +42,7 @@ class ForcingLook {
   double resolved(double time, double h, double pace, double tolerance, const Rates& v, const Sizes& sizes,
                   Accelerations&& accelerations) {
     h = std::min(h, most_parts * static_cast<double>(nodes_.size()) / (looks * pace));
-    const double least = smallest * std::max(std::abs(time), h);
+    const double least = std::max(smallest * std::max(std::abs(time), h), finest / pace);
     for (std::size_t k = 0; k < speeds_.size(); ++k) {
       least_speeds_[k] = rounding * pace * at(sizes, k);
       speeds_[k] = std::max(std::abs(at(v, k)), least_speeds_[k]);
@@ -58,7 +58,10 @@ class ForcingLook {
     return min(max(moved, Number(shortest)), Number(1.0));
   }
 
-  static constexpr double looks = 100;       ///< in the time in which motion changes
+  static constexpr double looks = 100;  ///< in the time in which motion changes
+  /// In that time: shorter steps than this are left to the error of the step. What does not look smooth then jumps, or
+  /// is nothing but differences of large numbers, as 1 + tanh(t) is long before 0.
+  static constexpr double finest = 1e-3;
   static constexpr int least_parts = 8;      ///< of a step
   static constexpr double invisible = 1e-3;  ///< of a rounding error: what forces are rounded by themselves
   static constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();  ///< of sums, and of times
