@@ -50,11 +50,22 @@ std::vector<double> zeros_of(Sight& sight, int sign_before = 0, int degree = 8) 
   return zeros;
 }
 
-TEST(SignSearch, LooksAtThreePlacesOfWhatIsFarFromZero) {
+TEST(SignSearch, LooksAtFourPlacesOfWhatIsFarFromZero) {
   Sight sight{[](double u) { return 3 + std::sin(u); }};
   EXPECT_TRUE(zeros_of(sight).empty());
-  EXPECT_EQ(sight.glances, 3);
+  EXPECT_EQ(sight.glances, 4);
   EXPECT_EQ(sight.looks, 0);
+}
+
+// Five Chebyshev points see nothing of some that turn by 35 radians or more: there they are nearly the same.
+TEST(SignSearch, IsNotTakenInByWhatTurnsOften) {
+  for (double frequency = 30; frequency < 70; frequency += 0.1) {
+    for (double phase = 0.05; phase < 3.1; phase += 0.1) {
+      Sight sight{[=](double u) { return std::sin(frequency * u + phase); }};
+      const double turned = std::floor((frequency + phase) / std::numbers::pi);
+      ASSERT_EQ(changes_of(sight).size(), static_cast<std::size_t>(turned)) << frequency << " " << phase;
+    }
+  }
 }
 
 TEST(SignSearch, FindsOneZeroByFewLooks) {
@@ -63,7 +74,7 @@ TEST(SignSearch, FindsOneZeroByFewLooks) {
   const std::vector<double> zeros = zeros_of(sight, 0, 6);
   ASSERT_EQ(zeros.size(), 1U);
   EXPECT_NEAR(zeros[0], std::log(1.7), 4e-16);  // measured 0
-  EXPECT_EQ(sight.glances, 9);
+  EXPECT_EQ(sight.glances, 10);
   EXPECT_LE(sight.looks, 3);  // measured 2
 }
 
@@ -428,6 +439,20 @@ TEST(Events, DoNotMoveTheMotion) {
         EXPECT_EQ(watched.rows[k].v, alone.rows[k].v);
       }
     }
+  }
+}
+
+TEST(Events, OfTimeAloneAreFoundWhereTheyTurnOftenInAStep) {
+  for (const double frequency : {35.0, 50.0, 60.0, 70.0}) {
+    RunSetup setup =
+        double_pendulum({{"turned", [=](const Motion& motion) { return std::sin(frequency * motion.time + 0.1); }}}, 5);
+    setup.start = State<Planar>::from_angles(Eigen::Vector2d(0.1, 0.1));
+    setup.options.step = 0.7;
+    Listener listener(setup);
+    pendula::Run run(setup);
+    run.add(listener);
+    const double turned = std::floor((frequency * 5 + 0.1) / std::numbers::pi);
+    EXPECT_EQ(run.go().events[0].count, static_cast<std::int64_t>(turned)) << frequency;
   }
 }
 

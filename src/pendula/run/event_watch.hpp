@@ -37,7 +37,7 @@ struct StepViews {
     double share = -1;
     Motion motion;
   };
-  std::array<View, 9> kept;
+  std::array<View, 10> kept;
   Motion passing;
 
   void forget() {

@@ -27,11 +27,12 @@ struct SignChange {
 
 /// Finds every change of sign of a function within a step, from what the step's polynomial shows of it.
 ///
-/// Five samples decide where the function is far from zero: they are Chebyshev points, and twice what the function was
-/// seen to vary by is less than what it is from zero. Else nine samples are interpolated, or halves where they do not
-/// tell the function. Bernstein coefficients, halved as long as needed, show pieces that are clear of zero or rise or
-/// fall all through, by more than interpolation and the polynomial may be off; what is neither, a zero that is nearly
-/// touched, is decided by states of full order, sampled and interpolated in the same way.
+/// Six samples decide where the function is far from zero: five are Chebyshev points, by which twice what the function
+/// was seen to vary by is less than what it is from zero, and a sixth is none, so that what turns often in a step is
+/// not taken for what it is at the others. Else nine samples are interpolated, or halves where they do not tell the
+/// function. Bernstein coefficients, halved as long as needed, show pieces that are clear of zero or rise or fall all
+/// through, by more than interpolation and the polynomial may be off; what is neither, a zero that is nearly touched,
+/// is decided by states of full order, sampled and interpolated in the same way.
 ///
 /// `Sight` has value(u), by the polynomial, and exact_value(u), at full order; u runs from 0 to 1.
 template <class Sight>
@@ -68,6 +69,8 @@ class SignSearch {
 
  private:
   static constexpr std::size_t points = BernsteinPolynomial::size;
+  /// The sixth place: what turns by less than 125 radians in a step is not the same there as at Chebyshev points.
+  static constexpr double unlike = 0.315;
   static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30;
   static constexpr double epsilon = std::numeric_limits<double>::epsilon();
   using Samples = BernsteinPolynomial::Numbers;
@@ -119,7 +122,7 @@ class SignSearch {
     values.front() = interval.first;
     values.back() = interval.last;
     for (const std::size_t k : {2U, 4U, 6U}) values[k] = sample(interval.at(sample_place(k)), by);
-    if (halvings == 0 && is_far_from_zero(values)) return node(interval.to, interval.sign);
+    if (halvings == 0 && is_far_from_zero(values, interval, by)) return node(interval.to, interval.sign);
     if (halvings == 0 && by == By::polynomial) take_ends(values);
     for (const std::size_t k : {1U, 3U, 5U, 7U}) values[k] = sample(interval.at(sample_place(k)), by);
     const auto finite = std::ranges::count_if(values, [](double value) { return std::isfinite(value); });
@@ -128,7 +131,8 @@ class SignSearch {
     const Samples sizes = chebyshev_sizes(values);
     double variation = 0;
     for (std::size_t k = 1; k < points; ++k) variation += sizes[k];
-    const double tail = 2 * (sizes[points - 2] + sizes[points - 1]);
+    const BernsteinPolynomial polynomial = BernsteinPolynomial::through(values);
+    const double tail = std::max(2 * (sizes[points - 2] + sizes[points - 1]), off_at_sixth(polynomial, interval, by));
     const double missed = by == By::polynomial ? 2 * missed_ : 0;
     if (sizes[0] > variation + tail + missed) return node(interval.to, interval.sign);
     const double largest = std::abs(*std::ranges::max_element(values, {}, [](double v) { return std::abs(v); }));
@@ -139,7 +143,7 @@ class SignSearch {
         by == By::polynomial ? missed + sizes[degree_] / std::pow(width, static_cast<double>(degree_)) : 0;
     // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
     const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
-    resolved(interval, BernsteinPolynomial::through(values), by,
+    resolved(interval, polynomial, by,
              {tail + noise + miss,
               steepest(tail + noise, points - 1) + width * steepest(miss, static_cast<double>(degree_ + 1))});
   }
@@ -153,9 +157,30 @@ class SignSearch {
     if (!std::isfinite(missed_)) missed_ = 0;
   }
 
-  static bool is_far_from_zero(const Samples& values) {
-    const std::array<double, 5> sizes = chebyshev_sizes<5>({values[0], values[2], values[4], values[6], values[8]});
-    return sizes[0] > 2 * (sizes[1] + sizes[2] + sizes[3] + sizes[4]);  // not where one is no number
+  /// Not where a sample is no number.
+  bool is_far_from_zero(const Samples& values, const Interval& interval, By by) {
+    const std::array<double, 5> seen{values[0], values[2], values[4], values[6], values[8]};
+    const std::array<double, 5> sizes = chebyshev_sizes<5>(seen);
+    if (!(sizes[0] > 2 * (sizes[1] + sizes[2] + sizes[3] + sizes[4]))) return false;
+    return std::abs(sample(interval.at(unlike), by) - expected_there(seen)) < 0.1 * sizes[0];
+  }
+
+  /// How far the interpolant is off there. Full order is asked for short parts only, where looks would cost more than
+  /// they tell.
+  double off_at_sixth(const BernsteinPolynomial& interpolant, const Interval& interval, By by) {
+    if (by == By::full_order) return 0;
+    return std::abs(sample(interval.at(unlike), by) - interpolant(unlike));
+  }
+
+  /// What the polynomial through five samples is at the sixth place, by the barycentric formula.
+  static double expected_there(const std::array<double, 5>& seen) {
+    double sum = 0, weights = 0;
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      const double weight = (k % 2 == 0 ? 1 : -1) * (k % 4 == 0 ? 0.5 : 1) / (unlike - sample_place(2 * k));
+      sum += weight * seen[k];
+      weights += weight;
+    }
+    return sum / weights;
   }
 
   /// Halves; where those are too short for anything but a jump or a corner, or too many, the samples' signs.
