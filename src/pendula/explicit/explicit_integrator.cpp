@@ -237,28 +237,26 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
     numbers(forcing_);
   }
 
+  // What depends on time is looked at as if nothing cut the step, and one that is cut and fails is found as if nothing
+  // cut it: so a run that goes on takes the steps of one that was not cut.
   Outcome step(double h) override {
-    // As if nothing cut it, so that a run that goes on takes the steps of one that was not cut.
     const double longest = forcing_.followed(dynamics(), time(), x_.data(), x_.data() + x_.size() / 2,
                                              proposed_ == 0 ? first_step : proposed_);
-    const bool cut = longest > h;  // a step that is cut short says nothing about the size of the next one
-    double tried = std::min(h, longest);
-    for (int attempt = 0; attempt < max_attempts && tried > smallest_step(); ++attempt) {
-      const double size = tried;
-      const bool accepted = try_step(tried);
-      if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(tried)) {
-        tried = size / 8;
-      } else if (accepted) {
-        x_.swap(next_);
-        const bool tells = !cut || tried < size;
-        if (tells) proposed_ = tried;
-        hand_on(tells);
-        if (!cut) statistics_.count_chosen(size);
-        return accept(size, next_);
-      }
-      ++statistics_.rejected_steps;
+    bool is_cut = longest > h;
+    Trial trial = is_cut ? find_step(h, 1) : find_step(longest);
+    if (is_cut && !trial.is_accepted) {
+      trial = find_step(longest);
+      is_cut = !(trial.is_accepted && trial.size < h);
+      if (is_cut) trial = find_step(h);
     }
-    return failure(Status::tolerance_not_met, tried, next_);
+    statistics_.rejected_steps += trial.rejected;
+    if (!trial.is_accepted) return failure(Status::tolerance_not_met, trial.proposed, next_);
+    x_.swap(next_);
+    const bool tells = !is_cut || trial.proposed < trial.size;  // else that of the next one is not known from this
+    if (tells) proposed_ = trial.proposed;
+    hand_on(tells);
+    if (!is_cut) statistics_.count_chosen(trial.size);
+    return accept(trial.size, next_);
   }
 
  protected:
@@ -270,6 +268,29 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   Vector next_, next_rate_;
 
  private:
+  /// What steps that were tried have come to; the last one's end is in next_.
+  struct Trial {
+    double size = 0, proposed = 0;  // of the last one, and of what follows it
+    int rejected = 0;
+    bool is_accepted = false;
+  };
+
+  /// Tries steps, shorter and shorter from this one on.
+  Trial find_step(double longest, int tries = max_attempts) {
+    Trial trial{.proposed = longest};
+    for (int attempt = 0; attempt < tries && trial.proposed > smallest_step(); ++attempt) {
+      trial.size = trial.proposed;
+      trial.is_accepted = try_step(trial.proposed);
+      if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(trial.proposed)) {
+        trial.proposed = trial.size / 8;
+        trial.is_accepted = false;
+      }
+      if (trial.is_accepted) break;
+      ++trial.rejected;
+    }
+    return trial;
+  }
+
   ForcedSteps forcing_;
 
   double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }

@@ -177,16 +177,34 @@ class GaussStepper {
   static constexpr double smallest_chosen = 1e-13;
   static constexpr int most_attempts = 100;
 
-  /// One step of the controller's choice. One that errs too much is taken again, shorter, from what it has found.
+  /// One step of the controller's choice, at most so long. What depends on time is looked at as if nothing cut the
+  /// step, and where one that is cut fails, it is found as if nothing cut it: so a run that goes on takes the steps of
+  /// one that was not cut.
   Outcome chosen_step(double most) {
-    const StepController before = controller_;
-    // Looked at as if nothing cut it, so that a run that goes on takes the steps of one that was not cut.
     const double longest = solver_.followed(time(), controller_.step(), options_.tolerance);
+    if (is_within(std::min(controller_.step(), longest), most)) return find_step(longest, most);
+    read_member();
+    Outcome outcome = find_step(longest, most, 1);
+    if (outcome) return outcome;
+    write_member();
+    outcome = find_step(longest, std::numeric_limits<double>::infinity());
+    if (outcome && is_within(outcome.step, most)) return outcome;
+    write_member();
+    forget_linearization();
+    return find_step(longest, most);
+  }
+
+  /// Whether a step is shorter than the most it may be, and by more than a sliver.
+  static bool is_within(double h, double most) { return h * (1 + 1e-9) < most; }
+
+  /// Tries steps; one that errs too much is taken again, shorter, from what it has found.
+  Outcome find_step(double longest, double most, int tries = most_attempts) {
+    const StepController before = controller_;
     int shorter = fixed_point_worth;
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
       const double chosen = std::min(controller_.step(), longest);
-      const bool is_cut = !(chosen * (1 + 1e-9) < most);
+      const bool is_cut = !is_within(chosen, most);
       const double h = is_cut ? most : chosen;
       is_found ? solver_.prepare_again(time(), h) : solver_.prepare(time(), h);
       solver_.allow_newton(shorter == 0);
@@ -210,7 +228,7 @@ class GaussStepper {
         solver_.forget();
         if (shorter > 0 && --shorter == 0) controller_ = before;
       }
-      if (h < smallest_chosen * std::abs(time()) || attempts == most_attempts) return outcome;
+      if (h < smallest_chosen * std::abs(time()) || attempts == tries) return outcome;
     }
   }
 
@@ -379,7 +397,7 @@ class GaussStepper {
   Statistics statistics_;
   bool remembers_ = false, looks_ = false;
   Remembered before_;
-  std::vector<double> member_;  // of the end of the step, while `look` is in it
+  std::vector<double> member_;  // to come back to: of the end of the step, while `look` is in it, or of its start
   std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;
 };
 
