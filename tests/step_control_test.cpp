@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <pendula/pendula.hpp>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "support/random_chain.hpp"
@@ -103,6 +105,26 @@ TEST(StepControl, FollowsAWeakDriveThatTurnsOften) {
       EXPECT_LT(subject.distance(end(solver, stages, 1e-6), exact), 1e-6) << stages << solver;  // measured 4.9e-8
     }
   }
+}
+
+// Where a swing turns, nothing but its acceleration is left of it.
+TEST(StepControl, TakesNoTinyStepsWhereASwingTurns) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(1);
+  const Chain<Planar> chain(parameters);
+  const auto start = State<Planar>::from_angles(Eigen::VectorXd::Constant(1, 1.6));
+  Stepper<Planar, 8> exact(chain, 8, {.tolerance = 1e-15});
+  exact.start(start);
+  const Motion end = run_to(exact, 10);
+  const auto expect_few = [&]<int S>(std::integral_constant<int, S>, std::int64_t most) {
+    Stepper<Planar, S> stepper(chain, S, {.tolerance = 1e-8});
+    stepper.start(start);
+    EXPECT_LT(ChainSubject<Planar>(chain).distance(run_to(stepper, 10), end), 1e-7) << S;  // measured 1.2e-9
+    EXPECT_LT(stepper.statistics().steps, most) << S;
+  };
+  expect_few(std::integral_constant<int, 2>(), 30000);  // measured 13619
+  expect_few(std::integral_constant<int, 3>(), 6000);   // measured 2688
+  expect_few(std::integral_constant<int, 4>(), 1000);   // measured 376
 }
 
 // Two links, let go high: chaos. Largest energy error, relative, over each tenth of a run.

@@ -1,14 +1,14 @@
 """Forces that depend on time and act between the nodes of a step, against impulses in closed form."""
 
 import json
-from math import cos, pi, sin, sqrt
+from math import cos, cosh, log, pi, sin, sqrt
 
 import h5py
 import numpy as np
 import pytest
 
 MODEL = """
-from sympy import cos, exp, sin
+from sympy import cos, exp, sin, tanh
 
 
 def define(model, links):
@@ -19,9 +19,11 @@ def define(model, links):
     center = model.parameter("center", "s", default=5.0)
     shaking = model.parameter("shaking", "N m", default=0.0)
     frequency = model.parameter("frequency", "rad/s", default=1.0)
+    swell = model.parameter("swell", "N m", default=0.0)
     model.lagrangian = model.rate(theta) ** 2 / 2 + gravity * cos(theta)
     pulse = exp(-(((model.time - center) / width) ** 2) / 2)
-    model.force(theta, push * pulse + shaking * sin(frequency * model.time))
+    growing = 1 + tanh((model.time - center) / width)
+    model.force(theta, push * pulse + shaking * sin(frequency * model.time) + swell * growing)
 """
 
 METHODS = {
@@ -76,6 +78,15 @@ def test_a_weak_force_that_turns_often_in_a_step_is_followed(method, moved):
     theta = 30 + strength / omega * (10 - sin(10 * omega) / omega)
     rate = 3 + strength / omega * (1 - cos(10 * omega))
     assert (got["q"]["theta"], got["v"]["theta"]) == pytest.approx((theta, rate), abs=3e-5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_begins_as_a_rounding_error_does_not_halt_a_run(method, moved):
+    text = scenario({"swell": 1.0, "width": 1.0, "center": 19.0}, METHODS[method], end=25.0)
+    got = json.loads(moved(text, "simulate", "--json").stdout)
+    rate = 25 + log(cosh(6) / cosh(19))  # 1 + tanh(t) begins as an ulp of 1, and goes up by as much
+    assert got["final"]["v"]["theta"] == pytest.approx(rate, rel=1e-8)  # measured 6e-10
+    assert got["steps"] < 10000  # measured 3241
 
 
 def test_pulses_in_lanes_are_their_impulses(moved, tmp_path):

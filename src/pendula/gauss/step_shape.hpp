@@ -28,11 +28,11 @@ struct StepShape {
   /// The error of a step h by a method of this order and so many stages, relative to the size of the motion.
   /// Coefficients of analytic motion decay geometrically, and the quadrature misses those from a degree of `order` on:
   /// the last ones go on as they have come from h R, or, of swings that are small beside a radian, from what the
-  /// coefficients begin with; or, where that is worse, as from those before them.
+  /// coefficients begin with, also where the swing turns; or, where that is worse, as from those before them.
   double error(double h, int stages, int order) const {
     const double moved = std::abs(h) * pace;
     if (stages == 1) return moved * moved * moved;
-    const double size = std::min(moved, small * std::max(at(0), at(1)));
+    const double size = std::min(moved, small * std::max(at(0), at(1) / std::min(moved, 1.0)));
     double error = 0;
     for (int k = std::max(1, stages - 2); k < stages; ++k) {
       if (at(k) > rounding * moved) error = std::max(error, at(k) * std::pow(at(k) / size, (order - k) / double(k)));

@@ -41,8 +41,8 @@ class LaneController {
   template <class Stepper>
   Mask accepts(const Mask& which, const L& h, Stepper& stepper) {
     const auto decay = [&](int k) { return stepper.chain().decay(k); };
-    const L size = 0.5 * log(max(stepper.chain().pace_squared(), L(tiny)));
-    log_error_ = log_error(decay, size) + L(std::log(safety)) - max(size, L(std::log(shortest)));
+    const L squared = max(stepper.chain().pace_squared(), L(tiny)), size = 0.5 * log(squared);
+    log_error_ = log_error(decay, squared, size) + L(std::log(safety)) - max(size, L(std::log(shortest)));
     const Mask good = log_error_ <= L(log_tolerance_);
     const Mask bad = which & !good;
     if (xsimd::any(bad)) {
@@ -92,14 +92,14 @@ class LaneController {
     length_ = select(seen, 2.0 * length_, length_);
   }
 
-  // StepShape::error, from the squares of the coefficients; moved: log h R.
+  // StepShape::error, from the squares of the coefficients and (h R)²; moved: log h R.
   template <class Decay>
-  static L log_error(Decay decay, const L& moved) {
+  static L log_error(Decay decay, const L& moved_squared, const L& moved) {
     if constexpr (S == 1) {
       return 3.0 * moved;
     } else {
       const L noise = moved + L(std::log(rounding));
-      const L largest_squared = max(max(decay(0), decay(1)), L(tiny));
+      const L largest_squared = max(max(decay(0), decay(1) / min(moved_squared, L(1.0))), L(tiny));
       const L size = min(moved, 0.5 * log(largest_squared) + L(std::log(small)));
       const L last = max(decay(S - 1), L(tiny)), log_last = 0.5 * log(last);
       L error = extended(log_last, size, noise, S - 1);
