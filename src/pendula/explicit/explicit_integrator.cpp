@@ -246,7 +246,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
     Trial trial = is_cut ? find_step(h, 1) : find_step(longest);
     if (is_cut && !trial.is_accepted) {
       trial = find_step(longest);
-      is_cut = !(trial.is_accepted && trial.size < h);
+      is_cut = !trial.is_accepted || trial.size >= h;
       if (is_cut) trial = find_step(h);
     }
     statistics_.rejected_steps += trial.rejected;
