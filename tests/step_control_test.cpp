@@ -107,6 +107,44 @@ TEST(StepControl, FollowsAWeakDriveThatTurnsOften) {
   }
 }
 
+// Drives that turn often in a step that few stages would take otherwise, and such as balance gravity at times.
+TEST(StepControl, FewStagesFollowDrives) {
+  struct Drive {
+    double amplitude, frequency;
+  };
+  for (const Drive& drive : {Drive{1, 30}, Drive{5, 3}, Drive{30, 30}, Drive{0.1, 300}}) {
+    ChainParameters<Planar> parameters;
+    parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(1);
+    const auto amplitude = Torque<Planar, 1>::Constant(drive.amplitude);
+    parameters.drives = {{.link = 0, .amplitude = amplitude, .frequency = drive.frequency, .phase = 0}};
+    const ChainSubject<Planar> subject{Chain<Planar>(parameters)};
+    const auto end = [&](RunOptions options) {
+      options.step = 0;
+      const auto integrator = subject.make_integrator(options);
+      EXPECT_TRUE(integrator->start(Motion(0, Eigen::VectorXd::Constant(1, 0.5), Eigen::VectorXd::Zero(1))));
+      while (integrator->time() < 10) {
+        if (!integrator->step(10 - integrator->time())) break;
+      }
+      return integrator->state();
+    };
+    const Motion exact = end({.stages = 8, .tolerance = 1e-14});
+    const auto expect_close = [&](RunOptions options, double most) {
+      for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+        options.tolerance = tolerance;
+        EXPECT_LT(subject.distance(end(options), exact), most * tolerance)
+            << drive.amplitude << " sin(" << drive.frequency << " t), " << options.method << ' ' << options.solver
+            << ' ' << options.stages << ", " << tolerance;
+      }
+    };
+    for (const Solver solver : {Solver::chain, Solver::dense}) {
+      expect_close({.stages = 2, .solver = solver}, 3);
+      expect_close({.stages = 3, .solver = solver}, 3);
+    }
+    expect_close({.method = Method::radau, .stages = 3}, 3);
+    expect_close({.stages = 2, .form = Form::velocity, .solver = Solver::dense}, 3);
+  }
+}
+
 // Where a swing turns, nothing but its acceleration is left of it.
 TEST(StepControl, TakesNoTinyStepsWhereASwingTurns) {
   ChainParameters<Planar> parameters;
@@ -238,6 +276,38 @@ TEST(DenseOutput, LeavesTheRunAsItIs) {
 }
 
 // A step that is taken in parts has no polynomial of its own.
+// A look a moment after the step's start knows the stages of that moment only, which are no prediction of later ones.
+TEST(DenseOutput, DependsOnNoLookBefore) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::VectorXd::Constant(1, 0.5);
+  const ChainSubject<Planar> subject{Chain<Planar>(parameters)};
+  const Motion start(0, Eigen::VectorXd::Constant(1, 1.0), Eigen::VectorXd::Constant(1, -2.0));
+  const auto looks = [&](const RunOptions& options, const std::vector<double>& shares) {
+    const auto integrator = subject.make_integrator(options);
+    EXPECT_TRUE(integrator->start(start));
+    integrator->remember_steps(true);
+    for (int step = 0; step < 3; ++step) EXPECT_TRUE(integrator->step(0.2));
+    Motion motion;
+    for (const double share : shares) EXPECT_TRUE(integrator->look(0.4 + 0.2 * share, motion));
+    return motion;
+  };
+  for (const Iteration iteration : {Iteration::automatic, Iteration::fixed_point, Iteration::newton}) {
+    for (const RunOptions& options : {RunOptions{.stages = 8, .solver = Solver::chain, .iteration = iteration},
+                                      RunOptions{.stages = 8, .solver = Solver::dense, .iteration = iteration},
+                                      RunOptions{.stages = 4, .solver = Solver::dense, .iteration = iteration},
+                                      RunOptions{.stages = 8, .form = Form::velocity, .solver = Solver::dense}}) {
+      for (const double share : {0.07, 0.5, 0.9}) {
+        const Motion alone = looks(options, {share});
+        for (const double before : {1e-12, 1e-9, 1e-6, 1e-3}) {
+          EXPECT_LT(subject.distance(looks(options, {before, share}), alone), 1e-13)
+              << options.solver << ' ' << options.form << ' ' << options.iteration << ' ' << options.stages << ", "
+              << before << " and " << share;
+        }
+      }
+    }
+  }
+}
+
 TEST(DenseOutput, KnowsStepsThatWereTakenInParts) {
   ChainParameters<Planar> parameters;
   parameters.masses = parameters.lengths = Eigen::Vector2d::Ones();

@@ -11,6 +11,7 @@
 #include <pendula/chain/chain_tangent.hpp>
 #include <pendula/gauss/iteration_choice.hpp>
 #include <pendula/gauss/roundoff.hpp>
+#include <pendula/system/forcing_look.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 
@@ -42,6 +43,7 @@ class ChainSolver {
       : family_(family),
         stages_(chain, family),
         newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
+        turn_(stages, order_of(family, stages)),
         choice_(iteration, newton_cost<Space>(S)) {
     tableau_of<S>(family, stages);
   }
@@ -97,7 +99,10 @@ class ChainSolver {
   StepShape shape() const { return stages_.shape(); }
   bool loaded() const { return stages_.loaded(); }
   bool damped() const { return stages_.chain().damped(); }
-  double followed(double, double h, double) const { return std::min(h, stages() / stages_.chain().fastest_drive()); }
+  double followed(double, double h, double tolerance) const {
+    const double fastest = stages_.chain().fastest_drive();
+    return fastest > 0 ? std::min(h, turn_.within(tolerance) / fastest) : h;
+  }
   bool dissipates() const { return family_ == Family::radau; }
   static constexpr int stages() { return S; }
   int parts() const { return stages_.links(); }
@@ -147,6 +152,7 @@ class ChainSolver {
   ChainStages<Space, S, N, Real, Arch> stages_;
   ChainNewton<Space, S, N, Real, Arch> newton_;
   ChainFixedPoint<Space, S, N, Real, Arch> fixed_point_;
+  SineTurn turn_;
   IterationChoice choice_;
   Correction last_;
   int count_ = 0;

@@ -163,7 +163,7 @@ class ChainStages {
     const bool other = Real(h) != columns_.h();
     columns_.prepare(Real(h), Real(alike ? last_h_ : 0));
     if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
-    hangs_ = columns_.h() * columns_.h() * constants_.fastest_swing() > unresolved_swing;
+    hangs_ = is_unresolved(h);
     is_predicted_ = alike;
     if (alike) {
       predict();
@@ -174,14 +174,15 @@ class ChainStages {
     step_ = h;
   }
 
-  /// Predicts the stages of another step from where the last one began that was solved, not accepted: from that one's.
+  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
+  /// one's.
   void prepare_again(double time, double h) {
-    columns_.predict_at(Real(0), Real(h / step_));
+    const double from = last_h_ != 0 ? last_h_ : step_;
+    columns_.predict_at(Real(0), Real(h / from));
     columns_.prepare(Real(h), Real(0));
     if (loaded()) set_torques(time);
-    const bool hung = hangs_;
-    hangs_ = columns_.h() * columns_.h() * constants_.fastest_swing() > unresolved_swing;
-    is_predicted_ = hangs_ == hung;
+    hangs_ = is_unresolved(h);
+    is_predicted_ = hangs_ == is_unresolved(from);
     if (is_predicted_) {
       for (int i = 0; i < links(); ++i) {
         for (std::size_t k = 0; k < D; ++k)
@@ -278,7 +279,9 @@ class ChainStages {
       }
       decay = max(decay, coefficients * inverse_square);
     }
-    return shape_of(quartic, decay);
+    StepShape shape = shape_of(quartic, decay);
+    if (S == StepShape::few_stages && loaded()) shape.beyond = missed_at_start();
+    return shape;
   }
 
   /// Energy that torque and damping bring in the step  [J].
@@ -367,8 +370,8 @@ class ChainStages {
  private:
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
-  // (h ω)² from which on a step does not resolve the chain's swinging.
-  static constexpr double unresolved_swing = 4;
+  // From (h ω)² = 4 on a step does not resolve the chain's swinging.
+  bool is_unresolved(double h) const { return Real(h) * Real(h) * constants_.fastest_swing() > Real(4); }
 
   // Where in the block of a link what stands; [number][stage].
   static constexpr std::size_t multiplier_at = D * Z, rod_at = (D + 1) * Z, freed_at = (2 * D + 1) * Z,
@@ -446,6 +449,19 @@ class ChainStages {
     for (std::size_t k = 0; k < S; ++k) shape.decay[k] = std::sqrt(static_cast<double>(squares[k]));
     shape.pace = std::sqrt(slowest_pace() + std::pow(static_cast<double>(paces[S / 2]), 0.25));
     return shape;
+  }
+
+  // By how much the polynomials through the stages' rates are off at the start of the step, times h, relative to the
+  // length of the rod.
+  double missed_at_start() const {
+    using std::sqrt;
+    Real furthest(0);
+    state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+      const Numbers missed = components<D>(
+          [&](std::size_t k) { return state_.free(i)[k] + columns_.at_start(stages_[i] + k * Z) - rate[k]; });
+      furthest = std::max(furthest, dot(missed, missed) * constants_[i].inverse_square);
+    });
+    return std::abs(step_) * static_cast<double>(sqrt(furthest));
   }
 
   void set_torques(double time) {

@@ -19,7 +19,7 @@ class ForcedSteps {
   /// errors does not see what depends on time alone.
   template <class Gauss>
   ForcedSteps(Gauss, std::size_t coordinates, double tolerance, bool is_blind = false)
-      : turn_(is_blind ? followed_turn(Gauss::stages, tolerance) : Gauss::stages),
+      : turn_(is_blind ? SineTurn(Gauss::stages, 2 * Gauss::stages).within(tolerance) : Gauss::stages),
         tolerance_(tolerance),
         look_(Gauss::c, Gauss::b, coordinates),
         moved_(coordinates),

@@ -138,10 +138,11 @@ class LagrangianStages {
     set_scales();
   }
 
-  /// Predicts the stages of another step from where the last one began that was solved, not accepted: from that one's.
+  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
+  /// one's.
   void prepare_again(double time, double h) {
     time_ = time;
-    columns_.predict_at(0, h / step_);
+    columns_.predict_at(0, h / (last_h_ != 0 ? last_h_ : step_));
     columns_.prepare(h, 0);
     set_context();
     for (auto& increments : U_) columns_.extrapolated_increments(increments).store(increments);
@@ -216,16 +217,15 @@ class LagrangianStages {
   /// that there was; both as √(Σ M_kk v_k²).
   double defect() {
     const Vector v = velocity(time_);
-    double missed = 0, speed = 0, later = 0;
+    double speed = 0, later = 0;
     for (std::size_t k = 0; k < count; ++k) {
       const double weight = weight_[k];
-      const double off = weight * (columns_.at_start(U_[k]) - v[at(k)]);
       const double last = weight * U_[k][stages() - 1] / columns_.hb(static_cast<std::size_t>(stages() - 1));
-      missed += off * off;
       speed += weight * weight * v[at(k)] * v[at(k)];
       later += last * last;
     }
     fastest_ = std::max({fastest_, speed, later});
+    const double missed = missed_at_start(v);
     return missed > 0 ? std::sqrt(missed / fastest_) : 0;
   }
   double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
@@ -361,6 +361,16 @@ class LagrangianStages {
     return end;
   }
 
+  // Σ M_kk (v_k − what the polynomial through the stages' rates is there)², v being the rates at the start of the step.
+  double missed_at_start(const Vector& v) const {
+    double missed = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double off = weight_[k] * (columns_.at_start(U_[k]) - v[at(k)]);
+      missed += off * off;
+    }
+    return missed;
+  }
+
   void count_turns() {
     for (std::size_t k = 0; k < count; ++k) {
       if (S::coordinate_is_periodic[k]) detail::take_out_turns(q_[k], turns_[k]);
@@ -389,6 +399,10 @@ class LagrangianStages {
     for (int k = 0; k < stages(); ++k) {
       const double size = std::sqrt(squares[k]);
       shape.decay[static_cast<std::size_t>(k)] = size > rounding ? scale * size : 0;
+    }
+    if (stages() == StepShape::few_stages && model_.loaded()) {
+      const double size = std::abs(step_) * std::sqrt(missed_at_start(velocity(time_)));
+      if (size > rounding) shape.beyond = scale * size;
     }
     return shape;
   }

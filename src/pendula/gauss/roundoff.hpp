@@ -57,7 +57,8 @@ class RoundoffStop {
     if (count_ < 3) return false;
     if (pair == 0) return true;
     const double rate = pair / pair_before;
-    if (rate < 1 && pair * rate <= lost_in_rounding()) return true;
+    // From stages that were no prediction at all the first corrections shrink at no rate that would go on.
+    if (rate < 1 && pair * rate <= lost_in_rounding() && pair <= small_) return true;
     if (count_ == 3) first_ = best_ = pair_before;
     const bool stalled = has_stalled(last_[0] / last_[2], 2.0 / std::max(1, count_ - 3));
     best_ = std::min(best_, pair);
@@ -70,7 +71,7 @@ class RoundoffStop {
       first_ = best_ = correction;
       return correction == 0 || is_enough(correction);
     }
-    if (correction > noise()) {
+    if (correction > noise() && last_[1] < 1) {
       const double measured = correction / (last_[1] * last_[1]);
       constant_ = constant_ == 0 ? measured : std::max(measured, constant_ / 2);
     }

@@ -19,6 +19,9 @@ struct Tempo {
 struct StepShape {
   /// Sizes of the Legendre coefficients of the rates on the step, times h, relative to the size of the motion  [rad].
   std::array<double, max_stages> decay{};
+  /// The coefficient of degree s, the first that s stages cannot show: by how much their polynomial misses the rates
+  /// where the step starts. 0 where nobody looks.
+  double beyond = 0;
   double pace = 0;       ///< R in the middle  [1/s]
   double imbalance = 0;  ///< of energy, relative to what there is; 0 where nobody looks
 
@@ -35,18 +38,29 @@ struct StepShape {
     const double size = std::min(moved, small * std::max(at(0), at(1) / std::min(moved, 1.0)));
     double error = 0;
     for (int k = std::max(1, stages - 2); k < stages; ++k) {
-      if (at(k) > rounding * moved) error = std::max(error, at(k) * std::pow(at(k) / size, (order - k) / double(k)));
+      if (at(k) > rounding * moved) error = std::max(error, extended(at(k), k, size, order));
     }
+    if (beyond > rounding * moved) error = std::max(error, extended(beyond, stages, size, order));
     if (stages < 4 || error == 0) return error;
     const double last = std::hypot(at(stages - 1), at(stages - 2)), before = std::hypot(at(stages - 3), at(stages - 4));
     const double ratio = std::sqrt(std::min(1.0, last / before));  // from degree to degree
     return std::max(error, std::max(at(stages - 1), ratio * at(stages - 2)) * std::pow(ratio, order - stages + 1));
   }
 
+  /// With so few stages all rests on one coefficient, which vanishes where loads balance gravity: that of degree s is
+  /// worth its time where there are any.
+  static constexpr int few_stages = 2;
+
  private:
   static constexpr double small = 10;  // h R over the largest coefficient
   // Coefficients that are smaller, relative to h R, may be rounding; what follows from them would not show.
   static constexpr double rounding = 1e-13;
+
+  // The coefficient that quadrature begins to miss, where they decay from `size` to that of degree k as they go on to
+  // do.
+  static double extended(double coefficient, int k, double size, int order) {
+    return coefficient * std::pow(coefficient / size, (order - k) / double(k));
+  }
 
   double at(int k) const { return decay[static_cast<std::size_t>(k)]; }
 };

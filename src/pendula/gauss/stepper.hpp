@@ -38,7 +38,7 @@ class GaussStepper {
       : solver_(model, stages, solver_options...),
         options_(options),
         at_roundoff_(solver_.parts(), epsilon()),
-        controller_(stages, solver_.dissipates() ? 2 * stages - 1 : 2 * stages, options.tolerance,
+        controller_(stages, order_of(solver_.dissipates() ? Family::radau : Family::gauss, stages), options.tolerance,
                     options.steering.value_or(solver_.loaded() || solver_.dissipates() ? Steering::greedy
                                                                                        : Steering::symmetric)) {}
 

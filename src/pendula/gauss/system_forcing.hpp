@@ -14,14 +14,16 @@ namespace pendula {
 template <System S>
 class SystemForcing {
  public:
-  SystemForcing(Family family, int stages) : SystemForcing(tableau_of<Eigen::Dynamic>(family, stages)) {}
+  SystemForcing(Family family, int stages)
+      : SystemForcing(tableau_of<Eigen::Dynamic>(family, stages), order_of(family, stages)) {}
 
   /// The longest step up to h from where `look` says that the system is: by a pair of state and pace, the motion
-  /// changing in 1/pace. Inputs that are sines turn by a radian a stage at most: one that is weak and turns often
+  /// changing in 1/pace. Inputs that are sines turn by no more than stages sum up: one that is weak and turns often
   /// within a step shows in no stage what it does.
   template <class Look>
   double followed(const SystemModel<S>& model, double h, double tolerance, Look&& look) {
-    h = std::min(h, stages_ / model.fastest_drive());
+    const double fastest = model.fastest_drive();
+    if (fastest > 0) h = std::min(h, turn_.within(tolerance) / fastest);
     if constexpr (holds_time<S>) {
       const auto [state, pace] = look();
       return look_.resolved(state.time, h, pace, tolerance, state.v, sizes_of(state.q),
@@ -44,12 +46,13 @@ class SystemForcing {
     return sizes;
   }
 
-  explicit SystemForcing(const Tableau<Eigen::Dynamic, double>& tableau)
-      : stages_(tableau.stages()),
-        look_({tableau.c.data(), static_cast<std::size_t>(stages_)},
-              {tableau.b.data(), static_cast<std::size_t>(stages_)}, static_cast<std::size_t>(S::coordinates)) {}
+  SystemForcing(const Tableau<Eigen::Dynamic, double>& tableau, int order)
+      : turn_(tableau.stages(), order),
+        look_({tableau.c.data(), static_cast<std::size_t>(tableau.stages())},
+              {tableau.b.data(), static_cast<std::size_t>(tableau.stages())},
+              static_cast<std::size_t>(S::coordinates)) {}
 
-  int stages_;
+  SineTurn turn_;
   ForcingLook look_;
 };
 

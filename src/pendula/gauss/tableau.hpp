@@ -29,6 +29,10 @@ enum class Family {
   radau,  ///< Radau IIA, order 2s − 1: damps at once what it does not resolve; 2 or 3 stages
 };
 
+constexpr int order_of(Family family, int stages) {
+  return family == Family::gauss ? 2 * stages : 2 * stages - 1;
+}
+
 /// The coefficients of a method. To the last bit of a Real of up to
 /// 106 bits, but for a_squared and extrapolation, where the bits of double are enough.
 template <int S = Eigen::Dynamic, class Real = double>

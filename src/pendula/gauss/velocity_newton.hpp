@@ -68,16 +68,20 @@ class VelocityNewton {
       at(i).a = acceleration_;
       if (last_h_ != 0) extrapolate(at(i).a, i);
     }
+    is_predicted_ = last_h_ != 0;
+    last_h_ = 0;  // what was predicted from is gone until the step is accepted
     set_weights();
   }
 
-  /// Predicts the stages of another step from where the last one began that was solved, not accepted: from that one's.
+  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
+  /// one's.
   void prepare_again(double time, double h) {
-    const double ratio = h / coefficients_.h();
+    const bool is_accepted = last_h_ != 0;
+    const double ratio = h / (is_accepted ? last_h_ : coefficients_.h());
     coefficients_.prepare(h, 0);
     set_context(time);
     std::array<Vector, max_stages> found;
-    for (int i = 0; i < stages(); ++i) found[static_cast<std::size_t>(i)] = at(i).a;
+    for (int i = 0; i < stages(); ++i) found[static_cast<std::size_t>(i)] = is_accepted ? at(i).last_a : at(i).a;
     for (int i = 0; i < stages(); ++i) {
       at(i).a.setZero();
       for (int j = 0; j < stages(); ++j) {
@@ -115,7 +119,7 @@ class VelocityNewton {
   int stages() const { return coefficients_.stages(); }
   static constexpr int parts() { return S::coordinates; }
   static constexpr int coordinates() { return S::coordinates; }
-  double predictor_gain() const { return last_h_ == 0 ? 1 : coefficients_.predictor_gain(); }
+  double predictor_gain() const { return is_predicted_ ? coefficients_.predictor_gain() : 1; }
 
   double turn() const { return farthest_turn().first; }
   int turning_part() const { return farthest_turn().second; }
@@ -131,11 +135,9 @@ class VelocityNewton {
   }
 
   double defect() {
-    Vector missed = -v_.value;
-    for (int i = 0; i < stages(); ++i) missed += coefficients_.lagrange(i, 0) * at(i).v;
     const auto squared = [&](const Vector& v) { return v.cwiseProduct(weight_).squaredNorm(); };
     fastest_ = std::max({fastest_, squared(v_.value), squared(at(stages() - 1).v)});
-    const double off = squared(missed);
+    const double off = squared(missed_at_start());
     return off > 0 ? std::sqrt(off / fastest_) : 0;
   }
 
@@ -166,6 +168,10 @@ class VelocityNewton {
       }
       const double h = std::abs(coefficients_.h()), size = h * std::sqrt(squared(coefficient));
       if (size > rounding) shape.decay[static_cast<std::size_t>(k)] = size * shape.pace / std::sqrt(fastest);
+    }
+    if (stages() == StepShape::few_stages && loaded()) {
+      const double size = std::abs(coefficients_.h()) * std::sqrt(squared(missed_at_start()));
+      if (size > rounding) shape.beyond = size * shape.pace / std::sqrt(fastest);
     }
     return shape;
   }
@@ -272,6 +278,13 @@ class VelocityNewton {
     }
   }
 
+  // By how much the polynomial through the stages' rates is off at the start of the step.
+  Vector missed_at_start() const {
+    Vector missed = -v_.value;
+    for (int i = 0; i < stages(); ++i) missed += coefficients_.lagrange(i, 0) * at(i).v;
+    return missed;
+  }
+
   // Of all angles, one whose inertia nearly vanishes counted twice; and whose it is.
   std::pair<double, int> farthest_turn() const {
     std::pair<double, int> farthest{0, -1};
@@ -358,7 +371,9 @@ class VelocityNewton {
   Vector weight_;
   MassScale<S> masses_;
   Pace<S> pace_;
-  double time_ = 0, last_h_ = 0, most_kinetic_ = 0;
+  double time_ = 0, most_kinetic_ = 0;
+  double last_h_ = 0;  // of the step that the last accelerations belong to; 0: they belong to none
+  bool is_predicted_ = false;
   double fastest_ = 0, fastest_here_ = 0;  // Σ M_kk v_k², of all steps so far and of the stages
 };
 

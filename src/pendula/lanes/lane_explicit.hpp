@@ -114,7 +114,7 @@ class LaneExplicit {
   L longest_step(double tolerance) const {
     double turn = nodes;
     if constexpr (can_choose) {
-      if (Method::is_blind) turn = followed_turn(nodes, tolerance);
+      if (Method::is_blind) turn = SineTurn(nodes, 2 * nodes).within(tolerance);
     }
     return dynamics_.template longest_step<nodes>(turn);
   }

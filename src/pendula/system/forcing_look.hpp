@@ -9,13 +9,28 @@
 
 namespace pendula {
 
-/// How far a sine may turn in a step for the Gauss quadrature of so many nodes to sum it up to a tolerance, but no more
-/// than a radian a node  [rad]. Its error is n!⁴/((2n + 1) (2n)!³) of the 2n-th power of the turn.
-inline double followed_turn(int nodes, double tolerance) {
-  const double n = std::tgamma(nodes + 1), m = std::tgamma(2 * nodes + 1);
-  const double constant = n * n * n * n / ((2 * nodes + 1) * m * m * m);
-  return std::min(static_cast<double>(nodes), std::pow(tolerance / constant, 0.5 / nodes));
-}
+/// How far a sine may turn in a step for a quadrature to sum it up. Of n nodes, its error is a constant times a power
+/// of the turn: n!⁴/((2n + 1) (2n)!³) and 2n of Gauss's, n (n − 1)!⁴/(2 (2n − 1)!³) and 2n − 1 of Radau's.
+class SineTurn {
+ public:
+  /// Of a quadrature of this order, 2n or 2n − 1.
+  SineTurn(int nodes, int order) : nodes_(nodes), order_(order), constant_(error_constant(nodes, order)) {}
+
+  /// The most that its error is within the tolerance by, but no more than a radian a node  [rad].
+  double within(double tolerance) const {
+    return std::min(static_cast<double>(nodes_), std::pow(tolerance / constant_, 1.0 / order_));
+  }
+
+ private:
+  static double error_constant(int n, int order) {
+    const double all = std::tgamma(order + 1);
+    if (order == 2 * n) return std::pow(std::tgamma(n + 1), 4) / ((order + 1) * all * all * all);
+    return n * std::pow(std::tgamma(n), 4) / (2 * all * all * all);
+  }
+
+  int nodes_, order_;
+  double constant_;
+};
 
 /// How far a step may go so that its nodes see what forces do that depend on time: a pulse between them, or what turns
 /// many times in the step, no error estimate shows.
