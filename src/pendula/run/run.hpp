@@ -148,14 +148,15 @@ inline std::optional<Motion> Run::try_out(double tolerance, double share, const 
 inline bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
   const auto stops = [&] { return stopped = stopped || stop(); };
-  double sign = 1;
+  double share = -1;
   const auto end = [&](double tolerance) {
-    sign = -sign;  // so that no two begin alike
-    return try_out(tolerance, sign * std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), stops);
+    share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
+    return try_out(tolerance, share, stops);  // no two begin alike
   };
+  const auto end_alike = [&](double tolerance) { return try_out(tolerance, share, stops); };
   const auto distance = [&](const Motion& a, const Motion& b) { return setup_.subject->distance(a, b); };
-  const double finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
-  kept_.aim = detail::aim_at(setup_.accuracy.error, finest, end, distance);
+  const double wanted = setup_.accuracy.error, finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
+  kept_.aim = detail::climb_up(wanted, detail::climb_down(wanted, finest, end, distance), end_alike, distance);
   if (kept_.aim.near.q.size() == 0) kept_.aim.near = setup_.start;  // as large as any, for checkpoints
   follow_aim();
   return !stopped;
