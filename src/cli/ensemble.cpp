@@ -243,7 +243,7 @@ class Session {
   /// twice.
   void doubt() {
     constexpr std::int64_t most = 8, one_of = 32;
-    const std::int64_t count = std::min(most, plan_.count / one_of);
+    const std::int64_t count = std::clamp<std::int64_t>(plan_.count / one_of, 1, most);
     const MemberRuns members(scenarios_, plan_, kept_, guard_);
     std::int64_t doubted = 0;
     std::string first;
@@ -254,9 +254,9 @@ class Session {
       first = "member " + std::to_string(member) + ": " + sentences.front();
     }
     if (doubted == 0) return;
-    warnings_.push_back("of " + std::to_string(count) +
-                        " members that were moved again to see how far they can be trusted " + std::to_string(doubted) +
-                        " cannot be, or not to their last digits; the first, " + first);
+    const std::string all = std::to_string(count) + (count == 1 ? " member that was" : " members that were");
+    warnings_.push_back("of " + all + " moved again to see how far the ensemble can be trusted " +
+                        std::to_string(doubted) + " cannot be, or not to the last digits; the first, " + first);
   }
 
   /// Of shards that end at once, one after the other.

@@ -430,6 +430,19 @@ def test_threads_are_counted(tmp_path):
     assert "expected a whole number of threads, 1 or more" in run(tmp_path, "--threads", "0").err
 
 
+def test_few_members_are_looked_at_again_as_well(tmp_path):
+    """Two of three members are chaos by the end; the third one would be no cause for a warning."""
+    few = ("--set", "ensemble.axis[1].count=1", "--set", "ensemble.axis[2].count=3")
+    chaotic = run(tmp_path, *few, "--set", "ensemble.axis[1].from=3.0", "--set", "run.duration=200", "--json")
+    assert chaotic.status == 0, chaotic.err
+    assert len(chaotic.json["warnings"]) == 1
+    assert chaotic.json["warnings"][0].startswith("of 1 member that was moved again")
+    (tmp_path / "out.h5").unlink()
+    calm = run(tmp_path, *few, "--set", "ensemble.axis[1].from=0.5", "--set", "ensemble.axis[2].from=0.3", "--json")
+    assert calm.status == 0, calm.err
+    assert calm.json["warnings"] == []
+
+
 def test_a_full_disk_loses_nothing(whole, tmp_path):
     """A limit on the size of files stands for it; what the journal has by then is there when there is room again."""
     limit = 20_000
