@@ -491,9 +491,28 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"chain.masses.first=3",
        "--set chain.masses.first=3: chain.masses.first: expected a table before the last dot (an "
        "array is set as a whole), got masses = [1.0, 2.0]"},
+      {"chain.masses[3]=1",
+       "--set chain.masses[3]=1: chain.masses[3]: expected an array of at least 3 elements, got [1.0, 2.0]"},
+      {"chain.masses[0]=1",
+       "--set chain.masses[0]=1: expected KEY=VALUE such as run.step=1e-4, got \"chain.masses[0]=1\""},
+      {"chain.drive[1].phase=1",
+       "--set chain.drive[1].phase=1: chain.drive[1].phase: expected an array of at least 1 elements, got none"},
       {"chain.masses=[1, -2]", "--set chain.masses=[1, -2]: chain.masses[2]: expected a finite number > 0, got -2"},
   };
   for (const auto& [override, message] : inputs) EXPECT_EQ(error_of(planar_text, {override}), message);
+}
+
+TEST(Scenario, OverridesReachElementsAndTablesInArrays) {
+  const auto scenario = parsed<Spatial>(
+      spatial_text, {"chain.masses[2]=7", "chain.drive[1].frequency=5", "chain.drive[1].amplitude[3]=-1",
+                     "chain.torque=[[0, 0, 1], [0, 0, 0], [0, 0, 0]]", "chain.torque[2][1]=4"});
+  EXPECT_EQ(scenario.chain.masses(), Eigen::Vector3d(1, 7, 2));
+  EXPECT_EQ(scenario.chain.drives()[0].frequency, 5);
+  EXPECT_EQ(scenario.chain.drives()[0].amplitude, Eigen::Vector3d(1, 0, -1));
+  EXPECT_EQ(scenario.chain.constant_torque()(0, 1), 4);
+  EXPECT_EQ(scenario.chain.constant_torque()(2, 0), 1);
+  EXPECT_EQ(error_of(spatial_text, {"chain.drive[1].frequency=nan"}),
+            "--set chain.drive[1].frequency=nan: chain.drive[1].frequency: expected a finite number, got nan");
 }
 
 TEST(Scenario, WithoutAStepThereAreAsManyStagesAsTheToleranceWants) {

@@ -141,7 +141,7 @@ std::vector<std::string> EnsemblePlan::overrides(std::int64_t member) const {
 }
 
 std::string unit_of_key(std::string_view key) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 13> units = {{
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 18> units = {{
       {"start.theta_dot", "rad/s"},
       {"start.phi_dot", "rad/s"},
       {"start.theta", "rad"},
@@ -151,12 +151,23 @@ std::string unit_of_key(std::string_view key) {
       {"chain.gravity", "m/s^2"},
       {"chain.damping", "N m s/rad"},
       {"chain.torque", "N m"},
+      {"chain.drive.amplitude", "N m"},
+      {"chain.drive.frequency", "rad/s"},
+      {"chain.drive.phase", "rad"},
+      {"system.drive.frequency", "rad/s"},
+      {"system.drive.phase", "rad"},
       {"run.step", "s"},
       {"run.duration", "s"},
       {"run.tolerance", "1"},
       {"run.accuracy", "1"},
   }};
-  const std::string_view name = key.substr(0, key.find('['));
+  std::string name;
+  int depth = 0;  // of brackets
+  for (const char c : key) {
+    depth += c == '[' ? 1 : 0;
+    if (depth == 0) name += c;
+    depth -= c == ']' ? 1 : 0;
+  }
   for (const auto& [known, unit] : units) {
     if (known == name) return std::string(unit);
   }

@@ -48,14 +48,37 @@ std::string_view trimmed(std::string_view text) {
   return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// The parts of `a.b.c`; empty where one of them is no bare TOML key.
-std::vector<std::string_view> key_path(std::string_view key) {
-  std::vector<std::string_view> path;
+/// A part of a key between dots, `torque[2][3]`: its name, and elements from 1 on.
+struct KeyPart {
+  std::string_view name;
+  std::vector<std::size_t> elements;
+};
+
+/// `masses[2]` and the like; nothing where it is none.
+std::optional<KeyPart> key_part(std::string_view text) {
+  KeyPart part;
+  part.name = text.substr(0, text.find('['));
+  if (part.name.empty() || !std::ranges::all_of(part.name, is_key_character)) return std::nullopt;
+  for (text.remove_prefix(part.name.size()); !text.empty();) {
+    const std::size_t close = text.find(']');
+    if (text.front() != '[' || close == std::string_view::npos) return std::nullopt;
+    std::size_t element = 0;
+    const auto [end, error] = std::from_chars(text.data() + 1, text.data() + close, element);
+    if (error != std::errc() || end != text.data() + close || element == 0) return std::nullopt;
+    part.elements.push_back(element);
+    text.remove_prefix(close + 1);
+  }
+  return part;
+}
+
+/// The parts of `a.b[2].c`; none where one of them is wrong.
+std::vector<KeyPart> key_path(std::string_view key) {
+  std::vector<KeyPart> path;
   for (std::size_t begin = 0; begin <= key.size();) {
     const std::size_t end = std::min(key.find('.', begin), key.size());
-    const std::string_view part = key.substr(begin, end - begin);
-    if (part.empty() || !std::ranges::all_of(part, is_key_character)) return {};
-    path.push_back(part);
+    std::optional<KeyPart> part = key_part(key.substr(begin, end - begin));
+    if (!part) return {};
+    path.push_back(*std::move(part));
     begin = end + 1;
   }
   return path;
@@ -165,46 +188,54 @@ toml::table parse_value(std::string_view value, const std::string& where) {
                    (number.empty() ? "a TOML value after '=', got " + quoted(value) : "a number, got " + number));
 }
 
-/// A key that ends in the number of an element, `masses[2]`: its name, and the element from 1; 0 for none.
-std::pair<std::string_view, std::size_t> split_element(std::string_view key) {
-  const std::size_t open = key.find('[');
-  if (open == std::string_view::npos || !key.ends_with(']')) return {key, 0};
-  const std::string_view digits = key.substr(open + 1, key.size() - open - 2);
-  std::size_t element = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), element);
-  const bool is_whole = error == std::errc() && end == digits.data() + digits.size();
-  return is_whole && element > 0 ? std::pair(key.substr(0, open), element) : std::pair(key, std::size_t{0});
-}
+/// Where a value is to be put.
+struct Place {
+  const std::string& where;
+  std::string_view key;
+};
 
-/// Puts a value in the place of an element of an array that is there.
-void set_element(toml::table& table, std::string_view name, std::size_t element, toml::node& value,
-                 const std::string& where, std::string_view key) {
-  toml::node* const node = table.get(name);
-  const toml::array* const array = node == nullptr ? nullptr : node->as_array();
+/// The array that has an element of this number.
+toml::array& array_with(toml::node* node, std::size_t element, const Place& place) {
+  toml::array* const array = node == nullptr ? nullptr : node->as_array();
   if (array == nullptr || array->size() < element) {
-    throw InputError(where, printable(key), "an array of at least " + std::to_string(element) + " elements",
+    throw InputError(place.where, printable(place.key), "an array of at least " + std::to_string(element) + " elements",
                      node == nullptr ? "none" : shown(*node));
   }
-  node->as_array()->replace(array->cbegin() + static_cast<std::ptrdiff_t>(element - 1), std::move(value));
+  return *array;
 }
 
-/// Puts a value in the place of what `whole_key` names.
-void put(toml::table& root, std::string_view whole_key, toml::node& value, const std::string& where) {
-  const auto [key, element] = split_element(whole_key);
-  const std::vector<std::string_view> path = key_path(key);
-  toml::table* table = &root;
-  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-    // A table made here takes the override as its place; one that stands in the file keeps its own.
-    if (!table->contains(path[i])) table->insert(path[i], std::move(*parse("t = {}", where).get("t")));
-    toml::node* next = table->get(path[i]);
-    if (!next->is_table()) {
-      throw InputError(where, printable(key), "a table before the last dot (an array is set as a whole)",
-                       std::string(path[i]) + " = " + shown(*next));
-    }
-    table = next->as_table();
+/// The table that a part names which others come after.
+toml::table& table_of(toml::table& table, const KeyPart& part, const Place& place) {
+  // A table made here takes the override as its place; one that stands in the file keeps its own.
+  if (part.elements.empty() && !table.contains(part.name)) {
+    table.insert(part.name, std::move(*parse("t = {}", place.where).get("t")));
   }
-  if (element > 0) return set_element(*table, path.back(), element, value, where, whole_key);
-  table->insert_or_assign(path.back(), std::move(value));
+  toml::node* next = table.get(part.name);
+  for (const std::size_t element : part.elements) next = array_with(next, element, place).get(element - 1);
+  if (!next->is_table()) {
+    throw InputError(place.where, printable(place.key), "a table before the last dot (an array is set as a whole)",
+                     std::string(part.name) + " = " + shown(*next));
+  }
+  return *next->as_table();
+}
+
+/// Puts a value in the place of what `key` names.
+void put(toml::table& root, std::string_view key, toml::node& value, const std::string& where) {
+  const std::vector<KeyPart> path = key_path(key);
+  const Place place{where, key};
+  toml::table* table = &root;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) table = &table_of(*table, path[i], place);
+  const auto& [name, elements] = path.back();
+  if (elements.empty()) {
+    table->insert_or_assign(name, std::move(value));
+    return;
+  }
+  toml::node* node = table->get(name);
+  for (std::size_t k = 0; k + 1 < elements.size(); ++k) {
+    node = array_with(node, elements[k], place).get(elements[k] - 1);
+  }
+  toml::array& array = array_with(node, elements.back(), place);
+  array.replace(array.cbegin() + static_cast<std::ptrdiff_t>(elements.back() - 1), std::move(value));
 }
 
 void apply_override(toml::table& root, const std::string& text) {
@@ -212,7 +243,7 @@ void apply_override(toml::table& root, const std::string& text) {
   require_shallow(text, where);
   const std::size_t equals = text.find('=');
   const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
-  if (equals == std::string::npos || key_path(split_element(key).first).empty()) {
+  if (equals == std::string::npos || key_path(key).empty()) {
     throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
   }
   toml::table value = parse_value(trimmed(std::string_view(text).substr(equals + 1)), where);
@@ -282,7 +313,7 @@ toml::table parse_toml(std::string_view text, std::string_view name, std::span<c
 
 void set_number(toml::table& root, std::string_view key, double number) {
   const std::string where = std::string(override_prefix) + std::string(key);
-  if (key_path(split_element(key).first).empty()) throw InputError(where + ": expected a key such as run.step");
+  if (key_path(key).empty()) throw InputError(where + ": expected a key such as run.step");
   const bool is_integer = std::abs(number) < 0x1p53 && number == std::floor(number);
   toml::value<std::int64_t> integer(is_integer ? static_cast<std::int64_t>(number) : 0);
   toml::value<double> real(number);

@@ -430,6 +430,19 @@ def test_threads_are_counted(tmp_path):
     assert "expected a whole number of threads, 1 or more" in run(tmp_path, "--threads", "0").err
 
 
+def test_an_axis_may_be_a_key_of_a_drive(tmp_path):
+    driven = MAP.replace("[start]", "[[chain.drive]]\nlink = 1\namplitude = 1.0\nfrequency = 2.0\n\n[start]")
+    driven = driven.replace('"start.theta[1]"\nfrom  = -3.0', '"chain.drive[1].amplitude"\nfrom  = 0.0')
+    done = run(tmp_path, "--set", "start.theta=[1.0, 0.0]", scenario=driven)
+    assert done.status == 0, done.err
+    with h5py.File(tmp_path / "out.h5") as opened:
+        amplitudes = opened["chain.drive[1].amplitude"]
+        assert amplitudes.attrs["units"] == "N m"
+        assert amplitudes[...].tolist() == pytest.approx(list(np.linspace(0, 3, 31)))
+        ends = opened["theta_1"][...]
+    assert len(np.unique(ends[:, 0])) == 31
+
+
 def test_few_members_are_looked_at_again_as_well(tmp_path):
     few = MAP.replace("count = 31", "count = 1").replace("count = 17", "count = 3")
     chaotic = run(tmp_path, "--set", "run.duration=200", "--json", scenario=few)
