@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <optional>
+#include <pendula/lanes/lane_chain.hpp>
 #include <pendula/lanes/lane_chain_seats.hpp>
 #include <pendula/lanes/lane_explicit.hpp>
+#include <pendula/lanes/lane_lagrangian.hpp>
 #include <pendula/lanes/lane_member.hpp>
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_stepper.hpp>
@@ -76,7 +78,8 @@ class LaneQueue {
   static typename Stepper::Options stepper_options(const LaneOptions& options) {
     if constexpr (Stepper::is_implicit) {
       typename Stepper::Options given;
-      if (options.step == 0) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
+      given.are_chosen = options.step == 0;
+      if (given.are_chosen) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
       if (options.enough > 0) given.enough = options.enough;
       return given;
     } else {
@@ -132,12 +135,12 @@ class LaneQueue {
   // Whose energy does not balance has come to stages that are not those of the motion.
   Mask accept_doubtful(const Mask& good, const Mask& doubtful) {
     auto& chain = stepper_.chain();
-    const L before = chain.energy();
+    const L due = chain.energy_due();
     chain.save();
     stepper_.accept(good);
     const L after = chain.energy();
-    const L bound = largest_energy_defect * (chain.energy_scale() + abs(before));
-    const Mask wrong = doubtful & !(abs(after - before) <= bound);
+    const L bound = largest_energy_defect * chain.energy_scale(due);
+    const Mask wrong = doubtful & !(abs(after - due) <= bound);
     chain.restore(wrong);
     stepper_.forget(wrong);
     const Mask right = good & !wrong;
@@ -268,7 +271,7 @@ class LaneQueue {
 
 /// By Gauss steps of S stages, of chains of N links.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
-using GaussLanes = LaneQueue<LaneStepper<Space, S, N, Register>>;
+using GaussLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register>>>;
 
 /// By explicit steps.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
@@ -283,7 +286,12 @@ template <class Method, class Register = MemberRegister>
 using SystemLanes =
     LaneQueue<LaneExplicit<LaneSystem<Register>, Method>, LaneSystemSeats<LaneExplicit<LaneSystem<Register>, Method>>>;
 
-/// The same with a tangent of each member.
+/// The same by Gauss steps of S stages.
+template <int S, class Register = MemberRegister>
+using GaussSystemLanes =
+    LaneQueue<LaneStepper<LaneLagrangian<S, Register>>, LaneSystemSeats<LaneStepper<LaneLagrangian<S, Register>>>>;
+
+/// By explicit steps with a tangent of each member.
 template <class Method, class Register = MemberRegister>
 using SystemTangentLanes = LaneQueue<LaneExplicit<LaneSystem<Register, true>, Method>,
                                      LaneSystemSeats<LaneExplicit<LaneSystem<Register, true>, Method>>>;
