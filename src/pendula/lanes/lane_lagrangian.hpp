@@ -31,6 +31,7 @@ class LaneLagrangian {
   using Subject = LaneDynamics&;
   using Stop = LaneStop<L, 2>;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
+  static constexpr bool may_be_stiff = true;  ///< forces and lengths may be anything
   static constexpr std::size_t D = 1;
   using Vector = std::array<L, D>;
   using Columns = LaneColumns<S, L>;
@@ -39,10 +40,11 @@ class LaneLagrangian {
   /// `dynamics` must outlive it.
   explicit LaneLagrangian(LaneDynamics& dynamics)
       : dynamics_(dynamics),
-        coordinates_(static_cast<std::size_t>(dynamics.coordinates())),
+        count_(dynamics.coordinates()),
+        coordinates_(static_cast<std::size_t>(count_)),
         inertia_(dynamics),
         calls_(S * per_call()),
-        state_(3 * links() + 4) {
+        state_(3 * count_ + 4) {
     for (int k = 0; k < links(); ++k) {
       Coordinate& coordinate = at(k);
       coordinate.is_angle = dynamics.is_angle(k);
@@ -54,7 +56,7 @@ class LaneLagrangian {
   LaneLagrangian& operator=(const LaneLagrangian&) = delete;
 
   /// Coordinates.
-  int links() const { return dynamics_.coordinates(); }
+  int links() const { return count_; }
 
   // --- One member ---
 
@@ -444,11 +446,12 @@ class LaneLagrangian {
   }
 
   LaneDynamics& dynamics_;
+  int count_;
   std::vector<Coordinate> coordinates_;
   LaneInertia<L> inertia_;
   LaneRegisters<L> calls_, state_;
   Columns columns_;
-  bool may_miss_ = false;
+  bool may_miss_ = false;  // lengths are among the coordinates
   std::size_t newest_ = 0;
   L now_{0.0}, saved_time_{0.0};
   L slowest_squared_{1.0}, natural_speed_squared_{0.0}, loaded_{0.0};
