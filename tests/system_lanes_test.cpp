@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
-#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/lanes/lane_dual_functions.hpp>
 #include <pendula/lanes/lane_functions.hpp>
@@ -17,53 +16,12 @@
 #include <pendula/run/simulation.hpp>
 #include <vector>
 
-#include "support/random_chain.hpp"
+#include "support/chain_systems.hpp"
 
 namespace pendula::test {
 namespace {
 
 using Kernel = kernels::Planar2;
-
-/// Random chains as systems, with damping and drives where they are loaded.
-struct Systems {
-  Systems(std::size_t count, bool loaded, double end) {
-    Random random(17);
-    for (std::size_t k = 0; k < count; ++k) {
-      Chain<Planar> chain = random_chain<Planar>(random, 2, loaded);
-      if (loaded) chain = driven(chain, 1 + k % 3);
-      chains.push_back(chain);
-    }
-    for (const Chain<Planar>& chain : chains) {
-      drives.push_back(plain_drives(chain));
-      numbers.emplace_back(plain(chain, drives.back()), 1);
-    }
-    for (const ChainSystem& system : numbers) {
-      const State<Planar> state = random_state<Planar>(random, 2);
-      members.push_back({Motion(0.25, state.q, state.v), end, system.plain()});
-    }
-  }
-
-  // By one to three sines, so that members differ in that.
-  static Chain<Planar> driven(const Chain<Planar>& chain, std::size_t sines) {
-    ChainParameters<Planar> parameters;
-    parameters.masses = chain.masses();
-    parameters.lengths = chain.lengths();
-    parameters.gravity = chain.gravity();
-    parameters.damping = chain.damping();
-    parameters.torque = chain.constant_torque();
-    for (std::size_t k = 0; k < sines; ++k) {
-      Drive<Planar> drive{static_cast<int>(k % 2), {}, 3.0 + static_cast<double>(k), 0.4};
-      drive.amplitude[0] = 0.7;
-      parameters.drives.push_back(drive);
-    }
-    return Chain<Planar>(std::move(parameters));
-  }
-
-  std::vector<Chain<Planar>> chains;
-  std::vector<std::vector<PlainChain::Drive>> drives;
-  std::vector<ChainSystem> numbers;
-  std::vector<LaneSystemMember> members;
-};
 
 template <class Register = MemberRegister>
 std::vector<LaneEnd> ends_of(const std::vector<LaneSystemMember>& members, const LaneOptions& options) {
@@ -92,7 +50,7 @@ class SystemLanesTest : public testing::TestWithParam<bool> {};
 
 // Largest differences seen: 3e-10 free, 3e-10 loaded.
 TEST_P(SystemLanesTest, MembersEndWhereTheChainSolverSays) {
-  const Systems systems(19, GetParam(), 1.5);
+  const ChainSystems systems(19, GetParam(), 1.5);
   const std::vector<LaneEnd> ends = ends_of(systems.members, {.tolerance = 1e-12});
   for (std::size_t k = 0; k < ends.size(); ++k) {
     ASSERT_EQ(ends[k].status, Status::ok) << k;
@@ -103,7 +61,7 @@ TEST_P(SystemLanesTest, MembersEndWhereTheChainSolverSays) {
 
 // Neither others, nor one that is so far from zero that its sines come from elsewhere.
 TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
-  Systems systems(23, GetParam(), 1);
+  ChainSystems systems(23, GetParam(), 1);
   systems.members[4].start.q[0] += 2e6 * std::numbers::pi;
   const LaneOptions options{.tolerance = 1e-8, .energy_every = 3};
   const std::vector<LaneEnd> together = ends_of(systems.members, options);
@@ -122,7 +80,7 @@ TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
 
 // Registers of two numbers, as of all: to the last bit.
 TEST_P(SystemLanesTest, WidthsAgree) {
-  const Systems systems(13, GetParam(), 1);
+  const ChainSystems systems(13, GetParam(), 1);
   const LaneOptions options{.tolerance = 1e-8, .energy_every = 1};
   const std::vector<LaneEnd> wide = ends_of(systems.members, options);
   const std::vector<LaneEnd> narrow = ends_of<RegisterFor<2>>(systems.members, options);
@@ -137,7 +95,7 @@ INSTANTIATE_TEST_SUITE_P(Loads, SystemLanesTest, testing::Bool(),
                          [](const auto& each) { return each.param ? "loaded" : "free"; });
 
 TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
-  Systems systems(11, false, 1);
+  ChainSystems systems(11, false, 1);
   const std::vector<LaneEnd> expected = ends_of(systems.members, {.tolerance = 1e-8});
   systems.members[2].start.v[1] = std::numeric_limits<double>::quiet_NaN();
   systems.members[6].start.q[0] = std::numeric_limits<double>::infinity();
@@ -152,7 +110,7 @@ TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
 
 // A kernel compiled for other registers than the library.
 TEST(SystemLanes, ACompiledLibraryMovesItsOwnLanesOnly) {
-  const Systems systems(3, false, 1);
+  const ChainSystems systems(3, false, 1);
   class Watch : public LaneWatch {
     bool wants_steps() const override { return false; }
     void after_step(LaneSteps& /*steps*/) override {}
@@ -188,7 +146,7 @@ TEST(SystemLanes, ACompiledLibraryMovesItsOwnLanesOnly) {
 // Accelerations are those without tangents, their derivatives those of dual numbers.
 TEST(SystemLanes, AccelerationsHaveTheirDerivatives) {
   using Slopes = Dual<1>;
-  const Systems systems(MemberRegister::size, true, 1);
+  const ChainSystems systems(MemberRegister::size, true, 1);
   constexpr auto lanes = static_cast<std::size_t>(MemberRegister::size);
   LaneKernel<Kernel> kernel;
   struct Numbers {

@@ -13,6 +13,7 @@ struct SystemMoves {
 }  // namespace
 
 MoveSystemMembers* system_lanes(const RunOptions& options) {
+  if (options.method == Method::gauss) return gauss_system_lanes(options.stages);
   return detail::explicit_lanes<SystemMoves>(options.method);
 }
 

@@ -4,9 +4,11 @@
 
 namespace pendula {
 
-/// Members of generated kernels in lanes, by explicit methods; nullptr for others.
+/// Members of generated kernels in lanes, by explicit methods and Gauss's; nullptr for others.
 MoveSystemMembers* system_lanes(const RunOptions& options);
-/// The same with a tangent of each.
+/// Those of so many stages.
+MoveSystemMembers* gauss_system_lanes(int stages);
+/// By explicit methods, with a tangent of each.
 MoveSystemMembers* system_tangent_lanes(const RunOptions& options);
 
 }  // namespace pendula

@@ -19,6 +19,7 @@
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <span>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct LaneKind {
 
   auto tied() const { return std::tie(dimension, links, kernel, stages, method, step, tolerance, every); }
   bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
+  bool operator==(const LaneKind& other) const { return tied() == other.tied(); }
 };
 
 namespace detail {
@@ -50,7 +52,7 @@ template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
   if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
-  if (chain->chain().loaded() && !is_explicit(options.method)) return false;
+  if ((chain->chain().loaded() || options.solver == Solver::dense) && !is_explicit(options.method)) return false;
   kind.dimension = Space::dimension;
   kind.links = chain->chain().links();
   return true;
@@ -58,19 +60,19 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind
 inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
   if (system == nullptr || library().system_lanes(options) == nullptr) return false;
+  if (system->info().depends_on_time && !is_explicit(options.method)) return false;
   kind.kernel = system->entry().lanes;
   return true;
 }
 
 }  // namespace detail
 
-/// The kind of a run that goes in lanes by `options`; none of others. Chains that gravity alone moves, by Gauss steps
-/// of the chain solver, and as many of their stages as lanes were compiled for; all chains, and all that a generated
-/// kernel moves, by explicit Runge–Kutta methods.
+/// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
+/// compiled for, chains that gravity alone moves, of the chain solver, and systems of generated kernels that depend on
+/// time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
-  const bool by_fixed_point =
-      options.form == Form::momentum && options.solver != Solver::dense && options.iteration != Iteration::newton;
+  const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;
   const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
                     setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
                     !setup.doubted && setup.accuracy.error == 0;
@@ -144,6 +146,10 @@ class PlainChains : public PlainEnds {
     return library_of<Space>().tangent_lanes(options)(options, 0, members_, ends(), watch);
   }
 
+  /// What solves the stage equations, and how scalar runs are told to.
+  static constexpr Solver solver = Solver::chain;
+  static Description description(const RunSetup& /*setup*/) { return {"chain", "fixed-point", ""}; }
+
  private:
   std::deque<std::vector<PlainChain::Drive>> drives_;  // which stay where they are
   std::vector<PlainMember> members_;
@@ -166,6 +172,11 @@ class PlainSystems : public PlainEnds {
   }
   bool move_with_tangents(const RunOptions& options, LaneWatch& watch) {
     return library().system_tangent_lanes(options)(*dynamics_, options, 0, members_, ends(), watch);
+  }
+
+  static constexpr Solver solver = Solver::dense;
+  static Description description(const RunSetup& setup) {
+    return {"dense", "fixed-point", std::string(system(setup).info().name)};
   }
 
  private:
@@ -196,18 +207,20 @@ class LaneRuns : private LaneWatch {
     takes_too_long_.resize(setups.size());
   }
 
-  /// What came of each. One that lanes could not move, by steps of their own or at all, is run alone from its start.
-  std::vector<RunReport> go() {
+  /// What came of each; none of one that lanes could not move, by steps of their own or at all.
+  std::vector<std::optional<RunReport>> go() {
     reports_.assign(setups_.size(), {});
     move();
+    std::vector<std::optional<RunReport>> found(setups_.size());
     for (std::size_t k = 0; k < setups_.size(); ++k) {
       if (stopped_) {
         reports_[k].end = RunEnd::stopped;
       } else if (!finish(k)) {
-        reports_[k] = Run(*setups_[k]).go(stop_);
+        continue;
       }
+      found[k] = std::move(reports_[k]);
     }
-    return std::move(reports_);
+    return found;
   }
 
  private:
@@ -234,7 +247,7 @@ class LaneRuns : private LaneWatch {
     report.rows = 1 + (end.steps + setup.every - 1) / setup.every;
     report.statistics.steps = end.steps;
     report.statistics.rejected_steps = end.rejected_steps;
-    if (!is_explicit(options_.method)) report.description = {"chain", "fixed-point", ""};
+    if (!is_explicit(options_.method)) report.description = Members::description(setup);
     report.events = watches_[k].tallies();
     report.event_cost = watches_[k].cost();
     report.warnings = event_warnings(setup.events, report.events);
@@ -267,7 +280,7 @@ class LaneRuns : private LaneWatch {
     bool take(std::size_t of, const RunSetup& setup, RunOptions options, const Motion& from, double end) {
       if (of != member) {
         options.step = 1;  // of the size that it is told
-        options.solver = Solver::chain;
+        options.solver = Members::solver;
         options.iteration = Iteration::fixed_point;
         integrator = setup.subject->make_integrator(options);
         integrator->remember_steps(true);

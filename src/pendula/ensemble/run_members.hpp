@@ -87,7 +87,7 @@ inline RunOptions quickest_with_tangents(const RunSetup& setup) {
 /// How members are moved.
 enum class MemberMethod {
   asked,    ///< as their options tell
-  quickest  ///< as quickest_in_lanes tells; who cannot be moved so, as their options tell
+  quickest  ///< as quickest_in_lanes tells; who cannot be moved so, as their options tell, in lanes where that goes
 };
 
 /// The options by which a run goes in lanes.
@@ -97,11 +97,36 @@ inline RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
 
 namespace detail {
 
-inline std::vector<RunReport> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
-                                           const RunOptions& options, const std::function<bool()>& stop) {
+inline std::vector<std::optional<RunReport>> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
+                                                          const RunOptions& options,
+                                                          const std::function<bool()>& stop) {
   if (kind.kernel != nullptr) return LaneRuns<PlainSystems>(alike, options, stop).go();
   if (kind.dimension == Planar::dimension) return LaneRuns<PlainChains<Planar>>(alike, options, stop).go();
   return LaneRuns<PlainChains<Spatial>>(alike, options, stop).go();
+}
+
+// The lanes in which a run was tried last, and what came of it, if they moved it.
+struct Tried {
+  std::optional<LaneKind> kind;
+  std::optional<RunReport> report;
+};
+
+// Those of which nothing came yet, if lanes are others than before.
+inline void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const std::function<bool()>& stop,
+                         std::vector<Tried>& tried) {
+  RunsByKind kinds;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    if (tried[k].report) continue;
+    const auto kind = lane_kind(setups[k], lane_options(setups[k], method));
+    if (!kind || tried[k].kind == kind) continue;
+    tried[k].kind = kind;
+    kinds[*kind].push_back(k);
+  }
+  for (const auto& [kind, numbers] : kinds) {
+    const std::vector<const RunSetup*> alike = chosen(setups, numbers);
+    auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop);
+    for (std::size_t k = 0; k < numbers.size(); ++k) tried[numbers[k]].report = std::move(reports[k]);
+  }
 }
 
 }  // namespace detail
@@ -111,19 +136,14 @@ inline std::vector<RunReport> run_in_lanes(const LaneKind& kind, std::span<const
 inline std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
     MemberMethod method = MemberMethod::asked) {
-  std::vector<RunReport> reports(setups.size());
-  detail::RunsByKind kinds;
+  std::vector<detail::Tried> tried(setups.size());
+  if (method == MemberMethod::quickest) detail::try_in_lanes(setups, method, stop, tried);
+  detail::try_in_lanes(setups, MemberMethod::asked, stop, tried);
+  std::vector<RunReport> reports;
+  reports.reserve(setups.size());
   for (std::size_t k = 0; k < setups.size(); ++k) {
-    if (const auto kind = lane_kind(setups[k], lane_options(setups[k], method))) {
-      kinds[*kind].push_back(k);
-    } else {
-      reports[k] = Run(setups[k]).go(stop);
-    }
-  }
-  for (const auto& [kind, numbers] : kinds) {
-    const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
-    std::vector<RunReport> found = detail::run_in_lanes(kind, alike, lane_options(*alike[0], method), stop);
-    for (std::size_t k = 0; k < numbers.size(); ++k) reports[numbers[k]] = std::move(found[k]);
+    std::optional<RunReport>& report = tried[k].report;
+    reports.push_back(report ? std::move(*report) : Run(setups[k]).go(stop));
   }
   return reports;
 }

@@ -34,6 +34,9 @@ class Pace {
     start_from_nothing(v, p_D_v);
   }
 
+  /// κ  [1/s²].
+  double slowest_squared() const { return slowest_squared_; }
+
   /// Σ M_kk v_k² of what forces at the start give in the time 1/√κ: what rates are small against.
   double natural_speed_squared() const { return natural_speed_squared_; }
 

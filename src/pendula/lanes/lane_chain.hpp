@@ -9,6 +9,8 @@
 #include <pendula/lanes/lane_columns.hpp>
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/lanes/lane_prediction.hpp>
+#include <pendula/lanes/lane_stop.hpp>
 #include <type_traits>
 
 namespace pendula {
@@ -23,6 +25,10 @@ class LaneChain {
  public:
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
+  using SpaceType = Space;
+  using Subject = int;
+  using Stop = LaneStop<L>;
+  static constexpr int stages = S, links_known = N;
   static constexpr std::size_t D = Space::dimension;
   using Vector = std::array<L, D>;
   using Columns = LaneColumns<S, L>;
@@ -41,8 +47,8 @@ class LaneChain {
   // --- One member ---
 
   /// A member comes into a lane, with its chain, at q and v  [rad, rad/s]; its next step starts cold.
-  void start(int lane, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain, const double* q,
-             const double* v) {
+  void start(int lane, double /*time*/, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain,
+             const double* q, const double* v) {
     const double gravity = given.gravity();
     gravity_.set(lane, gravity);
     double length = 0;
@@ -105,11 +111,14 @@ class LaneChain {
     return energy;
   }
 
-  /// Σ M |g| l, what energies are compared to.
-  L energy_scale() const {
+  /// What the energy at the end of the step that was solved is to be  [J].
+  L energy_due() { return energy(); }
+
+  /// What an energy that ought to be `due` is compared to: Σ M |g| l, and what there is.
+  L energy_scale(const L& due) const {
     L scale(0.0);
     for (int i = 0; i < links(); ++i) scale = fma(abs(constants_[i].weight), constants_[i].length, scale);
-    return scale;
+    return scale + abs(due);
   }
 
   /// R and d ln R/dt, as ChainStages::tempo.
@@ -131,14 +140,8 @@ class LaneChain {
     quickening = select(sum > L(0.0), growth / (root * root * root * squared), L(0.0));
   }
 
-  /// Whether a member's last step was accepted, was solved only, or never was.
-  struct Kind {
-    Mask follows, again, cold;
-    L depth;  ///< how many steps of this size a step follows
-  };
-
   /// Predicts the stages of a step of `h`, `ratio` times as long as the one that they are known from.
-  void prepare(const L& h, const L& ratio, const Kind& kind) {
+  void prepare(const L& /*time*/, const L& h, const L& ratio, const LanePrediction<L>& kind) {
     columns_.prepare(h);
     columns_.predict_at(select(kind.again, L(0.0), L(1.0)), ratio, kind.depth);
     predict(kind.follows);
@@ -229,6 +232,8 @@ class LaneChain {
 
   /// The most that a link turns in the step, squared; never less, hardly more  [rad²].
   L turn() const { return double(S) * turn_; }
+  /// From where on stages are no motion  [rad].
+  static constexpr double largest_turn(bool /*chosen*/) { return 3; }
 
   /// R in the middle of the step, squared, times h².
   L pace_squared() const { return fma(slowest_pace_, columns_.h() * columns_.h(), sqrt(sqrt(quartic_))); }

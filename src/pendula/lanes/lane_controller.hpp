@@ -2,21 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <pendula/gauss/step_controller.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 
-/// Chooses the steps of every member by a tolerance, as StepController does with symmetric steering: a density of steps
-/// that follows the member's pace, and a scale that changes where a step errs by too much or many err by less.
-/// Errors are compared by their logarithms.
+/// Chooses the steps of every member by a tolerance, as StepController does. With symmetric steering: a density of
+/// steps that follows the member's pace, and a scale that changes where a step errs by too much or many err by less; of
+/// members with loads, by the error of the last step. Errors are compared by their logarithms.
 template <class L, int S>
 class LaneController {
  public:
   using Mask = typename L::Mask;
 
   explicit LaneController(double tolerance)
-      : log_tolerance_(std::log(tolerance)), first_scale_(std::min(1.0, std::exp(log_tolerance_ / order))) {}
+      : tolerance_(tolerance),
+        log_tolerance_(std::log(tolerance)),
+        first_scale_(std::min(1.0, std::exp(log_tolerance_ / order))) {}
 
   /// Members that start, at the tempo of the stepper's chain.
   template <class Stepper>
@@ -29,11 +32,12 @@ class LaneController {
     largest_ = select(which, L(never), largest_);
     steps_ = select(which, L(0.0), steps_);
     length_ = select(which, L(1.0), length_);
+    if constexpr (has_loads<Stepper>) longest_ = select(which, stepper.chain().longest_step(), longest_);
   }
 
   /// Of the next step, unless the run ends before.
   L step() const {
-    const L step = scale_ / density_;
+    const L step = min(longest_, scale_ / density_);
     return select(last_ > L(0.0), min(step, most_growth * last_), step);
   }
 
@@ -43,10 +47,14 @@ class LaneController {
     const auto decay = [&](int k) { return stepper.chain().decay(k); };
     const L squared = max(stepper.chain().pace_squared(), L(tiny)), size = 0.5 * log(squared);
     log_error_ = log_error(decay, squared, size) + L(std::log(safety)) - max(size, L(std::log(shortest)));
-    const Mask good = log_error_ <= L(log_tolerance_);
+    L log_excess = log_error_ - L(log_tolerance_);
+    if constexpr (requires { stepper.chain().imbalance(); }) {
+      log_excess = max(log_excess, log_imbalance(stepper.chain().imbalance(), max(sqrt(squared), L(shortest))));
+    }
+    const Mask good = log_excess <= L(0.0);
     const Mask bad = which & !good;
     if (xsimd::any(bad)) {
-      const L factor = max(L(0.2), 0.9 * exp((L(log_tolerance_) - log_error_) * L(1.0 / order)));
+      const L factor = max(L(0.2), 0.9 * exp(log_excess * L(-1.0 / order)));
       shrink(bad, h, select(factor > L(0.2), factor, L(0.2)));
     }
     return which & good;
@@ -65,15 +73,36 @@ class LaneController {
     L pace, quickening;
     stepper.chain().tempo(pace, quickening);
     last_ = select(which, h, last_);
+    Mask symmetric = which;
+    if constexpr (has_loads<Stepper>) {
+      const Mask loaded = which & stepper.chain().loaded();
+      if (xsimd::any(loaded)) follow_error(loaded, h);
+      symmetric = which & !loaded;
+    }
     const L next = fma(scale_, quickening, density_);
     const Mask follows = (next < farthest * pace) & (farthest * next > pace);
-    density_ = select(which & follows, next, density_);
-    start_density(which & !follows, pace, quickening);
-    watch(which);
+    density_ = select(symmetric & follows, next, density_);
+    start_density(symmetric & !follows, pace, quickening);
+    watch(symmetric);
   }
 
  private:
   static constexpr int order = 2 * S;
+  template <class Stepper>
+  static constexpr bool has_loads = requires(Stepper& stepper) {
+    stepper.chain().loaded();
+  };
+
+  void follow_error(const Mask& which, const L& h) {
+    const L growth = exp((L(std::log(greedy_aim) + log_tolerance_) - log_error_) * L(1.0 / order));
+    scale_ = select(which, h * density_ * min(max(growth, L(least_growth)), L(greedy_growth)), scale_);
+  }
+
+  // Of the energy that is missing, by how much it is more than it may be in a step that goes on by so much.
+  L log_imbalance(const L& imbalance, const L& moved) const {
+    const L most = max(L(most_imbalance * tolerance_) * moved, L(energy_rounding));
+    return log(max(imbalance, L(tiny)) / most);
+  }
 
   void start_density(const Mask& which, const L& pace, const L& quickening) {
     const L change = 0.5 * (scale_ * quickening);
@@ -123,11 +152,13 @@ class LaneController {
 
   // StepController's.
   static constexpr double safety = 4, shortest = 1e-3, aim = 0.2, most_growth = 4, worthwhile = 1.05, farthest = 2;
+  static constexpr double most_imbalance = 5, energy_rounding = 1e-13;
+  static constexpr double greedy_aim = 0.03, greedy_growth = 1.5, least_growth = 0.3;
   static constexpr double rounding = 1e-13, small = 10;
   static constexpr double never = -700, tiny = 1e-300;  // a logarithm below all errors; in place of zero
 
-  double log_tolerance_, first_scale_;
-  L scale_{1.0}, density_{1.0}, last_{0.0};
+  double tolerance_, log_tolerance_, first_scale_;
+  L scale_{1.0}, density_{1.0}, last_{0.0}, longest_{std::numeric_limits<double>::infinity()};
   L log_error_{never};
   L largest_{never}, steps_{0.0}, length_{1.0};  // of the errors since the scale was last looked at
 };

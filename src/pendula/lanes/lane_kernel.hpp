@@ -1,13 +1,17 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <pendula/gauss/pace.hpp>
 #include <pendula/lanes/lane_dual_functions.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_functions.hpp>
 #include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/system/mass_scale.hpp>
 #include <pendula/system/system_model.hpp>
 
 namespace pendula {
@@ -29,6 +33,9 @@ class LaneKernel : public LaneDynamics {
     }
   }
 
+  bool is_periodic(int i) const override { return S::coordinate_is_periodic[static_cast<std::size_t>(i)]; }
+  bool constant_masses() const override { return S::constant_masses; }
+
   void take(int lane, const PlainSystem& system) override {
     if constexpr (parameter_count<S>() > 0) {
       std::array<L*, static_cast<std::size_t>(parameter_count<S>())> places;
@@ -48,7 +55,7 @@ class LaneKernel : public LaneDynamics {
     set_time(time);
     Vector<L> acceleration;
     S::acceleration(parameters_, read(q), read(v), inputs_at(time), acceleration);
-    for (int i = 0; i < S::coordinates; ++i) acceleration[i].store(a + i * L::size);
+    write(acceleration, a);
   }
 
   void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv, double* a,
@@ -68,6 +75,47 @@ class LaneKernel : public LaneDynamics {
 
   void fastest_drives(double* frequencies) const override { inputs_.fastest().store(frequencies); }
   bool depends_on_time() const override { return holds_time<S>; }
+
+  LaneStart start(const PlainSystem& system, double time, const double* q, const double* v, double* p,
+                  double* pivots) const override {
+    const SystemModel<S> model(system);
+    const Vector<double> position = Eigen::Map<const Vector<double>>(q), rates = Eigen::Map<const Vector<double>>(v);
+    Vector<double> momenta;
+    S::momentum_from_velocity(model.parameters(time), position, rates, momenta);
+    std::copy_n(momenta.data(), momenta.size(), p);
+    Pace<S> pace;
+    pace.start(model, time, position, rates);
+    MassScale<S> masses;
+    masses.start(model.parameters(time), position);
+    for (std::size_t k = 0; k < S::coordinates; ++k) pivots[k] = masses.largest_pivot(k);
+    return {pace.slowest_squared(), pace.natural_speed_squared(), model.loaded()};
+  }
+
+  void hamiltonian_form(const double* times, const double* q, const double* p, double* v, double* f) override {
+    const L time = L::load(times);
+    set_time(time);
+    Vector<L> rates, forces;
+    S::hamiltonian_form(parameters_, read(q), read(p), inputs_at(time), rates, forces);
+    write(rates, v);
+    write(forces, f);
+  }
+
+  void masses(const double* times, const double* q, double* masses) override {
+    set_time(L::load(times));
+    typename S::template Matrix<L> mass;
+    S::mass_matrix(parameters_, read(q), mass);
+    for (int i = 0; i < S::coordinates; ++i) {
+      for (int j = 0; j < S::coordinates; ++j) mass(i, j).store(masses + (i * S::coordinates + j) * L::size);
+    }
+  }
+
+  void powers(const double* times, const double* q, const double* v, double* powers) override {
+    const L time = L::load(times);
+    set_time(time);
+    L power;
+    S::power(parameters_, read(q), read(v), inputs_at(time), power);
+    power.store(powers);
+  }
 
   void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) override {
     set_time(L::load(times));
@@ -89,6 +137,9 @@ class LaneKernel : public LaneDynamics {
     Vector<L> x;
     for (int i = 0; i < S::coordinates; ++i) x[i] = L::load(numbers + i * L::size);
     return x;
+  }
+  static void write(const Vector<L>& x, double* numbers) {
+    for (int i = 0; i < S::coordinates; ++i) x[i].store(numbers + i * L::size);
   }
   static Vector<Varied> read(const double* numbers, const double* slopes) {
     Vector<Varied> x;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <optional>
+#include <pendula/lanes/lane_chain.hpp>
 #include <pendula/lanes/lane_chain_seats.hpp>
 #include <pendula/lanes/lane_explicit.hpp>
+#include <pendula/lanes/lane_lagrangian.hpp>
 #include <pendula/lanes/lane_member.hpp>
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_stepper.hpp>
@@ -68,7 +70,10 @@ class LaneQueue {
  private:
   // Of systems nobody knows before what their energies are to be compared with.
   static constexpr bool sums_energies = requires(const Stepper& stepper) { stepper.energy_sum(); };
-  static constexpr double most_attempts = 40;  // at one step
+  static constexpr bool may_be_stiff = requires { requires Stepper::Chain::may_be_stiff; };
+  static constexpr double most_attempts = 40;                        // at one step
+  static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // steps, and those a step that was taken
+  static constexpr int most_iterations = 25;                         // of a step whose size is chosen
   static constexpr double largest_energy_defect = 0.02;
   static constexpr double smallest_step = 1e-10;  // of the time that is left
 
@@ -76,7 +81,9 @@ class LaneQueue {
   static typename Stepper::Options stepper_options(const LaneOptions& options) {
     if constexpr (Stepper::is_implicit) {
       typename Stepper::Options given;
-      if (options.step == 0) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
+      given.are_chosen = options.step == 0;
+      if (given.are_chosen) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
+      if (given.are_chosen && may_be_stiff) given.max_iterations = most_iterations;
       if (options.enough > 0) given.enough = options.enough;
       return given;
     } else {
@@ -132,12 +139,12 @@ class LaneQueue {
   // Whose energy does not balance has come to stages that are not those of the motion.
   Mask accept_doubtful(const Mask& good, const Mask& doubtful) {
     auto& chain = stepper_.chain();
-    const L before = chain.energy();
+    const L due = chain.energy_due();
     chain.save();
     stepper_.accept(good);
     const L after = chain.energy();
-    const L bound = largest_energy_defect * (chain.energy_scale() + abs(before));
-    const Mask wrong = doubtful & !(abs(after - before) <= bound);
+    const L bound = largest_energy_defect * chain.energy_scale(due);
+    const Mask wrong = doubtful & !(abs(after - due) <= bound);
     chain.restore(wrong);
     stepper_.forget(wrong);
     const Mask right = good & !wrong;
@@ -174,9 +181,19 @@ class LaneQueue {
     Mask lost = bad;
     if (chooses()) {
       controller_.shrink(bad & !solved, h, L(0.5));
-      lost = bad & ((attempts_ >= L(most_attempts)) | !(h > smallest_step * remaining));
+      lost = bad & ((attempts_ >= L(most_attempts)) | !(h > smallest_step * remaining) | is_stiff(bad & !solved));
     }
     if (xsimd::any(lost)) retire(lost, Status::not_converged);
+  }
+
+  // Members whose fixed points have failed now as often that steps are short for their sake, not for what they err by:
+  // Newton is faster.
+  Mask is_stiff([[maybe_unused]] const Mask& unsolved) {
+    if constexpr (may_be_stiff) {
+      unsolved_ = unsolved_ + select(unsolved, L(1.0), L(0.0));
+      return unsolved & (unsolved_ > fma(L(most_unsolved), steps_, L(first_unsolved)));
+    }
+    return unsolved & !unsolved;
   }
 
   void retire(const Mask& which, Status status) {
@@ -222,7 +239,8 @@ class LaneQueue {
     member_[lane] = static_cast<std::ptrdiff_t>(member);
     time_.value.set(lane, next.start.time);
     end_.set(lane, next.end);
-    for (L* zero : {&time_.low, &steps_, &rejected_, &attempts_, &since_look_, &energy_error_, &energy_sum_})
+    for (L* zero :
+         {&time_.low, &steps_, &rejected_, &unsolved_, &attempts_, &since_look_, &energy_error_, &energy_sum_})
       zero->set(lane, 0);
     if (sight_) sight_->seat(lane, member);
     running_.set(lane, 1);
@@ -260,7 +278,7 @@ class LaneQueue {
   std::ptrdiff_t member_[L::width] = {};
   Twofold<L> time_{L(0.0), L(0.0)};
   L end_{0.0}, running_{0.0}, begins_{0.0};
-  L steps_{0.0}, rejected_{0.0}, attempts_{0.0};
+  L steps_{0.0}, rejected_{0.0}, unsolved_{0.0}, attempts_{0.0};
   L energy_{0.0}, energy_error_{0.0}, energy_sum_{0.0}, since_look_{0.0};
   LaneWatch* watch_ = nullptr;
   std::optional<typename Seats::Sight> sight_;
@@ -268,7 +286,7 @@ class LaneQueue {
 
 /// By Gauss steps of S stages, of chains of N links.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
-using GaussLanes = LaneQueue<LaneStepper<Space, S, N, Register>>;
+using GaussLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register>>>;
 
 /// By explicit steps.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
@@ -283,7 +301,12 @@ template <class Method, class Register = MemberRegister>
 using SystemLanes =
     LaneQueue<LaneExplicit<LaneSystem<Register>, Method>, LaneSystemSeats<LaneExplicit<LaneSystem<Register>, Method>>>;
 
-/// The same with a tangent of each member.
+/// The same by Gauss steps of S stages.
+template <int S, class Register = MemberRegister>
+using GaussSystemLanes =
+    LaneQueue<LaneStepper<LaneLagrangian<S, Register>>, LaneSystemSeats<LaneStepper<LaneLagrangian<S, Register>>>>;
+
+/// By explicit steps with a tangent of each member.
 template <class Method, class Register = MemberRegister>
 using SystemTangentLanes = LaneQueue<LaneExplicit<LaneSystem<Register, true>, Method>,
                                      LaneSystemSeats<LaneExplicit<LaneSystem<Register, true>, Method>>>;

@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <pendula/lanes/lane_chain.hpp>
 #include <pendula/lanes/lane_controller.hpp>
-#include <pendula/lanes/lane_stop.hpp>
+#include <pendula/lanes/lane_pack.hpp>
 
 namespace pendula {
 
@@ -12,54 +11,59 @@ struct LaneStepperOptions {
   /// Of the first correction that is left out, relative to what the step moves: by default a thousandth of a last bit.
   double enough = 1e-18;
   int max_iterations = 50;
+  bool are_chosen = false;  ///< steps are, by their errors
 };
 
-/// Gauss steps of several chains at once, one in each lane, every one of a size of its own, by fixed point.
+/// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Moved`
+/// holds their states and stages: LaneChain of chains, LaneLagrangian of systems.
 ///
 /// What becomes of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
 /// and one that fails stays where its last accepted step ended.
-template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
+template <class Moved>
 class LaneStepper {
  public:
-  using Chain = LaneChain<Space, S, N, Register>;
+  using Chain = Moved;
   using L = typename Chain::L;
   using Mask = typename L::Mask;
   using Options = LaneStepperOptions;
-  using SpaceType = Space;
-  static constexpr int lanes = L::size, stages = S, links_known = N;
+  using SpaceType = typename Chain::SpaceType;
+  static constexpr int lanes = L::size, stages = Chain::stages, links_known = Chain::links_known;
   static constexpr bool is_implicit = true, can_choose = true, has_tangent = false;
-  using Controller = LaneController<L, S>;
+  using Controller = LaneController<L, stages>;
 
-  explicit LaneStepper(int links, LaneStepperOptions options = {})
-      : chain_(links), options_(options), stop_(options.enough) {}
+  explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
+      : chain_(subject), options_(options), stop_(options.enough) {}
 
   Chain& chain() { return chain_; }
   const Chain& chain() const { return chain_; }
+  const L& energy_sum() const requires requires(const Chain& chain) { chain.energy_sum(); }
+  { return chain_.energy_sum(); }
 
-  /// A new member comes into a lane: LaneChain::start.
+  /// A new member comes into a lane: Chain::start.
   template <class... Start>
-  void start(int lane, double /*time*/, const Start&... start) {
-    chain_.start(lane, start...);
+  void start(int lane, double time, const Start&... start) {
+    chain_.start(lane, time, start...);
     known_.set(lane, cold);
     last_.set(lane, 0);
     depth_.set(lane, 0);
     stop_.forget(lane);
   }
 
-  /// Solves steps of `h`, at any time, of the members that are `wanted`; gives those where that worked. The state stays
+  /// Solves steps of `h` from `time` of the members that are `wanted`; gives those where that worked. The state stays
   /// what it was.
-  Mask solve(const L& /*time*/, const L& h, const Mask& wanted) {
+  Mask solve(const L& time, const L& h, const Mask& wanted) {
     const L ratio = h / last_;
     const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
     depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(1.0));
-    chain_.prepare(h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
+    chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
     const Mask found = iterate(wanted);
     chain_.finish();
     known_ = select(found, L(solved), L(cold));
     depth_ = select(found, depth_, L(0.0));
     last_ = h;
-    return found & (chain_.turn() < L(largest_turn * largest_turn));
+    const double farthest = chain_.largest_turn(options_.are_chosen);
+    return found & (chain_.turn() < L(farthest * farthest));
   }
 
   /// Moves those of the members that were solved to the end of their step.
@@ -85,7 +89,6 @@ class LaneStepper {
 
  private:
   static constexpr double cold = 0, solved = 1, accepted = 2;
-  static constexpr double largest_turn = 3;                               // rad
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
   static L farthest_extrapolation() { return L(1.5); }
 
@@ -103,7 +106,7 @@ class LaneStepper {
 
   Chain chain_;
   LaneStepperOptions options_;
-  LaneStop<L> stop_;
+  typename Chain::Stop stop_;
   L known_{cold}, last_{0.0},
       depth_{0.0};  // of the stages: what they are of, the size of their step, how many were alike
   std::int64_t iterations_ = 0;

@@ -6,7 +6,10 @@ namespace pendula {
 
 /// Decides for every member when its fixed point has got where it goes, as RoundoffStop does for one: from the sizes of
 /// its corrections, here squared and relative to the size of the step by `scale`, squared too.
-template <class L>
+///
+/// A fixed point on rates and forces is two interleaved sequences: then corrections are looked at in pairs, and their
+/// rate is that of two iterations.
+template <class L, int Sequences = 1>
 class LaneStop {
  public:
   using Mask = typename L::Mask;
@@ -21,7 +24,7 @@ class LaneStop {
   void restart(const L& scale) {
     count_ = 0;
     scale_ = scale;
-    last_[0] = last_[1] = last_[2] = L(0.0);
+    for (L& last : last_) last = L(0.0);
   }
 
   /// Takes the corrections just made; what has arrived, and what never will.
@@ -30,8 +33,7 @@ class LaneStop {
   };
   Verdict judge(const L& correction, const Mask& active) {
     ++count_;
-    last_[2] = last_[1];
-    last_[1] = last_[0];
+    for (std::size_t k = known - 1; k > 0; --k) last_[k] = last_[k - 1];
     last_[0] = correction;
     if (count_ == 1) {
       first_ = correction;
@@ -39,12 +41,15 @@ class LaneStop {
     }
     const L bound = L(enough_) * scale_;
     Verdict verdict{correction <= bound, !(correction <= L(largest) * scale_)};
-    if (count_ == 2) {
-      const L rate = last_[0] / last_[1];
-      verdict.done = verdict.done | ((last_[0] * max(rate, rate_) <= bound) & (rate_ < L(0.25)));
+    if (count_ <= Sequences) return verdict;
+    const L now = size(0), rate = now / size(Sequences);
+    if (count_ == Sequences + 1) {
+      verdict.done = verdict.done | ((now * max(rate, rate_) <= bound) & (rate_ < L(0.25)));
       rate_ = select(active, rate, rate_);
+    } else {
+      look_ahead(verdict, bound, now, rate);
     }
-    if (count_ >= 3) look_ahead(verdict, bound);
+    before_ = rate;
     return verdict;
   }
 
@@ -54,13 +59,19 @@ class LaneStop {
  private:
   // The next correction shrinks like the last two. Those that shrink by less than half the way that they once did, and
   // are small, are rounding.
-  void look_ahead(Verdict& verdict, const L& bound) {
-    const L rate = last_[0] / last_[1], before = last_[1] / last_[2];
-    const L slower = max(rate, before);
-    const Mask is_small = last_[0] <= L(small) * scale_, is_rounding = last_[0] <= L(rounding) * scale_;
-    const Mask stalls = (is_small & (rate >= L(0.25)) & (before >= L(0.25))) | (is_rounding & (rate * rate >= before));
-    verdict.done = verdict.done | ((last_[0] * slower <= bound) & (slower < L(0.25))) | stalls | (last_[0] == L(0.0));
-    if (count_ > 6) verdict.lost = verdict.lost | ((!is_small) & (rate > L(1.0)) & (before > L(1.0)));
+  void look_ahead(Verdict& verdict, const L& bound, const L& now, const L& rate) {
+    const L slower = max(rate, before_);
+    const Mask is_small = now <= L(small) * scale_, is_rounding = now <= L(rounding) * scale_;
+    const Mask stalls =
+        (is_small & (rate >= L(0.25)) & (before_ >= L(0.25))) | (is_rounding & (rate * rate >= before_));
+    verdict.done = verdict.done | ((now * slower <= bound) & (slower < L(0.25))) | stalls | (now == L(0.0));
+    if (count_ > 6) verdict.lost = verdict.lost | ((!is_small) & (rate > L(1.0)) & (before_ > L(1.0)));
+  }
+
+  // Of the last corrections but `back`, one of each sequence.
+  L size(std::size_t back) const {
+    if constexpr (Sequences == 1) return last_[back];
+    return max(last_[back], last_[back + 1]);
   }
 
   // Squares of what may be rounding at all, of a last bit, and of a correction that no step makes.
@@ -69,7 +80,9 @@ class LaneStop {
   double enough_;
   int count_ = 0;
   L first_{0.0}, scale_{0.0}, rate_{1.0};  // of the second correction of a step to its first
-  L last_[3];
+  L before_{1.0};                          // the rate at the last one
+  static constexpr std::size_t known = 2 * Sequences;
+  L last_[known];
 };
 
 }  // namespace pendula

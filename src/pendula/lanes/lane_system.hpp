@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <memory>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
+#include <pendula/lanes/lane_registers.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <random>
@@ -17,12 +17,6 @@
 #include <vector>
 
 namespace pendula {
-
-/// Where coordinates lie that are numbers and nothing else.
-struct CoordinateSpace {
-  static constexpr int dof = 1;
-  static constexpr std::size_t dimension = 1;
-};
 
 /// The forward dynamics of several systems at once, one in each lane, by whatever tells their accelerations.
 ///
@@ -43,11 +37,7 @@ class LaneSystem {
 
   /// `dynamics` must outlive it.
   explicit LaneSystem(LaneDynamics& dynamics)
-      : dynamics_(dynamics), buffer_(doubles_for(dynamics.coordinates())), inverse_sizes_(dynamics.coordinates()) {
-    void* first = buffer_.data();
-    std::size_t room = buffer_.size() * sizeof(double);
-    first_ = static_cast<double*>(std::align(pack_alignment, sizeof(double), first, room));
-  }
+      : dynamics_(dynamics), registers_(kinds * dynamics.coordinates() + 1), inverse_sizes_(dynamics.coordinates()) {}
   LaneSystem(const LaneSystem&) = delete;
   LaneSystem& operator=(const LaneSystem&) = delete;
 
@@ -226,16 +216,11 @@ class LaneSystem {
 
   // --- Numbers as they cross ---
 
-  // q, q̇, q̈, with their derivatives, and a time, of as many lanes as there are, from a place on that is aligned.
+  // q, q̇, q̈, with their derivatives, and a time.
   static constexpr int kinds = with_tangent ? 6 : 3;
-  static std::size_t doubles_for(int coordinates) {
-    return (std::size_t(kinds) * static_cast<std::size_t>(coordinates) + 1) * L::width +
-           pack_alignment / sizeof(double);
-  }
-  double* registers(int count) { return first_ + static_cast<std::ptrdiff_t>(count) * L::size; }
-  double* times() { return registers(kinds * parts()); }
+  double* times() { return registers_[kinds * parts()]; }
   // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈; 3, 4, 5: their derivatives.
-  double* numbers(int which, int i) { return registers(which * parts() + i); }
+  double* numbers(int which, int i) { return registers_[which * parts() + i]; }
 
   void write(const L& time, const Parts& parts) {
     time.store(times());
@@ -322,8 +307,7 @@ class LaneSystem {
   }
 
   LaneDynamics& dynamics_;
-  std::vector<double> buffer_;
-  double* first_ = nullptr;
+  LaneRegisters<L> registers_;
   L pace_squared_{1.0}, energy_sum_{0.0};
   Sums coarse_, fine_;
   L inverse_pace_squared_{1.0};  // of tangents

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_member.hpp>
 #include <pendula/lanes/lane_sight.hpp>
@@ -45,10 +44,11 @@ class LaneSystemSeats {
   void read(int lane, Motion& motion) {
     motion.q.resize(coordinates_);
     motion.v.resize(coordinates_);
-    for (int i = 0; i < coordinates_; ++i) {
-      motion.q[i] = detail::value_of(stepper_.parts()[i].place[0])[lane];
-      motion.v[i] = detail::value_of(stepper_.parts()[i].rate[0])[lane];
-    }
+    auto& moved = stepper_.chain();
+    moved.for_each_rate([&](int i, const auto& rate, const auto&) {
+      motion.q[i] = moved.along(i)[0][lane];
+      motion.v[i] = rate[0][lane];
+    });
   }
 
  private:

@@ -8,11 +8,13 @@ namespace pendula::detail {
 /// 2π in twice the digits of a double.
 inline constexpr double full_turn = 6.283185307179586, full_turn_low = 2.4492935982947064e-16;
 
+/// From where on an angle has full turns to be taken out, and how far a double tells where it is  [rad].
+inline constexpr double some_turns = 8, unknown_turns = 1e15;
+
 /// Takes full turns out of an angle that has some, and adds them to `turns`: of ten thousand turns a double has lost
 /// four digits of where it is within one.
 inline void take_out_turns(Compensated<double>& angle, double& turns) {
-  static constexpr double some = 8, unknown = 1e15;  // rad; beyond it a double does not tell where it is
-  if (!(std::abs(angle.value) > some) || std::abs(angle.value) > unknown) return;
+  if (!(std::abs(angle.value) > some_turns) || std::abs(angle.value) > unknown_turns) return;
   const double whole = std::nearbyint(angle.value / full_turn);
   const Twofold<double> gone = exact_product(whole, full_turn);
   const Twofold<double> rest = exact_sum(angle.value, -gone.value);

@@ -9,6 +9,11 @@
 
 namespace pendula {
 
+/// What pivots of a mass matrix are, of the largest that they have elsewhere.
+struct MassShare {
+  static constexpr double small = 1.0 / 16, vanished = 1e-12;
+};
+
 /// How the inertia of each coordinate, a pivot of the mass matrix, compares with the largest that it has elsewhere.
 ///
 /// Where it vanishes the coordinate has no meaning: φ at a pole, an angle about a point that the bob is at. How large
@@ -19,6 +24,7 @@ class MassScale {
   using Vector = typename S::template Vector<double>;
   using Matrix = typename S::template Matrix<double>;
   static constexpr std::size_t count = S::coordinates;
+  static constexpr double small = MassShare::small, vanished = MassShare::vanished;
 
  public:
   void start(const Parameters& parameters, const Vector& q) {
@@ -58,8 +64,11 @@ class MassScale {
   /// M_kk, where it was looked at last.
   double inertia(std::size_t k) const { return inertia_[k]; }
 
+  /// The largest pivot of coordinate k that was seen.
+  double largest_pivot(std::size_t k) const { return largest_[k]; }
+
   /// Whether the inertia of coordinate k is far below what it is elsewhere.
-  bool is_small(std::size_t k) const { return !S::constant_masses && pivot_[k] < largest_[k] / 16; }
+  bool is_small(std::size_t k) const { return !S::constant_masses && pivot_[k] < small * largest_[k]; }
 
   /// A coordinate that has lost more than half of its digits; −1 where none has.
   int singular() const { return singular_; }
@@ -79,7 +88,6 @@ class MassScale {
   }
 
   static constexpr int samples = 8;
-  static constexpr double vanished = 1e-12;
 
   std::array<double, count> inertia_{}, pivot_{}, largest_{};
   int singular_ = -1;

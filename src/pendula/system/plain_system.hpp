@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pendula/system/system.hpp>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -37,10 +38,11 @@ struct SystemInfo {
   std::span<const std::string_view> inputs, input_units;
   std::span<const std::string_view> points;
   std::span<const int> point_sizes;  ///< components of each
+  bool depends_on_time;              ///< other than by inputs
 };
 
 /// What the generated kernel S says of itself.
-template <class S>
+template <System S>
 constexpr SystemInfo info_of() {
   return {S::name,
           S::model,
@@ -57,7 +59,8 @@ constexpr SystemInfo info_of() {
           S::input_names,
           S::input_units,
           S::point_names,
-          S::point_sizes};
+          S::point_sizes,
+          holds_time<S>};
 }
 
 }  // namespace pendula
