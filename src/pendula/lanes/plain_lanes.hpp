@@ -87,7 +87,7 @@ struct PlainMemberEnd {
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                          std::span<PlainMemberEnd> ends, LaneWatch& watch);
 
-/// The same of systems whose accelerations `dynamics` tells, in as many lanes as the library has: otherwise all fail.
+/// The same of systems whose motion `dynamics` tells, in as many lanes as the library has: otherwise all fail.
 using MoveSystemMembers = bool(LaneDynamics& dynamics, const RunOptions& options, std::int64_t every,
                                std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends,
                                LaneWatch& watch);
