@@ -27,6 +27,7 @@ KNOWS = {
         "pendula/run",
         "pendula/lanes",
         "pendula/chain",
+        "pendula/gauss",
         "pendula/system",
         "pendula/numeric",
     },

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <pendula/chain/chain_numbers.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
@@ -60,7 +61,11 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind
 inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
   if (system == nullptr || library().system_lanes(options) == nullptr) return false;
-  if (system->info().depends_on_time && !is_explicit(options.method)) return false;
+  if (!is_explicit(options.method)) {
+    // What error estimates look at besides in these cases, lanes do not.
+    const bool misses_loads = is_adaptive(options) && options.stages == StepShape::few_stages && system->loaded();
+    if (system->info().depends_on_time || misses_loads) return false;
+  }
   kind.kernel = system->entry().lanes;
   return true;
 }

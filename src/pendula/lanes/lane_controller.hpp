@@ -32,7 +32,7 @@ class LaneController {
     largest_ = select(which, L(never), largest_);
     steps_ = select(which, L(0.0), steps_);
     length_ = select(which, L(1.0), length_);
-    if constexpr (has_loads<Stepper>) longest_ = select(which, stepper.chain().longest_step(), longest_);
+    if constexpr (has_loads<Stepper>) longest_ = select(which, stepper.chain().longest_step(tolerance_), longest_);
   }
 
   /// Of the next step, unless the run ends before.

@@ -15,6 +15,7 @@
 #include <pendula/lanes/lane_registers.hpp>
 #include <pendula/lanes/lane_stop.hpp>
 #include <pendula/lanes/lane_turned.hpp>
+#include <pendula/system/forcing_look.hpp>
 #include <vector>
 
 namespace pendula {
@@ -131,11 +132,11 @@ class LaneLagrangian {
     quickening = select(sum > L(0.0), growth / (root * root * root * squared), L(0.0));
   }
 
-  /// The longest step in which stages see what inputs are driven by: a radian a stage.
-  L longest_step() const {
+  /// The longest step in which stages sum up what inputs are driven by, to a tolerance.
+  L longest_step(double tolerance) const {
     alignas(pack_alignment) double fastest[L::width];
     dynamics_.fastest_drives(fastest);
-    return L(double(S)) / L::load(fastest);
+    return L(SineTurn(S, 2 * S).within(tolerance)) / L::load(fastest);
   }
 
   // --- A step ---
