@@ -69,7 +69,8 @@ class ChainSolver {
     choice_.count_iteration();
     if (choice_.active() == Iteration::newton) return last_ = newton_.correct(stages_);
     const Correction correction = fixed_point_.correct(stages_);
-    if (choice_.is_automatic() && diverges(correction.relative, last_.relative, count_, epsilon)) {
+    if (choice_.is_automatic() &&
+        diverges(correction.relative, last_.relative, count_, usual_rounding(parts(), epsilon), epsilon)) {
       if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN(), -1};
       stages_.start_cold();
       choice_.give_up_fixed_point();

@@ -10,11 +10,14 @@
 namespace pendula {
 
 /// Whether a fixed point, whose corrections were `last` and `correction` relative to the unknowns, contracts so slowly
-/// that Newton costs less; far from round-off, so that rounding is not taken for it. `count` iterations were made.
-inline bool diverges(double correction, double last, int count, double epsilon) {
+/// that Newton costs less; far from round-off, so that rounding is not taken for it, or after many iterations, where it
+/// is more than the `rounding` that is usual. `count` iterations were made.
+inline bool diverges(double correction, double last, int count, double rounding, double epsilon) {
   if (!std::isfinite(correction)) return true;
-  const bool far = correction > 67 * std::sqrt(epsilon);  // 1e-6 in double
-  return far && ((count > 3 && correction > 0.7 * last) || count > 20);
+  const double root = std::sqrt(epsilon);
+  const bool far = correction > 67 * root;                                                   // 1e-6 in double
+  const bool slow = correction > 0.5 * last && correction > std::max(rounding, root / 150);  // 1e-10
+  return count > 20 ? far || slow : far && count > 3 && correction > 0.7 * last;
 }
 
 /// Chooses between the two iterations by what they take: iterations a step, counted while the run goes, times the cost

@@ -7,6 +7,13 @@
 
 namespace pendula {
 
+/// Where iterations on so many links usually stop shrinking, relative: 1e-12 in double, more where links are many. The
+/// velocity of a link is the difference of momenta of all masses below it, a second one along the chain: rounding grows
+/// like the square of its length. (Measured in space: 8e-10, 9e-8 and 1e-5 for 10³, 10⁴ and 10⁵ links.)
+inline double usual_rounding(int links, double epsilon) {
+  return std::max(4500.0, 45.0 * links * links) * epsilon;
+}
+
 /// How the corrections of an iteration shrink.
 enum class Convergence {
   linear,    ///< δ_{k+1} ≈ ρ δ_k: fixed point
@@ -23,11 +30,13 @@ class RoundoffStop {
  public:
   /// `epsilon` is that of the numbers that are iterated on.
   explicit RoundoffStop(int links, double epsilon = double_epsilon)
-      : epsilon_(epsilon), small_(std::max(1e-7 * std::sqrt(coarser()), 1e-14 * coarser() * links * links)) {}
+      : epsilon_(epsilon),
+        rounded_(usual_rounding(links, epsilon)),
+        small_(std::max(1e-7 * std::sqrt(coarser()), rounded_)) {}
 
   /// A new step begins. What Newton's constant C was is remembered from step to step.
   void restart() {
-    count_ = 0;
+    count_ = kept_ = 0;
     last_ = {};
     ++steps_;
   }
@@ -88,11 +97,20 @@ class RoundoffStop {
   }
 
   // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding; of
-  // those that are as small as a last bit, half the way on a scale of powers will do.
-  bool has_stalled(double rate, double exponent) const {
+  // those that are as small as a last bit, half the way on a scale of powers will do. Where they are larger than is
+  // usual, it may be a mode that a step does not resolve, and that hardly moves, which converges slowly, or not at all,
+  // after those that move: rounding is what keeps its size.
+  bool has_stalled(double rate, double exponent) {
     if (last_[0] > small_ || (rate < 0.5 && last_[0] > epsilon_)) return false;
+    if (convergence_ == Convergence::linear && last_[0] > rounded_ && !keeps_its_size(rate)) return false;
     const double average = std::pow(best_ / first_, exponent);
     return rate >= std::max(0.5, (1 + average) / 2) || (last_[0] <= epsilon_ && rate >= std::sqrt(average));
+  }
+
+  bool keeps_its_size(double rate) {
+    const bool kept = rate >= 0.9 && last_[0] <= 4 * best_;
+    kept_ = kept ? kept_ + 1 : 0;
+    return kept_ >= certainly;
   }
 
   static constexpr double double_epsilon = std::numeric_limits<double>::epsilon();
@@ -105,18 +123,17 @@ class RoundoffStop {
   double noise() const { return 1e-12 * coarser(); }
 
   static constexpr double safety = 10;
-  static constexpr int check_interval = 32;
+  static constexpr int check_interval = 32, certainly = 8;
 
   double epsilon_;
-  // No iteration that converges stops shrinking above this: 1e-7 in double, more where links are many. The velocity of
-  // a link is the difference of momenta of all masses below it, a second one along the chain: rounding grows like the
-  // square of its length. (Measured in space: 8e-10, 9e-8 and 1e-5 for 10³, 10⁴ and 10⁵ links.)
-  double small_;
+  double rounded_;  // where iterations usually stop shrinking
+  double small_;    // no iteration that converges stops shrinking above this
   Convergence convergence_ = Convergence::quadratic;
   std::array<double, 4> last_{};  // the newest first
   double first_ = 0, best_ = 0;
   double constant_ = 0;
   int count_ = 0, steps_ = 0;
+  int kept_ = 0;  // corrections in a row
 };
 
 }  // namespace pendula

@@ -58,12 +58,13 @@ class LaneStop {
 
  private:
   // The next correction shrinks like the last two. Those that shrink by less than half the way that they once did, and
-  // are small, are rounding.
+  // are small, are rounding; those that are larger than usual have to stay where they are, as RoundoffStop says.
   void look_ahead(Verdict& verdict, const L& bound, const L& now, const L& rate) {
     const L slower = max(rate, before_);
     const Mask is_small = now <= L(small) * scale_, is_rounding = now <= L(rounding) * scale_;
-    const Mask stalls =
-        (is_small & (rate >= L(0.25)) & (before_ >= L(0.25))) | (is_rounding & (rate * rate >= before_));
+    const Mask is_usual = now <= L(usual) * scale_;
+    const Mask stays = is_small & (rate >= L(0.25)) & (before_ >= L(0.25)) & (is_usual | (rate >= L(0.81)));
+    const Mask stalls = stays | (is_rounding & (rate * rate >= before_));
     verdict.done = verdict.done | ((now * slower <= bound) & (slower < L(0.25))) | stalls | (now == L(0.0));
     if (count_ > 6) verdict.lost = verdict.lost | ((!is_small) & (rate > L(1.0)) & (before_ > L(1.0)));
   }
@@ -74,8 +75,9 @@ class LaneStop {
     return max(last_[back], last_[back + 1]);
   }
 
-  // Squares of what may be rounding at all, of a last bit, and of a correction that no step makes.
-  static constexpr double small = 1e-18, rounding = 4.9e-32, largest = 1e4;
+  // Squares of what may be rounding at all, of what it usually is, of a last bit, and of a correction that no step
+  // makes.
+  static constexpr double small = 1e-18, usual = 1e-24, rounding = 4.9e-32, largest = 1e4;
 
   double enough_;
   int count_ = 0;
