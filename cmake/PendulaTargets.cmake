@@ -53,9 +53,10 @@ set(_pendula_warnings
     "$<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-uninitialized>"
     $<$<BOOL:${PENDULA_WARNINGS_AS_ERRORS}>:-Werror>)
 # Not asked for: what AddressSanitizer (null, object-size) and vector loads (alignment) trap by themselves. Those are most
-# of what UndefinedBehaviorSanitizer puts in, and a third of the compile time.
+# of what UndefinedBehaviorSanitizer puts in, and a third of the compile time. Nor numbers too large for an integer, of
+# which xsimd makes some that it does not use (exp of what is no number).
 # Nor use of a stack frame after its return: g++ lays such frames out misaligned for AVX-512 (its bug 110027).
-set(_pendula_sanitizers -fsanitize=address,undefined -fno-sanitize=null,object-size,alignment,vptr
+set(_pendula_sanitizers -fsanitize=address,undefined -fno-sanitize=null,object-size,alignment,vptr,float-cast-overflow
                         -fno-sanitize-recover=all -fno-omit-frame-pointer
                         $<$<CXX_COMPILER_ID:GNU>:--param=asan-use-after-return=0>)
 

@@ -13,6 +13,12 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)  // as Clang says it
+#define __SANITIZE_ADDRESS__ 1
+#endif
+#endif
+
 #if defined(__SANITIZE_ADDRESS__)
 
 // The sanitizer has an allocator of its own, and calls back. (g++ comes without the header that declares this.)

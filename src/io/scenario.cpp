@@ -492,7 +492,7 @@ struct ScenarioDocument::Document {
 };
 
 ScenarioDocument::ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides)
-    : document_(std::make_unique<const Document>(std::string(name), parse_toml(text, name, overrides))) {}
+    : document_(std::make_unique<const Document>(Document{std::string(name), parse_toml(text, name, overrides)})) {}
 
 ScenarioDocument::~ScenarioDocument() = default;
 

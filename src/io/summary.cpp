@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/version.hpp>
@@ -158,7 +159,7 @@ std::string what_was_moved(const ModelSummary& model) {
     std::string numbers;
     for (const auto& [name, values] : model.parameters) {
       numbers += ", " + name + " " + rounded(values.front());
-      if (std::ranges::any_of(values, [&](double value) { return value != values.front(); })) numbers += " ...";
+      if (std::ranges::adjacent_find(values, std::not_equal_to()) != values.end()) numbers += " ...";
     }
     return line("system", model.model + (model.links > 1 ? ", " + plural(model.links, "link") : "") + numbers);
   }

@@ -10,7 +10,7 @@ namespace pendula::detail {
 template <int S, class Real>
 class NodePolynomials {
  public:
-  static constexpr std::size_t most = S == Eigen::Dynamic ? max_stages : S;
+  static constexpr auto most = static_cast<std::size_t>(S == Eigen::Dynamic ? max_stages : S);
   using Values = std::array<Real, most>;  ///< one a node
 
   explicit NodePolynomials(const Tableau<S, Real>& tableau) : count_(static_cast<std::size_t>(tableau.stages())) {

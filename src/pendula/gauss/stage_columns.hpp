@@ -14,7 +14,8 @@ namespace pendula::detail {
 template <int S, class Real, int Width = lanes_for<Real>(S)>
 class StageColumns {
   using L = Pack<Width, RegisterFor<Width, Real>>;
-  static constexpr std::size_t columns = S == Eigen::Dynamic ? Width : S, Z = Width;
+  static constexpr auto columns = static_cast<std::size_t>(S == Eigen::Dynamic ? Width : S);
+  static constexpr std::size_t Z = Width;
 
  public:
   explicit StageColumns(Family family = Family::gauss, int stages = S)

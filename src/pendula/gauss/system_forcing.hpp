@@ -25,7 +25,8 @@ class SystemForcing {
     const double fastest = model.fastest_drive();
     if (fastest > 0) h = std::min(h, turn_.within(tolerance) / fastest);
     if constexpr (holds_time<S>) {
-      const auto [state, pace] = look();
+      const auto [at, pace] = look();
+      const auto& state = at;  // no binding: Clang 14 captures none
       return look_.resolved(state.time, h, pace, tolerance, state.v, sizes_of(state.q),
                             [&](std::span<const double> times, double* found) {
                               accelerations_in_time(model, times, state.q, state.v, found);

@@ -190,7 +190,7 @@ class EventWatch {
     const auto search_by = [&](auto by) {
       return locate_all(k, search.find(before.value, last, before.sign, by), values, states.resolution(), found);
     };
-    using By = decltype(search)::By;
+    using By = typename decltype(search)::By;
     if (!search_by(By::polynomial)) search_by(By::full_order);
     const int sign = std::isfinite(last) ? sign_of(last) : 0;
     sides_[k] = {last, sign != 0 || !std::isfinite(last) ? sign : before.sign};
