@@ -270,6 +270,24 @@ TYPED_TEST(RunsInLanes, WhoCannotBeMovedThereIsRunAlone) {
   for (const std::size_t k : {3U, 5U}) EXPECT_EQ(found[k].end, RunEnd::complete);
 }
 
+TYPED_TEST(RunsInLanes, ConstantStepsThatDoNotResolveAChainAreTakenAlone) {
+  std::vector<RunSetup> setups = this->setups(5, 3, constant(0.5, 8), 2);
+  for (RunSetup& setup : setups) {
+    setup.start.q *= 1e-3;
+    setup.start.v *= 1e-3;
+    EXPECT_FALSE(lane_kind(setup));
+    setup.options.step = 0.01;
+    EXPECT_TRUE(lane_kind(setup));
+    setup.options.step = 0.5;
+  }
+  const std::vector<RunReport> found = run_members(setups);
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    const RunReport expected = pendula::Run(setups[k]).go();
+    EXPECT_EQ(found[k].last.q, expected.last.q);
+    EXPECT_EQ(found[k].last.v, expected.last.v);
+  }
+}
+
 TYPED_TEST(RunsInLanes, OfSeveralKindsEachGoesWithItsOwn) {
   std::vector<RunSetup> setups = this->setups(12, 2, constant(0.01), 1);
   for (std::size_t k = 0; k < setups.size(); ++k) {

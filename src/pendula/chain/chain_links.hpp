@@ -203,13 +203,14 @@ class ChainLinks {
     }
   }
   bool loaded() const { return loaded_; }
-  Real fastest_swing() const { return fastest_swing_; }  ///< ω² of a chain that hangs, by Gershgorin  [1/s²]
+  /// Whether a step of h resolves how fast the chain can swing, at rest ω² by Gershgorin: up to (h ω)² = 4.
+  bool resolves(Real h) const { return !(h * h * fastest_swing_ > Real(4)); }
   const LinkConstants<Real>& operator[](int link) const { return constants_[link]; }
 
  private:
   int links_;
   bool loaded_;
-  Real fastest_swing_{0};
+  Real fastest_swing_{0};  // ω²  [1/s²]
   detail::PerLink<LinkConstants<Real>, N> constants_;
 };
 

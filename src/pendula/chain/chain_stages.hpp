@@ -163,7 +163,7 @@ class ChainStages {
     const bool other = Real(h) != columns_.h();
     columns_.prepare(Real(h), Real(alike ? last_h_ : 0));
     if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
-    hangs_ = is_unresolved(h);
+    hangs_ = !constants_.resolves(Real(h));
     is_predicted_ = alike;
     if (alike) {
       predict();
@@ -181,8 +181,8 @@ class ChainStages {
     columns_.predict_at(Real(0), Real(h / from));
     columns_.prepare(Real(h), Real(0));
     if (loaded()) set_torques(time);
-    hangs_ = is_unresolved(h);
-    is_predicted_ = hangs_ == is_unresolved(from);
+    hangs_ = !constants_.resolves(Real(h));
+    is_predicted_ = hangs_ != constants_.resolves(Real(from));
     if (is_predicted_) {
       for (int i = 0; i < links(); ++i) {
         for (std::size_t k = 0; k < D; ++k)
@@ -370,9 +370,6 @@ class ChainStages {
  private:
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
-  // From (h ω)² = 4 on a step does not resolve the chain's swinging.
-  bool is_unresolved(double h) const { return Real(h) * Real(h) * constants_.fastest_swing() > Real(4); }
-
   // Where in the block of a link what stands; [number][stage].
   static constexpr std::size_t multiplier_at = D * Z, rod_at = (D + 1) * Z, freed_at = (2 * D + 1) * Z,
                                offset_at = (3 * D + 1) * Z, coupling_at = (3 * D + 2) * Z, per_link = (3 * D + 3) * Z;

@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/run/chain_subject.hpp>
@@ -53,7 +54,11 @@ template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
   if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
-  if ((chain->chain().loaded() || options.solver == Solver::dense) && !is_explicit(options.method)) return false;
+  if (!is_explicit(options.method)) {
+    if (chain->chain().loaded() || options.solver == Solver::dense) return false;
+    // Steps that do not resolve a chain are others without what it pulls where it hangs, which lanes do not know of.
+    if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
+  }
   kind.dimension = Space::dimension;
   kind.links = chain->chain().links();
   return true;
@@ -73,8 +78,8 @@ inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKi
 }  // namespace detail
 
 /// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
-/// compiled for, chains that gravity alone moves, of the chain solver, and systems of generated kernels that depend on
-/// time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods.
+/// compiled for, chains that gravity alone moves, of the chain solver and resolved by constant steps, and systems of
+/// generated kernels that depend on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;
