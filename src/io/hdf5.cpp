@@ -4,6 +4,7 @@
 #include <hdf5.h>
 #include <hdf5_hl.h>
 #include <isa-l/igzip_lib.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -144,6 +145,29 @@ struct Descriptor {
   }
 };
 
+std::uint64_t number_in(std::span<const unsigned char> bytes) {
+  std::uint64_t number = 0;
+  for (std::size_t k = bytes.size(); k-- > 0;) number = number << 8 | bytes[k];
+  return number;
+}
+void put_number(std::uint64_t number, std::span<unsigned char> bytes) {
+  for (unsigned char& byte : bytes) {
+    byte = static_cast<unsigned char>(number);
+    number >>= 8;
+  }
+}
+
+// What is written next leads to places beyond the end that the superblock tells, until that is written itself, last:
+// the file says before how long it will be.
+void make_room(const Handle& file, const std::string& name) {
+  hsize_t wanted = 0;
+  struct stat status {};
+  const Descriptor descriptor{open(name.c_str(), O_RDWR | O_CLOEXEC)};
+  if (descriptor.number < 0 || fstat(descriptor.number, &status) != 0) return;
+  if (H5Fget_filesize(file.get(), &wanted) < 0 || static_cast<hsize_t>(status.st_size) > wanted) return;
+  if (ftruncate(descriptor.number, static_cast<off_t>(wanted)) == 0) mark_as_closed(name);
+}
+
 }  // namespace
 
 Error::Error() : std::runtime_error(reason()) {}
@@ -173,20 +197,26 @@ void let_others_read(const Handle& file) {
 
 void flush(const Handle& file, const std::string& name) {
   errno = 0;
+  make_room(file, name);
   require(H5Fflush(file.get(), H5F_SCOPE_GLOBAL));
   mark_as_closed(name);
 }
 
-// The superblock of version 3: signature (8), version (1), sizes (2), flags (1), four addresses (32), checksum (4).
+// The superblock of version 3: signature (8), version (1), sizes (2), flags (1), four addresses (32), of which the
+// third is the end of the file, checksum (4).
 void mark_as_closed(const std::string& file) {
-  constexpr std::size_t version_at = 8, flags_at = 11, checksum_at = 44;
+  constexpr std::size_t version_at = 8, flags_at = 11, end_at = 28, checksum_at = 44;
   std::array<unsigned char, 48> block{};
+  struct stat status {};
   const Descriptor descriptor{open(file.c_str(), O_RDWR | O_CLOEXEC)};
   if (descriptor.number < 0 || pread(descriptor.number, block.data(), block.size(), 0) != ssize_t{48}) return;
-  if (block[version_at] != 3 || block[flags_at] == 0) return;
+  if (block[version_at] != 3 || fstat(descriptor.number, &status) != 0) return;
+  const std::array<unsigned char, 48> before = block;
   block[flags_at] = 0;
-  const std::uint32_t sum = checksum(std::span(block).first(checksum_at));
-  for (std::size_t k = 0; k < 4; ++k) block[checksum_at + k] = static_cast<unsigned char>(sum >> (8 * k));
+  const auto end = static_cast<std::uint64_t>(status.st_size);
+  if (number_in(std::span(block).subspan(end_at, 8)) < end) put_number(end, std::span(block).subspan(end_at, 8));
+  if (block == before) return;
+  put_number(checksum(std::span(block).first(checksum_at)), std::span(block).subspan(checksum_at, 4));
   if (pwrite(descriptor.number, block.data(), block.size(), 0) != ssize_t{48}) return;  // then it stays as it was
 }
 

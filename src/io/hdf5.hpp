@@ -67,7 +67,7 @@ void let_others_read(const Handle& file);
 /// is in the file leads only to what was there before.
 void flush(const Handle& file, const std::string& name);
 
-/// Takes that mark off a file that some program was killed with.
+/// Takes that mark off a file that some program was killed with, which ends where it ends.
 void mark_as_closed(const std::string& file);
 
 Handle create_group(const Handle& where, const std::string& name);

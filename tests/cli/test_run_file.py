@@ -67,6 +67,12 @@ def rows_of(file: Path) -> int:
         return run["t"].shape[0]
 
 
+def read_whole(file: Path) -> None:
+    with h5py.File(file) as run:
+        for name in ["t", "theta", "theta_dot", "x", "y", "energy"]:
+            assert run[name][...].size > 0, name
+
+
 @pytest.fixture
 def scenario(tmp_path):
     def write(text: str) -> Path:
@@ -158,7 +164,7 @@ def test_a_run_that_is_killed_leaves_a_file_that_opens_and_goes_on(scenario, tmp
             kills += 1
         if (tmp_path / "part.h5").exists():
             command = [program(), "simulate", "--resume", "part.h5"]
-            rows_of(tmp_path / "part.h5")
+            read_whole(tmp_path / "part.h5")
             opened += 1
     run([program(), "simulate", "--resume", "part.h5"])
     assert opened > 3
