@@ -196,8 +196,8 @@ void let_others_read(const Handle& file) {
 }
 
 void flush(const Handle& file, const std::string& name) {
-  errno = 0;
   make_room(file, name);
+  errno = 0;
   require(H5Fflush(file.get(), H5F_SCOPE_GLOBAL));
   mark_as_closed(name);
 }
