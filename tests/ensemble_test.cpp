@@ -271,7 +271,7 @@ TYPED_TEST(RunsInLanes, WhoCannotBeMovedThereIsRunAlone) {
 }
 
 TYPED_TEST(RunsInLanes, ConstantStepsThatDoNotResolveAChainAreTakenAlone) {
-  std::vector<RunSetup> setups = this->setups(5, 3, constant(0.5, 8), 2);
+  std::vector<RunSetup> setups = this->setups(5, 3, constant(0.5, 4), 2);
   for (RunSetup& setup : setups) {
     setup.start.q *= 1e-3;
     setup.start.v *= 1e-3;
