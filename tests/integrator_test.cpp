@@ -209,7 +209,7 @@ TEST(ExplicitMethods, RefuseASingularStart) {
 }
 
 // Three links in their slowest mode, by steps that do not resolve the fastest one: corrections of the mode that moves
-// are gone after a few iterations, those of the other shrink by a fifth each time.
+// are gone after a few iterations, those of the other shrink slowly, rest or grow for a while.
 TEST(Iterations, OfAFixedPointGoOnWhereAModeThatHardlyMovesConvergesSlowly) {
   const ChainSubject<Planar> subject(test::equal_chain<Planar>(3));
   const Motion start(0, Eigen::Vector3d(1e-3, 1.2921127216082604e-3, 1.6312232922920724e-3), Eigen::Vector3d::Zero());
