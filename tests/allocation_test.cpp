@@ -105,9 +105,9 @@ TEST(Allocation, NoneInAStepOfFixedSize) {
 }
 
 TEST(Allocation, NoneInAStepTakenInParts) {
-  const Chain<Planar> chain = equal_chain<Planar>(4);
+  const Chain<Planar> chain = equal_chain<Planar>(3);
   RunOptions options = gauss(8);
-  const auto start = State<Planar>::from_angles(Eigen::VectorXd::Constant(4, 1.0));
+  const auto start = State<Planar>::from_angles(Eigen::VectorXd::Constant(3, 1.0));
   for (Solver solver : {Solver::dense, Solver::chain}) {
     options.solver = solver;
     options.iteration = Iteration::newton;
@@ -122,10 +122,10 @@ TEST(Allocation, NoneInAStepTakenInParts) {
 
 TEST(Allocation, NoneInAStep) {
   Random random(1);
-  const Chain<Planar> planar = random_chain<Planar>(random, 4, true);
-  const Chain<Spatial> spatial = random_chain<Spatial>(random, 3, true);
-  const State<Planar> planar_start = random_state<Planar>(random, 4);
-  const State<Spatial> spatial_start = random_state<Spatial>(random, 3);
+  const Chain<Planar> planar = random_chain<Planar>(random, 3, true);
+  const Chain<Spatial> spatial = random_chain<Spatial>(random, 2, true);
+  const State<Planar> planar_start = random_state<Planar>(random, 3);
+  const State<Spatial> spatial_start = random_state<Spatial>(random, 2);
   for (int stages = 1; stages <= 8; ++stages) {
     for (Form form : {Form::momentum, Form::velocity}) {
       EXPECT_EQ(allocations_in_steps(planar, planar_start, gauss(stages, form)), 0) << stages << " stages";

@@ -15,6 +15,7 @@
 #include <iterator>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 
@@ -178,6 +179,7 @@ void compile(const std::string& name, const fs::path& folder, const fs::path& ob
                                    "-fvisibility-inlines-hidden",
                                    "-Wl,-Bsymbolic"};
   for (const std::string& flag : architecture_flags()) command.push_back(flag);
+  for (const std::string& flag : toolchain.flags) command.push_back(flag);
   for (const fs::path& include : toolchain.includes) command.push_back("-I" + include.string());
   command.insert(command.end(), {source.string(), "-o", object.string()});
   const Ended ended = run_process(command);
@@ -250,6 +252,8 @@ Toolchain Toolchain::of_this_program() {
   for (const char* include : configured::includes) toolchain.includes.emplace_back(include);
   toolchain.python = environment("PENDULA_PYTHON", toolchain.python);
   toolchain.compiler = environment("CXX", configured::compiler);
+  std::istringstream flags(environment("CXXFLAGS", ""));
+  for (std::string flag; flags >> flag;) toolchain.flags.push_back(flag);
   toolchain.cache = cache_folder();
   return toolchain;
 }
@@ -277,6 +281,7 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   Key key;
   key.add(read_model(file)).add(name).add(version).add(library().instruction_set);
   key.add(toolchain.python).add(toolchain.compiler).add_file(this_program());
+  for (const std::string& flag : toolchain.flags) key.add(flag);
   std::error_code none;
   for (const auto& part : fs::recursive_directory_iterator(toolchain.codegen / "pendula_codegen", none)) {
     if (part.path().extension() == ".py" || part.path().extension() == ".j2") key.add_file(part.path());

@@ -16,6 +16,7 @@ namespace pendula::io {
 struct Toolchain {
   std::string python;                           ///< with the packages of the generator
   std::string compiler;                         ///< C++20
+  std::vector<std::string> flags;               ///< of the user, after those that kernels are compiled with
   std::filesystem::path codegen;                ///< folder of the Python package pendula_codegen
   std::filesystem::path plotting;               ///< folder of the Python package pendula_plot
   std::filesystem::path examples;               ///< folder of the scenarios that come with pendula
@@ -23,7 +24,8 @@ struct Toolchain {
   std::filesystem::path cache;                  ///< folder of compiled kernels
 
   /// That of this program: of its build, told by the file pendula.toolchain beside it, or of where it is installed;
-  /// PENDULA_PYTHON and CXX in the environment go before. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  /// PENDULA_PYTHON and CXX in the environment go before, and CXXFLAGS has the flags. The cache is
+  /// $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
   static Toolchain of_this_program();
 };
 

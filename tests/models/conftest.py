@@ -1,4 +1,4 @@
-"""Runs of the program on models; PENDULA_PROGRAM names it, PENDULA_MODEL_CACHE where kernels are kept between runs."""
+"""Runs of the program on models; PENDULA_PROGRAM names it, XDG_CACHE_HOME where kernels are kept between runs."""
 
 import json
 import os
@@ -13,7 +13,7 @@ EXAMPLES = ROOT / "examples"
 
 @pytest.fixture(scope="session")
 def environment(tmp_path_factory) -> dict[str, str]:
-    kept = os.environ.get("PENDULA_MODEL_CACHE") or str(tmp_path_factory.mktemp("cache"))
+    kept = os.environ.get("XDG_CACHE_HOME") or str(tmp_path_factory.mktemp("cache"))
     return {**os.environ, "XDG_CACHE_HOME": kept}
 
 

@@ -165,3 +165,9 @@ def test_a_kernel_that_is_no_longer_used_goes(pendula, tmp_path):
     assert pendula("build", "spring_pendulum").returncode == 0
     assert kernel.exists() and recent.exists() and not forgotten.exists()
     recent.unlink()
+
+
+def test_flags_of_the_user_reach_the_compiler(pendula, tmp_path):
+    wrong = pendula("build", "furuta", XDG_CACHE_HOME=str(tmp_path), CXXFLAGS="-O1  -fno-such-flag")
+    assert wrong.returncode == 2
+    assert "-fno-such-flag" in wrong.stderr.splitlines()[-1]

@@ -72,7 +72,7 @@ def run_pendula(commands: list[str], check: bool = False) -> list[str]:
     """The program is on the path; one of its calls shows an error. Kernels of models are kept between tests."""
     with fresh_checkout() as folder:
         path = f"{Path(program()).parent}:{os.environ['PATH']}"
-        kept = os.environ.get("PENDULA_MODEL_CACHE", f"{folder}/kernels")
+        kept = os.environ.get("XDG_CACHE_HOME", f"{folder}/kernels")
         return shell(commands, folder, check, PATH=path, XDG_CACHE_HOME=kept)
 
 
