@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <pendula/numeric/fast_fma.hpp>
 #include <type_traits>
 
 namespace pendula {
@@ -41,17 +42,6 @@ Real rounded(Real x) {
   return x;
 #endif
 }
-
-template <class Real>
-inline constexpr bool has_fast_fma = false;
-#ifdef FP_FAST_FMA
-template <>
-inline constexpr bool has_fast_fma<double> = true;
-#endif
-#ifdef FP_FAST_FMAF
-template <>
-inline constexpr bool has_fast_fma<float> = true;
-#endif
 
 }  // namespace detail
 

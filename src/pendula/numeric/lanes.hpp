@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <pendula/numeric/fast_fma.hpp>
 #include <type_traits>
 #include <xsimd/xsimd.hpp>
 
@@ -80,10 +81,11 @@ void store(Real* to, const xsimd::batch<Real, Arch>& from) {
 // what a product loses to rounding could not be told.
 template <class Real>
 Real fused(const Real& x, const Real& y, const Real& z) {
-#ifdef FP_FAST_FMA
-  if constexpr (has_registers<Real>) return std::fma(x, y, z);
-#endif
-  return x * y + z;
+  if constexpr (has_fast_fma<Real>) {
+    return std::fma(x, y, z);
+  } else {
+    return x * y + z;
+  }
 }
 template <class Real, class Arch>
 xsimd::batch<Real, Arch> fused(const xsimd::batch<Real, Arch>& x, const xsimd::batch<Real, Arch>& y,
