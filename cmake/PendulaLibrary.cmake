@@ -111,8 +111,9 @@ function(_pendula_compile_copy copy arch)
   target_compile_options(${copy} PRIVATE ${_pendula_flags_${arch}} -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
   target_compile_definitions(${copy} PRIVATE $<$<BOOL:${PENDULA_CHECKED}>:PENDULA_FEW_LANES>)
   list(GET _pendula_archs 0 least)
-  if(NOT arch STREQUAL least)
-    # Without optimisation, Eigen's empty constants would be initialised when a program starts (check_runs_nothing.cmake).
+  if(PENDULA_CHECKED OR NOT arch STREQUAL least)
+    # Without optimisation, Eigen's empty constants would be initialised when a program starts (check_runs_nothing.cmake),
+    # and sanitized steps would take minutes.
     target_compile_options(${copy} PRIVATE $<$<NOT:$<CONFIG:Release,RelWithDebInfo,MinSizeRel>>:-O1>)
   endif()
   target_compile_definitions(${copy} PRIVATE PENDULA_LIBRARY=pendula_library_${arch} PENDULA_INSTRUCTION_SET="${arch}")
