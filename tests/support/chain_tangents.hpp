@@ -119,8 +119,8 @@ template <class Space>
 using TangentCases = ::testing::Types<Case<Space, 2>, Case<Space, 5>>;
 #else
 template <class Space>
-using TangentCases = ::testing::Types<Case<Space, 1>, Case<Space, 2>, Case<Space, 3>, Case<Space, 5>, Case<Space, 8>,
-                                      Case<Space, 2, long double>>;
+using TangentCases =
+    ::testing::Types<Case<Space, 1>, Case<Space, 2>, Case<Space, 5>, Case<Space, 8>, Case<Space, 2, long double>>;
 #endif
 
 }  // namespace pendula::test
