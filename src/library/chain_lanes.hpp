@@ -13,7 +13,7 @@ MoveMembers* chain_lanes(const RunOptions& options);
 extern template MoveMembers* chain_lanes<Planar>(const RunOptions&);
 extern template MoveMembers* chain_lanes<Spatial>(const RunOptions&);
 
-/// The same with a tangent of each member, by explicit methods.
+/// The same with a tangent of each member.
 template <class Space>
 MoveMembers* tangent_lanes(const RunOptions& options);
 

@@ -29,28 +29,14 @@ bool move_members(const RunOptions& options, std::int64_t every, std::span<const
 }
 
 template <class Space>
-MoveMembers* gauss_lanes(int stages) {
-  switch (stages) {
-    case 4:
-      return &move_members<Space, GaussLanes<Space, 4>>;
-#ifndef PENDULA_FEW_LANES  // where sanitizers make minutes of their compilation
-    case 2:
-      return &move_members<Space, GaussLanes<Space, 2>>;
-    case 6:
-      return &move_members<Space, GaussLanes<Space, 6>>;
-    case 8:
-      return &move_members<Space, GaussLanes<Space, 8>>;
-#endif
-    default:
-      return nullptr;
-  }
-}
-
-template <class Space>
 struct PlainMoves {
   template <class Method>
   static MoveMembers* by() {
     return &move_members<Space, ExplicitLanes<Space, Method>>;
+  }
+  template <int S>
+  static MoveMembers* of() {
+    return &move_members<Space, GaussLanes<Space, S>>;
   }
 };
 
@@ -60,17 +46,20 @@ struct TangentMoves {
   static MoveMembers* by() {
     return &move_members<Space, TangentLanes<Space, Method>>;
   }
+  template <int S>
+  static MoveMembers* of() {
+    return &move_members<Space, GaussTangentLanes<Space, S>>;
+  }
 };
 
 template <class Space>
 MoveMembers* chain_lanes(const RunOptions& options) {
-  if (options.method == Method::gauss) return gauss_lanes<Space>(options.stages);
-  return detail::explicit_lanes<PlainMoves<Space>>(options.method);
+  return detail::lanes_of<PlainMoves<Space>>(options);
 }
 
 template <class Space>
 MoveMembers* tangent_lanes(const RunOptions& options) {
-  return detail::explicit_lanes<TangentMoves<Space>>(options.method);
+  return detail::lanes_of<TangentMoves<Space>>(options);
 }
 
 }  // namespace pendula

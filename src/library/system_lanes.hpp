@@ -8,7 +8,7 @@ namespace pendula {
 MoveSystemMembers* system_lanes(const RunOptions& options);
 /// Those of so many stages.
 MoveSystemMembers* gauss_system_lanes(int stages);
-/// By explicit methods, with a tangent of each.
+/// The same with a tangent of each.
 MoveSystemMembers* system_tangent_lanes(const RunOptions& options);
 
 }  // namespace pendula

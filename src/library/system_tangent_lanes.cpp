@@ -8,12 +8,16 @@ struct SystemTangentMoves {
   static MoveSystemMembers* by() {
     return &move_systems<SystemTangentLanes<Method>>;
   }
+  template <int S>
+  static MoveSystemMembers* of() {
+    return &move_systems<GaussSystemTangentLanes<S>>;
+  }
 };
 
 }  // namespace
 
 MoveSystemMembers* system_tangent_lanes(const RunOptions& options) {
-  return detail::explicit_lanes<SystemTangentMoves>(options.method);
+  return detail::lanes_of<SystemTangentMoves>(options);
 }
 
 }  // namespace pendula

@@ -161,25 +161,31 @@ inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(const Lan
 
 }  // namespace detail
 
-/// The leading Lyapunov exponents of those of the runs that explicit methods move in lanes, each over the whole of its
-/// duration, with one tangent; of others, and of those that could not be moved so, none. Empty where it was stopped.
-/// Who loses too much energy by a method that was not asked for tries once more, by a hundredth of the tolerance.
+/// The leading Lyapunov exponents of those of the runs that go in lanes, each over the whole of its duration, with one
+/// tangent; of others, and of those that could not be moved so, none. Empty where it was stopped. Who loses too much
+/// energy by a method that was not asked for tries a hundredth of the tolerance, and then goes as its options tell.
 inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
     MemberMethod method = MemberMethod::asked) {
   std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
-  const bool is_asked = method == MemberMethod::asked;
-  for (const double finer : is_asked ? std::vector{1.0} : std::vector{1.0, 0.01}) {
-    const auto options_of = [&](const RunSetup& setup) {
-      RunOptions options = is_asked ? setup.options : quickest_with_tangents(setup);
-      if (finer < 1) options.tolerance = std::max(1e-13, finer * options.tolerance);
-      return options;
-    };
+  std::vector<std::optional<LaneKind>> tried(setups.size());
+  const auto quickest = [](const RunSetup& setup) { return quickest_with_tangents(setup); };
+  const auto finer = [](const RunSetup& setup) {
+    RunOptions options = quickest_with_tangents(setup);
+    if (options.method != setup.options.method) options.tolerance = std::max(1e-13, 0.01 * options.tolerance);
+    return options;
+  };
+  const auto asked = [](const RunSetup& setup) { return setup.options; };
+  std::vector<std::function<RunOptions(const RunSetup&)>> attempts;
+  if (method == MemberMethod::quickest) attempts = {quickest, finer};
+  attempts.emplace_back(asked);
+  for (const auto& options_of : attempts) {
     detail::RunsByKind kinds;
     for (std::size_t k = 0; k < setups.size(); ++k) {
-      const RunOptions options = options_of(setups[k]);
-      const auto kind = is_explicit(options.method) ? lane_kind(setups[k], options) : std::nullopt;
-      if (kind && !exponents[k]) kinds[*kind].push_back(k);
+      const auto kind = lane_kind(setups[k], options_of(setups[k]));
+      if (!kind || exponents[k] || tried[k] == kind) continue;
+      tried[k] = kind;
+      kinds[*kind].push_back(k);
     }
     for (const auto& [kind, numbers] : kinds) {
       const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);

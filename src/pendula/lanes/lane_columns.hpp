@@ -15,7 +15,10 @@ namespace pendula {
 template <int S, class L>
 class LaneColumns {
  public:
-  using Stages = std::array<L, static_cast<std::size_t>(S)>;  ///< one number at all stages
+  /// One number at all stages.
+  template <class Number>
+  using StagesOf = std::array<Number, static_cast<std::size_t>(S)>;
+  using Stages = StagesOf<L>;
   using Mask = typename L::Mask;
 
   LaneColumns() : tableau_(tableau_of<S>(Family::gauss, S)), polynomials_(tableau_) {
@@ -85,11 +88,13 @@ class LaneColumns {
   const L& hc(int j) const { return hc_[at(j)]; }          ///< h c_j
   const L& hc_low(int j) const { return hc_low_[at(j)]; }  ///< what it lost to rounding
 
-  /// start + Σ_j m_ij x_j for all i, x times h b.
-  [[gnu::always_inline]] void integrate(const Stages& x, const L& start, Stages& integral) const {
+  /// start + Σ_j m_ij x_j for all i, x times h b. Number: L, or one with its derivative (LaneDual).
+  template <class Number>
+  [[gnu::always_inline]] void integrate(const StagesOf<Number>& x, const Number& start,
+                                        StagesOf<Number>& integral) const {
     if constexpr (S < 4) {
       detail::unrolled<S>([&](auto i) PENDULA_WRITTEN_OUT {
-        L sum = start;
+        Number sum = start;
         detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { sum = fma(x[j], L(m_[i][j]), sum); });
         integral[i] = sum;
       });
@@ -99,11 +104,14 @@ class LaneColumns {
   }
 
   /// Stage values of the last steps, the newest first, all of them times h or none, continued at this step's stages.
-  using History = std::array<const Stages*, static_cast<std::size_t>(most_depth)>;
-  [[gnu::always_inline]] void extrapolate(const History& last, Stages& next, bool times_h) const {
+  template <class Number>
+  using HistoryOf = std::array<const StagesOf<Number>*, static_cast<std::size_t>(most_depth)>;
+  using History = HistoryOf<L>;
+  template <class Number>
+  [[gnu::always_inline]] void extrapolate(const HistoryOf<Number>& last, StagesOf<Number>& next, bool times_h) const {
     if (most_depth > 1 && xsimd::any(deep_)) {
       detail::unrolled<S>([&](auto i) PENDULA_WRITTEN_OUT {
-        L sum = (*last[0])[i] * across_[0];
+        Number sum = (*last[0])[i] * across_[0];
         detail::unrolled<most_depth - 1>(
             [&](auto d) PENDULA_WRITTEN_OUT { sum = fma((*last[d + 1])[i], across_[d + 1], sum); });
         next[i] = sum;
@@ -111,7 +119,7 @@ class LaneColumns {
       if (xsimd::all(deep_)) return;
     }
     detail::unrolled<S>([&](auto i) PENDULA_WRITTEN_OUT {
-      L sum = (*last[0])[0] * within_[i][0];
+      Number sum = (*last[0])[0] * within_[i][0];
       detail::unrolled<S - 1>([&](auto j)
                                   PENDULA_WRITTEN_OUT { sum = fma((*last[0])[j + 1], within_[i][j + 1], sum); });
       if (times_h) sum = ratio_ * sum;
@@ -120,8 +128,9 @@ class LaneColumns {
   }
 
   /// The mean over a step of what the stage values are of.
-  L mean(const Stages& x) const {
-    L sum = L(b_[0]) * x[0];
+  template <class Number>
+  Number mean(const StagesOf<Number>& x) const {
+    Number sum = L(b_[0]) * x[0];
     detail::unrolled<S - 1>([&](auto j) PENDULA_WRITTEN_OUT { sum = fma(L(b_[j + 1]), x[j + 1], sum); });
     return sum;
   }
@@ -157,9 +166,10 @@ class LaneColumns {
   }
 
   /// Σ_j x_j.
-  static L total(const Stages& x) {
+  template <class Number>
+  static Number total(const StagesOf<Number>& x) {
     if constexpr (S == 1) return x[0];
-    L sum = x[0] + x[at(S - 1)];
+    Number sum = x[0] + x[at(S - 1)];
     for (int j = 1; j < half; ++j) sum = sum + (x[at(j)] + x[at(S - 1 - j)]);
     return S % 2 == 1 ? sum + x[S / 2] : sum;
   }
@@ -171,24 +181,26 @@ class LaneColumns {
   static constexpr auto count = static_cast<std::size_t>(S), halves = static_cast<std::size_t>(half);
   static constexpr std::size_t at(int j) { return static_cast<std::size_t>(j); }
 
-  [[gnu::always_inline]] void integrate_symmetric(const Stages& x, const L& start, Stages& integral) const {
+  template <class Number>
+  [[gnu::always_inline]] void integrate_symmetric(const StagesOf<Number>& x, const Number& start,
+                                                  StagesOf<Number>& integral) const {
     constexpr bool has_middle = S % 2 == 1;
-    std::array<L, halves> even, odd;
+    std::array<Number, halves> even, odd;
     detail::unrolled<half>([&](auto j) PENDULA_WRITTEN_OUT {
       even[j] = x[j] + x[S - 1 - j];
       odd[j] = x[j] - x[S - 1 - j];
     });
-    L sum = even[0];
+    Number sum = even[0];
     detail::unrolled<half - 1>([&](auto j) PENDULA_WRITTEN_OUT { sum = sum + even[j + 1]; });
     if constexpr (has_middle) sum = sum + x[half];
-    const L base = fma(L(0.5), sum, start);
+    const Number base = fma(L(0.5), sum, start);
     if constexpr (has_middle) {
-      L of_middle = base;
+      Number of_middle = base;
       detail::unrolled<half>([&](auto j) PENDULA_WRITTEN_OUT { of_middle = fma(L(-middle_[j]), odd[j], of_middle); });
       integral[half] = of_middle;
     }
     detail::unrolled<half>([&](auto i) PENDULA_WRITTEN_OUT {
-      L rising = L(even_[i][0]) * even[0], common = fma(L(-even_[0][i]), odd[0], base);
+      Number rising = L(even_[i][0]) * even[0], common = fma(L(-even_[0][i]), odd[0], base);
       detail::unrolled<half - 1>([&](auto j) PENDULA_WRITTEN_OUT {
         rising = fma(L(even_[i][j + 1]), even[j + 1], rising);
         common = fma(L(-even_[j + 1][i]), odd[j + 1], common);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <pendula/numeric/compensated.hpp>
 
 namespace pendula {
 
@@ -39,11 +40,42 @@ struct LaneDual {
     return {fma(a.value, b, c.value), fma(a.slope, b, c.slope)};
   }
 
+  friend LaneDual fma(const L& a, const L& b, const LaneDual& c) { return {fma(a, b, c.value), c.slope}; }
+
   template <class Mask>
   friend LaneDual select(const Mask& which, const LaneDual& yes, const LaneDual& no) {
     return {select(which, yes.value, no.value), select(which, yes.slope, no.slope)};
   }
 };
+
+/// Of derivatives no more is kept than they are rounded to.
+template <class L>
+Twofold<LaneDual<L>> exact_sum(const LaneDual<L>& a, const LaneDual<L>& b) {
+  const Twofold<L> sum = exact_sum(a.value, b.value);
+  return {{sum.value, a.slope + b.slope}, LaneDual<L>(sum.low)};
+}
+template <class L>
+Twofold<LaneDual<L>> ordered_sum(const LaneDual<L>& a, const LaneDual<L>& b) {
+  const Twofold<L> sum = ordered_sum(a.value, b.value);
+  return {{sum.value, a.slope + b.slope}, LaneDual<L>(sum.low)};
+}
+template <class L>
+Twofold<LaneDual<L>> exact_product(const LaneDual<L>& a, const LaneDual<L>& b) {
+  const Twofold<L> product = exact_product(a.value, b.value);
+  return {{product.value, fma(a.slope, b.value, a.value * b.slope)}, LaneDual<L>(product.low)};
+}
+template <class L>
+Twofold<LaneDual<L>> exact_product(const LaneDual<L>& a, const L& b) {
+  const Twofold<L> product = exact_product(a.value, b);
+  return {{product.value, a.slope * b}, LaneDual<L>(product.low)};
+}
+template <class L>
+Twofold<LaneDual<L>> exact_product(const L& a, const LaneDual<L>& b) {
+  return exact_product(b, a);
+}
+
+/// Of what a tangent errs by, relative to itself, what chosen steps heed.
+inline constexpr double tangent_share = 0.01;
 
 namespace detail {
 
@@ -65,6 +97,13 @@ std::array<L, D> values_of(const std::array<LaneDual<L>, D>& x) {
   std::array<L, D> values;
   for (std::size_t k = 0; k < D; ++k) values[k] = x[k].value;
   return values;
+}
+
+template <class L, std::size_t D>
+std::array<L, D> slopes_of(const std::array<LaneDual<L>, D>& x) {
+  std::array<L, D> slopes;
+  for (std::size_t k = 0; k < D; ++k) slopes[k] = x[k].slope;
+  return slopes;
 }
 
 /// Sets a member's, and leaves its derivative.

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <pendula/lanes/explicit_tableau.hpp>
+#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_error_controller.hpp>
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/system/forcing_look.hpp>
@@ -178,7 +179,6 @@ class LaneExplicit {
 
   static constexpr int nodes = (Method::error_order + 2) / 2;  // of the quadrature that is as good
   static constexpr double largest_turn = 3;                    // rad
-  static constexpr double tangent_share = 0.01;                // of what a tangent errs by, relative to itself
 
   template <class Links>
   static auto& at(Links& of, int link) {

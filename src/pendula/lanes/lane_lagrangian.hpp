@@ -7,23 +7,26 @@
 #include <limits>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/lanes/lane_columns.hpp>
+#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_inertia.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_prediction.hpp>
 #include <pendula/lanes/lane_registers.hpp>
+#include <pendula/lanes/lane_stage_tangent.hpp>
 #include <pendula/lanes/lane_stop.hpp>
 #include <pendula/lanes/lane_turned.hpp>
 #include <pendula/system/forcing_look.hpp>
+#include <type_traits>
 #include <vector>
 
 namespace pendula {
 
 /// Systems of one kernel, one in each lane, and the stages of a Gauss step of theirs in momentum form: equations,
 /// rounding, and what is compared with what are those of LagrangianStages, the layout is not. All stages of one number
-/// are S packs.
-template <int S, class Register = MemberRegister>
+/// are S packs. With a tangent of each member (LaneStageTangent), whose stages are solved after the motion's.
+template <int S, class Register = MemberRegister, bool with_tangent = false>
 class LaneLagrangian {
  public:
   using L = LanePack<Register>;
@@ -32,6 +35,7 @@ class LaneLagrangian {
   using Subject = LaneDynamics&;
   using Stop = LaneStop<L, 2>;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
+  static constexpr bool has_tangent = with_tangent;
   static constexpr bool may_be_stiff = true;  ///< forces and lengths may be anything
   static constexpr std::size_t D = 1;
   using Vector = std::array<L, D>;
@@ -45,7 +49,8 @@ class LaneLagrangian {
         coordinates_(static_cast<std::size_t>(count_)),
         inertia_(dynamics),
         calls_(S * per_call()),
-        state_(3 * count_ + 4) {
+        state_(3 * count_ + 4),
+        tangent_(dynamics, columns_) {
     for (int k = 0; k < links(); ++k) {
       Coordinate& coordinate = at(k);
       coordinate.is_angle = dynamics.is_angle(k);
@@ -78,6 +83,7 @@ class LaneLagrangian {
       inertia_.start(lane, k, pivots[static_cast<std::size_t>(k)]);
     }
     read_inertia();
+    if constexpr (has_tangent) tangent_.start(lane, time, q, v);
   }
 
   // --- All members ---
@@ -152,6 +158,10 @@ class LaneLagrangian {
       predict(coordinate, &Past::pushed, coordinate.pushed);
     }
     if (xsimd::any(from.cold)) start_cold(from.cold);
+    if constexpr (has_tangent) {
+      if (xsimd::any(from.cold)) find_rates();
+      tangent_.prepare(from, state_[time_at()], state_[0], state_[rate_at(0)]);
+    }
     find_scale();
   }
 
@@ -171,6 +181,12 @@ class LaneLagrangian {
     return change;
   }
   const L& scale() const { return scale_; }  ///< size of the step, squared
+
+  /// The same of the tangents, where the stages of the motion are solved.
+  L iterate_tangent(const Mask& active) requires with_tangent {
+    return tangent_.iterate(active, [this](int j, int which) { return call(j, which == 0 ? 4 : 2 * (which - 1)); });
+  }
+  const L& tangent_scale() const requires with_tangent { return tangent_.scale(); }
 
   /// Sums up what the stages add to the state, which stays; after it `turn`, `pace_squared`, `decay` and `accept`.
   void finish() {
@@ -201,6 +217,7 @@ class LaneLagrangian {
     fastest_here_ = speeds[0];
     for (const L& speed : speeds) fastest_here_ = max(fastest_here_, speed);
     pace_squared_ = slowest_squared_ + sqrt(sqrt(eighth_powers));
+    if constexpr (has_tangent) tangent_.finish();
   }
 
   /// The most that an angle turns in the step, squared; twice as far where its inertia nearly vanishes  [rad²]. A
@@ -216,7 +233,7 @@ class LaneLagrangian {
   L pace_squared() const { return (columns_.h() * columns_.h()) * pace_squared_; }
 
   /// The coefficient of the Legendre polynomial P_n in the rates, times h, relative to the size of the motion, squared;
-  /// 0 where it may be what coordinates are rounded by.
+  /// 0 where it may be what coordinates are rounded by. With a share of the tangent's.
   L decay(int n) const {
     const L fastest = max(max(fastest_, fastest_here_), natural_speed_squared_);
     L squared(0.0);
@@ -226,7 +243,9 @@ class LaneLagrangian {
     }
     const L share = squared * (pace_squared_ / fastest);
     constexpr double visible = StepShape::visible;
-    return select((squared > L(visible * visible) * size_squared_) & (fastest > L(0.0)), share, L(0.0));
+    const L seen = select((squared > L(visible * visible) * size_squared_) & (fastest > L(0.0)), share, L(0.0));
+    if constexpr (has_tangent) return fma(L(tangent_share * tangent_share), tangent_.decay(n), seen);
+    return seen;
   }
 
   /// Energy that is missing at the end of the step or too much, relative to what there is, where lengths are among the
@@ -265,6 +284,7 @@ class LaneLagrangian {
     for (Coordinate& coordinate : coordinates_) coordinate.saved = {coordinate.q, coordinate.p};
     saved_time_ = now_;
     saved_fastest_ = fastest_;
+    if constexpr (has_tangent) tangent_.save();
   }
   void restore(const Mask& which) {
     for (Coordinate& coordinate : coordinates_) {
@@ -273,6 +293,7 @@ class LaneLagrangian {
     }
     now_ = select(which, saved_time_, now_);
     fastest_ = select(which, saved_fastest_, fastest_);
+    if constexpr (has_tangent) tangent_.restore(which);
     read_inertia();
   }
 
@@ -285,12 +306,20 @@ class LaneLagrangian {
     now_ = select(accepted, now_ + columns_.h(), now_);
     fastest_ = select(accepted, max(fastest_, fastest_here_), fastest_);
     if (!dynamics_.constant_masses()) read_inertia();
+    if constexpr (has_tangent) tangent_.accept(accepted);
   }
+
+  /// LaneStageTangent::take_growth.
+  L take_growth(const Mask& which) requires with_tangent { return tangent_.take_growth(which); }
 
  private:
   static constexpr int depth = Columns::most_depth;
   static constexpr std::size_t pasts = static_cast<std::size_t>(depth);
   static constexpr double invisible = 1e-9;  // LagrangianStages's
+
+  struct NoTangent {
+    NoTangent(LaneDynamics& /*dynamics*/, const Columns& /*columns*/) {}
+  };
 
   // What steps are predicted from: h q̇ and h ṗ.
   struct Past {
@@ -460,6 +489,7 @@ class LaneLagrangian {
   L fastest_{0.0}, fastest_here_{0.0}, saved_fastest_{0.0};
   L scale_{0.0}, size_squared_{0.0}, turn_{0.0}, pace_squared_{1.0};
   L energy_sum_{0.0}, kinetic_{0.0}, kinetic_before_{0.0}, brought_{0.0};
+  [[no_unique_address]] std::conditional_t<with_tangent, LaneStageTangent<S, L>, NoTangent> tangent_;
 };
 
 }  // namespace pendula

@@ -288,11 +288,15 @@ class LaneQueue {
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
 using GaussLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register>>>;
 
+/// The same with a tangent of each member, whose growth a watch is told of.
+template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
+using GaussTangentLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register, true>>>;
+
 /// By explicit steps.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
 using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register>, Method>>;
 
-/// The same with a tangent of each member, whose growth a watch is told of.
+/// By explicit steps with a tangent of each member.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register, true>, Method>>;
 
@@ -305,6 +309,11 @@ using SystemLanes =
 template <int S, class Register = MemberRegister>
 using GaussSystemLanes =
     LaneQueue<LaneStepper<LaneLagrangian<S, Register>>, LaneSystemSeats<LaneStepper<LaneLagrangian<S, Register>>>>;
+
+/// By Gauss steps with a tangent of each member.
+template <int S, class Register = MemberRegister>
+using GaussSystemTangentLanes = LaneQueue<LaneStepper<LaneLagrangian<S, Register, true>>,
+                                          LaneSystemSeats<LaneStepper<LaneLagrangian<S, Register, true>>>>;
 
 /// By explicit steps with a tangent of each member.
 template <class Method, class Register = MemberRegister>

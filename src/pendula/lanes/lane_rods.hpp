@@ -7,12 +7,12 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
+#include <pendula/lanes/lane_chain_tangent.hpp>
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_loads.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
-#include <random>
 #include <type_traits>
 
 namespace pendula {
@@ -233,46 +233,21 @@ class LaneRods {
     }
   }
 
-  // Of length 1: every link turned by a random angle, about a random axis in space, and turning faster by another; the
-  // same ones for all members.
   void start_tangent(int lane, Parts& rods) {
-    const double squared = pace_squared(rods)[lane], pace = squared > 0 ? std::sqrt(squared) : 1;
-    const double inverse_square = squared > 0 ? 1 / squared : 1;
-    inverse_pace_squared_.set(lane, inverse_square);
-    std::mt19937 random(1);
-    const auto drawn = [&] {
-      std::array<double, Space::dof == 1 ? 1 : 3> turn;
-      for (double& x : turn) x = static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5;
-      return turn;
+    const auto numbers = [&](const std::array<Number, D>& of) {
+      return components<D>([&](std::size_t k) { return of[k].value[lane]; });
     };
-    double length = 0;
-    for (int i = 0; i < links(); ++i) {
-      const auto turned = drawn(), turning = drawn();
-      std::array<double, D> along, rate;
-      for (std::size_t k = 0; k < D; ++k) {
-        along[k] = rods[i].place[k].value[lane];
-        rate[k] = rods[i].rate[k].value[lane];
-      }
-      const auto moved = across(turned, along), sped = sum(across(turned, rate), scaled(pace, across(turning, along)));
-      for (std::size_t k = 0; k < D; ++k) {
-        rods[i].place[k].slope.set(lane, moved[k]);
-        rods[i].rate[k].slope.set(lane, sped[k]);
-      }
-      length += constants_[i].inverse_square[lane] * (dot(moved, moved) + dot(sped, sped) * inverse_square);
-    }
-    length = std::sqrt(length);
+    const auto rod_of = [&](int i) {
+      return MovingRod<D>{numbers(rods[i].place), numbers(rods[i].rate), constants_[i].inverse_square[lane]};
+    };
+    const ChainTangent<Space> tangent(links(), slowest_pace_[lane], rod_of);
+    inverse_pace_squared_.set(lane, tangent.inverse_pace_squared());
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
-        for (Number* x : {&rods[i].place[k], &rods[i].rate[k]}) x->slope.set(lane, x->slope[lane] / length);
+        rods[i].place[k].slope.set(lane, tangent.place(i)[k]);
+        rods[i].rate[k].slope.set(lane, tangent.rate(i)[k]);
       }
     }
-  }
-
-  static std::array<double, 2> across(const std::array<double, 1>& turn, const std::array<double, 2>& x) {
-    return {-turn[0] * x[1], turn[0] * x[0]};
-  }
-  static std::array<double, 3> across(const std::array<double, 3>& turn, const std::array<double, 3>& x) {
-    return {turn[1] * x[2] - turn[2] * x[1], turn[2] * x[0] - turn[0] * x[2], turn[0] * x[1] - turn[1] * x[0]};
   }
 
   int links_;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <pendula/lanes/lane_controller.hpp>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/lanes/lane_stop.hpp>
 
 namespace pendula {
 
@@ -28,11 +29,11 @@ class LaneStepper {
   using Options = LaneStepperOptions;
   using SpaceType = typename Chain::SpaceType;
   static constexpr int lanes = L::size, stages = Chain::stages, links_known = Chain::links_known;
-  static constexpr bool is_implicit = true, can_choose = true, has_tangent = false;
+  static constexpr bool is_implicit = true, can_choose = true, has_tangent = Chain::has_tangent;
   using Controller = LaneController<L, stages>;
 
   explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
-      : chain_(subject), options_(options), stop_(options.enough) {}
+      : chain_(subject), options_(options), stop_(options.enough), tangent_stop_(options.enough) {}
 
   Chain& chain() { return chain_; }
   const Chain& chain() const { return chain_; }
@@ -47,6 +48,7 @@ class LaneStepper {
     last_.set(lane, 0);
     depth_.set(lane, 0);
     stop_.forget(lane);
+    tangent_stop_.forget(lane);
   }
 
   /// Solves steps of `h` from `time` of the members that are `wanted`; gives those where that worked. The state stays
@@ -57,7 +59,11 @@ class LaneStepper {
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
     depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(1.0));
     chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
-    const Mask found = iterate(wanted);
+    Mask found = iterate(wanted, stop_, chain_.scale(), [&](const Mask& active) { return chain_.iterate(active); });
+    if constexpr (solves_tangents_after) {
+      found = iterate(found, tangent_stop_, chain_.tangent_scale(),
+                      [&](const Mask& active) { return chain_.iterate_tangent(active); });
+    }
     chain_.finish();
     known_ = select(found, L(solved), L(cold));
     depth_ = select(found, depth_, L(0.0));
@@ -71,6 +77,9 @@ class LaneStepper {
     chain_.accept(which);
     known_ = select(which, L(accepted), known_);
   }
+
+  /// Chain::take_growth.
+  L take_growth(const Mask& which) requires(Chain::has_tangent) { return chain_.take_growth(which); }
 
   /// Members whose stages may be a solution that is not the motion: those that came far from where they began, or turn
   /// far.
@@ -88,15 +97,20 @@ class LaneStepper {
   std::int64_t iterations() const { return iterations_; }
 
  private:
+  static constexpr bool solves_tangents_after = requires(Chain & chain, const Mask& active) {
+    chain.iterate_tangent(active);
+  };
   static constexpr double cold = 0, solved = 1, accepted = 2;
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
   static L farthest_extrapolation() { return L(1.5); }
 
-  Mask iterate(const Mask& wanted) {
-    stop_.restart(chain_.scale());
+  // Until all have arrived or never will; gives who has. once(active): one iteration.
+  template <class Stop, class Once>
+  Mask iterate(const Mask& wanted, Stop& stop, const L& scale, Once once) {
+    stop.restart(scale);
     Mask active = wanted, found = wanted & !wanted;
-    while (xsimd::any(active) && stop_.count() < options_.max_iterations) {
-      const auto verdict = stop_.judge(chain_.iterate(active), active);
+    while (xsimd::any(active) && stop.count() < options_.max_iterations) {
+      const auto verdict = stop.judge(once(active), active);
       found = found | (active & verdict.done & !verdict.lost);
       active = active & !(verdict.done | verdict.lost);
       ++iterations_;
@@ -107,6 +121,7 @@ class LaneStepper {
   Chain chain_;
   LaneStepperOptions options_;
   typename Chain::Stop stop_;
+  LaneStop<L> tangent_stop_;  // of stages of tangents that are solved after the motion's
   L known_{cold}, last_{0.0},
       depth_{0.0};  // of the stages: what they are of, the size of their step, how many were alike
   std::int64_t iterations_ = 0;

@@ -10,9 +10,9 @@
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_registers.hpp>
+#include <pendula/lanes/lane_system_tangent.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/system/forcing_look.hpp>
-#include <random>
 #include <type_traits>
 #include <vector>
 
@@ -37,7 +37,7 @@ class LaneSystem {
 
   /// `dynamics` must outlive it.
   explicit LaneSystem(LaneDynamics& dynamics)
-      : dynamics_(dynamics), registers_(kinds * dynamics.coordinates() + 1), inverse_sizes_(dynamics.coordinates()) {}
+      : dynamics_(dynamics), registers_(kinds * dynamics.coordinates() + 1), tangent_(dynamics) {}
   LaneSystem(const LaneSystem&) = delete;
   LaneSystem& operator=(const LaneSystem&) = delete;
 
@@ -67,7 +67,7 @@ class LaneSystem {
       squared = std::max(squared, fast * fast + push);
     }
     pace_squared_.set(lane, squared);
-    if constexpr (has_tangent) start_tangent(lane, time, parts);
+    if constexpr (has_tangent) start_tangent(lane, time, q, v, parts);
   }
 
   /// T + U  [J].
@@ -166,15 +166,10 @@ class LaneSystem {
     return select(abs(h) * natural_pace() > L(ForcingLook::finest), largest, L(0.0));
   }
 
-  /// Σ (δq/size)² + (δq̇/(size ω))², size being 1 of angles, and of others the largest coordinate of the same unit where
-  /// the member began; ω how fast it moved then, and what is a little beside it.
+  /// LaneSystemTangent::squared.
   L tangent_squared(const Parts& parts) const requires with_tangent {
-    L squared(0.0);
-    for_parts([&](int i) {
-      const L along = inverse_sizes_[i] * parts[i].place[0].slope, rate = inverse_sizes_[i] * parts[i].rate[0].slope;
-      squared = fma(along, along, fma(inverse_pace_squared_ * rate, rate, squared));
-    });
-    return squared;
+    return tangent_.squared([&](int i) -> const L& { return parts[i].place[0].slope; },
+                            [&](int i) -> const L& { return parts[i].rate[0].slope; });
   }
 
  private:
@@ -251,67 +246,23 @@ class LaneSystem {
     }
   }
 
-  // --- Tangents ---
-
-  // Of length 1, drawn at random, the same one for all members. Where a member rests, its tangent tells how fast it
-  // swings, or is damped.
-  void start_tangent(int lane, double time, Parts& parts) {
-    const int count = this->parts();
-    std::vector<double> sizes, drawn;
-    std::mt19937 random(1);
-    for (int i = 0; i < count; ++i) sizes.push_back(size_at_start(lane, i, parts));
-    for (int i = 0; i < 2 * count; ++i) {
-      drawn.push_back(static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5);
+  void start_tangent(int lane, double time, const double* q, const double* v, Parts& parts) {
+    const auto tangent = tangent_.start(lane, time, q, v);
+    for (int i = 0; i < this->parts(); ++i) {
+      parts[i].place[0].slope.set(lane, tangent.place[static_cast<std::size_t>(i)]);
+      parts[i].rate[0].slope.set(lane, tangent.rate[static_cast<std::size_t>(i)]);
     }
-    const auto set_tangent = [&](double place, double rate) {
-      for (int i = 0; i < count; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        parts[i].place[0].slope.set(lane, place * sizes[k] * drawn[k]);
-        parts[i].rate[0].slope.set(lane, rate * sizes[k] * drawn[k + sizes.size()]);
-      }
-    };
-    const auto largest = [&](int which) {
-      find_accelerations(L(time), parts);
-      double pushed = 0, moved = 0;
-      for (int i = 0; i < count; ++i) {
-        const double size = sizes[static_cast<std::size_t>(i)];
-        pushed = std::max(pushed, std::abs(numbers(5, i)[lane]) / size);
-        moved = std::max(moved, std::abs(numbers(which, i)[lane]) / size);
-      }
-      return pushed / moved;
-    };
-    double squared = 0;
-    for (int i = 0; i < count; ++i) {
-      const double turning = value(parts[i].rate[0])[lane] / sizes[static_cast<std::size_t>(i)];
-      squared = std::max(squared, turning * turning);
-    }
-    set_tangent(1, 0);
-    squared = std::max(squared, largest(3));
-    set_tangent(0, 1);
-    squared = std::max(squared, std::pow(largest(4), 2));
-    if (!(squared > 0) || !std::isfinite(squared)) squared = 1;
-    inverse_pace_squared_.set(lane, 1 / squared);
-    for (int i = 0; i < count; ++i) inverse_sizes_[i].set(lane, 1 / sizes[static_cast<std::size_t>(i)]);
-    set_tangent(1, std::sqrt(squared));
-    const double length = std::sqrt(tangent_squared(parts)[lane]);
-    set_tangent(1 / length, std::sqrt(squared) / length);
   }
 
-  double size_at_start(int lane, int i, const Parts& parts) const {
-    if (dynamics_.is_angle(i)) return 1;
-    double size = 0;
-    for_parts([&](int j) {
-      if (dynamics_.of_one_unit(i, j)) size = std::max(size, std::abs(value(parts[j].place[0])[lane]));
-    });
-    return size > 0 ? size : 1;
-  }
+  struct NoTangent {
+    explicit NoTangent(LaneDynamics& /*dynamics*/) {}
+  };
 
   LaneDynamics& dynamics_;
   LaneRegisters<L> registers_;
   L pace_squared_{1.0}, energy_sum_{0.0};
   Sums coarse_, fine_;
-  L inverse_pace_squared_{1.0};  // of tangents
-  detail::PerLink<L, links_known> inverse_sizes_;
+  [[no_unique_address]] std::conditional_t<with_tangent, LaneSystemTangent<L>, NoTangent> tangent_;
 };
 
 }  // namespace pendula

@@ -56,4 +56,30 @@ auto explicit_lanes(Method method) -> decltype(Moves::template by<DormandPrince5
   }
 }
 
+/// What moves members by Gauss steps, of Moves::of<stages>(); nullptr for other numbers of stages.
+template <class Moves>
+auto gauss_lanes(int stages) -> decltype(Moves::template of<4>()) {
+  switch (stages) {
+    case 4:
+      return Moves::template of<4>();
+#ifndef PENDULA_FEW_LANES
+    case 2:
+      return Moves::template of<2>();
+    case 6:
+      return Moves::template of<6>();
+    case 8:
+      return Moves::template of<8>();
+#endif
+    default:
+      return nullptr;
+  }
+}
+
+/// Either of them.
+template <class Moves>
+auto lanes_of(const RunOptions& options) -> decltype(Moves::template of<4>()) {
+  if (options.method == Method::gauss) return gauss_lanes<Moves>(options.stages);
+  return explicit_lanes<Moves>(options.method);
+}
+
 }  // namespace pendula::detail
