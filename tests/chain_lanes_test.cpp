@@ -199,8 +199,8 @@ TEST(EnsembleLanesTest, EveryMemberMayHaveAChainOfItsOwn) {
   chains.reserve(members.size());
   for (std::size_t k = 0; k < members.size(); ++k) chains.push_back(drawn_chain<Planar, 2>(random, 2));
   for (std::size_t k = 0; k < members.size(); ++k) members[k].chain = &chains[k];
-  const auto ends = ends_of<GaussLanes<Planar, 6, 2>>(chains[0], members, {.step = 1e-2});
-  const RunOptions options{.stages = 6, .solver = Solver::chain, .iteration = Iteration::fixed_point, .step = 1e-2};
+  const auto ends = ends_of<GaussLanes<Planar, 8, 2>>(chains[0], members, {.step = 1e-2});
+  const RunOptions options{.stages = 8, .solver = Solver::chain, .iteration = Iteration::fixed_point, .step = 1e-2};
   for (std::size_t k = 0; k < members.size(); ++k) {
     const Motion scalar = scalar_end(of_any_size(chains[k]), members[k].start, 0.5, options);
     EXPECT_LT(distance(ends[k].motion, scalar), 1e-11);  // measured 2e-14
@@ -290,8 +290,8 @@ TEST(EnsembleLanesTest, WidthsAgree) {
   std::mt19937 random(10);
   const auto chain = drawn_chain<Planar, 2>(random, 2);
   const auto members = drawn_members<Planar, 2>(random, 2, 11, 0.5);
-  const auto wide = ends_of<GaussLanes<Planar, 3, 2>>(chain, members, {.step = 4e-3});
-  const auto narrow = ends_of<GaussLanes<Planar, 3, 2, RegisterFor<2>>>(chain, members, {.step = 4e-3});
+  const auto wide = ends_of<GaussLanes<Planar, 4, 2>>(chain, members, {.step = 4e-3});
+  const auto narrow = ends_of<GaussLanes<Planar, 4, 2, RegisterFor<2>>>(chain, members, {.step = 4e-3});
   for (std::size_t k = 0; k < members.size(); ++k) EXPECT_TRUE(same_bits(wide[k], narrow[k])) << k;
 }
 
@@ -401,10 +401,11 @@ TEST(EnsembleLanesTest, MembersThatDoNotFitAreRefused) {
   const auto chain = drawn_chain<Planar>(random, 3);
   auto members = drawn_members<Planar, any>(random, 2, 1, 1);
   std::vector<LaneEnd> ends(1);
-  GaussLanes<Planar, 2> queue(chain, {.step = 1e-3});
+  GaussLanes<Planar, 1> queue(chain, {.step = 1e-3});
   EXPECT_THROW(queue.run(members, ends), std::invalid_argument);
   EXPECT_THROW(queue.run({}, ends), std::invalid_argument);
-  EXPECT_THROW((ExplicitLanes<Planar, ClassicalRungeKutta>(chain, {})), std::invalid_argument);
+  const auto two = drawn_chain<Planar, 2>(random, 2);
+  EXPECT_THROW((ExplicitLanes<Planar, ClassicalRungeKutta, 2>(two, {})), std::invalid_argument);
 }
 
 }  // namespace
