@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "support/growths.hpp"
+
 namespace pendula {
 namespace {
 
@@ -357,22 +359,6 @@ TEST(EnsembleLanesTest, TangentsAreDerivatives) {
   expect_derivatives<Spatial>();
 }
 
-/// Adds up what tangents have grown by.
-class Growths : public LaneWatch {
- public:
-  explicit Growths(std::size_t members) : grown(members) {}
-
-  bool wants_steps() const override { return true; }
-  void after_step(LaneSteps& steps) override {
-    for (int lane = 0; lane < steps.lanes(); ++lane) {
-      if (steps.took_step(lane)) grown[steps.member(lane)] += steps.growth(lane);
-    }
-  }
-  bool stops() override { return false; }
-
-  std::vector<double> grown;
-};
-
 // Members move as they do without, to the last bit, and tangents do not see those of other lanes.
 TEST(EnsembleLanesTest, TangentsChangeNothing) {
   std::mt19937 random(13);
@@ -382,13 +368,13 @@ TEST(EnsembleLanesTest, TangentsChangeNothing) {
   const auto expected = ends_of<ExplicitLanes<Spatial, DormandPrince5, 2>>(chain, members, options);
   std::vector<LaneEnd> ends(members.size());
   TangentLanes<Spatial, DormandPrince5, 2> queue(chain, options);
-  Growths all(members.size());
+  test::Growths all(members.size());
   queue.set_watch(all);
   queue.run(members, ends);
   for (std::size_t k = 0; k < members.size(); ++k) {
     EXPECT_TRUE(same_bits(ends[k], expected[k])) << k;
     TangentLanes<Spatial, DormandPrince5, 2> lonely(chain, options);
-    Growths alone(1);
+    test::Growths alone(1);
     lonely.set_watch(alone);
     lonely.run({&members[k], 1}, {&ends[k], 1});
     EXPECT_EQ(alone.grown[0], all.grown[k]) << k;

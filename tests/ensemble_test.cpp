@@ -486,6 +486,20 @@ TYPED_TEST(ExponentsInLanes, OfChainsThatHangStillAreZero) {
   }
 }
 
+// To the last bit, by Gauss steps, whose iterations are of all lanes.
+TYPED_TEST(ExponentsInLanes, AreOfAMemberAlone) {
+  std::vector<RunSetup> setups = this->setups(11, 2, chosen(1e-6), 5);
+  for (RunSetup& setup : setups) setup.options.stages = 4;
+  const auto together = exponents_in_lanes(setups);
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    const auto alone = exponents_in_lanes({&setups[k], 1});
+    ASSERT_TRUE(together[k] && alone[0]);
+    EXPECT_EQ(together[k]->ftle, alone[0]->ftle) << k;
+    EXPECT_EQ(together[k]->megno, alone[0]->megno) << k;
+    EXPECT_EQ(together[k]->exponents, alone[0]->exponents) << k;
+  }
+}
+
 TYPED_TEST(ExponentsInLanes, OfOthersThereAreNone) {
   std::vector<RunSetup> setups = this->setups(7, 2, constant(0.01), 1);
   for (RunSetup& setup : setups) setup.options.iteration = Iteration::newton;

@@ -147,13 +147,16 @@ RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpress
   return setup;
 }
 
-// Of the members that go in lanes with a tangent.
+// Of the members that go in lanes with a tangent. Those of Gauss methods begin there with another one than that of
+// `pendula lyapunov`, which they are where they are to go as the scenario says.
 void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<RunSetup> setups;
   std::vector<Member*> members;
   for (Member& member : all) {
     if (!member.scenario) continue;
-    setups.push_back(std::visit([](const auto& read) { return member_setup(read); }, *member.scenario));
+    RunSetup setup = std::visit([](const auto& read) { return member_setup(read); }, *member.scenario);
+    if (method() == MemberMethod::asked && !is_explicit(setup.options.method)) continue;
+    setups.push_back(std::move(setup));
     members.push_back(&member);
   }
   std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(

@@ -35,8 +35,10 @@ def test_examples_run_without_a_warning(file, pendula):
 
 @pytest.mark.parametrize(
     ("model", "links"),
-    [("furuta", None), ("spring_pendulum", None), ("swinging_atwood", None)]
-    + [("joint_springs", 3), ("rods", 3), ("cart_chain", 2), ("driven_chain", 2), ("driven_chain", 1)],
+    [
+        *[(name, None) for name in ("furuta", "spring_pendulum", "swinging_atwood")],
+        *[("joint_springs", 3), ("rods", 3), ("cart_chain", 2), ("driven_chain", 2), ("driven_chain", 1)],
+    ],
 )
 def test_models_pass_their_own_checks(model, links, pendula):
     ended = pendula("check", model, *([] if links is None else ["--links", links]))

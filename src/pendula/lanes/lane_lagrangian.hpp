@@ -168,10 +168,7 @@ class LaneLagrangian {
   /// One fixed-point iteration for the members that are `active`, those of the others stay; what changed, squared,
   /// relative to the size of the step.
   PENDULA_IN_REGISTERS [[gnu::noinline]] L iterate(const Mask& active) {
-    for (int k = 0; k < links(); ++k) place_stages(k);
-    for (int j = 0; j < S; ++j) {
-      dynamics_.hamiltonian_form(call(j, 4), call(j, 0), call(j, 1), call(j, 2), call(j, 3));
-    }
+    find_stages();
     L change(0.0);
     for (int k = 0; k < links(); ++k) {
       const L weight = inertia_.weight_squared(k);
@@ -182,11 +179,16 @@ class LaneLagrangian {
   }
   const L& scale() const { return scale_; }  ///< size of the step, squared
 
-  /// The same of the tangents, where the stages of the motion are solved.
+  /// Goes to the stages of the motion that was solved, each member's to its own, however long those of others took.
+  /// Gives what changes of tangents are compared with, squared.
+  const L& start_tangents() requires with_tangent {
+    find_stages();
+    return tangent_.scale();
+  }
+  /// The same iteration of the tangents there.
   L iterate_tangent(const Mask& active) requires with_tangent {
     return tangent_.iterate(active, [this](int j, int which) { return call(j, which == 0 ? 4 : 2 * (which - 1)); });
   }
-  const L& tangent_scale() const requires with_tangent { return tangent_.scale(); }
 
   /// Sums up what the stages add to the state, which stays; after it `turn`, `pace_squared`, `decay` and `accept`.
   void finish() {
@@ -434,6 +436,13 @@ class LaneLagrangian {
       size_squared_ = max(size_squared_, weight * (size * size));
     }
     scale_ = max(step, L(invisible * invisible) * size_squared_);
+  }
+
+  [[gnu::always_inline]] void find_stages() {
+    for (int k = 0; k < links(); ++k) place_stages(k);
+    for (int j = 0; j < S; ++j) {
+      dynamics_.hamiltonian_form(call(j, 4), call(j, 0), call(j, 1), call(j, 2), call(j, 3));
+    }
   }
 
   [[gnu::always_inline]] void place_stages(int k) {

@@ -60,11 +60,8 @@ class LaneStageTangent {
   template <class Stage>
   L iterate(const Mask& active, Stage stage) {
     for (Part& part : parts_) {
-      Stages rates;
-      columns_.integrate(part.sped, part.rate, rates);
-      detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { part.moved[j] = columns_.hb(j) * rates[j]; });
+      find_rates(part);
       columns_.integrate(part.moved, part.place, part.places);
-      part.rates = rates;
     }
     L change(0.0);
     for (int j = 0; j < S; ++j) {
@@ -91,6 +88,7 @@ class LaneStageTangent {
   void finish() {
     newest_ = (newest_ + pasts - 1) % pasts;
     for (Part& part : parts_) {
+      find_rates(part);  // by the last pushes, however long the iteration of other members went on
       Past& past = part.past[newest_];
       detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT {
         past.moved[j] = L(columns_.inverse_b(j)) * part.moved[j];
@@ -167,6 +165,11 @@ class LaneStageTangent {
   L squared() const {
     return measure_.squared([&](int k) -> const L& { return at(k).place; },
                             [&](int k) -> const L& { return at(k).rate; });
+  }
+
+  void find_rates(Part& part) {
+    columns_.integrate(part.sped, part.rate, part.rates);
+    detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { part.moved[j] = columns_.hb(j) * part.rates[j]; });
   }
 
   // What it would be if the tangents were pushed as hard as their pace tells, and what they are.

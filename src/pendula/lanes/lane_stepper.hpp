@@ -61,7 +61,7 @@ class LaneStepper {
     chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
     Mask found = iterate(wanted, stop_, chain_.scale(), [&](const Mask& active) { return chain_.iterate(active); });
     if constexpr (solves_tangents_after) {
-      found = iterate(found, tangent_stop_, chain_.tangent_scale(),
+      found = iterate(found, tangent_stop_, chain_.start_tangents(),
                       [&](const Mask& active) { return chain_.iterate_tangent(active); });
     }
     chain_.finish();
