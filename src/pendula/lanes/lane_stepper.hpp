@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <pendula/lanes/lane_controller.hpp>
 #include <pendula/lanes/lane_pack.hpp>
@@ -33,7 +34,7 @@ class LaneStepper {
   using Controller = LaneController<L, stages>;
 
   explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
-      : chain_(subject), options_(options), stop_(options.enough), tangent_stop_(options.enough) {}
+      : chain_(subject), options_(options), stop_(options.enough), tangent_stop_(std::max(options.enough, tangent_enough)) {}
 
   Chain& chain() { return chain_; }
   const Chain& chain() const { return chain_; }
@@ -100,6 +101,8 @@ class LaneStepper {
   static constexpr bool solves_tangents_after = requires(Chain & chain, const Mask& active) {
     chain.iterate_tangent(active);
   };
+  // Near singular places tangents are rounded to little more than this.
+  static constexpr double tangent_enough = 1e-12;
   static constexpr double cold = 0, solved = 1, accepted = 2;
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
   static L farthest_extrapolation() { return L(1.5); }
