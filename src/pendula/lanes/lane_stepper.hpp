@@ -34,7 +34,10 @@ class LaneStepper {
   using Controller = LaneController<L, stages>;
 
   explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
-      : chain_(subject), options_(options), stop_(options.enough), tangent_stop_(std::max(options.enough, tangent_enough)) {}
+      : chain_(subject),
+        options_(options),
+        stop_(options.enough),
+        tangent_stop_(std::max(options.enough, tangent_enough)) {}
 
   Chain& chain() { return chain_; }
   const Chain& chain() const { return chain_; }
