@@ -147,8 +147,8 @@ RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpress
   return setup;
 }
 
-// Of the members that go in lanes with a tangent. Those of Gauss methods begin there with another one than that of
-// `pendula lyapunov`, which they are where they are to go as the scenario says.
+// Of the members that go in lanes with a tangent. By Gauss methods not where the scenario's own way is asked for: that
+// is what `pendula lyapunov` does, whose tangents begin otherwise than those in lanes.
 void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<RunSetup> setups;
   std::vector<Member*> members;

@@ -158,10 +158,7 @@ class LaneLagrangian {
       predict(coordinate, &Past::pushed, coordinate.pushed);
     }
     if (xsimd::any(from.cold)) start_cold(from.cold);
-    if constexpr (has_tangent) {
-      if (xsimd::any(from.cold)) find_rates();
-      tangent_.prepare(from, state_[time_at()], state_[0], state_[rate_at(0)]);
-    }
+    if constexpr (has_tangent) tangent_.prepare(from, state_[time_at()], state_[0], state_[rate_at(0)]);
     find_scale();
   }
 
