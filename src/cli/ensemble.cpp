@@ -1,10 +1,7 @@
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
-#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -28,9 +25,9 @@
 #include "cli/interrupt.hpp"
 #include "cli/kept.hpp"
 #include "cli/members.hpp"
-#include "cli/progress.hpp"
 #include "cli/ranks.hpp"
 #include "cli/scenario_subject.hpp"
+#include "cli/terminal_line.hpp"
 #include "io/ensemble_file.hpp"
 #include "io/ensemble_plan.hpp"
 #include "io/input_error.hpp"
@@ -50,35 +47,23 @@ using Clock = std::chrono::steady_clock;
 class EnsembleProgress {
  public:
   EnsembleProgress(std::int64_t members, std::int64_t done, bool wanted)
-      : members_(members), before_(done), done_(done), shown_(wanted && isatty(STDERR_FILENO) != 0) {}
-  ~EnsembleProgress() {
-    if (is_drawn_) std::fputs("\r\x1b[K", stderr);
-  }
-  EnsembleProgress(const EnsembleProgress&) = delete;
-  EnsembleProgress& operator=(const EnsembleProgress&) = delete;
+      : members_(members), before_(done), done_(done), line_(wanted) {}
 
   /// From any thread.
   void add(std::int64_t members) {
     const std::scoped_lock lock(guard_);
     done_ += members;
-    const auto now = Clock::now();
-    if (!shown_ || now - drawn_at_ < std::chrono::milliseconds(100)) return;
-    drawn_at_ = now;
-    is_drawn_ = true;
-    const double rate = static_cast<double>(done_ - before_) / std::chrono::duration<double>(now - began_).count();
-    const std::string text = std::to_string(done_) + " of " + std::to_string(members_) + " members   " +
-                             rounded(rate, 3) + " members/s   " +
-                             rest_text(static_cast<double>(members_ - done_) / rate) + " left";
-    std::fputs(("\r\x1b[K" + text).c_str(), stderr);
-    std::fflush(stderr);
+    line_.draw([this](double seconds) {
+      const double rate = static_cast<double>(done_ - before_) / seconds;
+      return std::to_string(done_) + " of " + std::to_string(members_) + " members   " + rounded(rate, 3) +
+             " members/s   " + rest_text(static_cast<double>(members_ - done_) / rate) + " left";
+    });
   }
 
  private:
   std::int64_t members_, before_, done_;
-  bool shown_;
-  bool is_drawn_ = false;
+  TerminalLine line_;
   std::mutex guard_;
-  Clock::time_point began_ = Clock::now(), drawn_at_ = began_;
 };
 
 /// Of the ensemble alone, so that whoever goes on has the same ones: a few members for each lane, where they go there.

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <new>
@@ -349,8 +350,15 @@ void keep_standard_streams() {
   }
 }
 
+/// Messages leave a line at a time: ranks, and mpirun itself, write to the same stream.
+void write_messages_by_line() {
+  std::setvbuf(stderr, nullptr, _IOLBF, BUFSIZ);
+  std::cerr << std::nounitbuf;
+}
+
 ExitStatus run(int argc, char** argv) {
   keep_standard_streams();
+  write_messages_by_line();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is a full disk: writing fails, the run ends in order
   CommandLine line;
   try {

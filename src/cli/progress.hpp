@@ -1,32 +1,20 @@
 #pragma once
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/observer.hpp>
 #include <pendula/run/run_report.hpp>
 #include <string>
 
-namespace pendula::cli {
+#include "cli/terminal_line.hpp"
 
-/// How long a rest will take, as people say it.
-inline std::string rest_text(double seconds) {
-  const auto whole = static_cast<std::int64_t>(std::min(std::ceil(seconds), 1e15));
-  if (whole < 60) return std::to_string(whole) + " s";
-  if (whole < 3600) return std::to_string(whole / 60) + " min " + std::to_string(whole % 60) + " s";
-  return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
-}
+namespace pendula::cli {
 
 /// A line on standard error that shows how far a run is, how fast, how long it will take and how far its energy is off;
 /// nothing at all where that is no terminal.
 class Progress : public Observer {
-  using Clock = std::chrono::steady_clock;
-
  public:
   Progress(const RunSetup& setup, bool wanted)
       : start_time_(setup.start.time),
@@ -34,24 +22,16 @@ class Progress : public Observer {
         every_(setup.rows.any() ? 0 : setup.every),
         scale_(setup.subject->energy_scale().value_or(0)),
         conserves_(!setup.subject->loaded()),
-        shown_(wanted && isatty(STDERR_FILENO) != 0) {}
+        line_(wanted) {}
 
   void take(const Row& row) override {
-    if (!shown_) return;
+    if (!line_.is_shown()) return;
     if (rows_ == 0) first_share_ = share_at(row.motion.time);
     follow(row.seen);
-    const auto now = Clock::now();
-    if (now - drawn_at_ < std::chrono::milliseconds(100)) return;
-    drawn_at_ = now;
-    is_drawn_ = true;
-    std::fputs(("\r\x1b[K" + line(row, std::chrono::duration<double>(now - began_).count())).c_str(), stderr);
-    std::fflush(stderr);
+    line_.draw([&](double seconds) { return line_text(row, seconds); });
   }
 
-  void finish() override {
-    if (is_drawn_) std::fputs("\r\x1b[K", stderr);
-    is_drawn_ = false;
-  }
+  void finish() override { line_.erase(); }
 
  private:
   // As the summary compares energies, as far as the run is known.
@@ -62,7 +42,7 @@ class Progress : public Observer {
 
   double share_at(double time) const { return duration_ > 0 ? std::min(1.0, (time - start_time_) / duration_) : 1; }
 
-  std::string line(const Row& row, double seconds) const {
+  std::string line_text(const Row& row, double seconds) const {
     const double share = share_at(row.motion.time);
     std::string text = rounded(std::floor(100 * share), 3) + " %   t = " + rounded(row.motion.time) + " of " +
                        rounded(start_time_ + duration_);
@@ -82,12 +62,11 @@ class Progress : public Observer {
   double start_time_, duration_;
   std::int64_t every_;  // steps from row to row; 0: rows are wanted at times
   double scale_;
-  bool conserves_, shown_;
-  bool is_drawn_ = false;
+  bool conserves_;
+  TerminalLine line_;
   std::int64_t rows_ = 0;
   double first_share_ = 0;                 // of a run that goes on, what was there already
   double first_energy_ = 0, largest_ = 0;  // J
-  Clock::time_point began_ = Clock::now(), drawn_at_ = began_;
 };
 
 }  // namespace pendula::cli

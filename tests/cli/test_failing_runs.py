@@ -145,6 +145,18 @@ def test_what_cannot_be_printed_is_reported(double, command):
     assert run.stderr == "pendula: standard output could not be written\n"
 
 
+@pytest.mark.skipif(not hasattr(os, "O_DIRECT"), reason="needs pipes that keep writes apart")
+def test_messages_are_written_a_line_at_a_time(tmp_path):
+    """Ranks, and mpirun itself, write to the same stream, so that messages in pieces come mixed."""
+    mine, theirs = os.pipe2(os.O_DIRECT)
+    with subprocess.Popen([program(), "simulate", "missing.toml"], stderr=theirs, cwd=tmp_path) as run:
+        os.close(theirs)
+        writes = list(iter(lambda: os.read(mine, 4096), b""))
+    os.close(mine)
+    assert run.returncode == 2
+    assert writes and all(text.endswith(b"\n") for text in writes), writes
+
+
 def read_terminal(terminal: int) -> str:
     """What was written to a terminal until its last writer closed it."""
     chunks = []
