@@ -132,6 +132,14 @@ class RunsInLanes : public testing::Test {
     return setups;
   }
 
+  // A third of them have damping, torques and drives.
+  static void load(std::vector<RunSetup>& setups, int links) {
+    Random random(5);
+    for (std::size_t k = 0; k < setups.size(); k += 3) {
+      setups[k].subject = std::make_shared<ChainSubject<Space>>(driven_chain<Space>(random, links));
+    }
+  }
+
   // By the scalar chain solver, the method that lanes have.
   static RunReport alone(RunSetup setup) {
     setup.options.solver = Solver::chain;
@@ -173,6 +181,7 @@ std::vector<Event> crossings() {
 // Largest differences seen: 1e-13 of the state, 8e-15 of the energy error, 2e-15 s of times.
 TYPED_TEST(RunsInLanes, ReportWhatTheScalarSolverWould) {
   std::vector<RunSetup> setups = this->setups(37, 2, constant(2e-3), 2);
+  this->load(setups, 2);
   for (RunSetup& setup : setups) setup.events = crossings<TypeParam>();
   const std::vector<RunReport> found = run_members(setups);
   std::int64_t happened = 0;
@@ -306,40 +315,43 @@ TYPED_TEST(RunsInLanes, OfSeveralKindsEachGoesWithItsOwn) {
   }
 }
 
-// Chains with damping, torques and drives, one of which is free among them. Against a Gauss run to round-off. Largest
-// differences seen: 1e-11 of bobs, 2e-12 s of times.
-TYPED_TEST(RunsInLanes, OfLoadedChainsGoByExplicitMethods) {
+// Chains with damping, torques and drives, some of which are free among them. Against a Gauss run to round-off. Largest
+// differences seen, of dopri5 and Gauss steps that are chosen: 1e-11 of bobs, 2e-12 s of times.
+TYPED_TEST(RunsInLanes, OfLoadedChainsAreThoseOfOneAlone) {
   using Space = TypeParam;
   Random random(23);
+  RunOptions dopri5 = chosen(1e-11), gauss = chosen(1e-11);
+  dopri5.method = Method::dopri5;
+  gauss.stages = 4;
   std::vector<RunSetup> setups;
   for (int k = 0; k < 21; ++k) {
     const int links = 1 + k % 5;
     const auto subject = std::make_shared<ChainSubject<Space>>(k % 7 == 3 ? random_chain<Space>(random, links)
                                                                           : driven_chain<Space>(random, links));
-    RunOptions options;
-    options.method = Method::dopri5;
-    options.tolerance = 1e-11;
     setups.push_back({.subject = subject,
                       .start = random_state<Space>(random, links),
-                      .options = options,
+                      .options = gauss,
                       .duration = 1,
                       .doubted = false});
     setups.back().events.push_back({"x", [=](const Motion& motion) { return subject->observe(motion).points[0]; }});
   }
-  const std::vector<RunReport> found = run_members(setups);
-  for (std::size_t k = 0; k < setups.size(); ++k) {
-    EXPECT_TRUE(lane_kind(setups[k])) << k;
-    RunSetup exact = setups[k];
-    exact.options = {.stages = 8, .solver = Solver::chain, .step = 0, .tolerance = 1e-13};
-    const RunReport expected = pendula::Run(exact).go();
-    ASSERT_EQ(found[k].end, RunEnd::complete);
-    const auto points = [&](const RunReport& report) { return setups[k].subject->observe(report.last).points; };
-    EXPECT_LT((points(found[k]) - points(expected)).cwiseAbs().maxCoeff(), 1e-10) << k;
-    ASSERT_EQ(found[k].events[0].count, expected.events[0].count) << k;
-    const RunReport one = run_members({&setups[k], 1})[0];
-    EXPECT_EQ(found[k].last.q, one.last.q) << k;
-    if (expected.events[0].count == 0) continue;
-    EXPECT_NEAR(found[k].events[0].first, expected.events[0].first, 1e-10);
+  for (const RunOptions& options : {dopri5, gauss}) {
+    for (RunSetup& setup : setups) setup.options = options;
+    const std::vector<RunReport> found = run_members(setups);
+    for (std::size_t k = 0; k < setups.size(); ++k) {
+      EXPECT_TRUE(lane_kind(setups[k])) << k;
+      RunSetup exact = setups[k];
+      exact.options = {.stages = 8, .solver = Solver::chain, .step = 0, .tolerance = 1e-13};
+      const RunReport expected = pendula::Run(exact).go();
+      ASSERT_EQ(found[k].end, RunEnd::complete);
+      const auto points = [&](const RunReport& report) { return setups[k].subject->observe(report.last).points; };
+      EXPECT_LT((points(found[k]) - points(expected)).cwiseAbs().maxCoeff(), 1e-10) << k;
+      ASSERT_EQ(found[k].events[0].count, expected.events[0].count) << k;
+      const RunReport one = run_members({&setups[k], 1})[0];
+      EXPECT_EQ(found[k].last.q, one.last.q) << k;
+      if (expected.events[0].count == 0) continue;
+      EXPECT_NEAR(found[k].events[0].first, expected.events[0].first, 1e-10);
+    }
   }
 }
 
@@ -422,6 +434,7 @@ TYPED_TEST_SUITE(ExponentsInLanes, Spaces);
 // 1/s by chosen steps, 8.8e-10 by constant ones, of 0.3 to 6.3; of MEGNO 1.9e-3, which is summed up by steps.
 TYPED_TEST(ExponentsInLanes, AreThoseOfOtherSteps) {
   std::vector<RunSetup> setups = this->setups(11, 3, chosen(1e-12), 2);
+  this->load(setups, 3);
   for (RunSetup& setup : setups) setup.options.method = Method::dopri5;
   const auto expected = exponents_in_lanes(setups);
   for (RunOptions options : {chosen(1e-10), constant(0.002)}) {
@@ -489,6 +502,7 @@ TYPED_TEST(ExponentsInLanes, OfChainsThatHangStillAreZero) {
 // To the last bit, by Gauss steps, whose iterations are of all lanes.
 TYPED_TEST(ExponentsInLanes, AreOfAMemberAlone) {
   std::vector<RunSetup> setups = this->setups(11, 2, chosen(1e-6), 5);
+  this->load(setups, 2);
   for (RunSetup& setup : setups) setup.options.stages = 4;
   const auto together = exponents_in_lanes(setups);
   for (std::size_t k = 0; k < setups.size(); ++k) {

@@ -49,13 +49,18 @@ inline bool has_to_be_tried(const Subject& subject) {
   return subject.loaded() || dynamic_cast<const SystemSubject*>(&subject) != nullptr;
 }
 
+/// What error estimates of few stages look at besides, where there are loads, lanes do not.
+inline bool misses_loads(const RunSetup& setup, const RunOptions& options) {
+  return is_adaptive(options) && options.stages == StepShape::few_stages && setup.subject->loaded();
+}
+
 /// What is moved, where lanes are for it.
 template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
   if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
   if (!is_explicit(options.method)) {
-    if (chain->chain().loaded() || options.solver == Solver::dense) return false;
+    if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
     // Steps that do not resolve a chain are others without what it pulls where it hangs, which lanes do not know of.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
@@ -66,11 +71,8 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind
 inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
   if (system == nullptr || library().system_lanes(options) == nullptr) return false;
-  if (!is_explicit(options.method)) {
-    // What error estimates look at besides in these cases, lanes do not.
-    const bool misses_loads = is_adaptive(options) && options.stages == StepShape::few_stages && system->loaded();
-    if (system->info().depends_on_time || misses_loads) return false;
-  }
+  const bool is_seen = !system->info().depends_on_time && !misses_loads(setup, options);
+  if (!is_explicit(options.method) && !is_seen) return false;
   kind.kernel = system->entry().lanes;
   return true;
 }
@@ -78,8 +80,8 @@ inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKi
 }  // namespace detail
 
 /// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
-/// compiled for, chains that gravity alone moves, of the chain solver and resolved by constant steps, and systems of
-/// generated kernels that depend on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods.
+/// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
+/// on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;

@@ -12,6 +12,7 @@
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_prediction.hpp>
+#include <pendula/lanes/lane_stage_loads.hpp>
 #include <pendula/lanes/lane_stop.hpp>
 #include <type_traits>
 
@@ -21,7 +22,7 @@ namespace pendula {
 /// theirs: equations, gauge and rounding are those of ChainStages and RodState (docs/method.md), the layout is not. All
 /// stages of one number are S packs.
 ///
-/// Gravity is all that acts. N may be Eigen::Dynamic. With a tangent, every number has its derivative along one tangent
+/// N may be Eigen::Dynamic. With a tangent, every number has its derivative along one tangent
 /// of each member's motion: that of the step itself, which is solved with it.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister, bool with_tangent = false>
 class LaneChain {
@@ -39,7 +40,7 @@ class LaneChain {
   using Columns = LaneColumns<S, L>;
 
   explicit LaneChain(int links)
-      : links_(links), constants_(links), rods_(links), stages_(links), rates_(links), kept_(links) {
+      : links_(links), constants_(links), rods_(links), stages_(links), rates_(links), kept_(links), loads_(links) {
     rest();
   }
 
@@ -55,6 +56,7 @@ class LaneChain {
              const double* q, const double* v) {
     const double gravity = given.gravity();
     gravity_.set(lane, gravity);
+    loads_.take(lane, given, chain);
     double length = 0;
     for (int i = 0; i < links(); ++i) {
       constants_[i].set(lane, chain[i]);
@@ -116,14 +118,24 @@ class LaneChain {
     return energy;
   }
 
-  /// What the energy at the end of the step that was solved is to be  [J].
-  L energy_due() { return energy(); }
+  /// Who has damping, torques or drives.
+  Mask loaded() const { return loads_.loaded(); }
+  /// Whose fixed points may ask for shorter steps than errors do, by damping.
+  Mask may_be_stiff() const { return loaded(); }
+  L longest_step(double tolerance) const { return loads_.longest_step(tolerance); }
 
-  /// What an energy that ought to be `due` is compared to: Σ M |g| l, and what there is.
+  /// What the energy at the end of the step that was solved is to be, by what loads bring  [J].
+  L energy_due() {
+    const L energy = this->energy();
+    brought_ = loads_.any() ? work() : L(0.0);
+    return energy + brought_;
+  }
+
+  /// What an energy that ought to be `due` is compared to: Σ M |g| l, what there is, and what loads brought.
   L energy_scale(const L& due) const {
     L scale(0.0);
     for (int i = 0; i < links(); ++i) scale = fma(abs(constants_[i].weight), constants_[i].length, scale);
-    return scale + abs(due);
+    return scale + abs(due) + abs(brought_);
   }
 
   /// R and d ln R/dt, as ChainStages::tempo.
@@ -148,8 +160,9 @@ class LaneChain {
   }
 
   /// Predicts the stages of a step of `h`, `ratio` times as long as the one that they are known from.
-  void prepare(const L& /*time*/, const L& h, const L& ratio, const LanePrediction<L>& kind) {
+  void prepare(const L& time, const L& h, const L& ratio, const LanePrediction<L>& kind) {
     columns_.prepare(h);
+    if (loads_.any()) loads_.prepare(time, columns_, [this](int i) -> const LaneLink<L>& { return constants_[i]; });
     columns_.predict_at(select(kind.again, L(0.0), L(1.0)), ratio, kind.depth);
     predict(kind.follows);
     scale_ = scale_ * (ratio * ratio);
@@ -160,6 +173,7 @@ class LaneChain {
   /// relative to the size of the step.
   PENDULA_IN_REGISTERS [[gnu::noinline]] L iterate(const Mask& active) {
     for_links([&](auto i) PENDULA_WRITTEN_OUT { place_stages(i); });
+    if (loads_.any()) add_loads();
     L change(0.0);
     if constexpr (S > 1) {
       detail::unrolled<S / 2>([&](auto pair) PENDULA_WRITTEN_OUT { change = sweep<2 * pair, 2>(active, change); });
@@ -202,6 +216,7 @@ class LaneChain {
       scale_ = scale_ + squares;
       quartic_ = fma(middle * middle, middle * middle, quartic_);
     }
+    if (loads_.any()) add_load_totals();
   }
 
   /// A rod at stage j of the step.
@@ -603,6 +618,55 @@ class LaneChain {
     });
   }
 
+  // h b times what loads add to the pull of a rod, at the stages of the step.
+  std::array<Stages, D> pull_of_loads(int i) const { return loads_.pull(i, stages_[i].rod, advance(i)); }
+  std::array<Stages, D> advance(int i) const {
+    std::array<Stages, D> advance;
+    for (std::size_t k = 0; k < D; ++k) {
+      for (int j = 0; j < S; ++j) {
+        const auto stage = static_cast<std::size_t>(j);
+        advance[k][stage] = fma(columns_.hb(j), rods_[i].free[k], stages_[i].U[k][stage]);
+      }
+    }
+    return advance;
+  }
+
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void add_loads() {
+    for (int i = 0; i < links(); ++i) {
+      const std::array<Stages, D> pull = pull_of_loads(i);
+      for (std::size_t k = 0; k < D; ++k) {
+        Stages integral;
+        columns_.integrate(pull[k], Number(0.0), integral);
+        for (std::size_t j = 0; j < integral.size(); ++j) stages_[i].pull[k][j] = stages_[i].pull[k][j] + integral[j];
+      }
+    }
+  }
+  // At each member's own stages, however long those of others took.
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void add_load_totals() {
+    for (int i = 0; i < links(); ++i) {
+      place_stages(i);
+      const std::array<Stages, D> pull = pull_of_loads(i);
+      for (std::size_t k = 0; k < D; ++k) stages_[i].pulled[k] = stages_[i].pulled[k] + Columns::total(pull[k]);
+    }
+  }
+
+  // Energy that loads bring in the step that was solved  [J].
+  L work() const {
+    L work(0.0);
+    const L inverse_h = L(1.0) / columns_.h();
+    for (int i = 0; i < links(); ++i) {
+      const std::array<Stages, D> pull = pull_of_loads(i), advanced = advance(i);
+      for (int j = 0; j < S; ++j) {
+        const L inverse_hb = inverse_h * L(columns_.inverse_b(j));
+        for (std::size_t k = 0; k < D; ++k) {
+          const auto stage = static_cast<std::size_t>(j);
+          work = fma(-inverse_hb * value(pull[k][stage]), value(advanced[k][stage]), work);
+        }
+      }
+    }
+    return select(loaded(), work, L(0.0));
+  }
+
   // What a sweep keeps on its way in for its way out, of one link at a few stages.
   template <std::size_t Count>
   struct Kept {
@@ -803,6 +867,7 @@ class LaneChain {
   int links_;
   Columns columns_;
   L gravity_{0.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0}, scale_{0.0}, turn_{0.0}, quartic_{0.0};
+  L brought_{0.0};  // by loads, in the step that is looked at
   std::size_t newest_ = 0;
   L restoring_{0.0};  // steps since lengths were restored
   detail::PerLink<LaneLink<L>, N> constants_;
@@ -810,6 +875,7 @@ class LaneChain {
   detail::PerLink<Work, N> stages_;
   detail::PerLink<Point, N> rates_;
   detail::PerLink<Kept<swept>, is_short ? 1 : N> kept_;
+  LaneStageLoads<Space, S, N, L> loads_;
 };
 
 }  // namespace pendula

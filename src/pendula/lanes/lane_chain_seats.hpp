@@ -8,7 +8,6 @@
 #include <pendula/lanes/lane_member.hpp>
 #include <pendula/lanes/lane_sight.hpp>
 #include <pendula/lanes/lane_turns.hpp>
-#include <stdexcept>
 
 namespace pendula {
 
@@ -20,15 +19,15 @@ class LaneChainSeats {
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
   using Turns = LaneTurns<Space, N, L>;
+  using Links = ChainLinks<Space, N, double>;
 
  public:
   using Common = const Chain<Space, N>&;  ///< the chain of members who have none of their own
   using Member = LaneMember<Space, N>;
   using Sight = LaneSight<Stepper, Turns>;
 
-  /// Throws std::invalid_argument for a chain with loads, where Gauss steps are taken: gravity alone is known to them.
   LaneChainSeats(Common chain, Stepper& stepper)
-      : chain_(chain), links_(links_of(chain)), stepper_(stepper), turns_(chain.links()) {}
+      : chain_(chain), links_(chain), stepper_(stepper), turns_(chain.links()) {}
 
   /// What a stepper of such members is made from.
   static int subject_of(Common chain) { return chain.links(); }
@@ -41,7 +40,7 @@ class LaneChainSeats {
   void take(int lane, const Member& next) {
     const bool own = next.chain != nullptr;
     const double* q = next.start.q.data();
-    stepper_.start(lane, next.start.time, own ? *next.chain : chain_, own ? links_of(*next.chain) : links_, q,
+    stepper_.start(lane, next.start.time, own ? *next.chain : chain_, own ? Links(*next.chain) : links_, q,
                    next.start.v.data());
     turns_.start(lane, q, [this](int i) -> decltype(auto) { return stepper_.chain().along(i); });
   }
@@ -69,15 +68,8 @@ class LaneChainSeats {
   }
 
  private:
-  static ChainLinks<Space, N, double> links_of(Common chain) {
-    if (Stepper::is_implicit && chain.loaded()) {
-      throw std::invalid_argument("ensemble: expected a chain without damping and torques");
-    }
-    return ChainLinks<Space, N, double>(chain);
-  }
-
   Chain<Space, N> chain_;
-  ChainLinks<Space, N, double> links_;
+  Links links_;
   Stepper& stepper_;
   Turns turns_;
 };

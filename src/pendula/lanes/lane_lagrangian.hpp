@@ -36,7 +36,7 @@ class LaneLagrangian {
   using Stop = LaneStop<L, 2>;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
-  static constexpr bool may_be_stiff = true;  ///< forces and lengths may be anything
+  static constexpr int most_iterations = 25;  ///< of a step whose size is chosen
   static constexpr std::size_t D = 1;
   using Vector = std::array<L, D>;
   using Columns = LaneColumns<S, L>;
@@ -98,6 +98,8 @@ class LaneLagrangian {
     for (int i = 0; i < links(); ++i) visit(i, Vector{state_.load(rate_at(i))}, L(0.0));
   }
 
+  /// Whether fixed points may ask for shorter steps than errors do: forces and lengths may be anything.
+  Mask may_be_stiff() const { return L(0.0) == L(0.0); }
   /// Whether energy may come from outside, or go there.
   Mask loaded() const { return loaded_ > L(0.0); }
 

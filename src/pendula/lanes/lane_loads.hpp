@@ -12,6 +12,7 @@
 namespace pendula {
 
 /// What acts on the chains of several members, one in each lane, beside gravity: damping, and torques of their times.
+/// Who has none is moved as if nobody had any, to the last bit.
 template <class Space, int N, class L>
 class LaneLoads {
   static constexpr std::size_t components = Space::torque_components;
@@ -20,10 +21,12 @@ class LaneLoads {
   explicit LaneLoads(int links)
       : links_(links), torques_(components * static_cast<std::size_t>(links), L(0.0)), inputs_(torques_.size()) {}
 
-  /// Whether any member that came has some.
+  /// Whether any member that came has some, and who of those in the lanes has.
   bool any() const { return any_; }
+  auto loaded() const { return loaded_ > L(0.0); }
 
   void take(int lane, const Chain<Space, N>& chain, const ChainLinks<Space, N, double>& links) {
+    loaded_.set(lane, chain.loaded() ? 1 : 0);
     if (!chain.loaded() && !any_) return;
     if (!any_) drag_.assign(static_cast<std::size_t>(links_), L(0.0));
     any_ = true;
@@ -38,16 +41,23 @@ class LaneLoads {
   /// The highest frequency that a member is driven with; 0 where there is none.
   L fastest_drive() const { return inputs_.fastest(); }
 
-  /// (torque_i × ξ_i − λ_i ξ̇_i)/l_i² of a rod.
-  template <class Number, std::size_t D>
-  std::array<Number, D> of_rod(int i, const LaneLink<L>& link, const std::array<Number, D>& rod,
-                               const std::array<Number, D>& rate) const {
-    typename Space::Link::template Torque<Number> torque;
+  /// Torque on a link at the time that was set, over l_i².
+  auto torque(int i, const LaneLink<L>& link) const {
+    typename Space::Link::template Torque<L> torque;
     for (std::size_t k = 0; k < components; ++k) {
-      torque[k] = Number(link.inverse_square * torques_[static_cast<std::size_t>(i) * components + k]);
+      torque[k] = link.inverse_square * torques_[static_cast<std::size_t>(i) * components + k];
     }
+    return torque;
+  }
+
+  /// (torque_i × ξ_i − λ_i ξ̇_i)/l_i² of a rod; torque: as above.
+  template <class Number, std::size_t D>
+  std::array<Number, D> of_rod(int i, const typename Space::Link::template Torque<L>& torque,
+                               const std::array<Number, D>& rod, const std::array<Number, D>& rate) const {
+    typename Space::Link::template Torque<Number> turning;
+    for (std::size_t k = 0; k < components; ++k) turning[k] = Number(torque[k]);
     std::array<Number, D> load;
-    Space::Link::torque_load(torque, rod, load);
+    Space::Link::torque_load(turning, rod, load);
     const L& drag = drag_[static_cast<std::size_t>(i)];
     for (std::size_t k = 0; k < D; ++k) load[k] = fma(-drag, rate[k], load[k]);
     return load;
@@ -56,6 +66,7 @@ class LaneLoads {
  private:
   int links_;
   bool any_ = false;
+  L loaded_{0.0};
   std::vector<L> torques_;  // now
   LaneInputs<L> inputs_;    // the same at any time
   std::vector<L> drag_;     // λ_i/l_i²

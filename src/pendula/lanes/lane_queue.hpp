@@ -70,10 +70,9 @@ class LaneQueue {
  private:
   // Of systems nobody knows before what their energies are to be compared with.
   static constexpr bool sums_energies = requires(const Stepper& stepper) { stepper.energy_sum(); };
-  static constexpr bool may_be_stiff = requires { requires Stepper::Chain::may_be_stiff; };
+  static constexpr bool may_be_stiff = requires(const Stepper& stepper) { stepper.chain().may_be_stiff(); };
   static constexpr double most_attempts = 40;                        // at one step
   static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // steps, and those a step that was taken
-  static constexpr int most_iterations = 25;                         // of a step whose size is chosen
   static constexpr double largest_energy_defect = 0.02;
   static constexpr double smallest_step = 1e-10;  // of the time that is left
 
@@ -83,7 +82,9 @@ class LaneQueue {
       typename Stepper::Options given;
       given.are_chosen = options.step == 0;
       if (given.are_chosen) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
-      if (given.are_chosen && may_be_stiff) given.max_iterations = most_iterations;
+      if constexpr (requires { Stepper::Chain::most_iterations; }) {
+        if (given.are_chosen) given.max_iterations = Stepper::Chain::most_iterations;
+      }
       if (options.enough > 0) given.enough = options.enough;
       return given;
     } else {
@@ -190,8 +191,9 @@ class LaneQueue {
   // Newton is faster.
   Mask is_stiff([[maybe_unused]] const Mask& unsolved) {
     if constexpr (may_be_stiff) {
-      unsolved_ = unsolved_ + select(unsolved, L(1.0), L(0.0));
-      return unsolved & (unsolved_ > fma(L(most_unsolved), steps_, L(first_unsolved)));
+      const Mask counted = unsolved & stepper_.chain().may_be_stiff();
+      unsolved_ = unsolved_ + select(counted, L(1.0), L(0.0));
+      return counted & (unsolved_ > fma(L(most_unsolved), steps_, L(first_unsolved)));
     }
     return unsolved & !unsolved;
   }

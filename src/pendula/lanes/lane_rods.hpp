@@ -219,7 +219,9 @@ class LaneRods {
   // What loads accelerate rods by, were there no tensions.
   [[gnu::noinline]] void find_freed(const L& time, const Parts& rods) {
     loads_.set_time(time);
-    const auto load = [&](int i) { return loads_.of_rod(i, constants_[i], rods[i].place, rods[i].rate); };
+    const auto load = [&](int i) {
+      return loads_.of_rod(i, loads_.torque(i, constants_[i]), rods[i].place, rods[i].rate);
+    };
     std::array<Number, D> before{}, here = load(0);
     for (int i = 0; i < links(); ++i) {
       std::array<Number, D> freed = scaled(constants_[i].inverse_masses, here);

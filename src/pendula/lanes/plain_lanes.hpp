@@ -81,9 +81,9 @@ struct PlainMemberEnd {
   double energy_sum;    ///< of systems, the largest |T| + |U| there  [J]
 };
 
-/// Moves chains of one number of links, without loads where steps are Gauss's, a member in each lane; `every`
-/// how many steps from one look at the energy to the next. What becomes of a member depends on that member alone, to
-/// the last bit. False where `watch` made it leave off.
+/// Moves chains of one number of links, a member in each lane; `every` how many steps from one look at the energy to
+/// the next. What becomes of a member depends on that member alone, to the last bit. False where `watch` made it leave
+/// off.
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                          std::span<PlainMemberEnd> ends, LaneWatch& watch);
 
