@@ -205,6 +205,8 @@ class ChainLinks {
   bool loaded() const { return loaded_; }
   /// Whether a step of h resolves how fast the chain can swing, at rest ω² by Gershgorin: up to (h ω)² = 4.
   bool resolves(Real h) const { return !(h * h * fastest_swing_ > Real(4)); }
+  /// That ω²  [1/s²].
+  Real fastest_swing_squared() const { return fastest_swing_; }
   const LinkConstants<Real>& operator[](int link) const { return constants_[link]; }
 
  private:

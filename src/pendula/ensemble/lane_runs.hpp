@@ -33,10 +33,11 @@ struct LaneKind {
   MakeLaneDynamics* kernel = nullptr;  // of others
   int stages = 0;
   Method method = Method::gauss;
+  Iteration iteration = Iteration::automatic;
   double step = 0, tolerance = 0;
   std::int64_t every = 0;
 
-  auto tied() const { return std::tie(dimension, links, kernel, stages, method, step, tolerance, every); }
+  auto tied() const { return std::tie(dimension, links, kernel, stages, method, iteration, step, tolerance, every); }
   bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
   bool operator==(const LaneKind& other) const { return tied() == other.tied(); }
 };
@@ -61,7 +62,7 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind
   if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
   if (!is_explicit(options.method)) {
     if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
-    // Steps that do not resolve a chain are others without what it pulls where it hangs, which lanes do not know of.
+    // By steps that do not resolve a chain fixed points hardly arrive; those that are chosen may become shorter.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
   kind.dimension = Space::dimension;
@@ -95,6 +96,7 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions
   }
   if (options.method == Method::gauss) kind.stages = options.stages;
   kind.method = options.method;
+  kind.iteration = options.iteration;
   (is_adaptive(options) ? kind.tolerance : kind.step) = chosen;
   kind.every = setup.every;
   return kind;

@@ -69,6 +69,7 @@ class LaneChain {
       place(lane, i, chain[i].length, Heading<Space, Wide>(angles, rates));
     }
     slowest_pace_.set(lane, 0.15 * links() * links() * std::abs(gravity) / length);
+    fastest_swing_.set(lane, chain.fastest_swing_squared());
     restoring_.set(lane, 0);
     if constexpr (has_tangent) start_tangent(lane);
   }
@@ -163,17 +164,21 @@ class LaneChain {
   void prepare(const L& time, const L& h, const L& ratio, const LanePrediction<L>& kind) {
     columns_.prepare(h);
     if (loads_.any()) loads_.prepare(time, columns_, [this](int i) -> const LaneLink<L>& { return constants_[i]; });
+    const L hung = hangs_;
+    hangs_ = select(h * h * fastest_swing_ > L(4.0), L(1.0), L(0.0));
+    pulls_more_ = loads_.any() || xsimd::any(hangs_ > L(0.0));
+    const Mask differs = !(hangs_ == hung), cold = kind.cold | differs;
     columns_.predict_at(select(kind.again, L(0.0), L(1.0)), ratio, kind.depth);
-    predict(kind.follows);
+    predict(kind.follows & !differs);
     scale_ = scale_ * (ratio * ratio);
-    if (xsimd::any(kind.cold)) start_cold(kind.cold);
+    if (xsimd::any(cold)) start_cold(cold);
   }
 
   /// One fixed-point iteration for the members that are `active`, those of the others stay; what changed, squared,
   /// relative to the size of the step.
   PENDULA_IN_REGISTERS [[gnu::noinline]] L iterate(const Mask& active) {
     for_links([&](auto i) PENDULA_WRITTEN_OUT { place_stages(i); });
-    if (loads_.any()) add_loads();
+    if (pulls_more_) pull_more();
     L change(0.0);
     if constexpr (S > 1) {
       detail::unrolled<S / 2>([&](auto pair) PENDULA_WRITTEN_OUT { change = sweep<2 * pair, 2>(active, change); });
@@ -216,7 +221,7 @@ class LaneChain {
       scale_ = scale_ + squares;
       quartic_ = fma(middle * middle, middle * middle, quartic_);
     }
-    if (loads_.any()) add_load_totals();
+    if (pulls_more_) add_more_to_totals();
   }
 
   /// A rod at stage j of the step.
@@ -401,7 +406,7 @@ class LaneChain {
     const auto rod_of = [&](int i) {
       return MovingRod<D>{numbers(rods_[i].along), numbers(rods_[i].free), constants_[i].inverse_square[lane]};
     };
-    const ChainTangent<Space> tangent(links(), slowest_pace_[lane], rod_of);
+    const LaneChainTangent<Space> tangent(links(), slowest_pace_[lane], rod_of);
     inverse_pace_squared_.set(lane, tangent.inverse_pace_squared());
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
@@ -618,8 +623,7 @@ class LaneChain {
     });
   }
 
-  // h b times what loads add to the pull of a rod, at the stages of the step.
-  std::array<Stages, D> pull_of_loads(int i) const { return loads_.pull(i, stages_[i].rod, advance(i)); }
+  // h b ξ̇ at the stages of the step.
   std::array<Stages, D> advance(int i) const {
     std::array<Stages, D> advance;
     for (std::size_t k = 0; k < D; ++k) {
@@ -630,10 +634,30 @@ class LaneChain {
     }
     return advance;
   }
+  std::array<Stages, D> pull_of_loads(int i) const { return loads_.pull(i, stages_[i].rod, advance(i)); }
 
-  PENDULA_IN_REGISTERS [[gnu::noinline]] void add_loads() {
+  // h b times what pulls a rod besides its multiplier: loads, and in a step that does not resolve how fast a chain can
+  // swing the tension of one that hangs at rest (ChainStages).
+  std::array<Stages, D> more_pull(int i) const {
+    std::array<Stages, D> pull;
+    if (loads_.any()) {
+      pull = pull_of_loads(i);
+    } else {
+      for (Stages& component : pull) component.fill(Number(0.0));
+    }
+    const L tension = hangs_ * constants_[i].hanging;
+    for (std::size_t k = 0; k < D; ++k) {
+      for (int j = 0; j < S; ++j) {
+        const auto stage = static_cast<std::size_t>(j);
+        pull[k][stage] = fma(columns_.hb(j) * tension, stages_[i].rod[k][stage], pull[k][stage]);
+      }
+    }
+    return pull;
+  }
+
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void pull_more() {
     for (int i = 0; i < links(); ++i) {
-      const std::array<Stages, D> pull = pull_of_loads(i);
+      const std::array<Stages, D> pull = more_pull(i);
       for (std::size_t k = 0; k < D; ++k) {
         Stages integral;
         columns_.integrate(pull[k], Number(0.0), integral);
@@ -642,10 +666,10 @@ class LaneChain {
     }
   }
   // At each member's own stages, however long those of others took.
-  PENDULA_IN_REGISTERS [[gnu::noinline]] void add_load_totals() {
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void add_more_to_totals() {
     for (int i = 0; i < links(); ++i) {
       place_stages(i);
-      const std::array<Stages, D> pull = pull_of_loads(i);
+      const std::array<Stages, D> pull = more_pull(i);
       for (std::size_t k = 0; k < D; ++k) stages_[i].pulled[k] = stages_[i].pulled[k] + Columns::total(pull[k]);
     }
   }
@@ -867,7 +891,9 @@ class LaneChain {
   int links_;
   Columns columns_;
   L gravity_{0.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0}, scale_{0.0}, turn_{0.0}, quartic_{0.0};
-  L brought_{0.0};  // by loads, in the step that is looked at
+  L brought_{0.0};                     // by loads, in the step that is looked at
+  L fastest_swing_{0.0}, hangs_{0.0};  // ω², at rest; whether the step does not resolve it
+  bool pulls_more_ = false;
   std::size_t newest_ = 0;
   L restoring_{0.0};  // steps since lengths were restored
   detail::PerLink<LaneLink<L>, N> constants_;

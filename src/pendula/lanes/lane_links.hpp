@@ -16,6 +16,7 @@ struct LaneLink {
   Twofold<L> inverse_mass{L(1.0), L(0.0)};  ///< 1/m
   L inverse_masses{1.0};                    ///< 1/m_i + 1/m_{i−1}, 1/m_0 = 0
   L weight{1.0};                            ///< M g, M the mass that the rod carries
+  L hanging{0.0};                           ///< M |g|/l
 
   void set(int lane, const LinkConstants<double>& link) {
     mass.set(lane, link.mass);
@@ -25,6 +26,7 @@ struct LaneLink {
     inverse_mass.low.set(lane, link.inverse_mass.low);
     inverse_masses.set(lane, link.inverse_masses);
     weight.set(lane, link.weight);
+    hanging.set(lane, link.hanging);
   }
 };
 

@@ -83,7 +83,7 @@ class LaneQueue {
       given.are_chosen = options.step == 0;
       if (given.are_chosen) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
       if constexpr (requires { Stepper::Chain::most_iterations; }) {
-        if (given.are_chosen) given.max_iterations = Stepper::Chain::most_iterations;
+        if (given.are_chosen && options.enough == 0) given.max_iterations = Stepper::Chain::most_iterations;
       }
       if (options.enough > 0) given.enough = options.enough;
       return given;

@@ -242,7 +242,7 @@ class LaneRods {
     const auto rod_of = [&](int i) {
       return MovingRod<D>{numbers(rods[i].place), numbers(rods[i].rate), constants_[i].inverse_square[lane]};
     };
-    const ChainTangent<Space> tangent(links(), slowest_pace_[lane], rod_of);
+    const LaneChainTangent<Space> tangent(links(), slowest_pace_[lane], rod_of);
     inverse_pace_squared_.set(lane, tangent.inverse_pace_squared());
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {

@@ -20,6 +20,8 @@ bool move_plainly(typename Queue::Common common, const RunOptions& options, std:
   asked.step = is_adaptive(options) ? 0 : options.step;
   asked.tolerance = options.tolerance;
   asked.energy_every = every;
+  // Who asks for the iteration of lanes has one that `simulate` takes as well, to round-off.
+  if (options.iteration == Iteration::fixed_point) asked.enough = LaneStepperOptions{}.enough;
   Queue queue(common, asked);
   queue.set_watch(watch);
   std::vector<LaneEnd> reached(members.size());
