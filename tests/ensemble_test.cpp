@@ -215,6 +215,7 @@ TYPED_TEST(RunsInLanes, ChooseTheStepsOfTheScalarSolver) {
   RunOptions six_stages = chosen(1e-6);
   six_stages.stages = 6;
   for (RunOptions options : {chosen(1e-8), six_stages}) {
+    options.solver = Solver::chain;
     options.iteration = Iteration::fixed_point;
     std::vector<RunSetup> setups = this->setups(37, 2, options, 2);
     this->load(setups, 2);
