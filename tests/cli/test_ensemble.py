@@ -279,8 +279,8 @@ DENSE = MAP.replace("tolerance = 1e-6", 'tolerance = 1e-6\nsolver = "dense"')
 NEWTON = DRAWN.replace("duration = 1.0", 'duration = 1.0\ntolerance = 1e-9\niteration = "newton"')
 
 
-# In lanes to rounding, seen: 3e-15 and, by chosen steps, 2e-13; without the tension of a chain that hangs, in steps that
-# do not resolve it, 3e-9. Alone to the last bit.
+# In lanes to rounding, seen: 3e-15 and, by chosen steps, 2e-13; without the tension of a chain that hangs, in steps
+# that do not resolve it, 3e-9. Alone to the last bit.
 @pytest.mark.parametrize(
     ("scenario", "within"),
     [(STEADY, 1e-12), (CHOSEN, 1e-9), (DENSE, 0), (NEWTON, 0)],
