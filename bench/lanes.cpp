@@ -161,6 +161,9 @@ void race_all(const char* file) {
   for (const double tolerance : {1e-7, 1e-8, 1e-10, 1e-11, 1e-13, 1e-15}) {
     go(std::type_identity<ExplicitLanes<Planar, Fehlberg8, 2>>(), "fehlberg78", {.tolerance = tolerance});
   }
+  for (const double tolerance : {1e-6, 1e-7, 1e-8, 1e-11, 1e-13, 1e-14, 1e-16}) {
+    go(std::type_identity<TaylorLanes<Planar, 2>>(), "taylor", {.tolerance = tolerance});
+  }
 }
 
 }  // namespace

@@ -394,6 +394,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, RandomCrossings,
                                            Case{"rk4", Method::rk4, 1, 0.01, false, 2},
                                            Case{"dopri5", Method::dopri5, 1, 1, false, 2},
                                            Case{"bulirsch_stoer", Method::bulirsch_stoer, 1, 1, false, 2, 9, 20},
+                                           Case{"taylor", Method::taylor, 1, 1, true, 3},
                                            Case{"radau", Method::radau, 3, 0.01, false, 2}),
                          [](const auto& test) { return std::string(test.param.name); });
 
@@ -419,7 +420,7 @@ Event at_time(double time) {
 
 TEST(Events, DoNotMoveTheMotion) {
   for (const RowTimes& rows : {RowTimes{}, RowTimes{0.013, {}}}) {
-    for (const Method method : {Method::gauss, Method::rk4, Method::dopri5, Method::bulirsch_stoer}) {
+    for (const Method method : {Method::gauss, Method::rk4, Method::dopri5, Method::bulirsch_stoer, Method::taylor}) {
       RunSetup with = double_pendulum({bob_passes_below(), at_time(1.23)});
       with.rows = rows;
       with.options.method = method;

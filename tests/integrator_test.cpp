@@ -105,6 +105,8 @@ TEST(ExplicitMethods, MeetGaussLegendre) {
   EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);  // measured 4e-10
   options.method = Method::bulirsch_stoer;
   EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);  // measured 4.5e-10
+  options.method = Method::taylor;
+  EXPECT_LT(distance(final_state(chain, swinging(2), options, any, 1), reference), 3e-9);
 }
 
 // Extrapolation needs few steps, the fewer the more digits are wanted: it raises its order.
@@ -172,7 +174,7 @@ TEST(ExplicitMethods, FollowSmallSwings) {
     while (integrator->time() < 10) EXPECT_TRUE(integrator->step(10 - integrator->time()));
     return std::pair(integrator->state().q[0] / size, integrator->statistics().steps);
   };
-  for (const Method method : {Method::dopri5, Method::fehlberg78, Method::bulirsch_stoer}) {
+  for (const Method method : {Method::dopri5, Method::fehlberg78, Method::bulirsch_stoer, Method::taylor}) {
     const auto [angle, steps] = swung(method, 1e-9);
     EXPECT_NEAR(angle, std::cos(std::sqrt(9.81) * 10), 1e-6) << method;  // measured 4.7e-9
     const auto [other, as_many] = swung(method, 1e-3);

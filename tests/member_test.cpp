@@ -66,17 +66,22 @@ std::vector<RunOptions> every_method(double step) {
   options.form = Form::velocity;
   with_stages({2, 5});
   options.form = Form::momentum;
-  for (const Method method : {Method::rk4, Method::dopri5, Method::fehlberg78, Method::bulirsch_stoer}) {
+  for (const Method method :
+       {Method::rk4, Method::dopri5, Method::fehlberg78, Method::bulirsch_stoer, Method::taylor}) {
     options.method = method;
     all.push_back(options);
   }
   return all;
 }
 
+bool has_loads(const RunOptions& options) {
+  return options.method != Method::taylor;
+}
+
 TEST(Member, OfEveryMethodGoesOnToTheLastBit) {
   Random random(3);
   for (const RunOptions& options : every_method(0.02)) {
-    const Chain<Planar> planar = driven_chain<Planar>(random, 3);
+    const Chain<Planar> planar = has_loads(options) ? driven_chain<Planar>(random, 3) : random_chain<Planar>(random, 3);
     expect_the_same_end(planar, random_state<Planar>(random, 3), options, 200, random_cuts(random, 200));
     const Chain<Spatial> spatial = random_chain<Spatial>(random, 2);
     expect_the_same_end(spatial, random_state<Spatial>(random, 2), options, 200, random_cuts(random, 200));
@@ -142,7 +147,8 @@ TEST(Member, OfAStepThatAnEndCutAndThatFailsIsThatOfOneWithoutAnEnd) {
     options.tolerance = 1e-7;
     const Chain<Planar> planar = random_chain<Planar>(random, 3);
     failed += expect_the_same_before_an_end(planar, random_state<Planar>(random, 3), options, random);
-    const Chain<Spatial> spatial = driven_chain<Spatial>(random, 2);
+    const Chain<Spatial> spatial =
+        has_loads(options) ? driven_chain<Spatial>(random, 2) : random_chain<Spatial>(random, 2);
     failed += expect_the_same_before_an_end(spatial, random_state<Spatial>(random, 2), options, random);
   }
   EXPECT_GT(failed, 500);  // measured 786

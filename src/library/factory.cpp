@@ -9,6 +9,7 @@
 #include <string>
 
 #include "library/chain_integrator.hpp"
+#include "library/taylor_integrator.hpp"
 
 namespace pendula {
 namespace {
@@ -41,6 +42,7 @@ const KernelEntry& require_kernel(int links) {
 
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
+  if (options.method == Method::taylor) return make_taylor_integrator(chain_of<Space>(chain), options);
   if (const KernelEntry* kernel = find_kernel<Space>(chain.links)) return kernel->make(chain, options);
   return make_explicit_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain_of<Space>(chain)),
                                   Space::dof * chain.links, chain.links, options, "");

@@ -14,22 +14,36 @@ template <class Space, class Queue>
 bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                   std::span<PlainMemberEnd> ends, LaneWatch& watch) {
   if (members.empty()) return true;
-  std::vector<Chain<Space>> chains;
+  constexpr int N = Queue::Member::links_known;
+  std::vector<Chain<Space, N>> chains;
   chains.reserve(members.size());  // so that pointers to them stay
-  std::vector<LaneMember<Space>> starts;
+  std::vector<LaneMember<Space, N>> starts;
   starts.reserve(members.size());
   for (const PlainMember& member : members) {
     const auto numbers = [&](const double* from) {
       return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(from, Space::dof * member.chain.links));
     };
-    chains.push_back(chain_of<Space>(member.chain));
+    chains.push_back(chain_of<Space, N>(member.chain));
     starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
   }
   return detail::move_plainly<Queue>(chains.front(), options, every, starts, ends, watch);
 }
 
+/// Series of chains of two and three links are summed up in registers.
+template <class Space>
+bool move_by_series(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
+                    std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+  [[maybe_unused]] const int links = members.empty() ? 0 : members[0].chain.links;
+#ifndef PENDULA_FEW_LANES
+  if (links == 2) return move_members<Space, TaylorLanes<Space, 2>>(options, every, members, ends, watch);
+  if (links == 3) return move_members<Space, TaylorLanes<Space, 3>>(options, every, members, ends, watch);
+#endif
+  return move_members<Space, TaylorLanes<Space>>(options, every, members, ends, watch);
+}
+
 template <class Space>
 struct PlainMoves {
+  static MoveMembers* by_series() { return &move_by_series<Space>; }
   template <class Method>
   static MoveMembers* by() {
     return &move_members<Space, ExplicitLanes<Space, Method>>;
@@ -42,6 +56,7 @@ struct PlainMoves {
 
 template <class Space>
 struct TangentMoves {
+  static MoveMembers* by_series() { return &move_members<Space, TaylorTangentLanes<Space>>; }
   template <class Method>
   static MoveMembers* by() {
     return &move_members<Space, TangentLanes<Space, Method>>;

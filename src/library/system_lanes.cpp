@@ -4,6 +4,7 @@ namespace pendula {
 namespace {
 
 struct SystemMoves {
+  static MoveSystemMembers* by_series() { return nullptr; }
   template <class Method>
   static MoveSystemMembers* by() {
     return &move_systems<SystemLanes<Method>>;

@@ -39,12 +39,12 @@ PlainChain plain(const Chain<Space, N>& chain, std::span<const PlainChain::Drive
           drives};
 }
 
-/// The chain that `plain` was made from.
-template <class Space>
-Chain<Space> chain_of(const PlainChain& plain) {
+/// The chain that `plain` was made from, which has N links if that is known.
+template <class Space, int N = Eigen::Dynamic>
+Chain<Space, N> chain_of(const PlainChain& plain) {
   const auto numbers = [&](const double* values) { return Eigen::Map<const Eigen::VectorXd>(values, plain.links); };
   using PlainTorque = Eigen::Map<const Torque<Space, Eigen::Dynamic>>;
-  ChainParameters<Space> parameters;
+  ChainParameters<Space, N> parameters;
   parameters.masses = numbers(plain.masses);
   parameters.lengths = numbers(plain.lengths);
   parameters.gravity = plain.gravity;
@@ -55,7 +55,7 @@ Chain<Space> chain_of(const PlainChain& plain) {
     std::copy_n(from.amplitude, Space::torque_components, drive.amplitude.data());
     parameters.drives.push_back(drive);
   }
-  return Chain<Space>(std::move(parameters));
+  return Chain<Space, N>(std::move(parameters));
 }
 
 /// A chain's numbers as a generated kernel takes them: masses, lengths, damping and gravity are its parameters, the

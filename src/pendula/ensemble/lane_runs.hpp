@@ -60,6 +60,7 @@ template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
   if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
+  if (options.method == Method::taylor && setup.subject->loaded()) return false;
   if (!is_explicit(options.method)) {
     if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
     // By steps that do not resolve a chain fixed points hardly arrive; those that are chosen may become shorter.

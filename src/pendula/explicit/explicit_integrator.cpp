@@ -530,9 +530,12 @@ std::unique_ptr<PlainIntegrator> make_explicit_integrator(std::unique_ptr<Forwar
                                                        options.tolerance);
     case Method::gauss:
     case Method::radau:
+    case Method::taylor:
       break;
   }
-  throw std::invalid_argument("method: expected an explicit one");
+  throw std::invalid_argument("method: expected one that needs nothing but accelerations, got " +
+                              std::string(name_of(options.method)) +
+                              (options.method == Method::taylor ? ", which moves chains alone" : ""));
 }
 
 }  // namespace pendula

@@ -36,7 +36,8 @@ class LaneController {
   }
 
   /// Of the next step, unless the run ends before.
-  L step() const {
+  template <class Stepper>
+  L step(Stepper& /*stepper*/) const {
     const L step = min(longest_, scale_ / density_);
     return select(last_ > L(0.0), min(step, most_growth * last_), step);
   }

@@ -42,6 +42,8 @@ struct LaneDual {
 
   friend LaneDual fma(const L& a, const L& b, const LaneDual& c) { return {fma(a, b, c.value), c.slope}; }
 
+  friend LaneDual in_register(const LaneDual& a) { return {in_register(a.value), in_register(a.slope)}; }
+
   template <class Mask>
   friend LaneDual select(const Mask& which, const LaneDual& yes, const LaneDual& no) {
     return {select(which, yes.value, no.value), select(which, yes.slope, no.slope)};

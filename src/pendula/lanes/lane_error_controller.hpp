@@ -27,7 +27,10 @@ class LaneErrorController {
   }
 
   /// Of the next step, unless the run ends before.
-  L step() const { return min(next_, longest_); }
+  template <class Stepper>
+  L step(Stepper& /*stepper*/) const {
+    return min(next_, longest_);
+  }
 
   /// Which of the steps `h` that were tried are good enough; those that are not get a shorter one.
   template <class Stepper>

@@ -6,6 +6,7 @@
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_error_controller.hpp>
 #include <pendula/lanes/lane_rods.hpp>
+#include <pendula/lanes/lane_state.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <utility>
 #include <vector>
@@ -16,24 +17,24 @@ namespace pendula {
 /// stepper of LaneQueue. After each step rods have their lengths again, and rates go across. `Dynamics` is LaneRods,
 /// with a tangent of each member or without.
 template <class Dynamics, class Method>
-class LaneExplicit {
+class LaneExplicit : public LaneState<Dynamics> {
+  using State = LaneState<Dynamics>;
+
  public:
-  using SpaceType = typename Dynamics::SpaceType;
-  static constexpr int links_known = Dynamics::links_known, stages = static_cast<int>(Method::stages);
-  static constexpr bool is_implicit = false, can_choose = Method::error_order > 0;
-  static constexpr bool has_tangent = Dynamics::has_tangent;
+  static constexpr int stages = static_cast<int>(Method::stages);
+  static constexpr bool can_choose = Method::error_order > 0;
   using Chain = LaneExplicit;
-  using L = typename Dynamics::L;
-  using Mask = typename L::Mask;
+  using typename State::L;
+  using typename State::Mask;
+  using typename State::Vector;
+  static constexpr std::size_t D = State::D;
+  static constexpr bool has_tangent = State::has_tangent;
+  using State::links;
   using Controller = LaneErrorController<L, Method::error_order>;
-  static constexpr int lanes = L::size;
-  static constexpr std::size_t D = Dynamics::D;
-  using Vector = std::array<L, D>;
 
   struct Options {};
   explicit LaneExplicit(typename Dynamics::Subject subject, Options = {})
-      : dynamics_(subject),
-        parts_(dynamics_.parts()),
+      : State(subject),
         trial_(parts_),
         before_(parts_),
         stages_(parts_),
@@ -41,32 +42,18 @@ class LaneExplicit {
         before_slopes_(parts_),
         errors_(dynamics_.parts()) {
     for (int i = 0; i < dynamics_.parts(); ++i) {
-      for (Parts* all : {&parts_, &trial_, &before_, &stages_, &before_slopes_}) (*all)[i] = Dynamics::resting();
       for (Parts& slopes : slopes_) slopes[i] = Part::zero();
     }
   }
 
   LaneExplicit& chain() { return *this; }
   const LaneExplicit& chain() const { return *this; }
-  int links() const { return dynamics_.parts(); }
-  const auto& parts() const { return parts_; }
 
   /// A member comes into a lane: LaneRods::start.
   template <class... Start>
   void start(int lane, double time, const Start&... start) {
-    dynamics_.start(lane, time, start..., parts_);
-    now_.set(lane, time);
+    State::seat(lane, time, start...);
     fresh_.set(lane, 1);
-  }
-
-  auto heading(int lane, int i) const { return dynamics_.heading(lane, i, parts_); }
-  void find_rates() const {}
-  decltype(auto) along(int i) const { return detail::values_of(parts_[i].place); }
-
-  /// Rates of all rods; visit(i, ξ̇_i, …).
-  template <class Visit>
-  void for_each_rate(Visit visit) const {
-    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
   }
 
   /// Parts and rates of the members whose step was accepted when `share` of it was done, by the polynomial of degree
@@ -106,11 +93,6 @@ class LaneExplicit {
     go_back();
   }
 
-  L energy() { return dynamics_.energy(now_, parts_); }
-  const L& energy_sum() const requires requires(const Dynamics& dynamics) { dynamics.energy_sum(); }
-  { return dynamics_.energy_sum(); }
-  L pace_squared() const { return dynamics_.pace_squared(parts_); }
-
   /// In which stages see what drives turn: one that is weak and turns often within a step shows in none what it does.
   L longest_step(double tolerance) const {
     double turn = nodes;
@@ -136,7 +118,7 @@ class LaneExplicit {
     if constexpr (can_choose) find_error(time, h, pace);
     tried_ = h;
     tried_from_ = time;
-    const L turned = max(pace, pace_squared()) * (h * h);
+    const L turned = max(pace, State::pace_squared()) * (h * h);
     return wanted & (turned < L(largest_turn * largest_turn));
   }
 
@@ -149,49 +131,36 @@ class LaneExplicit {
     begin_ = select(which, tried_from_, begin_);
     now_ = select(which, tried_from_ + tried_, now_);
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      assign(which, at(parts_, i), at(before_, i));
-      assign(which, at(slopes_[0], i), at(before_slopes_, i));
-      assign(which, at(trial_, i), at(parts_, i));
-      assign(which, at(slopes_[Method::stages], i), at(slopes_[0], i));
+      State::assign(which, State::at(parts_, i), State::at(before_, i));
+      State::assign(which, State::at(slopes_[0], i), State::at(before_slopes_, i));
+      State::assign(which, State::at(trial_, i), State::at(parts_, i));
+      State::assign(which, State::at(slopes_[Method::stages], i), State::at(slopes_[0], i));
     });
   }
 
   /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
   /// again after this.
   L take_growth(const Mask& which) requires(Dynamics::has_tangent) {
-    const L squared = dynamics_.tangent_squared(parts_);
-    const L factor = select(which, L(1.0) / sqrt(squared), L(1.0));
+    const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
     for (int i = 0; i < links(); ++i) {
-      for (Part* rod : {&parts_[i], &slopes_[0][i]}) {
-        for (std::size_t k = 0; k < D; ++k) {
-          rod->place[k].slope = factor * rod->place[k].slope;
-          rod->rate[k].slope = factor * rod->rate[k].slope;
-        }
-      }
+      State::scale_tangent(factor, parts_[i]);
+      State::scale_tangent(factor, slopes_[0][i]);
     }
     return 0.5 * log(squared);
   }
 
  private:
-  using Number = typename Dynamics::Number;
-  using Part = typename Dynamics::Part;
-  using Parts = typename Dynamics::Parts;
+  using State::dynamics_;
+  using State::largest_turn;
+  using State::now_;
+  using State::parts_;
+  using typename State::Number;
+  using typename State::Part;
+  using typename State::Parts;
 
   static constexpr int nodes = (Method::error_order + 2) / 2;  // of the quadrature that is as good
-  static constexpr double largest_turn = 3;                    // rad
 
-  template <class Links>
-  static auto& at(Links& of, int link) {
-    return Dynamics::at(of, link);
-  }
   static const L& value(const Number& number) { return detail::value_of(number); }
-
-  static void assign(const Mask& which, const Part& from, Part& to) {
-    for (std::size_t k = 0; k < D; ++k) {
-      to.place[k] = select(which, from.place[k], to.place[k]);
-      to.rate[k] = select(which, from.rate[k], to.rate[k]);
-    }
-  }
 
   // To where the last step began, and from there.
   void go_back() {
@@ -206,7 +175,8 @@ class LaneExplicit {
     fresh_ = L(0.0);
     Parts& found = stages_;  // slopes are as large
     dynamics_.slopes(time, parts_, found);
-    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { assign(fresh, at(found, i), at(slopes_[0], i)); });
+    dynamics_.for_parts(
+        [&](auto i) PENDULA_WRITTEN_OUT { State::assign(fresh, State::at(found, i), State::at(slopes_[0], i)); });
   }
 
   // Where the first `Count` slopes lead to, weighed.
@@ -217,10 +187,10 @@ class LaneExplicit {
       detail::unrolled<static_cast<int>(Count)>([&](auto j) PENDULA_WRITTEN_OUT {
         const double weight = weights[static_cast<std::size_t>(j)];
         if (weight == 0) return;
-        add(L(weight), at(slopes_[static_cast<std::size_t>(j)], i), moved);
+        add(L(weight), State::at(slopes_[static_cast<std::size_t>(j)], i), moved);
       });
-      const Part& from = at(parts_, i);
-      Part& there = at(to, i);
+      const Part& from = State::at(parts_, i);
+      Part& there = State::at(to, i);
       for (std::size_t k = 0; k < D; ++k) {
         there.place[k] = fma(h, moved.place[k], from.place[k]);
         there.rate[k] = fma(h, moved.rate[k], from.rate[k]);
@@ -240,14 +210,14 @@ class LaneExplicit {
       detail::unrolled<static_cast<int>(Method::stages) + 1>([&](auto j) PENDULA_WRITTEN_OUT {
         constexpr double weight = Method::e[static_cast<std::size_t>(j)];
         if constexpr (weight != 0) {
-          const Part& slope = at(slopes_[static_cast<std::size_t>(j)], i);
+          const Part& slope = State::at(slopes_[static_cast<std::size_t>(j)], i);
           for (std::size_t k = 0; k < D; ++k) {
             error.place[k] = fma(L(weight), slope.place[k], error.place[k]);
             error.rate[k] = fma(L(weight), slope.rate[k], error.rate[k]);
           }
         }
       });
-      at(errors_, i) = error;
+      State::at(errors_, i) = error;
     });
     error_ = dynamics_.error_squared(h, errors_, parts_, slopes_[0], trial_, pace_squared);
     if constexpr (requires { dynamics_.depends_on_time(); }) {
@@ -262,13 +232,11 @@ class LaneExplicit {
     }
   }
 
-  Dynamics dynamics_;
   L fresh_{0.0}, error_{0.0};
   L tried_{0.0}, step_{1.0};        // the steps that were tried, and those that were taken last
   L tried_from_{0.0}, begin_{0.0};  // when they began
-  L now_{0.0};
-  Parts parts_, trial_, before_, stages_;  // before_: where the last step began
-  std::vector<Parts> slopes_;              // of the stages, and of the end
+  Parts trial_, before_, stages_;   // before_: where the last step began
+  std::vector<Parts> slopes_;       // of the stages, and of the end
   Parts before_slopes_;
   Parts errors_;  // of the step, over its size
 };

@@ -10,6 +10,8 @@ namespace pendula {
 /// One member of an ensemble: where it starts, when it ends, and its chain where that is its own.
 template <class Space, int N = Eigen::Dynamic>
 struct LaneMember {
+  static constexpr int links_known = N;
+
   Motion start;                            ///< angles and rates, (dof·n)  rad, rad/s
   double end = 0;                          ///< s
   const Chain<Space, N>* chain = nullptr;  ///< with as many links; nullptr: that of the ensemble

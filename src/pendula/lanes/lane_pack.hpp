@@ -74,6 +74,8 @@ class LanePack {
   friend LanePack select(const Mask& which, const LanePack& yes, const LanePack& no) {
     return LanePack(Register(xsimd::select(which, yes.held_, no.held_)));
   }
+  /// The same number, of which GCC forgets where it was loaded from: it would load it anew for each product.
+  friend LanePack in_register(const LanePack& a) { return LanePack(kept(a.held_)); }
 
  private:
   static Register rounded(const Register& product) {
@@ -82,6 +84,16 @@ class LanePack {
     return Register(__builtin_assoc_barrier(static_cast<Raw>(product)));
 #else
     return product;  // Clang fuses within one expression only
+#endif
+  }
+
+  static Register kept(const Register& number) {
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__)
+    auto raw = static_cast<typename Register::register_type>(number);
+    asm("" : "+v"(raw));
+    return Register(raw);
+#else
+    return number;
 #endif
   }
 

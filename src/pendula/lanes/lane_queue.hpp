@@ -11,6 +11,7 @@
 #include <pendula/lanes/lane_stepper.hpp>
 #include <pendula/lanes/lane_system.hpp>
 #include <pendula/lanes/lane_system_seats.hpp>
+#include <pendula/lanes/lane_taylor.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -91,7 +92,9 @@ class LaneQueue {
       if (options.step == 0 && !Stepper::can_choose) {
         throw std::invalid_argument("ensemble: expected a step for a method that chooses none");
       }
-      return {};
+      typename Stepper::Options given;
+      if constexpr (requires { given.tolerance; }) given.tolerance = options.tolerance;
+      return given;
     }
   }
 
@@ -101,7 +104,7 @@ class LaneQueue {
   // One step of all members.
   void step() {
     const L remaining = (end_ - time_.value) - time_.low;
-    const L wanted = chooses() ? controller_.step() : L(options_.step);
+    const L wanted = chooses() ? controller_.step(stepper_) : L(options_.step);
     const Mask is_cut = !(wanted * L(1 + 1e-9) < remaining);
     const L h = select(running() & is_cut, remaining, wanted);
     const Mask found = stepper_.solve(time_.value, h, running() & (h > smallest_step * remaining));
@@ -301,6 +304,14 @@ using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register>, Metho
 /// By explicit steps with a tangent of each member.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register, true>, Method>>;
+
+/// By Taylor series, of chains without loads.
+template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
+using TaylorLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, Register>>>;
+
+/// The same with a tangent of each member.
+template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
+using TaylorTangentLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, Register, true>>>;
 
 /// By explicit steps, of systems of a generated kernel (LaneKernel).
 template <class Method, class Register = MemberRegister>

@@ -29,7 +29,7 @@ class LaneRods {
   using Mask = typename L::Mask;
   using Number = std::conditional_t<with_tangent, LaneDual<L>, L>;
   static constexpr int links_known = N;
-  static constexpr bool has_tangent = with_tangent;
+  static constexpr bool has_tangent = with_tangent, is_short = detail::is_short_chain<N>;
   static constexpr std::size_t D = Space::dimension;
 
   using Part = LanePart<Number, D>;  ///< ξ, ξ̇
@@ -43,6 +43,8 @@ class LaneRods {
     return N;
   }
   int parts() const { return links(); }
+  const LaneLink<L>& link(int i) const { return constants_[i]; }
+  const L& gravity() const { return gravity_; }
 
   /// The longest step in which drives turn by no more than `turn`  [rad], for a method that is as good as a quadrature
   /// of so many nodes.
@@ -55,6 +57,17 @@ class LaneRods {
   template <class Body>
   [[gnu::always_inline]] void for_parts(Body body) const {
     detail::for_links<N>(links(), body);
+  }
+  /// The same from the last one on.
+  template <class Body>
+  [[gnu::always_inline]] void for_parts_inward(Body body) const {
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      if constexpr (is_short) {
+        body(std::integral_constant<int, N - 1 - i>());
+      } else {
+        body(links() - 1 - i);
+      }
+    });
   }
   template <class Links>
   static auto& at(Links& of, int link) {
@@ -162,13 +175,7 @@ class LaneRods {
       at(rows_, i) = row;
       beyond = before;
     };
-    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      if constexpr (is_short) {
-        inward(std::integral_constant<int, N - 1 - i>());
-      } else {
-        inward(links() - 1 - i);
-      }
-    });
+    for_parts_inward(inward);
     Number tau = row.offset;
     std::array<Number, D> bond_before;
     bond_before.fill(Number(0.0));
@@ -214,8 +221,6 @@ class LaneRods {
   }
 
  private:
-  static constexpr bool is_short = detail::is_short_chain<N>;
-
   // What loads accelerate rods by, were there no tensions.
   [[gnu::noinline]] void find_freed(const L& time, const Parts& rods) {
     loads_.set_time(time);

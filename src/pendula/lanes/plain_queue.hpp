@@ -41,12 +41,14 @@ bool move_plainly(typename Queue::Common common, const RunOptions& options, std:
   return is_done;
 }
 
-/// What moves members by an explicit method, of Moves::by<Method>(); nullptr for others.
+/// What moves members by an explicit method, of Moves::by<Method>() and Moves::by_series(); nullptr for others.
 template <class Moves>
 auto explicit_lanes(Method method) -> decltype(Moves::template by<DormandPrince5>()) {
   switch (method) {
     case Method::dopri5:
       return Moves::template by<DormandPrince5>();
+    case Method::taylor:
+      return Moves::by_series();
 #ifndef PENDULA_FEW_LANES  // where sanitizers make minutes of their compilation
     case Method::rk4:
       return Moves::template by<ClassicalRungeKutta>();

@@ -50,7 +50,8 @@ inline int order_of(const RunOptions& options) {
 inline double finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
   constexpr double most_steps = 4;
   const double rounding = is_explicit(options.method) ? 1e-14 : 1e-16;
-  if (accuracy.chooses_stages || options.method == Method::bulirsch_stoer) return rounding;
+  const bool chooses_order = options.method == Method::bulirsch_stoer || options.method == Method::taylor;
+  if (accuracy.chooses_stages || chooses_order) return rounding;
   return std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
 }
 

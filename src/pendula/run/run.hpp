@@ -28,8 +28,9 @@ namespace pendula {
 
 namespace detail {
 
-/// Of the polynomial that shows a step: through the stages of an implicit method, else a cubic.
+/// Of the polynomial that shows a step: through the stages of an implicit method, the series itself, else a cubic.
 inline int glance_degree(const RunOptions& options) {
+  if (options.method == Method::taylor) return 8;
   return is_explicit(options.method) ? 3 : options.stages;
 }
 

@@ -9,7 +9,7 @@ namespace pendula {
 
 /// How time is advanced: implicit Gauss–Legendre, Radau IIA where damping is stiff, or an explicit method for
 /// comparison (paper §3.2).
-enum class Method { gauss, radau, rk4, dopri5, fehlberg78, bulirsch_stoer };
+enum class Method { gauss, radau, rk4, dopri5, fehlberg78, bulirsch_stoer, taylor };
 
 /// Which form of the equations Gauss–Legendre solves: (q, p) is symplectic, (q, q̇) is the paper's.
 enum class Form { momentum, velocity };
@@ -26,15 +26,15 @@ constexpr bool is_explicit(Method method) {
 
 /// Whether an explicit method chooses its steps; implicit ones do where no step is asked for.
 constexpr bool is_adaptive(Method method) {
-  return method == Method::dopri5 || method == Method::fehlberg78 || method == Method::bulirsch_stoer;
+  return is_explicit(method) && method != Method::rk4;
 }
 
 /// What scenarios call the values of an option, in the order of its enumerators.
 template <class Option>
 inline constexpr std::array<std::string_view, 0> names_of{};
 template <>
-inline constexpr std::array<std::string_view, 6> names_of<Method>{"gauss",  "radau",      "rk4",
-                                                                  "dopri5", "fehlberg78", "bulirsch-stoer"};
+inline constexpr std::array<std::string_view, 7> names_of<Method>{"gauss",      "radau",          "rk4",   "dopri5",
+                                                                  "fehlberg78", "bulirsch-stoer", "taylor"};
 template <>
 inline constexpr std::array<std::string_view, 2> names_of<Form>{"momentum", "velocity"};
 template <>

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+#include <pendula/chain/chain.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
+
+namespace pendula {
+
+/// Steps of Taylor series of rods, for any number of links; poles are no obstacle. Throws std::invalid_argument for
+/// chains with damping, torques or drives, and a tolerance ≤ 0.
+template <class Space>
+std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Space>& chain, const RunOptions& options);
+
+extern template std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Planar>&, const RunOptions&);
+extern template std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Spatial>&, const RunOptions&);
+
+}  // namespace pendula

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <pendula/lanes/lane_dual.hpp>
+
+namespace pendula {
+
+/// What moves of several members, one in each lane, as explicit methods keep it: parts and their rates at a time, with
+/// a tangent of each member or without. `Dynamics` is LaneRods or LaneSystem.
+template <class Dynamics>
+class LaneState {
+ public:
+  using SpaceType = typename Dynamics::SpaceType;
+  using L = typename Dynamics::L;
+  using Mask = typename L::Mask;
+  static constexpr int links_known = Dynamics::links_known, lanes = L::size;
+  static constexpr bool is_implicit = false, has_tangent = Dynamics::has_tangent;
+  static constexpr std::size_t D = Dynamics::D;
+  using Vector = std::array<L, D>;
+
+  int links() const { return dynamics_.parts(); }
+  const auto& parts() const { return parts_; }
+
+  auto heading(int lane, int i) const { return dynamics_.heading(lane, i, parts_); }
+  void find_rates() const {}
+  decltype(auto) along(int i) const { return detail::values_of(parts_[i].place); }
+
+  /// Rates of all rods; visit(i, ξ̇_i, …).
+  template <class Visit>
+  void for_each_rate(Visit visit) const {
+    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
+  }
+
+  /// The numbers of the member in a lane, as MemberNumbers goes through them.
+  template <class Numbers>
+  void member(int lane, Numbers& numbers) requires(!has_tangent) {
+    for (int i = 0; i < links(); ++i) {
+      for (auto* vector : {&parts_[i].place, &parts_[i].rate}) {
+        for (L& x : *vector) {
+          double number = x[lane];
+          numbers(number);
+          x.set(lane, number);
+        }
+      }
+    }
+  }
+
+  L energy() { return dynamics_.energy(now_, parts_); }
+  const L& energy_sum() const requires requires(const Dynamics& dynamics) { dynamics.energy_sum(); }
+  { return dynamics_.energy_sum(); }
+  L pace_squared() const { return dynamics_.pace_squared(parts_); }
+
+ protected:
+  using Number = typename Dynamics::Number;
+  using Part = typename Dynamics::Part;
+  using Parts = typename Dynamics::Parts;
+
+  static constexpr double largest_turn = 3;  // in a step  [rad]
+
+  explicit LaneState(typename Dynamics::Subject subject) : dynamics_(subject), parts_(dynamics_.parts()) {
+    for (int i = 0; i < links(); ++i) parts_[i] = Dynamics::resting();
+  }
+
+  /// A member comes into a lane: LaneRods::start.
+  template <class... Start>
+  void seat(int lane, double time, const Start&... start) {
+    dynamics_.start(lane, time, start..., parts_);
+    now_.set(lane, time);
+  }
+
+  template <class Links>
+  static auto& at(Links& of, int link) {
+    return Dynamics::at(of, link);
+  }
+
+  static void assign(const Mask& which, const Part& from, Part& to) {
+    for (std::size_t k = 0; k < D; ++k) {
+      to.place[k] = select(which, from.place[k], to.place[k]);
+      to.rate[k] = select(which, from.rate[k], to.rate[k]);
+    }
+  }
+
+  /// By which the tangents of these members have the length 1, those of others what they have.
+  static L to_unit_length(const Mask& which, const L& squared) { return select(which, L(1.0) / sqrt(squared), L(1.0)); }
+  static void scale_tangent(const L& factor, Part& part) {
+    for (std::size_t k = 0; k < D; ++k) {
+      part.place[k].slope = factor * part.place[k].slope;
+      part.rate[k].slope = factor * part.rate[k].slope;
+    }
+  }
+
+  Dynamics dynamics_;
+  L now_{0.0};
+  Parts parts_;
+};
+
+}  // namespace pendula
