@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/run.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -173,6 +175,50 @@ TYPED_TEST(Taylor, OfManyInLanesIsThatOfOne) {
       EXPECT_LT((found[k].last.v - expected.last.v).cwiseAbs().maxCoeff(), 3e-12) << links << ", " << k;
     }
   }
+}
+
+TYPED_TEST(Taylor, TangentsInLanesGrowAsThoseOfOtherMethods) {
+  Random random(7);
+  std::vector<RunSetup> setups;
+  for (int k = 0; k < 11; ++k) {
+    const Chain<TypeParam> chain = random_chain<TypeParam>(random, 1 + k / 6);
+    setups.push_back(setup_of(chain, this->start_of(random, 1 + k / 6), taylor(1e-12), 2));
+  }
+  const auto found = exponents_in_lanes(setups);
+  for (RunSetup& setup : setups) setup.options.method = Method::dopri5;
+  const auto expected = exponents_in_lanes(setups);
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    ASSERT_TRUE(found[k] && expected[k]);
+    EXPECT_NEAR(found[k]->ftle, expected[k]->ftle, 3e-10) << k;  // measured 1.8e-11
+  }
+}
+
+// Of what "auto" makes of a run by Gauss steps: in lanes with others, although each has a length of its own, and by
+// steps that lose no more of the energy the longer it is.
+TYPED_TEST(Taylor, IsTheQuickestForShortChainsHoweverLongTheyAreMoved) {
+  Random random(8);
+  std::vector<RunSetup> setups;
+  std::set<LaneKind> kinds, kinds_with_tangents;
+  for (int k = 0; k < 24; ++k) {
+    const Chain<TypeParam> chain = random_chain<TypeParam>(random, 2);
+    setups.push_back(setup_of(chain, this->start_of(random, 2, 10), exact(), 200));
+    setups.back().options.tolerance = 1e-6;
+    setups.back().events = {{"turns", [](const Motion& motion) { return motion.v[0]; }}};
+    const RunOptions options = quickest_in_lanes(setups.back());
+    EXPECT_EQ(options.method, Method::taylor);
+    kinds.insert(*lane_kind(setups.back(), options));
+    kinds_with_tangents.insert(lane_kind(setups.back(), quickest_with_tangents(setups.back())).value_or(LaneKind()));
+  }
+  EXPECT_LE(kinds.size(), 2U);
+  EXPECT_LE(kinds_with_tangents.size(), 2U);
+  const auto never = [] { return false; };
+  std::int64_t happened = 0;
+  for (const RunReport& report : run_members(setups, never, MemberMethod::quickest)) {
+    EXPECT_EQ(report.end, RunEnd::complete);
+    happened += report.events[0].count;
+    EXPECT_LT(report.energy_error.largest, 1e-6);  // measured 2.9e-7
+  }
+  EXPECT_GT(happened, 1000);
 }
 
 // A vertical plane is one, whatever its direction: through both poles of (θ, φ).

@@ -29,12 +29,13 @@ bool move_members(const RunOptions& options, std::int64_t every, std::span<const
   return detail::move_plainly<Queue>(chains.front(), options, every, starts, ends, watch);
 }
 
-/// Series of chains of two and three links are summed up in registers.
+/// Series of short chains are summed up in registers.
 template <class Space>
 bool move_by_series(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                     std::span<PlainMemberEnd> ends, LaneWatch& watch) {
   [[maybe_unused]] const int links = members.empty() ? 0 : members[0].chain.links;
 #ifndef PENDULA_FEW_LANES
+  if (links == 1) return move_members<Space, TaylorLanes<Space, 1>>(options, every, members, ends, watch);
   if (links == 2) return move_members<Space, TaylorLanes<Space, 2>>(options, every, members, ends, watch);
   if (links == 3) return move_members<Space, TaylorLanes<Space, 3>>(options, every, members, ends, watch);
 #endif

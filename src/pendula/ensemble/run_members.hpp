@@ -21,6 +21,13 @@ namespace pendula {
 
 namespace detail {
 
+/// Of a chain of one kind; none of others.
+template <class Space>
+int links_of(const Subject& subject) {
+  const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
+  return found == nullptr ? 0 : found->chain().links();
+}
+
 /// About how fast a chain of one kind swings  [1/s]; none of others.
 template <class Space>
 std::optional<double> natural_pace_in(const Subject& subject) {
@@ -53,17 +60,36 @@ inline double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
 }
 
+// Of few links series are summed up in registers (library/lane_methods.hpp); how long such a chain's run is, is known.
+inline bool goes_by_series(const RunSetup& setup) {
+  const bool is_short = links_of<Planar>(*setup.subject) + links_of<Spatial>(*setup.subject) <= 3;
+  return setup.options.tolerance >= 1e-13 && is_short && std::isfinite(natural_pace(*setup.subject)) &&
+         !setup.subject->loaded();
+}
+
+// Of a tolerance by which no more of the energy is lost than in a short run, a hundredth: what the motion makes of the
+// errors of steps. In powers of ten, so that members whose runs are about as long go in lanes together.
+inline double tolerance_of_steps(const RunSetup& setup, double finest) {
+  const double length = run_length(setup);
+  const double longer = length > short_run && std::isfinite(length) ? length / short_run : 1;
+  return std::max(finest, 0.01 * setup.options.tolerance / std::pow(10, std::ceil(std::log10(longer))));
+}
+
 }  // namespace detail
 
-/// The options of a run, or those of an explicit method where lanes come to the same errors sooner by that: a Gauss run
-/// by a tolerance of more than a few last digits, in which nothing is looked for step by step, and which is over before
-/// the energy, which an explicit method loses step by step, is off by more than the motion. A hundredth of the
-/// tolerance stands for what the motion makes of the errors of steps.
+/// The options of a run, or those of an explicit method where lanes come to the same errors sooner by that. Of a Gauss
+/// run by a tolerance those are Taylor series where the chain is short; else Fehlberg's pair, by a tolerance of more
+/// than a few last digits, where nothing is looked for step by step, and the run is over before the energy, which an
+/// explicit method loses step by step, is off by more than the motion.
 inline RunOptions quickest_in_lanes(const RunSetup& setup) {
   RunOptions options = setup.options;
-  const bool fits =
-      options.method == Method::gauss && options.step == 0 && options.tolerance >= 1e-9 && setup.events.empty();
-  if (!fits) return options;
+  if (options.method != Method::gauss || options.step != 0) return options;
+  if (detail::goes_by_series(setup)) {
+    options.method = Method::taylor;
+    options.tolerance = detail::tolerance_of_steps(setup, 1e-16);
+    return lane_kind(setup, options) ? options : setup.options;
+  }
+  if (options.tolerance < 1e-9 || !setup.events.empty()) return options;
   options.method = Method::fehlberg78;
   options.tolerance *= 0.01;
   const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
@@ -77,9 +103,7 @@ inline RunOptions quickest_with_tangents(const RunSetup& setup) {
   RunOptions options = setup.options;
   if (options.method != Method::gauss || options.step != 0) return options;
   options.method = Method::fehlberg78;
-  const double length = detail::run_length(setup);
-  const double longer = std::isfinite(length) ? std::max(1.0, length / detail::short_run) : 1;
-  options.tolerance = std::max(1e-13, 0.01 * options.tolerance / longer);
+  options.tolerance = detail::tolerance_of_steps(setup, 1e-13);
   const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
   return is_tried || lane_kind(setup) ? options : setup.options;
 }
