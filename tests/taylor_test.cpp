@@ -113,7 +113,7 @@ TYPED_TEST(Taylor, KnowsNoUnits) {
   const Chain<TypeParam> chain = random_chain<TypeParam>(random, 3);
   const Motion start = this->start_of(random, 3);
   const Motion expected = run_of(setup_of(chain, start, taylor(1e-10), 2)).last;
-  for (const double length : {1e-8, 1e-3, 1e6}) {
+  for (const double length : {1e-24, 1e-8, 1e-3, 1e6}) {
     ChainParameters<TypeParam> parameters;
     parameters.masses = 1e9 * chain.masses();
     parameters.lengths = length * chain.lengths();

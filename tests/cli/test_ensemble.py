@@ -310,7 +310,7 @@ def test_a_member_is_what_simulate_makes_of_it(tmp_path, scenario, within):
 
 
 def test_the_method_may_be_left_open(tmp_path):
-    """Explicit steps, more of them, to the same ends; with events it is Gauss, bit for bit."""
+    """Taylor series, to the same ends, whatever is looked for on the way."""
     calm = (
         MAP.replace("from  = -2.9", "from  = -0.5")
         .replace("to    = 2.9", "to    = 0.5")
@@ -326,12 +326,12 @@ def test_the_method_may_be_left_open(tmp_path):
             with h5py.File(tmp_path / "out.h5") as opened:
                 found[events, method] = {name: opened[name][...] for name in ("theta_1", "theta_2", "steps")}
             (tmp_path / "out.h5").unlink()
-    for name in ("theta_1", "theta_2", "steps"):
-        assert (found[True, "auto"][name] == found[True, "run"][name]).all()
-    assert found[False, "auto"]["steps"].sum() > 1.5 * found[False, "run"]["steps"].sum()
-    for name in ("theta_1", "theta_2"):
-        # seen: 1.8e-6, of a tolerance of 1e-6
-        assert np.abs(found[False, "auto"][name] - found[False, "run"][name]).max() < 1e-5
+    for events in (True, False):
+        asked, quickest = found[events, "run"], found[events, "auto"]
+        assert (quickest["steps"] != asked["steps"]).any()
+        for name in ("theta_1", "theta_2"):
+            # seen: 1.3e-6, of a tolerance of 1e-6
+            assert np.abs(quickest[name] - asked[name]).max() < 1e-5
     assert 'ensemble.method: expected "run" or "auto"' in run(tmp_path, "--set", "ensemble.method=rk4").err
 
 

@@ -23,16 +23,18 @@ class LaneSeries {
   static constexpr std::size_t D = Rods::D;
   static constexpr int most_order = 24;
 
-  /// Rates up to t^order, rods to one more; order ≤ most_order.
+  /// Rates up to t^order, rods to one more; order ≤ most_order. Time is counted in 1/pace, so that coefficients are
+  /// numbers whatever the units are.
   LaneSeries(const Rods& rods, int order)
-      : order_(order), links_(rods.links()), sums_(Rods::is_short ? 1 : rods.links()) {
-    for (std::size_t k = 1; k < inverses_.size(); ++k) inverses_[k] = L(1.0 / static_cast<double>(k));
-  }
+      : order_(order), links_(rods.links()), sums_(Rods::is_short ? 1 : rods.links()) {}
 
   int order() const { return order_; }
 
-  /// About `parts`, which are those of `rods`.
-  PENDULA_IN_REGISTERS [[gnu::noinline]] void expand(const Rods& rods, const Parts& parts) {
+  /// About `parts`, which are those of `rods`; pace  [1/s].
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void expand(const Rods& rods, const Parts& parts, const L& pace) {
+    const L unit = L(1.0) / pace;
+    for (std::size_t k = 1; k <= static_cast<std::size_t>(order_) + 1; ++k)
+      inverses_[k] = L(1.0 / static_cast<double>(k)) * unit;
     begin(rods, parts);
     for (std::size_t k = 0; k < static_cast<std::size_t>(order_); ++k) {
       if constexpr (Rods::is_short) {
@@ -48,7 +50,7 @@ class LaneSeries {
     });
   }
 
-  /// Of t^k.
+  /// Of (pace t)^k.
   Part term(int i, int k) const {
     const Link& link = at(i);
     const auto order = static_cast<std::size_t>(k);
@@ -60,7 +62,7 @@ class LaneSeries {
     return term;
   }
 
-  /// After a time t.
+  /// After a time t/pace.
   [[gnu::always_inline]] Part sum(int i, const L& t) const {
     const auto last = static_cast<std::size_t>(order_);
     const Link& link = at(i);
@@ -268,7 +270,7 @@ class LaneSeries {
   }
 
   int order_;
-  std::array<L, static_cast<std::size_t>(most_order) + 2> inverses_;  // 1/k
+  std::array<L, static_cast<std::size_t>(most_order) + 2> inverses_;  // 1/(k pace)
   detail::PerLink<Link, Rods::links_known> links_;
   detail::PerLink<Sums, Rods::is_short ? 1 : Rods::links_known> sums_;
 };

@@ -83,15 +83,24 @@ class LaneTaylor : public LaneState<Rods> {
   }
 
   /// The series about where all are, and how long steps may be by them.
+  ///
+  /// Where a light rod is between heavy ones it soon turns much faster than all do now: then in a shorter unit of time.
   L expand() {
-    series_.expand(dynamics_, parts_);
-    return longest_step();
+    const L found = sqrt(State::pace_squared()), now = select(found > L(0.0), found, L(1.0));
+    pace_ = now;
+    for (int k = 0; k < most_units; ++k) {
+      series_.expand(dynamics_, parts_, pace_);
+      const L step = longest_step(now);
+      if (xsimd::all(step > L(0.0))) return step;
+      pace_ = select(step > L(0.0), pace_, L(shorter_unit) * pace_);
+    }
+    return longest_step(now);
   }
 
   /// Tries a step of `h` from `time`, by the series about there; gives those of the members that are `wanted` who turn
   /// by less than half a turn. The state stays what it was.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
-    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { State::at(trial_, i) = series_.sum(i, h); });
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { State::at(trial_, i) = series_.sum(i, pace_ * h); });
     dynamics_.restore(trial_);
     tried_ = h;
     tried_from_ = time;
@@ -108,7 +117,7 @@ class LaneTaylor : public LaneState<Rods> {
   }
 
   /// A rod and its rate, of the members whose step was accepted, when `share` of it was done.
-  auto glance(int i, double share) const { return series_.sum(i, L(share) * step_); }
+  auto glance(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
 
   /// Of all rods; visit(i, ξ, ξ̇).
   template <class Visit>
@@ -140,6 +149,8 @@ class LaneTaylor : public LaneState<Rods> {
 
   static constexpr double finest = 1e-17, tiny = 1e-300;
   static constexpr int least_order = 6, looked_at = 4;
+  static constexpr int most_units = 8;
+  static constexpr double shorter_unit = 1e6;
 
   /// Of the fewest operations for a tolerance.
   static int order_for(double tolerance) {
@@ -149,9 +160,9 @@ class LaneTaylor : public LaneState<Rods> {
 
   // The last terms shrink as the series does, beside the size of the motion. Those that begin at rest, and symmetric
   // ones, have but every second or fourth.
-  PENDULA_IN_REGISTERS [[gnu::noinline]] L longest_step() {
-    const L found = State::pace_squared(), pace = select(found > L(0.0), found, L(1.0));
-    const L moves = term_squared(1, pace) / pace;  // where it is, or will be
+  PENDULA_IN_REGISTERS [[gnu::noinline]] L longest_step(const L& now) {
+    const L pace = now * now, units = pace_ / now;
+    const L moves = (units * units) * term_squared(1, pace);  // where it is, or will be
     const L log_size = log(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)));
     L log_radius(1e3);
     for (int k = series_.order() - looked_at + 1; k <= series_.order(); ++k) {
@@ -162,7 +173,7 @@ class LaneTaylor : public LaneState<Rods> {
       }
       log_radius = min(log_radius, L(-0.5 / k) * (log(max(squared, L(tiny))) - log_size));
     }
-    return exp(min(log_radius + L(log_reach_), L(600.0)));
+    return exp(min(log_radius + L(log_reach_), L(600.0))) / pace_;
   }
 
   // Of the coefficient of t^k in all rods and rates, relative to lengths and the pace.
@@ -173,6 +184,7 @@ class LaneTaylor : public LaneState<Rods> {
 
   LaneSeries<Rods> series_;
   double log_reach_;          // of steps, relative to the radius that terms tell
+  L pace_{1.0};               // in which time is counted
   L tried_{0.0}, step_{1.0};  // the steps that were tried, and those that were taken last
   L tried_from_{0.0};         // when they began
   Parts trial_, terms_;
