@@ -50,7 +50,7 @@ class TaylorIntegrator : public PlainIntegrator {
     for (int attempt = 0; attempt < most_attempts; ++attempt) {
       const bool is_cut = !(wanted * (1 + 1e-9) < h);
       const double size = is_cut ? h : wanted;
-      if (solves(size)) {
+      if (size > 0 && solves(size)) {
         accept(size);
         if (!is_cut) statistics_.count_chosen(size);
         return outcome(Status::ok, size);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <pendula/chain/chain_links.hpp>
 #include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>

@@ -7,7 +7,6 @@
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_series.hpp>
 #include <pendula/lanes/lane_state.hpp>
-#include <vector>
 
 namespace pendula {
 
@@ -112,8 +111,10 @@ class LaneTaylor : public LaneState<Rods> {
   void accept(const Mask& which) {
     step_ = select(which, tried_, step_);
     now_ = select(which, tried_from_ + tried_, now_);
-    dynamics_.for_parts([&](auto i)
-                            PENDULA_WRITTEN_OUT { State::assign(which, State::at(trial_, i), State::at(parts_, i)); });
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      const Part& there = State::at(trial_, i);
+      State::assign(which, there, State::at(parts_, i));
+    });
   }
 
   /// A rod and its rate, of the members whose step was accepted, when `share` of it was done.
