@@ -96,11 +96,12 @@ inline double gain(const RunOptions& run, const RunOptions& coarser) {
   return std::min(most, std::pow(coarser.step / run.step, order) - 1);
 }
 
-/// The error that is not told: about what was asked for, where that is a tolerance what a motion that is no chaos makes
-/// of it.
+/// The error that is not told: about what was asked for; where that is a tolerance of the motion, what that makes of it
+/// where it is no chaos.
 inline double trusted_error(const RunSetup& setup) {
   if (setup.accuracy.error > 0) return close_to_wanted * setup.accuracy.error;
-  return is_adaptive(setup.options) ? std::min(visible, 1000 * setup.options.tolerance) : visible;
+  const bool is_of_motion = is_adaptive(setup.options) && !is_explicit(setup.options.method);
+  return is_of_motion ? std::min(visible, 1000 * setup.options.tolerance) : visible;
 }
 
 /// Of a second run: where that goes elsewhere, the steps or the chaos of the motion decide where.
