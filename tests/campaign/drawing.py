@@ -11,12 +11,14 @@ after these, so that a number stays what it was.
 import math
 import random
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import model_drawing
 from random_chains import Draw
 
 FIRST = {"chains": 1000, "models": 400, "events": 3000, "ensembles": 300}
 KINDS = tuple(FIRST)
+BROUGHT = Path(__file__).parents[2] / "codegen" / "pendula_codegen" / "models"
 
 
 @dataclass
@@ -425,7 +427,9 @@ CHAINS = {
 
 
 def a_model(seed: int, number: int) -> Case:
-    """Model number % 40 with parameters, start and settings of its own."""
+    """Model number % 40 with parameters, start and settings of its own; later ones are those that pendula brings."""
+    if number >= FIRST["models"]:
+        return a_model_brought(seed, number)
     which, variant = number % model_drawing.COUNT, number // model_drawing.COUNT
     dice = random.Random(f"models:{seed}:{number}")
     model = model_drawing.draw(seed, which)
@@ -447,6 +451,15 @@ def a_model(seed: int, number: int) -> Case:
     }
     narrow = [(text, model_drawing.number(width, values)) for text, width in model.narrow]
     return Case("models", seed, number, f"{which}: {model.family}", tables, model.text, narrow)
+
+
+def a_model_brought(seed: int, number: int) -> Case:
+    dice = random.Random(f"models:{seed}:{number}")
+    name, tables = model_drawing.brought(dice)
+    fastest, duration = tables.pop("fastest"), tables["run"]["duration"]
+    tables["run"] |= settings(dice, fastest, series=False, long=duration * fastest > 300)
+    tables["output"] = output(dice, duration)
+    return Case("models", seed, number, name, tables, (BROUGHT / f"{name}.py").read_text())
 
 
 # --- events

@@ -7,6 +7,7 @@ refused       exit status 1 with a message
 not taken     exit status 2 with a message: the scenario is not one
 slow          it took longer than the time limit
 SILENT        wrong without a word
+too narrow    that, where something in the model is passed in less than SEEN of a step, which nobody promises to see
 crash         another exit status, no message, or a traceback
 undecided     the reference is not converged where it matters
 """
@@ -35,6 +36,7 @@ ROOM_FOR_TOLERANCE = {
 }  # times the growth of a disturbance; explicit ones as radau
 ADAPTIVE = ("dopri5", "fehlberg78", "bulirsch-stoer", "taylor")
 NOTHING_ASKED = 1e-3  # of the size; no run that is further off may be silent
+SEEN = 1e-3
 COLUMNS_AGREE = 1e-11  # energies, of their size, and points with the coordinates beside them
 MOST_ROWS = 80
 # What does not say how far a run can be trusted.
@@ -59,6 +61,7 @@ class Verdict:
     asked: float = 0.0
     growth: float = 1.0
     seconds: float = 0.0
+    narrow: bool = False  # what is narrow is passed in less than a thousandth of a step
     wrong: list[str] = field(default_factory=list)
     words: list[str] = field(default_factory=list)
 
@@ -196,7 +199,7 @@ def simulate(program: Program, tables: dict, model: str, extra: Iterable[str] = 
     folder = program.folder
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scenario.toml").write_text(toml(tables))
-    if model:  # compiled before time is taken
+    if tables.get("system", {}).get("model") == "model.py":  # compiled before time is taken
         (folder / "model.py").write_text(model)
         build = [program.file, "build", "model.py", "--links", str(tables["system"].get("links", 1))]
         subprocess.run(build, cwd=folder, capture_output=True, check=False)
@@ -317,10 +320,17 @@ def final_columns(summary: dict) -> dict[str, np.ndarray]:
     }
 
 
+def spelled(name: str, columns: dict) -> str:
+    """theta_1_dot is theta_dot_1."""
+    other = truth.other_spelling(name)
+    return other if name not in columns and other in columns else name
+
+
 def with_final(columns: dict[str, np.ndarray], summary: dict) -> dict[str, np.ndarray]:
     last = final_columns(summary)
     if last["t"].dtype == object or not np.isfinite(last["t"]).all():
         return columns
+    last = {spelled(name, columns): value for name, value in last.items()} if columns else last
     names = [name for name in columns if name in last] if columns else list(last)
     return {name: np.append(columns.get(name, []), last[name]) for name in names}
 
@@ -372,7 +382,24 @@ def judge_run(case: Case, room: truth.Room, program: Program) -> Verdict:
     if motion is not None:
         wrong += event_faults(case, tables, subject, motion, ends, done, errors, duration)
     decided = errors.right.all() and ends_are_sure(ends)
+    verdict.narrow = passage(case, subject, duration) < SEEN * float(
+        done.summary.get("largest_step") or run.get("step", 0)
+    )
     return conclude(verdict, done, wrong, decided)
+
+
+def passage(case: Case, subject: truth.Subject, duration: float) -> float:
+    """About the least time in which something that is narrow is passed, s."""
+    if not case.narrow:
+        return math.inf
+    between = [duration * k / 60 for k in range(61)]
+    columns = truth.rows_at(subject, between, duration).columns
+    rates = [columns[name] for name in subject.model.names[len(subject.model.q) :]]
+    fastest = max(float(np.abs(rate).max()) for rate in rates)
+    return min(
+        width if set(re.findall(r"[a-z_]+", text)) == {"t"} else width / fastest
+        for text, width in case.narrow
+    )
 
 
 def ends_are_sure(ends: truth.Rows | None) -> bool:
@@ -385,7 +412,7 @@ def conclude(verdict: Verdict, done: Run, wrong: list[tuple[float, str]], decide
     silent = [text for t, text in wrong if t <= until]
     verdict.wrong = [text for _, text in wrong][:6]
     if silent:
-        verdict.kind = "SILENT"
+        verdict.kind = "SILENT" if not verdict.narrow else "too narrow"
     elif wrong:
         told_less = expected and all("is not reached" in w for w in done.doubts)
         too_little = told_less and verdict.error > max(100 * expected, 10 * verdict.asked)

@@ -405,3 +405,67 @@ def draw(seed: int, which: int) -> Model:
         piece(b, dice.choice(places))
     family = " ".join([frame, *sorted(set(b.pieces) - {"spring"})])
     return Model(family, b.text(), b.narrow, b.ranges, b.starts, b.has_input, 6.0, 12.0)
+
+
+# --- models that pendula brings
+
+
+def brought(dice: random.Random) -> tuple[str, dict]:
+    """The name of one, and its scenario but for the settings; its fastest rate, 1/s, stands beside the tables."""
+    name = dice.choice(
+        [
+            "cart_chain",
+            "driven_chain",
+            "rods",
+            "joint_springs",
+            "furuta",
+            "swinging_atwood",
+            "spring_pendulum",
+        ]
+    )
+    links = dice.choice([1, 2]) if name in ("cart_chain", "driven_chain", "rods", "joint_springs") else 1
+    rest = dice.random() < 0.4  # it comes to rest
+    damping = power(dice, -2, 0.5) if rest else dice.choice([0.0, power(dice, -4, -1)])
+    size = dice.choice([0.0, 1e-3, 0.5, 2.5])  # of the start
+    system: dict = {"model": name}
+    start: dict = {}
+    parameters: dict = {}
+    fastest = 6.0
+    if links > 1:
+        system["links"] = links
+    angles = ["theta"] if name == "furuta" else [f"theta_{i + 1}" for i in range(links)]
+    if name in ("cart_chain", "driven_chain", "rods", "joint_springs", "furuta"):
+        for angle in angles:
+            start[angle] = dice.uniform(-1, 1) * size
+    if name in ("cart_chain", "driven_chain", "rods", "joint_springs"):
+        parameters = {"masses": power(dice, -0.5, 0.5), "lengths": power(dice, -0.5, 0.3), "damping": damping}
+    if name == "cart_chain":
+        parameters |= {"cart_mass": power(dice, -1, 1), "cart_friction": damping}
+        if dice.random() < 0.5:
+            fastest = max(6.0, power(dice, -1, 2))
+            system["drive"] = [{"input": "push", "amplitude": power(dice, -2, 1), "frequency": fastest}]
+    if name == "driven_chain":
+        fastest = power(dice, 0, 2.3)
+        parameters |= {"frequency": fastest, "y_amplitude": power(dice, -3, -0.5) / max(1.0, fastest / 20)}
+        parameters |= {"x_amplitude": dice.choice([0.0, 0.01])}
+    if name == "joint_springs":
+        parameters |= {"stiffness": power(dice, -1, 3)}
+        fastest = max(6.0, math.sqrt(parameters["stiffness"] / parameters["masses"]) / parameters["lengths"])
+    if name == "furuta":
+        parameters = {"arm_friction": 0.1 * damping, "rod_friction": 0.01 * damping}
+        start |= {"alpha": dice.uniform(-1, 1) * size, "alpha_dot": dice.uniform(-3, 3) * min(size, 1)}
+        fastest = 15.0
+    if name == "swinging_atwood":
+        parameters = {"mu": power(dice, 0.05, 0.8)}
+        start = {"r": power(dice, -0.5, 0.5), "theta": dice.uniform(0.1, 2.5)}
+    if name == "spring_pendulum":
+        parameters = {
+            "stiffness": power(dice, 1, 3),
+            "rest_length": dice.choice([0.0, 0.5]),
+            "friction": damping,
+        }
+        start = {"x": dice.uniform(-1, 1) * size, "y": dice.uniform(-1, 1) * size, "z": -1.0}
+        fastest = math.sqrt(parameters["stiffness"])
+    system["parameters"] = parameters
+    duration = power(dice, 1, 2.3) if rest else power(dice, -0.3, 1.2)
+    return name, {"system": system, "start": start, "run": {"duration": duration}, "fastest": fastest}

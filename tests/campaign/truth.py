@@ -6,6 +6,7 @@ trajectory has, and are kept on disk by what they depend on.
 
 import hashlib
 import os
+import re
 import subprocess
 from dataclasses import dataclass
 from functools import cached_property
@@ -225,10 +226,16 @@ class ModelSubject(Subject):
         return self.model.columns(rows, self.parameters)
 
     def compared(self, columns, sizes=None):
+        columns = self.named(columns)
         numbers = np.array([columns[name] for name in self.model.names]).T
         return numbers if sizes is None else numbers / sizes
 
+    def named(self, columns):
+        """theta_dot_1 as theta_1_dot, which the model's own names are."""
+        return columns | {n: columns[other_spelling(n)] for n in self.model.names if n not in columns}
+
     def derived(self, columns):
+        columns = self.named(columns)
         rows = np.array([columns[name] for name in (*self.model.names, "t")]).T
         own = self.model.columns(rows, self.parameters)
         kinetic = own.pop("kinetic")
@@ -244,6 +251,13 @@ class ModelSubject(Subject):
         for name, unit in zip(self.model.names, units + rates, strict=True):
             largest[unit] = max(largest.get(unit, 1e-300), np.abs(columns[name]).max())
         return np.array([largest[unit] for unit in units + rates], dtype=Real)
+
+
+def other_spelling(name: str) -> str:
+    """theta_dot_1 for theta_1_dot, and back; x_dot as it is."""
+    if found := re.fullmatch(r"(.*)_(\d+)_dot", name):
+        return f"{found[1]}_dot_{found[2]}"
+    return re.sub(r"_dot_(\d+)$", r"_\1_dot", name)
 
 
 @dataclass
