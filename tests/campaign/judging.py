@@ -201,7 +201,7 @@ def simulate(program: Program, tables: dict, model: str, extra: Iterable[str] = 
     (folder / "scenario.toml").write_text(toml(tables))
     if tables.get("system", {}).get("model") == "model.py":  # compiled before time is taken
         (folder / "model.py").write_text(model)
-        build = [program.file, "build", "model.py", "--links", str(tables["system"].get("links", 1))]
+        build = [program.file, "build", "model.py"]
         subprocess.run(build, cwd=folder, capture_output=True, check=False)
     rows, happened = folder / "rows.csv", folder / "events.csv"
     for file in (rows, happened):
