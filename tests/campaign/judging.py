@@ -392,14 +392,14 @@ def passage(case: Case, subject: truth.Subject, duration: float) -> float:
     """About the least time in which something that is narrow is passed, s."""
     if not case.narrow:
         return math.inf
-    between = [duration * k / 60 for k in range(61)]
-    columns = truth.rows_at(subject, between, duration).columns
-    rates = [columns[name] for name in subject.model.names[len(subject.model.q) :]]
-    fastest = max(float(np.abs(rate).max()) for rate in rates)
-    return min(
-        width if set(re.findall(r"[a-z_]+", text)) == {"t"} else width / fastest
-        for text, width in case.narrow
-    )
+    times = np.linspace(0, duration, 601)
+    columns = truth.rows_at(subject, [float(t) for t in times], duration).columns
+    least = math.inf
+    for text, width in case.narrow:
+        g = crossings.Expression(text)(columns).astype(float)
+        change = np.abs(np.diff(g))[np.flatnonzero(g[1:] * g[:-1] <= 0)]
+        least = min(least, width * (times[1] - times[0]) / float(change.max(initial=1e-300)))
+    return least
 
 
 def ends_are_sure(ends: truth.Rows | None) -> bool:
