@@ -15,7 +15,7 @@ from truth import Dense, Real
 FUNCTIONS = {
     name: getattr(np, name)
     for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "fmod", "sign", "floor")
-}
+} | {"atan2": np.arctan2}
 MOST_TURNS = 5000
 
 
@@ -30,11 +30,20 @@ class Gap:
     zeros: int
 
 
+@dataclass
+class Fault:
+    """What is wrong with events; where, and how long the shorter stretch of sure sign beside it lasts."""
+
+    text: str
+    time: float
+    lasts: float = np.inf
+
+
 class Expression:
     def __init__(self, text: str) -> None:
         self.code = compile(text.replace("^", "**"), text, "eval")
         self.columns = [
-            name for name in dict.fromkeys(re.findall(r"[a-z]\w*", text)) if name not in FUNCTIONS
+            name for name in dict.fromkeys(re.findall(r"(?<![\w.])[a-z]\w*", text)) if name not in FUNCTIONS
         ]
 
     def __call__(self, columns: dict[str, np.ndarray]) -> np.ndarray:
@@ -60,9 +69,8 @@ def doubt(
         column = columns[name]
         rounding = 4e-16 * np.maximum(np.abs(column), np.abs(column).max() if name != "t" else 0)
         step = rounding + (off.get(name, 0.0) if name != "t" else 0.0)
-        for shift in (step, -step):
-            moved = np.abs(expression({**columns, name: column + shift}) - g)
-            total = total + np.where(np.isfinite(moved), moved, 0) / 2
+        moved = [np.abs(expression({**columns, name: column + shift}) - g) for shift in (step, -step)]
+        total = total + np.nan_to_num(np.maximum(*moved), nan=0.0, posinf=0.0)
     return total
 
 
@@ -90,16 +98,26 @@ def turns(
     return (low + high) / 2
 
 
-def crossing(
-    g: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, level: np.ndarray
-) -> np.ndarray:
-    """Times between low and high where g passes its level, by halving."""
-    below = g(low) < level
-    for _ in range(70):
+def boundary(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Where what holds at low, and does not at high, ends; by halving."""
+    for _ in range(60):
         middle = (low + high) / 2
-        same = (g(middle) < level) == below
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        there = holds(middle)
+        low, high = np.where(there, middle, low), np.where(there, high, middle)
     return (low + high) / 2
+
+
+def beside_zeros(g: Callable[[np.ndarray], np.ndarray], grid: np.ndarray) -> np.ndarray:
+    """The grid, and times that close in on where g crosses zero."""
+    values = g(grid)
+    k = np.flatnonzero(values[1:] * values[:-1] <= 0)
+    if len(k) == 0 or len(k) > MOST_TURNS // 20:
+        return grid
+    positive = values[k] > 0
+    zeros = boundary(lambda at: (g(at) > 0) == positive, grid[k], grid[k + 1])
+    away = np.concatenate([[0.0], np.diff(grid).max() * 2 * Real(1.3) ** -np.arange(130, dtype=Real)])
+    near = np.concatenate([zeros[:, None] + away, zeros[:, None] - away]).ravel()
+    return np.unique(np.concatenate([grid, near[(near > grid[0]) & (near < grid[-1])]]))
 
 
 def gaps(
@@ -111,34 +129,32 @@ def gaps(
     if len(extra):
         grid = np.unique(np.concatenate([grid, extra]))
         values = g(grid)
-    width = wide(grid)
-    label = np.where(values > width, 1, np.where(values < -width, -1, 0))
-    # Boundaries of sure stretches.
-    marks: list[tuple[float, int, int]] = []  # time, the label before and after
+
+    def sure(values: np.ndarray, width: np.ndarray) -> np.ndarray:
+        return np.where(values > width, 1, np.where(values < -width, -1, 0))
+
+    label = sure(values, wide(grid))
     k = np.flatnonzero(label[1:] != label[:-1])
-    if len(k):
-        for before, after in ((-1, 0), (0, 1), (1, 0), (0, -1)):
-            # −1 to 1 passes both levels
-            these = k[
-                (label[k] * (after - before) <= before * (after - before))
-                & (label[k + 1] * (after - before) >= after * (after - before))
-            ]
-            if len(these) == 0:
-                continue
-            sign = before or after
-            levels = sign * (width[these] + width[these + 1]) / 2
-            found = crossing(g, grid[these], grid[these + 1], levels)
-            marks += [(float(t), before, after) for t in found]
-    marks.sort(key=lambda m: (m[0], (m[2] - m[1]) * m[1]))
+    marks: list[tuple[float, int, int]] = []  # time, the label before and after
+    for old, new in ((label[k], 0 * k), (0 * k, label[k + 1])):
+        those = np.flatnonzero(old != new)
+        low, high = grid[k[those]], grid[k[those] + 1]
+        here = old[those] + new[those]  # the label that is not 0
+        ends = old[those] != 0
+        if len(those) == 0:
+            continue
+        where = boundary(lambda at, here=here, ends=ends: (sure(g(at), wide(at)) == here) == ends, low, high)
+        marks += list(zip(map(float, where), old[those], new[those], strict=True))
+    marks.sort(key=lambda m: (m[0], m[2] != 0))
     zero = np.flatnonzero((values[1:] > 0) != (values[:-1] > 0))
     zeros = (grid[zero] + grid[zero + 1]) / 2
     found: list[Gap] = []
     start, left = (float(grid[0]), 0) if label[0] == 0 else (None, int(label[0]))
     for time, before, after in marks:
         if after == 0 and start is None:
-            start, left = time, before
+            start, left = time, int(before)
         elif before == 0 and start is not None:
-            found.append(Gap(start, time, left, after, 0))
+            found.append(Gap(start, time, left, int(after), 0))
             start = None
     if start is not None:
         found.append(Gap(start, float(grid[-1]), left, 0, 0))
@@ -147,13 +163,15 @@ def gaps(
     return found
 
 
-def compare(found: list[Gap], events: list[tuple[float, str]], direction: str, until: float) -> list[str]:
+def compare(found: list[Gap], events: list[tuple[float, str]], direction: str, until: float) -> list[Fault]:
     """What is wrong with events (time, "up" or "down") that were found until then."""
-    wrong, slack = [], 1e-15
+    wrong, slack = [], 8e-15
     taken = np.zeros(len(events), dtype=bool)
     times = np.array([t for t, _ in events])
-    for gap in found:
-        edge = slack * max(abs(gap.end), 1e-300) * 8
+    ends = [gap.end for gap in found]
+    starts = [gap.start for gap in found]
+    for k, gap in enumerate(found):
+        edge = slack * max(abs(gap.end), 1e-300)
         mine = (times >= gap.start - edge) & (times <= gap.end + edge) & ~taken if len(events) else taken
         taken |= mine
         if gap.start > until:
@@ -161,19 +179,26 @@ def compare(found: list[Gap], events: list[tuple[float, str]], direction: str, u
         over = gap.end >= until - edge  # a crossing may lie behind the end
         ups = sum(1 for k in np.flatnonzero(mine) if events[k][1] == "up")
         downs = int(mine.sum()) - ups
+        before = gap.start - ends[k - 1] if k else np.inf
+        after = starts[k + 1] - gap.end if k + 1 < len(found) else np.inf
+        place = f"in [{gap.start!r}, {gap.end!r}]"
+
+        def tell(text: str, place=place, end=gap.end, lasts=(before, after)) -> None:
+            wrong.append(Fault(f"{text} {place}", end, min(lasts)))
+
         if gap.left * gap.right < 0 and not over:
             wanted = "up" if gap.right > 0 else "down"
             if direction in ("both", wanted) and (ups if wanted == "up" else downs) == 0:
-                wrong.append(f"missed: {wanted} in [{gap.start!r}, {gap.end!r}]")
+                tell(f"missed: {wanted}")
             elif direction == "both" and ups - downs != gap.right:
-                wrong.append(
-                    f"{ups} up and {downs} down in [{gap.start!r}, {gap.end!r}], one {wanted} more is right"
-                )
+                tell(f"one {wanted} more is right than {ups} up and {downs} down")
         if gap.left * gap.right > 0 and not over and direction == "both" and ups != downs:
-            wrong.append(f"{ups} up and {downs} down in [{gap.start!r}, {gap.end!r}], a pair")
+            tell(f"half a pair: {ups} up and {downs} down")
         if ups + downs > max(gap.zeros, 1) + 3:
-            wrong.append(f"{ups + downs} events in [{gap.start!r}, {gap.end!r}], where {gap.zeros} are")
+            tell(f"{ups + downs} events where {gap.zeros} are")
         if direction != "both" and (downs if direction == "up" else ups):
-            wrong.append(f"another direction than {direction} in [{gap.start!r}, {gap.end!r}]")
-    wrong += [f"false: {events[k][1]} at {events[k][0]!r}" for k in np.flatnonzero(~taken)]
+            tell(f"another direction than {direction}")
+    wrong += [
+        Fault(f"false: {events[k][1]} at {events[k][0]!r}", events[k][0]) for k in np.flatnonzero(~taken)
+    ]
     return wrong

@@ -40,7 +40,9 @@ class Level:
 @dataclass
 class Case:
     """tables: the scenario. model: the text of model.py. narrow: (expression, width) of what is narrow in it.
-    levels: for each event, the numbers that stand as {0}, {1} in `when`."""
+    levels: for each event, the numbers that stand as {0}, {1} in `when`. around: for each event, expressions beside
+    whose zeros `when` changes quickly. resumed: the part of the duration after which the run ends, and goes on; 0 for
+    none."""
 
     kind: str
     seed: int
@@ -50,6 +52,8 @@ class Case:
     model: str = ""
     narrow: list[tuple[str, float]] = field(default_factory=list)
     levels: list[list[Level]] = field(default_factory=list)
+    around: list[list[str]] = field(default_factory=list)
+    resumed: float = 0.0
 
     @property
     def name(self) -> str:
@@ -126,7 +130,8 @@ def output(dice: random.Random, duration: float) -> dict:
 
 def a_chain(seed: int, number: int) -> Case:
     dice = random.Random(f"chains:{seed}:{number}")
-    (family,) = dice.choices(list(CHAINS), list(CHAINS.values()))
+    families = CHAINS if number < FIRST["chains"] else CHAINS_LATER
+    (family,) = dice.choices(list(families), list(families.values()))
     drawing = AnyChain(dice)
     tables = getattr(drawing, family)()
     chain, start = tables["chain"], tables["start"]
@@ -135,8 +140,15 @@ def a_chain(seed: int, number: int) -> Case:
     loads = any(key in chain for key in ("damping", "torque", "drive"))
     long = duration * fastest > 300
     tables["run"] = {"duration": duration, **settings(dice, fastest, not loads, long)}
+    if family == "coarse":
+        tables["run"] = {
+            "duration": duration,
+            "stages": dice.randint(1, 8),
+            "step": power(dice, -1, 0.5) / fastest,
+        }
     tables["output"] = output(dice, duration)
-    return Case("chains", seed, number, family, tables)
+    resumed = dice.uniform(0.05, 0.95) if family == "goes_on" else 0.0
+    return Case("chains", seed, number, family, tables, resumed=resumed)
 
 
 def pace(chain: dict) -> float:
@@ -383,6 +395,55 @@ class AnyChain(Draw):
             "duration": self.turns(chain, -1, 0),
         }
 
+    def goes_on(self) -> dict:
+        """A run that ends, and goes on."""
+        return getattr(
+            self, self.dice.choice(["plain", "rest", "chaos_rest", "driven", "upright", "chaos", "stiff"])
+        )()
+
+    def coarse(self) -> dict:
+        """For constant steps that are too long."""
+        return getattr(self, self.dice.choice(["plain", "rest", "driven", "upright", "pole", "torques"]))()
+
+    def resonance(self) -> dict:
+        """Driven at its own pace for long: beats of small size."""
+        chain = self.base(most=2)
+        if self.dice.random() < 0.7:
+            self.damp(chain, -3, -1)
+        amplitude = self.moment(chain, 0, self.power(-4, -1))
+        frequency = pace(chain) * self.dice.uniform(0.7, 1.5)
+        chain["drive"] = [{"link": 1, "amplitude": amplitude, "frequency": frequency, "phase": 0.0}]
+        return {"chain": chain, "start": self.placed(chain, 0.1, 0), "duration": self.turns(chain, 1, 2)}
+
+    def tiny_drive(self) -> dict:
+        """At rest but for a drive that hardly moves it, or after a long time."""
+        chain = self.base(most=3)
+        amplitude = self.moment(chain, 0, self.power(-9, -4))
+        frequency = pace(chain) * self.power(-3, 2)
+        chain["drive"] = [{"link": 1, "amplitude": amplitude, "frequency": frequency, "phase": 0.0}]
+        start = self.placed(chain, 0.0, 0.0)
+        if self.dice.random() < 0.4:
+            start["theta"] = [math.pi for _ in chain["masses"]]
+        return {"chain": chain, "start": start, "duration": self.turns(chain, 0, 1)}
+
+    def turned(self) -> dict:
+        """Starts that have turned many times."""
+        chain = self.base("planar", most=3)
+        start = self.placed(chain, 2.0, 1)
+        start["theta"] = [theta + 2 * math.pi * round(self.power(0, 5)) for theta in start["theta"]]
+        return {"chain": chain, "start": start, "duration": self.turns(chain, -0.5, 0.8)}
+
+    def hardly_stiff(self) -> dict:
+        """Fast at first, slow later: what was fast is over after a thousandth of the run."""
+        chain = self.base(most=3)
+        self.damp(chain, 0.3, 2.5)
+        return {"chain": chain, "start": self.placed(chain, math.pi, 30), "duration": self.turns(chain, 0, 2)}
+
+    def at_once(self) -> dict:
+        """Hardly any time at all."""
+        chain = self.base(most=4)
+        return {"chain": chain, "start": self.placed(chain, 3.0, 3), "duration": self.turns(chain, -9, -2)}
+
     def units(self) -> dict:
         chain = self.base(most=3)
         scale = self.power(-6, 6)
@@ -404,6 +465,15 @@ class AnyChain(Draw):
 
 
 # How often each comes.
+CHAINS_LATER = {
+    "goes_on": 3,
+    "coarse": 3,
+    "resonance": 1,
+    "tiny_drive": 1,
+    "turned": 1,
+    "hardly_stiff": 2,
+    "at_once": 1,
+}
 CHAINS = {
     "plain": 1,
     "rest": 2,
@@ -495,9 +565,14 @@ def an_event(seed: int, number: int) -> Case:
         "run": run,
         "output": output(dice, duration),
     }
-    families, levels, tables["event"] = set(), [], []
+    families, levels, around, tables["event"] = set(), [], [], []
     for k in range(dice.randint(1, 3)):
-        family, when, open_numbers = an_expression(dice, chain, duration)
+        if number < FIRST["events"]:
+            family, when, open_numbers = an_expression(dice, chain, duration)
+            around.append([])
+        else:
+            family, when, open_numbers, beside = a_later_expression(dice, chain)
+            around.append(beside)
         event = {
             "name": f"e{k + 1}",
             "when": when,
@@ -508,7 +583,7 @@ def an_event(seed: int, number: int) -> Case:
         families.add(family)
         levels.append(open_numbers)
         tables["event"].append(event)
-    return Case("events", seed, number, " ".join(sorted(families)), tables, levels=levels)
+    return Case("events", seed, number, " ".join(sorted(families)), tables, levels=levels, around=around)
 
 
 LOADS = {"damping", "torque", "drive"}
@@ -585,6 +660,41 @@ def an_expression(dice: random.Random, chain: dict, duration: float) -> tuple[st
         f"sin(theta_{link} - {{0}})",
         [Level(f"theta_{link}", "turn", part, depth)],
     )
+
+
+def a_later_expression(dice: random.Random, chain: dict) -> tuple[str, str, list[Level], list[str]]:
+    """Those that turn faster than the motion, are narrow, have kinks or jump; and beside what."""
+    names = ["x", "y", "theta"] if chain["space"] == "planar" else ["x", "y", "z"]
+    what = f"{dice.choice(names)}_{dice.randint(1, chain['links'])}"
+    part, size = dice.random(), sum(chain["lengths"])
+    here = Level(what, "time", part, 0.0)
+    family = dice.choice(
+        ["fast", "fast", "narrow", "narrow", "kink", "leap", "branch", "root", "rate product"]
+    )
+    if family == "fast":
+        turns = power(dice, 0.5, 2.5) / (1 if what.startswith("theta") else size)
+        level = dice.choice([dice.uniform(-1, 1), 1 - power(dice, -8, -1)])
+        return family, f"sin({turns!r}*{what}) - {level!r}", [], []
+    if family == "narrow":
+        width = power(dice, -6, -1) * size
+        return family, f"exp(-(({what} - {{0}})/{width!r})^2) - 0.5", [here], [f"{what} - {{0}}"]
+    if family == "kink":
+        depth = power(dice, -9, -1) * size
+        return family, f"{depth!r} - abs({what} - {{0}})", [here], [f"{what} - {{0}}"]
+    if family == "leap":
+        return family, f"sign({what} - {{0}}) + 0.5", [here], [f"{what} - {{0}}"]
+    if family == "branch" and chain["space"] == "planar":
+        return family, f"atan2(x_1, y_1) - {dice.uniform(-3.2, 3.2)!r}", [], ["x_1"]
+    if family == "root":
+        return (
+            family,
+            f"sqrt(abs({what} - {{0}})) - {math.sqrt(power(dice, -9, -1) * size)!r}",
+            [here],
+            [f"{what} - {{0}}"],
+        )
+    rate = f"theta_dot_{dice.randint(1, chain['links'])}" if chain["space"] == "planar" else what
+    levels = [here, Level(rate, "time", dice.random(), 0.0)]
+    return "rate product", f"({what} - {{0}})*({rate} - {{1}})", levels, []
 
 
 def a_quantity(dice: random.Random, chain: dict) -> str:

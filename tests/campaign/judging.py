@@ -111,11 +111,18 @@ def subject_of(case: Case, room: truth.Room, tables: dict | None = None) -> trut
 
 def closed(case: Case, motion: truth.Dense) -> dict:
     """The scenario, with every level of its events filled in."""
-    events = []
-    for event, levels in zip(case.tables["event"], case.levels, strict=True):
-        numbers = [repr(value_of(level, case, motion)) for level in levels]
-        events.append({**event, "when": event["when"].format(*numbers).replace("- -", "+ ")})
-    return {**case.tables, "event": events}
+    return {
+        **case.tables,
+        "event": [
+            {**event, "when": filled(event["when"], levels, case, motion)}
+            for event, levels in zip(case.tables["event"], case.levels, strict=True)
+        ],
+    }
+
+
+def filled(text: str, levels: list[Level], case: Case, motion: truth.Dense) -> str:
+    numbers = [repr(value_of(level, case, motion)) for level in levels]
+    return text.format(*numbers).replace("- -", "+ ")
 
 
 def value_of(level: Level, case: Case, motion: truth.Dense) -> float:
@@ -195,7 +202,25 @@ def table_of(file: Path) -> tuple[list[list[str]], dict[str, np.ndarray]]:
     return lines, columns
 
 
-def simulate(program: Program, tables: dict, model: str, extra: Iterable[str] = ()) -> Run:
+def rows_of(file: Path) -> dict[str, np.ndarray]:
+    """Those of a run file, named as in a CSV file."""
+    import h5py
+
+    columns = {}
+    if not file.exists():
+        return columns
+    with h5py.File(file) as opened:
+        for name, data in opened.items():
+            if isinstance(data, h5py.Dataset) and name != "link" and data.ndim == 1:
+                columns[name] = np.asarray(data)
+            elif isinstance(data, h5py.Dataset) and data.ndim == 2:
+                columns |= {f"{name}_{i + 1}": np.asarray(data[:, i]) for i in range(data.shape[1])}
+    rows = len(columns.get("t", []))
+    return {name: column for name, column in columns.items() if len(column) == rows}
+
+
+def simulate(program: Program, tables: dict, model: str, resumed: float = 0.0) -> Run:
+    """resumed: part of the duration after which it ends, and goes on."""
     folder = program.folder
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scenario.toml").write_text(toml(tables))
@@ -206,9 +231,31 @@ def simulate(program: Program, tables: dict, model: str, extra: Iterable[str] = 
     rows, happened = folder / "rows.csv", folder / "events.csv"
     for file in (rows, happened):
         file.unlink(missing_ok=True)
-    command = [program.file, "simulate", "scenario.toml", "--json", "-o", "rows.csv", *extra]
+    command = [program.file, "simulate", "scenario.toml", "--json", "-o", "rows.csv"]
     if "event" in tables:
         command += ["--events", "events.csv"]
+    if resumed:
+        duration = tables["run"]["duration"]
+        (folder / "rows.h5").unlink(missing_ok=True)
+        begin = [program.file, "simulate", "scenario.toml", "--quiet", "-o", "rows.h5"]
+        part = {**tables, "run": {**tables["run"], "duration": resumed * duration}}
+        if "times" in tables.get("output", {}):  # those behind the end are no rows of the first part
+            del part["output"]
+            tables = {name: table for name, table in tables.items() if name != "output"}
+        (folder / "scenario.toml").write_text(toml(part))
+        try:
+            subprocess.run(begin, cwd=folder, capture_output=True, check=False, timeout=program.patience)
+        except subprocess.TimeoutExpired:
+            return Run(None, {}, "", {}, [], {}, program.patience)
+        command = [
+            program.file,
+            "simulate",
+            "--resume",
+            "rows.h5",
+            "--set",
+            f"run.duration={duration!r}",
+            "--json",
+        ]
     began = time.monotonic()
     try:
         done = subprocess.run(
@@ -221,6 +268,8 @@ def simulate(program: Program, tables: dict, model: str, extra: Iterable[str] = 
     if done.stdout.startswith("{"):
         summary = json.loads(done.stdout)
     _, columns = table_of(rows)
+    if resumed:
+        columns = rows_of(folder / "rows.h5")
     lines, event_columns = table_of(happened)
     events = [(line[0], float(line[1]), line[2]) for line in lines]
     message = (done.stderr.strip().splitlines() or [""])[-1]
@@ -350,7 +399,7 @@ def judge_run(case: Case, room: truth.Room, program: Program) -> Verdict:
         tables = closed(case, motion)
     else:
         truth.rows_at(subject, [duration], duration)  # before the program is run for nothing
-    done = simulate(program, tables, case.model)
+    done = simulate(program, tables, case.model, case.resumed)
     verdict = Verdict(
         case.name, case.family, settings_of(run), "right", asked=asked_of(run)[1], seconds=done.seconds
     )
@@ -436,27 +485,26 @@ def event_faults(case, tables, subject, motion, ends, done, errors, duration) ->
     times = ends.columns["t"].astype(float)
     until = min(float((done.summary.get("final") or {}).get("t") or duration), duration)
     faults = []
-    for event in tables["event"]:
+    for k, event in enumerate(tables["event"]):
         if any(w.startswith(f"event {event['name']}:") for w in done.summary.get("warnings", [])):
             continue
         if isinstance(subject, truth.ChainSubject) and subject.chain.spatial and "theta_dot" in event["when"]:
             continue  # it depends on which way theta went by a pole
         mine = [(t, direction) for name, t, direction in done.events if name == event["name"]]
         try:
-            gaps = gaps_of(motion, ends, event["when"], allowed)
+            beside = case.around[k] if case.around else []
+            beside = [filled(text, case.levels[k], case, motion) for text in beside]
+            gaps = gaps_of(motion, ends, event["when"], allowed, beside)
         except OverflowError:
             continue
         wrong = crossings.compare(gaps, mine, event.get("direction", "both"), until)
+        if case.around and ("sin(" in event["when"] or beside):  # it turns faster than the motion
+            step = float(done.summary.get("largest_step") or run.get("step", 0))
+            wrong = [fault for fault in wrong if fault.lasts > SEEN * step]
         told = {e["name"]: e["count"] for e in done.summary.get("events", [])}.get(event["name"])
         if told != len(mine):
-            wrong.append(f"count {told}, {len(mine)} in the file")
-        faults += [
-            (
-                float(re.findall(r"[\d.e-]+", w)[-1]) if "in [" in w or "at " in w else 0.0,
-                f"event {event['name']} ({event['when']}): {w}",
-            )
-            for w in wrong
-        ]
+            wrong.append(crossings.Fault(f"count {told}, {len(mine)} in the file", 0.0))
+        faults += [(fault.time, f"event {event['name']} ({event['when']}): {fault.text}") for fault in wrong]
     if done.events and done.event_columns:
         few = some(done.event_columns["t"])[:12]
         columns = {name: column[few] for name, column in done.event_columns.items()}
@@ -475,8 +523,11 @@ def event_faults(case, tables, subject, motion, ends, done, errors, duration) ->
     return faults
 
 
-def gaps_of(motion: truth.Dense, ends: truth.Rows, when: str, allowed: np.ndarray) -> list[crossings.Gap]:
-    """Of an event of a motion whose state may be off by `allowed`, relative to sizes, at `ends`."""
+def gaps_of(
+    motion: truth.Dense, ends: truth.Rows, when: str, allowed: np.ndarray, beside: Iterable[str] = ()
+) -> list[crossings.Gap]:
+    """Of an event of a motion whose state may be off by `allowed`, relative to sizes, at `ends`. Beside zeros of
+    `beside` it changes quickly."""
     expression = crossings.Expression(when)
     sizes = {name: size_of(motion.subject, name, ends.sizes) for name in expression.columns}
     times = ends.columns["t"].astype(float)
@@ -490,8 +541,14 @@ def gaps_of(motion: truth.Dense, ends: truth.Rows, when: str, allowed: np.ndarra
         return crossings.doubt(expression, crossings.columns_of(motion, expression, at), off)
 
     found = [float(x) for x in re.findall(r"([\d.e-]+)\*t\b", when)]
+    found += [
+        30 * float(x) for x in re.findall(r"sin\(([\d.e-]+)\*(?!t\b)", when)
+    ]  # no faster than 30 of its units
     found += [2 * np.pi / float(x) for x in re.findall(r"fmod\(t, ([\d.e-]+)\)", when)]
-    return crossings.gaps(g, wide, grid_of(motion, max(found, default=0.0)))
+    grid = grid_of(motion, max(found, default=0.0))
+    for inner in map(crossings.Expression, beside):
+        grid = crossings.beside_zeros(lambda at, e=inner: e(crossings.columns_of(motion, e, at)), grid)
+    return crossings.gaps(g, wide, grid)
 
 
 def size_of(subject: truth.Subject, name: str, sizes: np.ndarray) -> float:
