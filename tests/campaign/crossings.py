@@ -60,15 +60,14 @@ def columns_of(motion: Dense, expression: Expression, times: np.ndarray) -> dict
 
 
 def doubt(
-    expression: Expression, columns: dict[str, np.ndarray], off: dict[str, np.ndarray | float]
+    expression: Expression, columns: dict[str, np.ndarray], off: dict[str, np.ndarray], size: float
 ) -> np.ndarray:
-    """How far g may be off, where each column is by so much, and doubles are."""
+    """How far g, whose values are up to `size`, may be off, where each column is by so much, and doubles are."""
     g = expression(columns)
-    total = 1e-15 * np.abs(g).max() + 0 * g
+    total = 1e-15 * size + 0 * g
     for name in expression.columns:
         column = columns[name]
-        rounding = 4e-16 * np.maximum(np.abs(column), np.abs(column).max() if name != "t" else 0)
-        step = rounding + (off.get(name, 0.0) if name != "t" else 0.0)
+        step = 4e-16 * np.abs(column) + off.get(name, 0.0)
         moved = [np.abs(expression({**columns, name: column + shift}) - g) for shift in (step, -step)]
         total = total + np.nan_to_num(np.maximum(*moved), nan=0.0, posinf=0.0)
     return total

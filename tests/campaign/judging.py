@@ -479,7 +479,8 @@ def event_faults(case, tables, subject, motion, ends, done, errors, duration) ->
     """(time, sentence) of what is wrong with events. Times of those that are missed are the ends of their gaps."""
     run = tables["run"]
     rows = errors.error[np.isfinite(errors.uncertainty)]
-    seen = max(100 * float(rows.max(initial=0)), 2e-14)
+    there = event_errors(subject, motion, ends, done)
+    seen = max(100 * float(max(rows.max(initial=0), there[1].max(initial=0))), 2e-14)
     allowed = limits(run, ends.growth)
     allowed = np.maximum(np.minimum(allowed, seen), 10 * ends.uncertainty)
     times = ends.columns["t"].astype(float)
@@ -505,22 +506,28 @@ def event_faults(case, tables, subject, motion, ends, done, errors, duration) ->
         if told != len(mine):
             wrong.append(crossings.Fault(f"count {told}, {len(mine)} in the file", 0.0))
         faults += [(fault.time, f"event {event['name']} ({event['when']}): {fault.text}") for fault in wrong]
-    if done.events and done.event_columns:
-        few = some(done.event_columns["t"])[:12]
-        columns = {name: column[few] for name, column in done.event_columns.items()}
-        place = motion.at(columns["t"])
-        numbers = subject.compared(subject.columns(place), ends.sizes)
-        off = truth.largest(subject.compared(columns, ends.sizes) - numbers)
-        part = np.interp(columns["t"], times, np.maximum(limits(run, ends.growth), 10 * ends.uncertainty))
-        for t, e, m in zip(columns["t"], off, part, strict=True):
-            if e > m:
-                faults.append(
-                    (
-                        float(t),
-                        f"state of the event at {float(t)!r}: off by {e:.2e}, {e / m:.1e} times what it may be",
-                    )
+    part = np.interp(there[0], times, np.maximum(limits(run, ends.growth), 10 * ends.uncertainty))
+    for t, e, m in zip(*there, part, strict=True):
+        if e > m:
+            faults.append(
+                (
+                    float(t),
+                    f"state of the event at {float(t)!r}: off by {e:.2e}, {e / m:.1e} times what it may be",
                 )
+            )
     return faults
+
+
+def event_errors(
+    subject: truth.Subject, motion: truth.Dense, ends: truth.Rows, done: Run
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times of some events, and how far the states are off that are told of them."""
+    if not done.event_columns:
+        return np.zeros(0), np.zeros(0)
+    few = some(done.event_columns["t"])[:12]
+    columns = {name: column[few] for name, column in done.event_columns.items()}
+    numbers = subject.compared(subject.columns(motion.at(columns["t"])), ends.sizes)
+    return columns["t"], truth.largest(subject.compared(columns, ends.sizes) - numbers)
 
 
 def gaps_of(
@@ -535,10 +542,13 @@ def gaps_of(
     def g(at: np.ndarray) -> np.ndarray:
         return expression(crossings.columns_of(motion, expression, at))
 
+    values = g(grid_of(motion, 0.0))
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0))
+
     def wide(at: np.ndarray) -> np.ndarray:
         part = np.interp(np.asarray(at, dtype=float), times, allowed)
-        off = {name: part * size for name, size in sizes.items()}
-        return crossings.doubt(expression, crossings.columns_of(motion, expression, at), off)
+        off = {name: (part + 4e-16) * size for name, size in sizes.items() if name != "t"}
+        return crossings.doubt(expression, crossings.columns_of(motion, expression, at), off, largest)
 
     found = [float(x) for x in re.findall(r"([\d.e-]+)\*t\b", when)]
     found += [
@@ -714,8 +724,7 @@ def member_faults(case, changed, room, kept, member):
     sure = bool(errors.right.all())
     for event in changed.get("event", []):
         motion, ends = truth.dense(subject, duration)
-        seen = max(100 * float(errors.error.max(initial=0)), 1e-12)
-        allowed = np.maximum(np.minimum(limits(run, ends.growth, True), seen), 10 * ends.uncertainty)
+        allowed = np.maximum(limits(run, ends.growth, True), 10 * ends.uncertainty)
         found = gaps_of(motion, ends, event["when"], allowed)
         crossed = [gap for gap in found if gap.left * gap.right < 0]
         most = len(crossed) + sum(max(gap.zeros, 2) for gap in found if gap.left * gap.right >= 0)
