@@ -725,7 +725,10 @@ def member_faults(case, changed, room, kept, member):
     for event in changed.get("event", []):
         motion, ends = truth.dense(subject, duration)
         allowed = np.maximum(limits(run, ends.growth, True), 10 * ends.uncertainty)
-        found = gaps_of(motion, ends, event["when"], allowed)
+        try:
+            found = gaps_of(motion, ends, event["when"], allowed)
+        except OverflowError:
+            continue
         crossed = [gap for gap in found if gap.left * gap.right < 0]
         most = len(crossed) + sum(max(gap.zeros, 2) for gap in found if gap.left * gap.right >= 0)
         name = f"event:{event['name']}"
