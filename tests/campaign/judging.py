@@ -1,7 +1,7 @@
 """Runs the program on a case and says whether what it wrote is right, or said not to be.
 
 right         within what was asked for in every row and event
-false doubt   right by a factor of a hundred, and a warning says that it cannot be trusted
+false doubt   right by far (DOUBTFUL), and a warning says that it cannot be trusted
 said          wrong, and a warning says so (all of what is wrong lies behind `trusted_until`, where there is one)
 refused       exit status 1 with a message
 not taken     exit status 2 with a message: the scenario is not one
@@ -37,6 +37,11 @@ ROOM_FOR_TOLERANCE = {
 ADAPTIVE = ("dopri5", "fehlberg78", "bulirsch-stoer", "taylor")
 NOTHING_ASKED = 1e-3  # of the size; no run that is further off may be silent
 SEEN = 1e-3
+DOUBTFUL = {
+    "accuracy": 0.1,
+    "tolerance": 1.0,
+    "step": 0.01,
+}  # of what was asked for: a doubt of less is false
 COLUMNS_AGREE = 1e-11  # energies, of their size, and points with the coordinates beside them
 MOST_ROWS = 80
 # What does not say how far a run can be trusted.
@@ -58,6 +63,7 @@ class Verdict:
     kind: str
     error: float = 0.0  # the largest, relative to sizes
     ratio: float = 0.0  # of an error to what it may be, the largest
+    by: str = "step"  # accuracy, tolerance or step
     asked: float = 0.0
     growth: float = 1.0
     seconds: float = 0.0
@@ -400,8 +406,9 @@ def judge_run(case: Case, room: truth.Room, program: Program) -> Verdict:
     else:
         truth.rows_at(subject, [duration], duration)  # before the program is run for nothing
     done = simulate(program, tables, case.model, case.resumed)
+    by, asked = asked_of(run)
     verdict = Verdict(
-        case.name, case.family, settings_of(run), "right", asked=asked_of(run)[1], seconds=done.seconds
+        case.name, case.family, settings_of(run), "right", by=by, asked=asked, seconds=done.seconds
     )
     verdict.words = done.doubts
     if done.status is None:
@@ -470,7 +477,7 @@ def conclude(verdict: Verdict, done: Run, wrong: list[tuple[float, str]], decide
             verdict.wrong.insert(0, f"expected {expected:.1e}, is {verdict.error:.1e}")
     elif not decided:
         verdict.kind = "said" if done.doubts else "undecided"
-    elif done.doubts and verdict.ratio < 0.01:
+    elif done.doubts and verdict.error < DOUBTFUL[verdict.by] * verdict.asked:
         verdict.kind = "false doubt"
     return verdict
 
@@ -591,7 +598,8 @@ def judge_ensemble(case: Case, room: truth.Room, program: Program) -> Verdict:
         old.unlink() if old.is_file() else [*map(Path.unlink, old.iterdir()), old.rmdir()]
     began = time.monotonic()
     command = [program.file, "ensemble", "scenario.toml", "-o", "out.h5", "--json", "--threads", "1"]
-    verdict = Verdict(case.name, case.family, settings_of(run), "right", asked=asked_of(run, True)[1])
+    by, asked = asked_of(run, True)
+    verdict = Verdict(case.name, case.family, settings_of(run), "right", by=by, asked=asked)
     verdict.settings += f", {tables['ensemble'].get('method', 'run')}"
     try:
         ended = subprocess.run(
