@@ -287,7 +287,7 @@ class Session {
     setup.options = by;
     setup.accuracy.error = 0;
     setup.doubted = false;
-    page_->begin_run("start + " + shortest(copy * options_.apart));
+    page_->begin_run("start + " + rounded(copy * options_.apart));
     Run run(setup);
     run.add(*page_);
     const RunReport report = run.go(interrupted);

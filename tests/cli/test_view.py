@@ -19,11 +19,11 @@ def about(page: Path) -> dict:
 
 
 def test_a_page_shows_every_run(pendula, double, tmp_path):
-    result = pendula("simulate", double, "--view", "out.html", "--copies", 3, "--apart", "1e-6", "--json")
+    result = pendula("simulate", double, "--view", "out.html", "--copies", 3, "--apart", "5e-9", "--json")
     assert result.status == 0, result.err
     assert result.json["view"] == "out.html"
     labels = [run["label"] for run in about(tmp_path / "out.html")["runs"]]
-    assert labels == ["start", "start + 1e-06", "start + 2e-06", "start + 3e-06"]
+    assert labels == ["start", "start + 5e-09", "start + 1e-08", "start + 1.5e-08"]
 
 
 def test_a_page_tells_how_it_was_made(pendula, double, tmp_path):
