@@ -26,6 +26,17 @@ def test_a_page_shows_every_run(pendula, double, tmp_path):
     assert labels == ["start", "start + 5e-09", "start + 1e-08", "start + 1.5e-08"]
 
 
+def test_a_page_has_rows_of_its_own_and_changes_nothing(pendula, double, tmp_path):
+    """Whatever steps and rows a run has, its page moves evenly."""
+    plain = settings("run.step=0.1", "output.every=7", "run.duration=3")
+    for asked in plain, [*plain, *settings("output.interval=0.5")]:
+        assert pendula("simulate", double, "-o", "alone.csv", *asked).status == 0
+        assert pendula("simulate", double, "-o", "beside.csv", "--view", "out.html", *asked).status == 0
+        assert (tmp_path / "alone.csv").read_bytes() == (tmp_path / "beside.csv").read_bytes()
+        [run] = about(tmp_path / "out.html")["runs"]
+        assert run["rows"] == 751 and run["seen"] == 751  # 250 a second
+
+
 def test_a_page_tells_how_it_was_made(pendula, double, tmp_path):
     assert pendula("simulate", double, "--view", "out.html", *settings("run.stages=3")).status == 0
     scenario = about(tmp_path / "out.html")["scenario"]

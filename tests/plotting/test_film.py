@@ -115,6 +115,21 @@ print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
     assert megabytes < 150  # measured 119, 111, 77
 
 
+def test_frames_do_not_wait_for_rows(runs, pendula):
+    """Long steps, and a row each: every frame is another one, and the rows are as without a film."""
+    scenario = (runs / "double.toml").read_text().replace("step     = 5e-3", "tolerance = 1e-9")
+    (runs / "steps.toml").write_text(scenario.replace("every = 2", ""))
+    limits = ("--set", "run.duration=1", "--set", "run.stages=8")
+    assert pendula("simulate", "steps.toml", "-o", "alone.csv", *limits).returncode == 0
+    film = pendula("simulate", "steps.toml", "-o", "beside.csv", "--video", "film.gif", *limits)
+    assert film.returncode == 0, film.stderr
+    assert len((runs / "alone.csv").read_text().splitlines()) < 25
+    assert (runs / "alone.csv").read_bytes() == (runs / "beside.csv").read_bytes()
+    frames = frames_of(runs / "film.gif")
+    moved = [int((np.abs(a - b).max(axis=2) > 30).sum()) for a, b in pairwise(frames)]
+    assert len(frames) == 31 and min(moved) > 250  # pixels; measured 510
+
+
 def test_a_film_of_a_run_file_leaves_the_file(runs, pendula):
     film = pendula(
         "simulate", "double.toml", "--set", "run.duration=0.2", "--video", "film.gif", "-o", "kept.h5"
