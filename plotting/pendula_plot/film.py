@@ -126,6 +126,14 @@ def trace_strokes() -> list[tuple[Colour, float]]:
 TRACE_STROKES = trace_strokes()
 
 
+def looks(count: int) -> list[tuple[Colour, Colour, float]]:
+    """Of each run the colours of its bobs and of its rods, and their part of the full size."""
+    if count == 1:
+        return [(BOB, ROD, 1.0)]
+    colours = [colour_between(FIRST_RUN, LAST_RUN, k / (count - 1)) for k in range(count)]
+    return [(colour, colour_between(BACKGROUND, colour, 0.6), 0.6) for colour in colours]
+
+
 class Film:
     """Runs that have the same rows, in real time; the first has a trace, several have colours of their own."""
 
@@ -133,6 +141,7 @@ class Film:
         self.time = runs[0].time
         self.rows = rows_at(runs[0], fps, seconds)
         self.bodies = [body_of(run) for run in runs]
+        self.looks = looks(len(runs))
         seen = [body.places[: self.rows[-1] + 1] for body in self.bodies]
         self.stage = Stage.around(np.concatenate(seen), size)
         self.canvas = Canvas(size, BACKGROUND)
@@ -154,10 +163,11 @@ class Film:
         self.canvas.clear()
         self._draw_shadow(self.bodies[0], row)
         self._draw_trace(self.bodies[0], row)
-        for k in reversed(range(len(self.bodies))):
-            place = k / max(1, len(self.bodies) - 1)
-            alone = len(self.bodies) == 1
-            self._draw_body(self.bodies[k], row, BOB if alone else colour_between(FIRST_RUN, LAST_RUN, place))
+        for body, look in reversed([*zip(self.bodies, self.looks, strict=True)]):
+            self._draw_body(body, row, *look)
+        self.canvas.discs(
+            self.stage.pixels(self.bodies[0].places[row, :1]), np.array([3.0]), WHITE
+        )  # where it hangs
         return self.canvas.image()
 
     def _draw_grid(self) -> None:
@@ -191,13 +201,12 @@ class Film:
                 path = self.stage.pixels(body.places[begin : end + 1, -1])
                 self.canvas.lines([path], colour, width)
 
-    def _draw_body(self, body: Body, row: int, colour: Colour) -> None:
-        """Rods, then bobs, then where it hangs."""
+    def _draw_body(self, body: Body, row: int, bob: Colour, rod: Colour, share: float) -> None:
+        """Rods, then bobs; `share` of their full size."""
         pixels = self.stage.pixels(body.places[row])
-        width = max(1, min(3, round(120 / len(pixels))))
-        self.canvas.lines([pixels[[*rod]] for rod in body.rods], ROD, width)
-        self.canvas.discs(pixels[1:], body.radii * self.stage.size, colour)
-        self.canvas.discs(pixels[:1], np.array([3.0]), WHITE)
+        width = share * max(1, min(3, round(120 / len(pixels))))
+        self.canvas.lines([pixels[[*ends]] for ends in body.rods], rod, width)
+        self.canvas.discs(pixels[1:], share * body.radii * self.stage.size, bob)
 
 
 def check(path: Path) -> None:
