@@ -96,10 +96,10 @@ class Separation {
       places_.push_back({std::min(one.time, other.time), std::isnan(off) ? infinity : off});
     };
     for (std::size_t k = 0; k < common; ++k) add(a.states()[k], b.states()[k]);
-    if (!a.is_complete() || !b.is_complete() || a.states().size() != b.states().size()) {
-      places_.push_back({std::min(a.last().time, b.last().time), infinity});
-    } else {
+    if (a.is_complete() && b.is_complete()) {
       add(a.last(), b.last());
+    } else {
+      places_.push_back({std::min(a.last().time, b.last().time), infinity});
     }
   }
 
