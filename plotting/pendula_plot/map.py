@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,13 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
 
 from .figure import GREEK, style, symbol
-from .run import PlotError
+from .run import PlotError, keys_of
 
 WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
+FEW_DECADES = 1e4  # on which 1, 2, 5, … are numbered, not powers of ten alone
 SIDE = 5.2  # inches, of the longer side of a map
 DOTS = 200  # an inch, as pictures are written
+DURATION = 10.0  # s, of a run whose scenario does not say
 NEVER, FAILED = "#e8e8e8", "#b00020"
 
 
@@ -32,6 +37,7 @@ class Ensemble:
     axes: list[tuple[str, str, np.ndarray]]  # name, unit, values; the first one slowest
     contour: np.ndarray | None
     complete: bool
+    duration: str  # of a member's run, as a legend says it
 
     def lost(self) -> np.ndarray:
         """Members that were not moved, or failed."""
@@ -61,18 +67,29 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
                 (scale.name[1:], str(scale.attrs.get("units", "")), scale[:])
                 for scale in (file[key].dims[k][0] for k in range(status.ndim))
             ]
+            unit = str(file[key].attrs.get("units", ""))
             return Ensemble(
                 str(path),
                 key,
                 counted(file[key][...]),
-                str(file[key].attrs.get("units", "")),
+                unit,
                 status[...],
                 axes,
                 file[contour][...] if contour else None,
                 bool(file.attrs["complete"]),
+                duration_of(file.attrs, [name for name, _, _ in axes], unit),
             )
     except OSError as error:
         raise reject(path, "a file of pendula ensemble", f"{error.strerror or error}") from None
+
+
+def duration_of(attributes: Mapping, axes: list[str], unit: str) -> str:
+    """How long members are moved, by the attributes of a file; `unit` is of the number that is shown."""
+    if "run.duration" in axes:
+        return "its duration"
+    keys = keys_of(str(attributes["scenario"]), json.loads(attributes["set"]))
+    time = unit if unit not in ("", "1") else "s"
+    return f"{float(keys.get('run.duration') or DURATION):g} {time}"
 
 
 def counted(values: np.ndarray) -> np.ndarray:
@@ -134,7 +151,9 @@ def draw_map(drawn: Figure, axes: Axes, ensemble: Ensemble, choice: MapChoice) -
     marks = np.where(ensemble.lost().T[..., None], rgba(FAILED), rgba(NEVER))
     axes.imshow(marks, **place)
     image = axes.imshow(np.ma.masked_invalid(values.T), cmap=cmap, norm=norm, **place)
-    drawn.colorbar(image, ax=axes, label=named(ensemble.key, ensemble.unit))
+    few_decades = isinstance(norm, LogNorm) and norm.vmax < FEW_DECADES * norm.vmin
+    ticks = {"ticks": LogLocator(subs=(1, 2, 5)), "format": "%g"} if few_decades else {}
+    drawn.colorbar(image, ax=axes, label=named(ensemble.key, ensemble.unit), **ticks)
     if choice.level is not None:
         first, second = (axis[2] for axis in ensemble.axes)
         axes.contour(first, second, ensemble.contour.T, levels=[choice.level], colors="k", linewidths=0.8)
@@ -161,7 +180,7 @@ def legend(axes: Axes, ensemble: Ensemble, values: np.ndarray) -> None:
     lost = ensemble.lost()
     patches = []
     if (np.isnan(values) & ~lost).any():
-        patches.append(Patch(color=NEVER, label="never"))
+        patches.append(Patch(color=NEVER, label=f"not within {ensemble.duration}"))
     if lost.any():
         text = "failed" if ensemble.complete else "failed, or not run yet"
         patches.append(Patch(color=FAILED, label=text))

@@ -119,16 +119,7 @@ class Run:
         """Accepted steps from row to row, 0 where rows are at times; None where no scenario tells."""
         if not self.scenario:
             return None
-        document = tomllib.loads(self.scenario)
-        keys = {
-            f"{table}.{key}": value
-            for table in ("run", "output")
-            for key, value in document.get(table, {}).items()
-        }
-        keys |= {
-            key.strip(): value.strip()
-            for key, _, value in (setting.partition("=") for setting in self.settings)
-        }
+        keys = keys_of(self.scenario, self.settings)
         if {"output.interval", "output.times"} & keys.keys():
             return 0
         is_constant = "run.step" in keys or str(keys.get("run.method")).strip("\"'") == "rk4"
@@ -158,6 +149,18 @@ class Run:
     def only(self, wanted: np.ndarray) -> Run:
         """Some of the rows, by a mask."""
         return replace(self, columns={name: values[wanted] for name, values in self.columns.items()})
+
+
+def keys_of(scenario: str, settings: list[str]) -> dict[str, object]:
+    """What [run] and [output] say, by `run.step`, …: of a scenario, and in its place what `--set` said, as text."""
+    document = tomllib.loads(scenario)
+    told = {
+        f"{table}.{key}": value
+        for table in ("run", "output")
+        for key, value in document.get(table, {}).items()
+    }
+    changes = (setting.partition("=") for setting in settings)
+    return told | {key.strip(): value.strip() for key, _, value in changes}
 
 
 def read_run(path: Path) -> Run:

@@ -168,6 +168,9 @@ std::vector<Quantity> quantities_of(const Subject& subject, const std::optional<
   return quantities;
 }
 
+/// Rows of a film: four to each frame of pendula_plot, so that traces are smooth between them.
+const RowTimes film_times{1.0 / 120, {}};
+
 /// The last place that a run may go on from.
 class LastCheckpoint : public Observer {
  public:
@@ -194,9 +197,9 @@ class Session {
         film_rows_(open_film_rows(quantities_of(*setup_.subject, plan.natural))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
-    if (page_) run_.add(*page_);
+    if (page_) run_.add(*page_, page_->times(setup_.duration));
     if (events_) run_.add(*events_);
-    if (film_rows_) run_.add(*film_rows_);
+    if (film_rows_) run_.add(*film_rows_, film_times);
     run_.add(last_);
     run_.add(progress_);
     warn(plan.warnings);
@@ -246,9 +249,10 @@ class Session {
     }
   }
 
-  /// A film is made of a run file: of the one that is asked for, or of one that goes again.
+  /// A film is made of a run file that goes again, with rows for each frame; one of a run that goes on, of that run's,
+  /// which has the rows of before.
   std::unique_ptr<io::RunFile> open_film_rows(const std::vector<Quantity>& quantities) const {
-    if (!options_.video || (output_ && is_run_file(*output_))) return nullptr;
+    if (!options_.video || (from_ && output_ && is_run_file(*output_))) return nullptr;
     return std::make_unique<io::RunFile>(film_rows_name(), origin_, quantities);
   }
 
@@ -287,9 +291,9 @@ class Session {
     setup.options = by;
     setup.accuracy.error = 0;
     setup.doubted = false;
-    page_->begin_run("start + " + shortest(copy * options_.apart));
+    page_->begin_run("start + " + rounded(copy * options_.apart));
     Run run(setup);
-    run.add(*page_);
+    run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));
     const RunReport report = run.go(interrupted);
     page_->end_run(report.energy_error);
     const io::Ending ending = io::ending_of(report, setup.subject->coordinates(), event_names(setup));

@@ -53,7 +53,23 @@ def test_those_that_failed_and_those_it_never_happened_to_are_told_apart(ensembl
     colours = marks.get_array()
     assert len(np.unique(colours[0].reshape(-1, 4), axis=0)) == 1  # a mass below zero: all failed
     assert not np.array_equal(colours[0, 0], colours[1, 0])
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["never", "failed"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["not within 3 s", "failed"]
+
+
+def test_how_long_members_were_moved_is_told(pendula, tmp_path):
+    (tmp_path / "double.toml").write_text(DOUBLE.replace("duration", "# duration") + AXES)
+    for changes, expected in [
+        ((), "not within 10 s"),
+        (("--set", "run.duration=2.5"), "not within 2.5 s"),
+        (
+            ("--set", "ensemble.axis[2].key=run.duration", "--set", "ensemble.axis[2].from=1"),
+            "not within its duration",
+        ),
+    ]:
+        done = pendula("ensemble", "double.toml", "-o", "out.h5", *changes)
+        assert done.returncode == 0, done.stderr
+        axes, _ = figure(read(tmp_path / "out.h5", "event:up"), MapChoice()).axes
+        assert axes.get_legend().get_texts()[0].get_text() == expected
 
 
 def test_angles_go_round(ensemble):
