@@ -425,11 +425,11 @@ TEST(Scenario, MomentaThatMakeNoSenseAreTold) {
 TEST(Scenario, AnglesThatLookLikeDegreesAreWarnedOf) {
   const auto warnings = [](const Overrides& overrides) { return parsed<Spatial>(spatial_text, overrides).warnings; };
   EXPECT_EQ(warnings({"start.theta=90"}),
-            Overrides{"--set start.theta=90: start.theta: 90 rad is more than two turns; did you mean \"90 deg\"?"});
+            Overrides{"--set start.theta=90: start.theta: 90 rad is more than a turn; did you mean \"90 deg\"?"});
   EXPECT_EQ(warnings({"start.theta=[1, -45.5, 90]", "start.phi=[1, 2, 12.6]"}),
-            (Overrides{"--set start.theta=[1, -45.5, 90]: start.theta[2]: -45.5 rad is more than two turns; did you "
+            (Overrides{"--set start.theta=[1, -45.5, 90]: start.theta[2]: -45.5 rad is more than a turn; did you "
                        "mean \"-45.5 deg\"?",
-                       "--set start.phi=[1, 2, 12.6]: start.phi[3]: 12.6 rad is more than two turns; did you mean "
+                       "--set start.phi=[1, 2, 12.6]: start.phi[3]: 12.6 rad is more than a turn; did you mean "
                        "\"12.6 deg\"?"}));
   EXPECT_TRUE(warnings({"start.theta=[12.56, \"90 deg\", \"90 rad\"]"}).empty());
 }

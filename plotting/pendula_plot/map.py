@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from .figure import GREEK, style, symbol
-from .run import PlotError
+from .run import PlotError, unit_of
 
 WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
 SIDE = 5.2  # inches, of the longer side of a map
@@ -51,28 +53,41 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
             if str(file.attrs.get("kind", "")) != "ensemble":
                 raise reject(path, "a file of pendula ensemble", "another HDF5 file")
             status = file["status"]
-            names = sorted(
-                name for name in file if file[name].shape == status.shape and not file[name].is_scale
-            )
-            for name in filter(None, (key, contour)):
-                if name not in names:
-                    raise reject(path, f"one of {', '.join(names)}", f'"{name}"')
-            axes = [
-                (scale.name[1:], str(scale.attrs.get("units", "")), scale[:])
-                for scale in (file[key].dims[k][0] for k in range(status.ndim))
-            ]
+            kept = {
+                name: file[name]
+                for name in sorted(file)
+                if file[name].shape == status.shape and not file[name].is_scale
+            }
+            key, contour = (called(path, kept, name) if name else "" for name in (key, contour))
+            axes = [scale_of(kept[key].dims[k][0]) for k in range(status.ndim)]
             return Ensemble(
                 str(path),
                 key,
-                counted(file[key][...]),
-                str(file[key].attrs.get("units", "")),
+                counted(kept[key][...]),
+                unit_of(kept[key].attrs),
                 status[...],
                 axes,
-                file[contour][...] if contour else None,
+                kept[contour][...] if contour else None,
                 bool(file.attrs["complete"]),
             )
     except OSError as error:
         raise reject(path, "a file of pendula ensemble", f"{error.strerror or error}") from None
+
+
+def called(path: Path, kept: Mapping[str, Any], name: str) -> str:
+    """The data set of that name; or of what the scenario calls it, `event:flip` of event_flip. Raises PlotError."""
+    if name in kept:
+        return name
+    typed = {str(data.attrs.get("long_name", "")): word for word, data in kept.items()}
+    if name in typed:
+        return typed[name]
+    raise reject(path, f"one of {', '.join(kept)}", f'"{name}"')
+
+
+def scale_of(scale: Any) -> tuple[str, str, np.ndarray]:
+    """Key of the scenario, unit and values of an axis; in files of old the key is the name."""
+    key = str(scale.attrs.get("long_name", scale.name[1:]))
+    return key, unit_of(scale.attrs), scale[:]
 
 
 def counted(values: np.ndarray) -> np.ndarray:

@@ -37,6 +37,7 @@ RunSetup member_setup(const Scenario& scenario) {
           .duration = scenario.duration,
           .every = scenario.every,
           .accuracy = scenario.places.contains("accuracy") ? scenario.accuracy : Accuracy{},
+          .estimate = scenario.estimate,
           .doubted = false};
 }
 

@@ -48,7 +48,7 @@ def test_members_are_the_middles_of_cells(ensemble):
 
 
 def test_those_that_failed_and_those_it_never_happened_to_are_told_apart(ensemble):
-    axes, _ = figure(read(ensemble, "event:up"), MapChoice()).axes
+    axes, _ = figure(read(ensemble, "event_up"), MapChoice()).axes
     marks, _ = axes.images
     colours = marks.get_array()
     assert len(np.unique(colours[0].reshape(-1, 4), axis=0)) == 1  # a mass below zero: all failed

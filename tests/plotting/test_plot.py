@@ -137,7 +137,7 @@ def test_what_is_wrong_is_told(runs, pendula, monkeypatch, capsys):
         ),
         (
             ["double.h5", "--coordinates", "theta_3"],
-            "double.h5: expected a coordinate, one of theta_1, theta_2, got theta_3",
+            "double.h5: expected a coordinate, one of theta_1, theta_2, or another column, got theta_3",
         ),
         (["double.h5", "--output", "a.bmp"], "a.bmp: expected a name that ends in .svg, .png or .pdf"),
         (

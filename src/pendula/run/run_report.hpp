@@ -28,6 +28,7 @@ struct RunSetup {
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
   RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
   Accuracy accuracy = {};   ///< of runs by tolerance, which follows from it by trials where it has an error
+  bool estimate = true;     ///< whether to look how far the rows can be trusted, which takes a second run or a tangent
   bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
   double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
   /// To look for.
