@@ -7,7 +7,7 @@ from math import sin
 import h5py
 import numpy as np
 import pytest
-from conftest import EXAMPLES
+from conftest import EXAMPLES, ROOT
 
 SCENARIO = """\
 [system]
@@ -132,14 +132,11 @@ def test_angles_of_models_look_like_degrees_too(pendula, tmp_path):
 def test_a_run_goes_on_from_any_folder(pendula, tmp_path):
     """A run file names its model as the scenario does, and not by the folders that it lay in."""
     (tmp_path / "here").mkdir()
-    (tmp_path / "here" / "spring.py").write_text(
-        "def define(model, links):\n"
-        '    x = model.coordinate("x", "m")\n'
-        "    model.lagrangian = model.rate(x) ** 2 / 2 - x**2 / 2\n"
-    )
-    text = '[system]\nmodel = "spring.py"\n[start]\nx = 1.0\n[run]\nduration = 1.0\nstep = 0.1\n'
-    (tmp_path / "here" / "spring.toml").write_text(text)
-    ended = pendula("simulate", tmp_path / "here" / "spring.toml", "-o", "run.h5", cwd=tmp_path / "here")
+    model = (ROOT / "codegen/pendula_codegen/models/cart_chain.py").read_text()
+    (tmp_path / "here" / "cart_chain.py").write_text(model)
+    (tmp_path / "here" / "cart.toml").write_text(SCENARIO.replace('"cart_chain"', '"cart_chain.py"'))
+    cut = ["--set", "run.duration=1"]
+    ended = pendula("simulate", tmp_path / "here" / "cart.toml", *cut, "-o", "run.h5", cwd=tmp_path / "here")
     assert ended.returncode == 0, ended.stderr
     assert str(tmp_path).encode() not in (tmp_path / "here" / "run.h5").read_bytes()
     ended = pendula("simulate", "--resume", "here/run.h5", "--set", "run.duration=2", cwd=tmp_path)

@@ -39,6 +39,22 @@ def test_panels_show_the_columns_of_the_run(runs):
     assert np.array_equal(trace.lines[0].get_ydata(), run.columns["y_2"])
 
 
+def test_inputs_are_drawn_like_coordinates(tmp_path):
+    """They have no rate: a phase portrait is that of the coordinate."""
+    (tmp_path / "cart.csv").write_text("t,x,x_dot,push,energy\n0,1,2,3,0\n1,4,5,6,0\n2,7,8,9,0\n")
+    run = read_run(tmp_path / "cart.csv")
+    series, phase = figure([run], Choice(("series", "phase"), ("push",))).axes
+    assert list(series.lines[0].get_ydata()) == [3, 6, 9]
+    assert list(phase.lines[0].get_xdata()) == [1, 4, 7] and list(phase.lines[0].get_ydata()) == [2, 5, 8]
+
+
+def test_natural_units_are_named(pendula, runs):
+    natural = ["--set", 'chain.units="natural"', "--set", "run.duration=1"]
+    assert pendula("simulate", "double.toml", *natural, "-o", "natural.h5").returncode == 0
+    run = read_run(runs / "natural.h5")
+    assert [run.unit(name) for name in ("t", "x_2", "theta_1")] == ["sqrt(l_1/g)", "l_1", "rad"]
+
+
 def test_space_is_traced_in_space(runs):
     (trace,) = figure([read_run(runs / "space.h5")], Choice(("trace",))).axes
     assert trace.name == "3d" and trace.get_zlabel() == "$z_{2}$ [m]"
