@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import DOUBLE
+from conftest import DOUBLE, ROOT
 from pendula_plot.__main__ import main
 from pendula_plot.figure import Choice, figure, symbol
 from pendula_plot.run import PlotError, Run, read_run
@@ -184,7 +184,6 @@ def test_a_row_that_is_just_being_written_is_left_out(runs):
 def test_a_missing_python_is_told(runs, pendula):
     plot = pendula("plot", "double.h5", "-o", "a.svg", PENDULA_PYTHON="/none/python")
     assert plot.returncode == 2
-    expected = (
-        "pictures take a Python, and /none/python could not be started (PENDULA_PYTHON names another one)"
-    )
+    setup = f"which {ROOT}/scripts/setup installs"
+    expected = f"pictures take a Python, {setup}; /none/python could not be started (PENDULA_PYTHON names another one)"
     assert plot.stderr == f"pendula: {expected}\n"
