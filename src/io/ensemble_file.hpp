@@ -33,7 +33,8 @@ struct EnsembleColumn {
   std::string name;    ///< as it is asked for, `event:flip`: a data set is called so in letters, digits and underscores
   std::string unit;    ///< in SI
   bool whole = false;  ///< a count: an integer in the file, −1 where there is none
-  std::string meaning = {};  ///< in words, where the name has none
+  /// In words, where the name has none.
+  std::string meaning = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
 /// What an ensemble's file says besides what came of the members.

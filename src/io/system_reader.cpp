@@ -126,7 +126,7 @@ class StartTable {
   template <class Name>
   std::optional<Entry> find(Name name, const std::string& stem) const {
     const std::string key = name(stem), old = stem + "_dot";
-    const std::optional<Entry> entry = table_->find(key);
+    std::optional<Entry> entry = table_->find(key);
     if (key == old || key != present_name(old)) return entry;
     const std::optional<Entry> before = table_->find(old);
     if (entry && before) before->fail("nothing beside " + entry->key() + ", which is the same");

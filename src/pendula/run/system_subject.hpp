@@ -95,7 +95,8 @@ class SystemSubject : public Subject {
       const std::string point(info().points[k]);
       for (int axis = 0; axis < info().point_sizes[k]; ++axis) {
         const std::string name(1, axes[static_cast<std::size_t>(axis)]);
-        add(point + "_" + name, "m", Role::point, name + " of the point " + point);
+        add(std::string(point).append("_").append(name), "m", Role::point,
+            std::string(name).append(" of the point ").append(point));
       }
     }
     add("energy", "J", Role::energy, "energy v dL/dv - L");

@@ -1,4 +1,4 @@
-"""Names of models' numbers: inputs and rates in files and expressions, also as they were called before."""
+"""Columns of models: inputs and rates in files and expressions, also as they were called before."""
 
 import csv
 import json
