@@ -50,7 +50,7 @@ class Header:
     counts: Mapping[str, Counts] = field(default_factory=dict)
 
 
-# Sources that only some kinds of headers are made from; all others go into each. __main__, counts and describe write none.
+# Sources that only some kinds of headers are made from; all others go into each. Those of no kind write none.
 KINDS = {
     "blocks.py": {"kernel"},
     "chain.py": {"kernel"},
