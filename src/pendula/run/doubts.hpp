@@ -26,7 +26,7 @@ inline std::string smaller_step_advice(const RunOptions& run) {
 /// The energy of an undamped motion is known, that of a damped one at least never grows.
 inline Doubt of_energy(const Subject& subject, const RunOptions& run, const EnergyBalance& balance) {
   static constexpr double trusted = 1e-3;
-  if (is_explicit(run.method) && subject.loaded()) return {};  // nobody adds up the work
+  if (!subject.balances(run.method)) return {};
   const bool sinks = run.method == Method::radau && subject.damped();
   const double off = sinks ? balance.most : std::max(balance.most, -balance.least);
   if (off <= trusted) return {};
@@ -54,9 +54,12 @@ inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunRep
 /// An error that everybody sees, relative to the size of the motion.
 inline constexpr double visible = 1e-3;
 
-/// Which rows are meant, by up to when others can be trusted.
+/// Which rows are meant, by up to when others are not.
 inline std::string rows_after(double until, double start) {
   return until > start ? "rows after t = " + pendula::rounded(until, 4) + " s" : "all rows";
+}
+inline std::string untrusted_after(double until, double start) {
+  return until > start ? rows_after(until, start) + " cannot be trusted" : "no row can be trusted";
 }
 
 /// Of trials before the run; `parted` tells how far it went from the finest of them, where it was compared.
@@ -74,7 +77,7 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
   }
   const double seen = parted ? parted->within(visible, start) : aim.trusted_until;
   return of_wanted + "runs by the smallest tolerances that are of use part; " + rows_after(trust.until, start) +
-         " are less accurate, " + rows_after(std::max(seen, trust.until), start) + " cannot be trusted";
+         " are less accurate, " + untrusted_after(std::max(seen, trust.until), start);
 }
 
 /// How a run is made again: with a tolerance a hundred times as large, or longer steps. Steps of twice the length,
@@ -124,7 +127,7 @@ inline Doubt of_second_look(const RunSetup& setup, const RunOptions& coarser, co
   const double seen = parted.within(visible * less, start);
   return what + " the motion " + elsewhere + ": " +
          (seen > trust.until ? rows + " may be off by more than " + pendula::rounded(trusted, 2) + ", " : "") +
-         rows_after(seen, start) + " cannot be trusted; " + smaller_step_advice(setup.options);
+         untrusted_after(seen, start) + "; " + smaller_step_advice(setup.options);
 }
 
 }  // namespace detail

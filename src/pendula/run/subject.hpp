@@ -41,6 +41,8 @@ class Subject {
   /// Whether energy may come from outside or go there, and whether it may go by damping.
   virtual bool loaded() const = 0;
   virtual bool damped() const = 0;
+  /// Whether the energy at every time is known: it is kept, or all that comes and goes is added up.
+  virtual bool balances(Method method) const { return !loaded() || !is_explicit(method); }
 
   /// Why a run with these options would be wrong, known beforehand: one sentence each.
   virtual std::vector<std::string> expected_trouble(const RunOptions& options) const = 0;

@@ -68,6 +68,8 @@ class SystemSubject : public Subject {
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return entry_->loaded(numbers_.plain()); }
   bool damped() const override { return loaded(); }
+  /// What depends on time may bring and take energy many times in a step that the motion does not need to be shorter.
+  bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
   std::vector<std::string> expected_trouble(const RunOptions& /*options*/) const override { return {}; }
   bool has_poles() const override { return false; }
 
