@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 
 from .figure import GREEK, style, symbol
-from .run import PlotError, keys_of
+from .run import PlotError, keys_of, unit_of
 
 WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
 FEW_DECADES = 1e4  # on which 1, 2, 5, … are numbered, not powers of ten alone
@@ -57,25 +58,22 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
             if str(file.attrs.get("kind", "")) != "ensemble":
                 raise reject(path, "a file of pendula ensemble", "another HDF5 file")
             status = file["status"]
-            names = sorted(
-                name for name in file if file[name].shape == status.shape and not file[name].is_scale
-            )
-            for name in filter(None, (key, contour)):
-                if name not in names:
-                    raise reject(path, f"one of {', '.join(names)}", f'"{name}"')
-            axes = [
-                (scale.name[1:], str(scale.attrs.get("units", "")), scale[:])
-                for scale in (file[key].dims[k][0] for k in range(status.ndim))
-            ]
-            unit = str(file[key].attrs.get("units", ""))
+            kept = {
+                name: file[name]
+                for name in sorted(file)
+                if file[name].shape == status.shape and not file[name].is_scale
+            }
+            key, contour = (called(path, kept, name) if name else "" for name in (key, contour))
+            axes = [scale_of(kept[key].dims[k][0]) for k in range(status.ndim)]
+            unit = unit_of(kept[key].attrs)
             return Ensemble(
                 str(path),
                 key,
-                counted(file[key][...]),
+                counted(kept[key][...]),
                 unit,
                 status[...],
                 axes,
-                file[contour][...] if contour else None,
+                kept[contour][...] if contour else None,
                 bool(file.attrs["complete"]),
                 duration_of(file.attrs, [name for name, _, _ in axes], unit),
             )
@@ -90,6 +88,22 @@ def duration_of(attributes: Mapping, axes: list[str], unit: str) -> str:
     keys = keys_of(str(attributes["scenario"]), json.loads(attributes["set"]))
     time = unit if unit not in ("", "1") else "s"
     return f"{float(keys.get('run.duration') or DURATION):g} {time}"
+
+
+def called(path: Path, kept: Mapping[str, Any], name: str) -> str:
+    """The data set of that name; or of what the scenario calls it, `event:flip` of event_flip. Raises PlotError."""
+    if name in kept:
+        return name
+    typed = {str(data.attrs.get("long_name", "")): word for word, data in kept.items()}
+    if name in typed:
+        return typed[name]
+    raise reject(path, f"one of {', '.join(kept)}", f'"{name}"')
+
+
+def scale_of(scale: Any) -> tuple[str, str, np.ndarray]:
+    """Key of the scenario, unit and values of an axis; in files of old the key is the name."""
+    key = str(scale.attrs.get("long_name", scale.name[1:]))
+    return key, unit_of(scale.attrs), scale[:]
 
 
 def counted(values: np.ndarray) -> np.ndarray:

@@ -73,8 +73,8 @@ def test_copies_that_are_interrupted_are_missed(double, tmp_path):
     ("arguments", "message"),
     [
         (["--view", "-"], "pendula: -: expected a file of its own for the page"),
-        (["--view", "a.html", "-o", "a.html"], "pendula: a.html: expected a file of its own for the page"),
-        (["--view", "a.html", "-o", "./a.html"], "pendula: a.html: expected a file of its own for the page"),
+        (["--view", "a.csv", "-o", "a.csv"], "pendula: a.csv: expected a file of its own for the page"),
+        (["--view", "a.csv", "-o", "./a.csv"], "pendula: a.csv: expected a file of its own for the page"),
         (
             ["--view", "a.html", "--copies", "2", "--apart", "nan"],
             "--apart: expected a number that is finite, got nan",

@@ -36,6 +36,12 @@ inline int glance_degree(const RunOptions& options) {
   return is_explicit(options.method) ? 3 : options.stages;
 }
 
+/// How far rows are apart; 0 where steps tell it.
+inline double row_spacing(const RunSetup& setup) {
+  if (setup.rows.any()) return setup.rows.interval;
+  return is_adaptive(setup.options) ? 0 : static_cast<double>(setup.every) * setup.options.step;
+}
+
 }  // namespace detail
 
 /// One run of anything that moves, once.
@@ -124,7 +130,7 @@ class Run {
 inline Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
       integrator_(setup_.subject->make_integrator(setup_.options)),
-      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration),
+      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, detail::row_spacing(setup_)),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
             {}} {}
 
