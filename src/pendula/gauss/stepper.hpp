@@ -163,6 +163,7 @@ class GaussStepper {
   // From where on the defect of a step is looked for. It is told, not acted on: steps of different sizes would cost
   // what symplectic ones are taken for, and long chains move well in modes far slower than their fastest.
   static constexpr double noticed_defect = 1e-6;
+  static constexpr double visible_turn = 1e-10;  // rad, or of a coordinate
 
   // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
   // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
@@ -269,12 +270,14 @@ class GaussStepper {
       if (!(energy > -largest_energy_defect) && !solver_.damped()) return Status::wrong_root;
     }
     defect_ = 0;
-    if (!solver_.dissipates() && may_have_defect(first)) defect_ = solver_.defect();
+    if (!solver_.dissipates() && may_have_defect(first, turn)) defect_ = solver_.defect();
     return Status::ok;
   }
 
-  // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that.
-  bool may_have_defect(double first) const {
+  // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that. What
+  // hardly moves has rates that are nothing to compare with.
+  bool may_have_defect(double first, double turn) const {
+    if (turn < visible_turn) return false;
     if (controller_.chooses()) return solver_.damped();
     return first >= noticed_defect * solver_.predictor_gain();
   }

@@ -80,23 +80,50 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
          " are less accurate, " + untrusted_after(std::max(seen, trust.until), start);
 }
 
-/// How a run is made again: with a tolerance a hundred times as large, or longer steps. Steps of twice the length,
-/// where some were taken in parts, would be taken in the same parts again; steps that are as long as a method can take
-/// by both tolerances, the same ones, are not where there is a stage less.
-inline RunOptions coarser(RunOptions options, const Statistics& statistics) {
-  if (options.method == Method::gauss && is_adaptive(options) && options.stages > 2) --options.stages;
-  options.step *= statistics.rejected_steps > 0 ? 3 : 2;
-  options.tolerance *= 100;
-  return options;
+/// Another run to compare one with.
+struct SecondLook {
+  RunOptions options;
+  std::string how;     ///< "with twice the step"
+  double factor = 1;   ///< what the run errs by over what it is off this one, about
+  double trusted = 1;  ///< at most, since errors scatter: that factor
+};
+
+/// One that errs more, and takes less time: with a tolerance a hundred times as large, or longer steps. Steps of twice
+/// the length, where some were taken in parts, would be taken in the same parts again; steps that are as long as a
+/// method can take by both tolerances, the same ones, are not where there are fewer stages.
+inline SecondLook coarser(const RunOptions& run, const Statistics& statistics) {
+  SecondLook look{run, "with a hundred times the tolerance", 0.2, 0.2};
+  if (is_adaptive(run)) {
+    look.options.tolerance *= 100;
+    if (run.method == Method::gauss && run.stages > 2) look.options.stages -= run.stages >= 6 ? 2 : 1;
+    return look;
+  }
+  const bool in_parts = statistics.rejected_steps > 0;
+  const double longer = in_parts ? 3 : 2;
+  look.options.step *= longer;
+  look.how = in_parts ? "with three times the step" : "with twice the step";
+  const double less = std::pow(longer, run.method == Method::rk4 ? 4 : order_of(run)) - 1;
+  look.factor = 1 / std::min(5.0, less);
+  look.trusted = 1 / std::min(2.5, less / 2);
+  return look;
 }
 
-/// How much less a run errs than what a coarser one is off it by, where that errs by its order: not more than a few
-/// times, since errors scatter.
-inline double gain(const RunOptions& run, const RunOptions& coarser) {
-  constexpr double most = 5;
-  if (is_adaptive(run)) return most;
-  const int order = run.method == Method::rk4 ? 4 : order_of(run);
-  return std::min(most, std::pow(coarser.step / run.step, order) - 1);
+/// One that errs less, where the coarser one says that the run cannot be trusted, which is so of the coarser one,
+/// perhaps. None where no run errs less.
+inline std::optional<SecondLook> finer(const RunOptions& run) {
+  SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
+  if (is_adaptive(run)) {
+    look.options.tolerance /= 100;
+    if (look.options.tolerance < (is_explicit(run.method) ? 1e-14 : 1e-16)) return {};
+    if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
+    return look;
+  }
+  constexpr double shorter = 0.8;
+  look.options.step *= shorter;
+  look.how = "with four fifths of the step";
+  look.factor = 1 / (1 - std::pow(shorter, run.method == Method::rk4 ? 4 : order_of(run)));
+  look.trusted = 1.5 * look.factor;
+  return look;
 }
 
 /// The error that is not told: about what was asked for; where that is a tolerance of the motion, what that makes of it
@@ -107,25 +134,19 @@ inline double trusted_error(const RunSetup& setup) {
   return is_of_motion ? std::min(visible, 1000 * setup.options.tolerance) : visible;
 }
 
-/// Of a second run: where that goes elsewhere, the steps or the chaos of the motion decide where.
-inline Doubt of_second_look(const RunSetup& setup, const RunOptions& coarser, const Separation& parted, Trust& trust) {
-  const double less = gain(setup.options, coarser), start = setup.start.time;
-  const double trusted = trusted_error(setup), error = parted.largest() / less;
-  if (error <= visible) trust.expected_error = error;
-  trust.until = parted.within(trusted * less, start);
+/// Where the other run goes elsewhere, the steps or the chaos of the motion decide where.
+inline Doubt of_second_look(const RunSetup& setup, const SecondLook& look, const Separation& parted, Trust& trust) {
+  const double start = setup.start.time, trusted = trusted_error(setup), error = parted.largest() * look.factor;
+  trust.expected_error = error <= visible ? error : std::numeric_limits<double>::quiet_NaN();
+  trust.until = parted.within(trusted / look.trusted, start);
   if (std::isinf(trust.until)) return {};
-  const bool in_parts = coarser.step == 3 * setup.options.step;
-  const std::string what = is_adaptive(coarser) ? "with a hundred times the tolerance"
-                           : in_parts           ? "with three times the step"
-                                                : "with twice the step";
   const std::string rows = rows_after(trust.until, start);
-  if (error <= visible) {
+  if (parted.largest() * look.trusted <= visible) {
     return rows + " may be off by more than " + pendula::rounded(trusted, 2) + ", up to about " +
            pendula::rounded(error, 1) + " of the size of the motion, which makes so much of the errors of its steps";
   }
-  const std::string elsewhere = std::isinf(error) ? "ends before its time" : "goes elsewhere";
-  const double seen = parted.within(visible * less, start);
-  return what + " the motion " + elsewhere + ": " +
+  const double seen = parted.within(visible / look.trusted, start);
+  return look.how + " the motion goes elsewhere: " +
          (seen > trust.until ? rows + " may be off by more than " + pendula::rounded(trusted, 2) + ", " : "") +
          untrusted_after(seen, start) + "; " + smaller_step_advice(setup.options);
 }

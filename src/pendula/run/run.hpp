@@ -82,8 +82,8 @@ class Run {
   struct NotFinite {};
 
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
-  std::optional<Track> try_out(const RunOptions& options, double share, Track track,
-                               const std::function<bool()>& stop) const;
+  Track try_out(const RunOptions& options, double share, Track track,
+                const std::function<bool(const Track&)>& stop) const;
   Track own_track() const { return Track(is_adaptive(setup_.options) ? Track::apart / 2 : Track::apart); }
   void choose_stages(RunOptions& options) const;
   bool aim(const std::function<bool()>& stop);
@@ -100,6 +100,7 @@ class Run {
   void conclude(RunReport& report);
   void finish(RunReport& report);
   void doubt(RunReport& report, bool went_on, const std::function<bool()>& stop);
+  detail::Doubt look_again(RunReport& report, const std::function<bool()>& stop);
   bool is_estimated() const { return setup_.doubted && setup_.estimate; }
 
   /// What is kept of a run besides its observers, for checkpoints.
@@ -150,10 +151,10 @@ inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bo
   return go(&checkpoint, stop);
 }
 
-// Nothing where it does not come to its end. Its start is off by `share` of itself: what a motion makes of that, errors
-// of steps do not show where they vanish with it, as beside an equilibrium.
-inline std::optional<Track> Run::try_out(const RunOptions& options, double share, Track track,
-                                         const std::function<bool()>& stop) const {
+// As far as it comes, until `stop`, asked of its track after every step. Its start is off by `share` of itself: what a
+// motion makes of that, errors of steps do not show where they vanish with it, as beside an equilibrium.
+inline Track Run::try_out(const RunOptions& options, double share, Track track,
+                          const std::function<bool(const Track&)>& stop) const {
   RunSetup trial = setup_;
   trial.accuracy.error = 0;
   trial.options = options;
@@ -165,23 +166,22 @@ inline std::optional<Track> Run::try_out(const RunOptions& options, double share
   std::erase_if(trial.events, [](const Event& event) { return !event.stop; });
   Run run(std::move(trial));
   run.track_ = std::move(track);
-  const RunReport report = run.go(stop);
-  if (report.end == RunEnd::stopped) return {};
-  return std::move(run.track_);
+  run.go([&] { return stop(*run.track_); });
+  return *std::move(run.track_);
 }
 
 // Whether the trials came to their ends.
 inline bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
-  const auto stops = [&] { return stopped = stopped || stop(); };
+  const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
   std::optional<Track> first;  // whose times are those of all
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
     RunOptions options = setup_.options;
     options.tolerance = tolerance;
     choose_stages(options);
-    std::optional<Track> track = try_out(options, share, first ? Track::at_times_of(*first) : own_track(), stops);
-    if (!track || !track->is_complete()) return {};
+    Track track = try_out(options, share, first ? Track::at_times_of(*first) : own_track(), stops);
+    if (!track.is_complete()) return {};
     if (!first) first = track;
     return track;
   };
@@ -288,6 +288,7 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
 inline void Run::take(const Motion& motion, double work) {
   const Observation seen = look_at(motion, work);
   ++rows_;
+  if (track_ && setup_.rows.any() && !is_adaptive(setup_.options)) track_->add_row(motion);
   for (Observer* observer : takers_) observer->take({motion, seen, row_, step_});
 }
 
@@ -367,14 +368,36 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
     if (track_ && kept_.aim.finest) parted.emplace(*setup_.subject, *track_, *kept_.aim.finest);
     return add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
   }
-  if (!track_) return;
-  const RunOptions coarser = detail::coarser(setup_.options, report.statistics);
-  const double share = is_adaptive(coarser) ? 0.01 * coarser.tolerance : std::numeric_limits<double>::epsilon();
+  if (track_) add(look_again(report, stop));
+}
+
+// By a run that takes less time; where that says that this one cannot be trusted, by one that takes more, if there is
+// time for it: of constant steps not where the other came far.
+inline detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
-  const std::optional<Track> other =
-      try_out(coarser, share, Track::at_times_of(*track_), [&] { return stopped = stopped || stop(); });
-  if (!other) return add("it was interrupted while it ran again to see how far it can be trusted: that is not known");
-  add(detail::of_second_look(setup_, coarser, Separation(*setup_.subject, *track_, *other), report.trust));
+  const double tolerance = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
+  const double share = std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon());
+  const auto compare = [&](const detail::SecondLook& look) {
+    Divergence divergence(*setup_.subject, *track_);
+    const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {
+      stopped = stopped || stop();
+      return stopped || divergence.exceeds(track, detail::visible / look.trusted);
+    });
+    return Separation(*setup_.subject, *track_, other);
+  };
+  const std::string unknown =
+      "it was interrupted while it ran again to see how far it can be trusted: that is not known";
+  const detail::SecondLook coarser = detail::coarser(setup_.options, report.statistics);
+  const Separation first = compare(coarser);
+  if (stopped) return unknown;
+  detail::Doubt doubt = detail::of_second_look(setup_, coarser, first, report.trust);
+  if (!doubt) return doubt;
+  const double begin = setup_.start.time, end = report.last.time;
+  const bool is_soon = first.within(detail::visible / coarser.trusted, begin) < begin + (end - begin) / 2;
+  const std::optional<detail::SecondLook> finer = detail::finer(setup_.options);
+  if (!finer || !(is_adaptive(setup_.options) || is_soon)) return doubt;
+  const Separation second = compare(*finer);
+  return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);
 }
 
 // The first failure is the one that is told.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <pendula/run/integrator.hpp>
@@ -52,10 +53,27 @@ class Track {
     }
   }
 
+  /// A row within a step, which may err as the step does not. Of very many rows fewer are kept.
+  void add_row(const Motion& row) {
+    if (looks() || ++all_rows_ % every_row_ != 0) return;
+    rows_.push_back(row);
+    if (rows_.size() < most_rows) return;
+    std::size_t kept = first;
+    for (std::size_t k = kept + 1; k < rows_.size(); k += 2) std::swap(rows_[kept++], rows_[k]);
+    rows_.resize(kept);
+    every_row_ *= 2;
+  }
+
   /// The run is over, in this state; one that is not complete ended before its time.
   void finish(Motion last, bool is_complete) {
     last_ = std::move(last);
     is_complete_ = is_complete;
+    if (rows_.empty()) return;
+    std::ranges::move(rows_, std::back_inserter(states_));
+    rows_.clear();
+    std::ranges::stable_sort(states_, {}, &Motion::time);
+    const auto same = std::ranges::unique(states_, {}, &Motion::time);
+    states_.erase(same.begin(), same.end());
   }
 
   bool is_complete() const { return is_complete_; }
@@ -65,6 +83,7 @@ class Track {
  private:
   // The first steps; states of a run of few steps, as dense as that; what is kept of any run, about 64 MB.
   static constexpr std::size_t first = 12, few = 64, most_numbers = std::size_t{1} << 23, numbers_besides = 16;
+  static constexpr std::size_t most_rows = 256;
 
   void count_step(const Integrator& integrator) {
     ++steps_;
@@ -82,9 +101,23 @@ class Track {
   std::int64_t every_, steps_ = 0;
   std::vector<double> times_;
   std::vector<Motion> states_;
+  std::int64_t all_rows_ = 0, every_row_ = 1;
+  std::vector<Motion> rows_;
   Motion last_;
   bool is_complete_ = false;
 };
+
+/// The largest of each number of a track.
+inline Motion size_of(const Track& track) {
+  Motion size = track.last();
+  size.q = size.q.cwiseAbs();
+  size.v = size.v.cwiseAbs();
+  for (const Motion& state : track.states()) {
+    size.q = size.q.cwiseMax(state.q.cwiseAbs());
+    size.v = size.v.cwiseMax(state.v.cwiseAbs());
+  }
+  return size;
+}
 
 /// How far two runs of one system are apart along their motion.
 class Separation {
@@ -92,7 +125,10 @@ class Separation {
   /// Of two tracks, one of them at the times of the other, or both at those of a third.
   Separation(const Subject& subject, const Track& a, const Track& b) {
     const std::size_t common = std::min(a.states().size(), b.states().size());
-    const Motion size = size_of(a, b);
+    Motion size = size_of(a);
+    const Motion other_size = size_of(b);
+    size.q = size.q.cwiseMax(other_size.q);
+    size.v = size.v.cwiseMax(other_size.v);
     places_.reserve(common + 1);
     const auto add = [&](const Motion& one, const Motion& other) {
       const double off = subject.distance(one, other, size);
@@ -130,23 +166,28 @@ class Separation {
     double time, off;
   };
 
-  // The largest of each number.
-  static Motion size_of(const Track& a, const Track& b) {
-    Motion size = a.last();
-    size.q = size.q.cwiseAbs();
-    size.v = size.v.cwiseAbs();
-    const auto grow = [&](const Motion& motion) {
-      size.q = size.q.cwiseMax(motion.q.cwiseAbs());
-      size.v = size.v.cwiseMax(motion.v.cwiseAbs());
-    };
-    for (const Track* track : {&a, &b}) {
-      for (const Motion& state : track->states()) grow(state);
-      grow(track->last());
+  std::vector<Place> places_;
+};
+
+/// Goes along with a track that grows at the times of one that is complete.
+class Divergence {
+ public:
+  /// `track` must outlive it.
+  Divergence(const Subject& subject, const Track& track) : subject_(subject), track_(track), size_(size_of(track)) {}
+
+  /// Whether what has come since is further off than that.
+  bool exceeds(const Track& growing, double limit) {
+    for (; next_ < growing.states().size(); ++next_) {
+      if (!(subject_.distance(track_.states()[next_], growing.states()[next_], size_) <= limit)) return true;
     }
-    return size;
+    return false;
   }
 
-  std::vector<Place> places_;
+ private:
+  const Subject& subject_;
+  const Track& track_;
+  Motion size_;
+  std::size_t next_ = 0;
 };
 
 }  // namespace pendula
