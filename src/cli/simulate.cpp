@@ -90,13 +90,13 @@ std::optional<std::string> output_of(const RunSource& source, const SimulateOpti
   return options.output;
 }
 
-/// Opens the file for the rows; a run file that goes on begins as a copy. Throws io::InputError.
+/// Opens the file for the rows; a run file that goes on begins with those that are there. Throws io::InputError.
 std::unique_ptr<io::RowsFile> open_rows(const std::string& file, const SimulateOptions& options,
-                                        const io::RunOrigin& origin, const std::optional<Checkpoint>& from,
+                                        const io::RunOrigin& origin, const std::optional<io::SavedRun>& saved,
                                         const std::vector<Quantity>& quantities) {
   if (!is_run_file(file)) return std::make_unique<io::TrajectoryFile>(file, columns_of(quantities));
-  if (!options.resume) return std::make_unique<io::RunFile>(file, origin, quantities);
-  return std::make_unique<io::RunFile>(file, *options.resume, from ? from->rows : 0, quantities);
+  if (!saved) return std::make_unique<io::RunFile>(file, origin, quantities);
+  return std::make_unique<io::RunFile>(file, *options.resume, *saved, origin, quantities);
 }
 
 /// The same where one is asked for, and says what it replaces.
@@ -189,7 +189,7 @@ class Session {
         origin_(origin_of(source, run_.description(), model)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
-        file_(open_rows(output_, options, origin_, from_, quantities_of(*setup_.subject, plan.natural))),
+        file_(open_rows(output_, options, origin_, source.saved, quantities_of(*setup_.subject, plan.natural))),
         events_(open_events(options, setup_)),
         film_rows_(open_film_rows(quantities_of(*setup_.subject, plan.natural))),
         progress_(setup_, !options.quiet) {

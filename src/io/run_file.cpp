@@ -11,12 +11,15 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "io/fingerprint.hpp"
 #include "io/input_error.hpp"
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
+#include "io/process.hpp"
 
 namespace pendula::io {
 namespace {
@@ -24,26 +27,56 @@ namespace {
 namespace fs = std::filesystem;
 
 // Of a row of the table of checkpoints; after them the numbers of the two members.
-enum Place : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
+enum Place : std::size_t {
+  check,
+  serial,
+  at_time,
+  kept_rows,
+  rows_check,
+  since_row,
+  integrator_size,
+  record_size,
+  numbers
+};
 
 /// Slots for checkpoints: what is being written is never the last that is whole.
 constexpr std::size_t slots = 2;
 
-/// A number that tells whether all others came through.
-double checksum(std::span<const double> row) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const double number : row.subspan(check + 1)) {
+/// Of numbers to the last bit, `before` being that of those before them.
+std::uint64_t fingerprint_of(std::span<const double> numbers, std::uint64_t before = empty_fingerprint) {
+  std::uint64_t hash = before;
+  for (const double number : numbers) {
     hash = (hash ^ std::bit_cast<std::uint64_t>(number)) * 0x100000001b3U;
     hash ^= hash >> 32;
   }
-  return static_cast<double>(hash >> 12);
+  return hash;
 }
 
-std::vector<double> to_row(const Checkpoint& checkpoint, std::uint64_t count) {
+/// What a double holds of it.
+double as_number(std::uint64_t fingerprint) {
+  return static_cast<double>(fingerprint >> 12);
+}
+
+/// A number that tells whether all others came through.
+double checksum(std::span<const double> row) {
+  return as_number(fingerprint_of(row.subspan(check + 1)));
+}
+
+/// Of what a run began with, but for what whoever goes on compares with itself.
+std::uint64_t fingerprint_of(const RunOrigin& origin) {
+  std::vector<std::string> texts = {origin.scenario_name, origin.scenario, origin.model};
+  texts.insert(texts.end(), origin.overrides.begin(), origin.overrides.end());
+  std::uint64_t hash = empty_fingerprint;
+  for (const std::string& text : texts) hash = fingerprint(text, fingerprint(std::to_string(text.size()) + ':', hash));
+  return hash;
+}
+
+std::vector<double> to_row(const Checkpoint& checkpoint, std::uint64_t rows, std::uint64_t count) {
   std::vector<double> row(numbers);
   row[serial] = static_cast<double>(count);
   row[at_time] = checkpoint.time;
   row[kept_rows] = static_cast<double>(checkpoint.rows);
+  row[rows_check] = as_number(rows);
   row[since_row] = static_cast<double>(checkpoint.since_row);
   row[integrator_size] = static_cast<double>(checkpoint.integrator.numbers.size());
   row[record_size] = static_cast<double>(checkpoint.record.numbers.size());
@@ -82,17 +115,56 @@ std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& run, doub
   return last;
 }
 
+/// What a run file says that it was not written with.
+class Changed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A word, such as the name of a kernel; may be empty. Throws Changed.
+std::string read_word(const hdf5::Handle& object, const std::string& name) {
+  std::string word = hdf5::read_attribute(object, name);
+  if (!std::ranges::all_of(word, [](char c) { return c > ' ' && c < '\x7f'; })) {
+    throw Changed("one whose attribute \"" + name + "\" is damaged");
+  }
+  return word;
+}
+
 RunOrigin read_origin(const hdf5::Handle& file, const hdf5::Handle& run) {
   RunOrigin origin;
-  origin.version = hdf5::read_attribute(file, "pendula");
-  origin.instruction_set = hdf5::read_attribute(file, "instruction_set");
-  origin.solver = hdf5::read_attribute(file, "solver");
-  origin.kernel = hdf5::read_attribute(file, "kernel");
+  origin.version = read_word(file, "pendula");
+  origin.instruction_set = read_word(file, "instruction_set");
+  origin.solver = read_word(file, "solver");
+  origin.kernel = read_word(file, "kernel");
   origin.scenario_name = hdf5::read_attribute(run, "scenario_file");
   origin.scenario = hdf5::read_text(run, "scenario");
   origin.overrides = nlohmann::json::parse(hdf5::read_text(run, "set")).get<std::vector<std::string>>();
   origin.model = hdf5::read_text(run, "model");
+  if (static_cast<std::uint64_t>(hdf5::read_number(run, "checksum")) != fingerprint_of(origin)) {
+    throw Changed("one whose scenario, settings or model are not what it was written with");
+  }
   return origin;
+}
+
+/// Does it to a run file that a run goes on from. Throws InputError where the file is damaged.
+template <class Do>
+auto guarded_source(const std::string& file, Do it) {
+  const auto reject = [&](const std::string& what) {
+    throw InputError(file + ": expected a run file to go on from, got " + what);
+  };
+  std::error_code unknown;
+  if (!fs::exists(file, unknown)) reject("a file that is not there");
+  hdf5::begin();
+  try {
+    return it();
+  } catch (const hdf5::Error& error) {
+    reject(std::string("one that HDF5 cannot read: ") + error.what());
+  } catch (const nlohmann::json::exception&) {
+    reject("one whose list of settings is damaged");
+  } catch (const Changed& error) {
+    reject(error.what());
+  }
+  throw std::logic_error("guarded_source");  // not reached
 }
 
 /// Of numbers that all runs of this kind have; a chunk of a quantity has about 32 kB where there are few.
@@ -104,29 +176,23 @@ std::size_t chunk_rows(std::size_t columns) {
 }  // namespace
 
 SavedRun read_saved_run(const std::string& file) {
-  const auto reject = [&](const std::string& what) {
-    throw InputError(file + ": expected a run file to go on from, got " + what);
-  };
-  std::error_code unknown;
-  if (!fs::exists(file, unknown)) reject("a file that is not there");
-  hdf5::begin();
-  try {
-    const hdf5::Handle opened = hdf5::open_file(file, false);
-    if (!hdf5::has(opened, "run")) reject("a file without the group \"run\"");
+  return guarded_source(file, [&] {
+    const hdf5::Handle opened = hdf5::open_file(file);
+    if (!hdf5::has(opened, "run")) throw Changed("a file without the group \"run\"");
     const hdf5::Handle run = hdf5::open_group(opened, "run");
     SavedRun saved;
+    // Where texts are, HDF5 has no checksums, and goes in circles through what is damaged.
+    if (!comes_to_an_end([&] { read_origin(opened, run); })) throw Changed("one that is damaged");
     saved.origin = read_origin(opened, run);
     saved.has_rows = hdf5::has(opened, "t");
     double rows = std::numeric_limits<double>::infinity();
     if (saved.has_rows) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(opened, "t"))[0]);
-    if (const auto last = last_checkpoint(run, rows)) saved.checkpoint = from_row(*last);
+    if (const auto last = last_checkpoint(run, rows)) {
+      saved.checkpoint = from_row(*last);
+      saved.rows_check = (*last)[rows_check];
+    }
     return saved;
-  } catch (const hdf5::Error& error) {
-    reject(std::string("one that HDF5 cannot read: ") + error.what());
-  } catch (const nlohmann::json::exception& error) {
-    reject(error.what());
-  }
-  return {};
+  });
 }
 
 void write_saved_run(const std::string& file, const RunOrigin& origin, const Checkpoint& checkpoint) {
@@ -157,14 +223,10 @@ RunFile::RunFile(const std::string& name, const RunOrigin& origin, std::vector<Q
   guarded([&] { create(origin); });
 }
 
-RunFile::RunFile(const std::string& name, const std::string& from, std::int64_t rows, std::vector<Quantity> quantities)
-    : quantities_(std::move(quantities)) {
-  open_part(name);
-  std::error_code error;
-  fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
-  if (error) throw OutputError(name_, error.value());
-  hdf5::mark_as_closed(path_);
-  guarded([&] { reopen(rows); });
+RunFile::RunFile(const std::string& name, const std::string& from, const SavedRun& saved, const RunOrigin& origin,
+                 std::vector<Quantity> quantities)
+    : RunFile(name, origin, std::move(quantities)) {
+  if (saved.checkpoint) guarded_source(from, [&] { take_over(from, saved); });
 }
 
 RunFile::~RunFile() {
@@ -217,6 +279,7 @@ void RunFile::create(const RunOrigin& origin) {
   hdf5::write_text(run_, "scenario", origin.scenario);
   hdf5::write_text(run_, "set", nlohmann::json(origin.overrides).dump());
   hdf5::write_text(run_, "model", origin.model);
+  hdf5::write_attribute(run_, "checksum", static_cast<std::int64_t>(fingerprint_of(origin)));
   hdf5::Handle links;
   for (const Quantity& quantity : quantities_) {
     datasets_.push_back(hdf5::create_rows(file_, quantity.name, quantity.links, chunk_rows_));
@@ -234,41 +297,47 @@ void RunFile::create(const RunOrigin& origin) {
   }
 }
 
-void RunFile::reopen(std::int64_t rows) {
-  file_ = hdf5::open_file(path_, true);
-  run_ = hdf5::open_group(file_, "run");
-  for (const Quantity& quantity : quantities_) datasets_.push_back(hdf5::open_dataset(file_, quantity.name));
-  in_file_ = static_cast<std::size_t>(rows);
-  begun_ = in_file_ - in_file_ % chunk_rows_;
-  const std::size_t pending = in_file_ - begun_;
-  block_.resize(pending * columns_);
-  for (std::size_t k = 0; k < datasets_.size(); ++k) {
-    hdf5::set_rows(datasets_[k], in_file_);
-    if (pending == 0) continue;
-    const std::vector<double> read = hdf5::read_rows(datasets_[k], begun_, pending);
-    const std::size_t size = quantities_[k].size();
-    for (std::size_t i = 0; i < read.size(); ++i) {
-      block_[i / size * columns_ + quantities_[k].column(i % size)] = read[i];
+// Row by row, so that what is damaged is noticed, and not handed on.
+void RunFile::take_over(const std::string& from, const SavedRun& saved) {
+  const hdf5::Handle source = hdf5::open_file(from);
+  std::vector<hdf5::Handle> datasets;
+  for (const Quantity& quantity : quantities_) datasets.push_back(hdf5::open_dataset(source, quantity.name));
+  const auto rows = static_cast<std::size_t>(saved.checkpoint->rows);
+  for (std::size_t first = 0; first < rows; first += chunk_rows_) {
+    const std::size_t count = std::min(chunk_rows_, rows - first);
+    block_.resize(count * columns_);
+    for (std::size_t k = 0; k < datasets.size(); ++k) {
+      const std::vector<double> read = hdf5::read_rows(datasets[k], first, count);
+      const std::size_t size = quantities_[k].size();
+      for (std::size_t i = 0; i < read.size(); ++i) {
+        block_[i / size * columns_ + quantities_[k].column(i % size)] = read[i];
+      }
     }
+    rows_hash_ = fingerprint_of(block_, rows_hash_);
+    write_if_full();
   }
-  const auto last = last_checkpoint(run_, static_cast<double>(rows));
-  if (last) serial_ = static_cast<std::uint64_t>((*last)[serial]);
+  if (as_number(rows_hash_) != saved.rows_check) throw Changed("one whose rows are not those that were written");
+  waits_ = !block_.empty();
 }
 
 void RunFile::take(const Row& row) {
   block_.insert(block_.end(), row.numbers.begin(), row.numbers.end());
-  const bool full = block_.size() == chunk_rows_ * columns_;
-  if (full) guarded([&] { write_rows(); });
-  if (full || is_due()) guarded([&] { flush(); });
+  rows_hash_ = fingerprint_of(row.numbers, rows_hash_);
+  if (write_if_full() || is_due()) guarded([&] { flush(); });
+}
+
+bool RunFile::write_if_full() {
+  if (block_.size() < chunk_rows_ * columns_) return false;
+  guarded([&] { write_rows(); });
+  return true;
 }
 
 void RunFile::keep(const Checkpoint& checkpoint) {
   kept_ = checkpoint;
+  kept_hash_ = rows_hash_;
   if (checkpoint_.get() < 0) {
     guarded([&] {
-      checkpoint_ = hdf5::has(run_, "checkpoint")
-                        ? hdf5::open_dataset(run_, "checkpoint")
-                        : hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, 0).size());
+      checkpoint_ = hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, 0, 0).size());
       hdf5::let_others_read(file_);
       flush();
     });
@@ -316,7 +385,7 @@ void RunFile::flush(std::size_t rows) {
   const bool has_its_rows = kept_ && (columns_ == 0 || static_cast<std::size_t>(kept_->rows) <= rows);
   if (has_its_rows && checkpoint_.get() >= 0) {
     ++serial_;
-    hdf5::write_row(checkpoint_, serial_ % slots, to_row(*kept_, serial_));
+    hdf5::write_row(checkpoint_, serial_ % slots, to_row(*kept_, kept_hash_, serial_));
     kept_.reset();
   }
   hdf5::flush(file_, path_);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/rows_file.hpp"
 
@@ -31,9 +32,10 @@ struct SavedRun {
   RunOrigin origin;
   std::optional<Checkpoint> checkpoint;  ///< none where it had just begun
   bool has_rows = true;                  ///< whether the file keeps the trajectory, too
+  double rows_check = 0;                 ///< what its rows up to the checkpoint are known by
 };
 
-/// Reads all that a run needs to go on. Throws InputError where the file has none.
+/// Reads all that a run needs to go on. Throws InputError where the file has none, or is damaged.
 SavedRun read_saved_run(const std::string& file);
 
 /// Writes a file that has only what a run needs to go on. Throws InputError where it cannot be opened, OutputError.
@@ -47,8 +49,10 @@ class RunFile : public RowsFile {
   /// written or is just being written by somebody else.
   RunFile(const std::string& name, const RunOrigin& origin, std::vector<Quantity> quantities);
 
-  /// Goes on with a copy of the file `from`, after the first `rows` rows.
-  RunFile(const std::string& name, const std::string& from, std::int64_t rows, std::vector<Quantity> quantities);
+  /// Begins with the rows of the file `from` up to its checkpoint. Throws InputError also where those are not what was
+  /// written.
+  RunFile(const std::string& name, const std::string& from, const SavedRun& saved, const RunOrigin& origin,
+          std::vector<Quantity> quantities);
 
   ~RunFile() override;
 
@@ -76,9 +80,10 @@ class RunFile : public RowsFile {
 
   void open_part(const std::string& name);
   void create(const RunOrigin& origin);
-  void reopen(std::int64_t rows);
+  void take_over(const std::string& from, const SavedRun& saved);
   void put_in_place();
   void close();
+  bool write_if_full();
   void write_rows();
   void write_rest();
   void reserve();
@@ -104,7 +109,9 @@ class RunFile : public RowsFile {
   bool waits_ = false;           // the block began before the last flush
   bool unpacked_ = false;        // it was written before it was full, and so stays: its place could not be used again
   int full_ = 0;                 // errno: the disk has room only for what is to be written last
+  std::uint64_t rows_hash_ = empty_fingerprint;
   std::optional<Checkpoint> kept_;  // and not yet written
+  std::uint64_t kept_hash_ = 0;     // of the rows by then
   std::uint64_t serial_ = 0;        // of checkpoints
   Clock::time_point flushed_ = Clock::now();
 };

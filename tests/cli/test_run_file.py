@@ -349,17 +349,50 @@ def test_a_file_that_is_replaced_is_told(pendula, scenario, tmp_path):
     assert run.status == 2 and file.read_text() == DOUBLE
 
 
-def test_a_file_that_cannot_be_gone_on_with_stays_as_it_is(pendula, scenario, tmp_path):
-    """A member that does not fit is found when the new file is begun already."""
-    text = DOUBLE.replace("step     =", 'solver = "chain"\nstages = 2\nstep =')
-    assert pendula("simulate", scenario(text), "-o", "run.h5").status == 0
+CHANGES = {
+    "masses": ("run/scenario", DOUBLE.replace("[1.0, 1.0]", "[1.0, 2.0]")),
+    "stages": ("run/scenario", DOUBLE.replace("step     =", "stages = 5\nstep =")),
+    "settings": ("run/set", '["run.duration=2.0", "chain.gravity=1.62"]'),
+    "model": ("run/model", "import os"),
+}
+ANOTHER_RUN = "one whose scenario, settings or model are not what it was written with"
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_file_that_tells_of_another_run_is_refused_and_stays_as_it_is(name, pendula, scenario, tmp_path):
+    assert pendula("simulate", scenario(DOUBLE), "--set", "run.duration=1.0", "-o", "run.h5").status == 0
+    dataset, text = CHANGES[name]
     with h5py.File(tmp_path / "run.h5", "a") as run:
-        run["run/scenario"][()] = text.replace("stages = 2", "stages = 5")
+        run[dataset][()] = text
     before = (tmp_path / "run.h5").read_bytes()
     resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=2")
-    assert resumed.status != 0 and "member: expected" in resumed.err, resumed.err
+    assert resumed.status == 2
+    assert resumed.err == f"pendula: run.h5: expected a run file to go on from, got {ANOTHER_RUN}\n"
     assert (tmp_path / "run.h5").read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.toml"]
+
+
+def test_rows_that_are_not_those_of_the_run_are_refused(pendula, scenario, tmp_path):
+    """That is found when the new file is begun already."""
+    assert pendula("simulate", scenario(DOUBLE), "-o", "run.h5").status == 0
+    with h5py.File(tmp_path / "run.h5", "a") as run:
+        run["theta"][3, 1] = np.nextafter(run["theta"][3, 1], 0)
+    before = (tmp_path / "run.h5").read_bytes()
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=2")
+    expected = "expected a run file to go on from, got one whose rows are not those that were written"
+    assert (resumed.status, resumed.err) == (2, f"pendula: run.h5: {expected}\n")
+    assert (tmp_path / "run.h5").read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.toml"]
+
+
+def test_a_run_that_went_on_says_how_long_it_is(pendula, scenario, tmp_path):
+    """The file is the one that a run of this duration would have written, so it goes on to there once more."""
+    assert pendula("simulate", scenario(DOUBLE), "--set", "chain.gravity=1.62", "-o", "run.h5").status == 0
+    for duration in ("2", "3"):
+        assert pendula("simulate", "--resume", "run.h5", "--set", f"run.duration={duration}").status == 0
+    with h5py.File(tmp_path / "run.h5") as run:
+        assert run["run/set"].asstr()[()] == '["chain.gravity=1.62","run.duration=3"]'
+    assert pendula("simulate", "--resume", "run.h5").status == 0
 
 
 def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monkeypatch):
