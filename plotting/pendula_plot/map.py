@@ -11,8 +11,8 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from .errors import PlotError, require_end_of_reading, told_of
 from .figure import GREEK, style, symbol
-from .run import PlotError
 
 WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
 SIDE = 5.2  # inches, of the longer side of a map
@@ -46,7 +46,8 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
     """Reads a key of an ensemble's file, and the one that a contour is of. Raises PlotError."""
     import h5py
 
-    try:
+    with told_of(path, "a file of pendula ensemble"):
+        require_end_of_reading(path)
         with h5py.File(path, "r") as file:
             if str(file.attrs.get("kind", "")) != "ensemble":
                 raise reject(path, "a file of pendula ensemble", "another HDF5 file")
@@ -71,8 +72,6 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
                 file[contour][...] if contour else None,
                 bool(file.attrs["complete"]),
             )
-    except OSError as error:
-        raise reject(path, "a file of pendula ensemble", f"{error.strerror or error}") from None
 
 
 def counted(values: np.ndarray) -> np.ndarray:

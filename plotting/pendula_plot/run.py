@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import PlotError, require_end_of_reading, told_of
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # of a column
 FIRST_UNITS = {"t": "s", "energy": "J"}
 STEPS_A_ROW = 10  # what output.every is where the step is constant and a scenario does not say; else 1
-
-
-class PlotError(Exception):
-    """A message for people: what was expected, and what there is."""
 
 
 @dataclass(frozen=True)
@@ -115,15 +114,19 @@ class Run:
         return places
 
     @cached_property
+    def document(self) -> dict:
+        """The scenario, parsed."""
+        return tomllib.loads(self.scenario)
+
+    @cached_property
     def steps_a_row(self) -> int | None:
         """Accepted steps from row to row, 0 where rows are at times; None where no scenario tells."""
         if not self.scenario:
             return None
-        document = tomllib.loads(self.scenario)
         keys = {
             f"{table}.{key}": value
             for table in ("run", "output")
-            for key, value in document.get(table, {}).items()
+            for key, value in self.document.get(table, {}).items()
         }
         keys |= {
             key.strip(): value.strip()
@@ -137,11 +140,7 @@ class Run:
     @cached_property
     def masses(self) -> np.ndarray | None:
         """Of a chain's bobs, as far as its scenario tells them."""
-        try:
-            chain = tomllib.loads(self.scenario).get("chain", {})
-        except tomllib.TOMLDecodeError:
-            return None
-        masses = chain.get("masses")
+        masses = self.document.get("chain", {}).get("masses")
         if masses is None or not self.is_chain:
             return None
         masses = np.ravel(np.asarray(masses, dtype=float))
@@ -162,22 +161,20 @@ class Run:
 
 def read_run(path: Path) -> Run:
     """Reads a trajectory, CSV or HDF5, also one that is still growing. Raises PlotError."""
-    try:
+    with told_of(path, "a trajectory"):
         with path.open("rb") as stream:
             is_hdf5 = stream.read(8) == b"\x89HDF\r\n\x1a\n"
         run = read_hdf5(path) if is_hdf5 else read_csv(path)
-    except OSError as error:
-        raise PlotError(
-            f"{path}: expected a trajectory that can be read, got: {error.strerror or error}"
-        ) from None
-    if len(run.time) == 0:
-        raise PlotError(f"{path}: expected rows, got none")
-    return run
+        if len(run.time) == 0:
+            raise PlotError(f"{path}: expected rows, got none")
+        _ = run.steps_a_row, run.masses  # what the scenario of a damaged file tells is wrong here, not later
+        return run
 
 
 def read_hdf5(path: Path) -> Run:
     import h5py
 
+    require_end_of_reading(path)
     columns, units = {}, {}
     with h5py.File(path, "r") as file:
         if "t" not in file or "run" not in file:
@@ -197,7 +194,7 @@ def read_hdf5(path: Path) -> Run:
 
 def read_csv(path: Path) -> Run:
     header, rows = read_lines(path)
-    if header[:1] != ["t"]:
+    if header[:1] != ["t"] or not all(map(NAME.fullmatch, header)):
         text = ",".join(header)
         got = "an empty file" if not text else text if len(text) <= 60 else text[:60] + "…"
         raise PlotError(f"{path}: expected a trajectory with columns t, …, got {got}")
