@@ -316,6 +316,14 @@ void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
   }
 }
 
+/// An error that something is asked for: no method tells smaller ones from rounding.
+double error_number(const Section& run, std::string_view key, double otherwise) {
+  constexpr double finest = 1e-16;
+  const double error = number(run, key, otherwise, Sign::positive);
+  if (error < finest && error != otherwise) run.find(key)->fail("a number of at least " + shortest(finest));
+  return error;
+}
+
 RunOptions read_run(const Section& run) {
   RunOptions options;
   options.method = choice(run, "method", options.method);
@@ -327,7 +335,7 @@ RunOptions read_run(const Section& run) {
   options.solver = choice(run, "solver", options.solver);
   options.iteration = choice(run, "iteration", options.iteration);
   options.step = number(run, "step", options.step, Sign::positive);
-  options.tolerance = number(run, "tolerance", options.tolerance, Sign::positive);
+  options.tolerance = error_number(run, "tolerance", options.tolerance);
   if (!is_explicit(options.method) && !run.find("step")) {
     options.step = 0;
     if (!stages) options.stages = stages_for(options.method, options.tolerance);
@@ -341,7 +349,7 @@ Accuracy read_accuracy(const Section& run, const RunOptions& options) {
   const auto accuracy = run.find("accuracy");
   if (accuracy && run.find("tolerance")) accuracy->fail("nothing beside run.tolerance, which follows from it");
   const bool is_asked = !is_explicit(options.method) && !run.find("step") && !run.find("tolerance");
-  return {number(run, "accuracy", is_asked ? options.tolerance : 0, Sign::positive), !run.find("stages").has_value()};
+  return {error_number(run, "accuracy", is_asked ? options.tolerance : 0), !run.find("stages").has_value()};
 }
 
 double read_duration(const Section& run, const RunOptions& options) {

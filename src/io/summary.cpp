@@ -170,10 +170,6 @@ std::string what_was_moved(const ModelSummary& model) {
                            ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
 }
 
-std::string aim_text(const AccuracyAim& aim) {
-  return std::isfinite(aim.error) ? "expected at the end: " + rounded(aim.error, 1) : "";
-}
-
 std::string settings(const Summary& summary) {
   const ModelSummary& model = summary.model;
   const UnitNames unit = unit_names(model.natural);
@@ -190,7 +186,7 @@ std::string settings(const Summary& summary) {
   if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
-  if (summary.aimed) text += line("accuracy", shortest(summary.accuracy), aim_text(*summary.aimed));
+  if (summary.aimed) text += line("accuracy", shortest(summary.accuracy));
   text += is_adaptive(summary.options) ? line("tolerance", summary.aimed ? rounded(summary.options.tolerance, 3)
                                                                          : shortest(summary.options.tolerance))
                                        : line("step", shortest(summary.options.step) + time);
@@ -246,6 +242,20 @@ std::string energies(const Summary& summary) {
          line("energy at end", shown_or_dash(summary.energy_final, 12) + unit) +
          line("largest " + error_name(summary), shown_or_dash(summary.energy_error.largest, 3),
               of + ", over " + plural(summary.rows, "row"));
+}
+
+/// How far rows can be trusted.
+std::string trust(const Summary& summary) {
+  const Trust& trust = summary.trust;
+  std::string text;
+  if (std::isfinite(trust.expected_error)) {
+    const std::string of = summary.model.space.empty() ? "size of the motion" : "length of the chain, or radians";
+    text += line("expected error", rounded(trust.expected_error, 1), "of the " + of + ", in every row");
+  }
+  if (std::isfinite(trust.until)) {
+    text += line("trusted until", rounded(trust.until, 4) + std::string(unit_names(summary.model.natural).time));
+  }
+  return text;
 }
 
 /// Where the last bob is, or of a system what its table shows.
@@ -377,8 +387,8 @@ std::string to_json(const Summary& summary) {
                    {"step", where(!adaptive, summary.options.step)},
                    {"tolerance", where(adaptive, summary.options.tolerance)},
                    {"accuracy", where(summary.aimed.has_value(), summary.accuracy)},
-                   {"expected_error", where(summary.aimed && std::isfinite(summary.aimed->error),
-                                            summary.aimed ? summary.aimed->error : 0)},
+                   {"expected_error", summary.trust.expected_error},
+                   {"trusted_until", summary.trust.until},
                    {"duration", summary.duration},
                    {"every", where(!summary.at.any(), summary.every)},
                    {"interval", where(summary.at.interval > 0, summary.at.interval)},
@@ -404,7 +414,8 @@ std::string to_json(const Summary& summary) {
 
 std::string to_text(const Summary& summary) {
   return "pendula " + std::string(version) + ": " + summary.model.scenario + "\n\n" + settings(summary) + "\n" +
-         table(summary) + "\n" + statistics(summary) + "\n" + energies(summary) + "\n" + ending(summary);
+         table(summary) + "\n" + statistics(summary) + "\n" + energies(summary) + trust(summary) + "\n" +
+         ending(summary);
 }
 
 }  // namespace pendula::io

@@ -140,7 +140,9 @@ def test_a_run_goes_on_as_if_it_had_never_stopped(name, pendula, scenario, tmp_p
         resumed = pendula("simulate", "--resume", "part.h5", "--set", f"run.duration={end}", "--json")
         assert (resumed.status, resumed.err) == (0, ""), resumed.err
     assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
-    different = {"scenario", "trajectory", "wall_seconds"}
+    # How far rows can be trusted is estimated anew, of those that are new.
+    assert 0 < resumed.json["expected_error"] < 1e-3
+    different = {"scenario", "trajectory", "wall_seconds", "expected_error"}
     assert {**resumed.json, **dict.fromkeys(different)} == {**whole.json, **dict.fromkeys(different)}
 
 

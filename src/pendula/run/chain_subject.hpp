@@ -89,18 +89,46 @@ class ChainSubject : public Subject {
     return {1 + 2 * Space::dof * links + dimension * (links - 1), dimension};
   }
 
-  /// Of bobs relative to the length of the chain, and of their velocities to the fastest.
-  double distance(const Motion& a, const Motion& b) const override {
+  using Subject::distance;
+  /// Of bobs relative to the length of the chain, and of angles  [rad], those around the vertical by as far as they
+  /// move a rod: the larger one. And of their rates relative to the fastest bob and rod there; to a tenth of what the
+  /// chain swings with, and a hundredth of the fastest theta in the motion, at least.
+  double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     const auto furthest = [](const auto& x) { return x.colwise().norm().maxCoeff(); };
-    const auto v = bob_velocities(chain_, a);
-    const double position = furthest(bob_positions(chain_, a) - bob_positions(chain_, b)) / chain_.lengths().sum();
-    const double natural = std::sqrt(std::abs(chain_.gravity()) * chain_.lengths().sum());
-    const double speed = std::max(furthest(v), 0.1 * natural);
-    const double velocity = furthest(v - bob_velocities(chain_, b));
-    return position + (velocity == 0 ? 0 : velocity / speed);
+    const auto of = [](double off, double whole) { return off == 0 ? 0 : off / whole; };
+    const double length = chain_.lengths().sum();
+    const double slowest =
+        std::max(0.1 * std::sqrt(std::abs(chain_.gravity()) / length), 0.01 * size.v.head(chain_.links()).maxCoeff());
+    const auto velocities = bob_velocities(chain_, a);
+    const double bobs = furthest(bob_positions(chain_, a) - bob_positions(chain_, b)) / length;
+    const double rates = furthest(velocities - bob_velocities(chain_, b));
+    const Turned turned = turned_between(a, b);
+    return std::max(bobs, turned.angle) + std::max(of(rates, std::max(furthest(velocities), slowest * length)),
+                                                   of(turned.rate, std::max(turned.fastest, slowest)));
   }
 
  private:
+  /// What rods differ by, and the fastest of the first state.
+  struct Turned {
+    double angle = 0, rate = 0, fastest = 0;
+  };
+
+  Turned turned_between(const Motion& a, const Motion& b) const {
+    const int links = chain_.links();
+    Turned turned;
+    const auto keep = [](double& largest, double value) { largest = std::max(largest, std::abs(value)); };
+    for (int i = 0; i < links; ++i) {
+      const detail::LinkMotion<Space, double> one(a, links, i), other(b, links, i);
+      keep(turned.rate, (one.rate - other.rate).norm());
+      keep(turned.fastest, one.rate.norm());
+      keep(turned.angle, a.q[i] - b.q[i]);
+      if constexpr (Space::dof == 2) {
+        keep(turned.angle, std::hypot(one.direction[0], one.direction[1]) * (a.q[links + i] - b.q[links + i]));
+      }
+    }
+    return turned;
+  }
+
   Chain<Space> chain_;
 };
 

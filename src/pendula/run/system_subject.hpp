@@ -68,6 +68,8 @@ class SystemSubject : public Subject {
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return entry_->loaded(numbers_.plain()); }
   bool damped() const override { return loaded(); }
+  /// What depends on time may bring and take energy many times in a step that the motion does not need to be shorter.
+  bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
   std::vector<std::string> expected_trouble(const RunOptions& /*options*/) const override { return {}; }
   bool has_poles() const override { return false; }
 
@@ -112,17 +114,19 @@ class SystemSubject : public Subject {
     return {1 + 2 * count + static_cast<std::size_t>(point_components()) - last, last};
   }
 
-  /// Of coordinates relative to the largest, angles at least to one radian, and of rates to the fastest, each in its
-  /// own unit.
-  double distance(const Motion& a, const Motion& b) const override {
+  using Subject::distance;
+  /// The largest of coordinates, relative to the largest of their unit, angles at least to one radian, and of rates,
+  /// relative to the fastest of their unit.
+  double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     double furthest = 0;
-    const auto compare = [&](double x, double y, double size) {
-      if (x != y) furthest = std::max(furthest, std::abs(x - y) / size);
+    const auto compare = [&](double x, double y, double scale) {
+      if (x != y) furthest = std::max(furthest, std::abs(x - y) / scale);
     };
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
-      compare(a.q[i], b.q[i], std::max(info().is_angle[k] ? 1.0 : 0.0, largest(a.q, b.q, info().coordinate_units[k])));
-      compare(a.v[i], b.v[i], largest(a.v, b.v, info().coordinate_units[k]));
+      const std::string_view unit = info().coordinate_units[k];
+      compare(a.q[i], b.q[i], std::max(info().is_angle[k] ? 1.0 : 0.0, largest(size.q, unit)));
+      compare(a.v[i], b.v[i], largest(size.v, unit));
     }
     return furthest;
   }
@@ -130,13 +134,11 @@ class SystemSubject : public Subject {
  private:
   int point_components() const { return std::accumulate(info().point_sizes.begin(), info().point_sizes.end(), 0); }
 
-  // Among the coordinates of one unit.
-  double largest(const Eigen::VectorXd& a, const Eigen::VectorXd& b, std::string_view unit) const {
+  // Among those of one unit.
+  double largest(const Eigen::VectorXd& sizes, std::string_view unit) const {
     double largest = 0;
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) {
-      if (info().coordinate_units[k] != unit) continue;
-      const auto i = static_cast<Eigen::Index>(k);
-      largest = std::max({largest, std::abs(a[i]), std::abs(b[i])});
+      if (info().coordinate_units[k] == unit) largest = std::max(largest, sizes[static_cast<Eigen::Index>(k)]);
     }
     return largest;
   }
