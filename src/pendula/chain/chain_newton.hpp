@@ -8,6 +8,7 @@
 #include <pendula/chain/stage_change.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/numeric/block.hpp>
+#include <pendula/system/stop_sign.hpp>
 #include <vector>
 
 namespace pendula {
@@ -32,6 +33,9 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
 
   explicit ChainNewton(int links, int kept = most_kept)
       : block_(kept), gains_(std::min(links, kept)), below_(static_cast<std::size_t>(std::max(links - 1, 0) / kept)) {}
+
+  /// Asked from now on after every `most_kept` links; what an iteration finds that ends by it is of no use.
+  void heed(StopSign stop) { stop_ = stop; }
 
   /// Improves increments and multipliers once.
   Correction correct(Stages& stages) {
@@ -109,7 +113,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     Carried carried;
     const int last = stages.links() - 1;
     for (std::size_t k = 0; k < vectors; ++k) carried.P.set_row(k, carried.P.unit(k, stages.constants(last).mass));
-    for (int end = stages.links(); end > 0;) {
+    for (int end = stages.links(); end > 0 && !stop_();) {
       const int begin = (end - 1) / block_ * block_;
       if (begin > 0) below_[static_cast<std::size_t>(begin / block_ - 1)] = carried;
       inward(stages, begin, end, carried);
@@ -198,7 +202,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   PENDULA_IN_REGISTERS Correction outward(Stages& stages, Visit visit) {
     Real dw[vectors] = {};
     detail::StageChange<S, L> change;
-    for (int begin = 0; begin < stages.links(); begin += block_) {
+    for (int begin = 0; begin < stages.links() && !stop_(); begin += block_) {
       const int end = std::min(begin + block_, stages.links());
       if (begin > 0) {
         Carried again = below_[static_cast<std::size_t>(begin / block_ - 1)];
@@ -246,6 +250,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
+  StopSign stop_;
   int block_;
   detail::PerLink<Gain, N> gains_;  // of one block
   std::vector<Carried> below_;      // from each block but the first to the one before
