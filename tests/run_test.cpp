@@ -210,6 +210,61 @@ TEST(Run, HasRowsAtTimesWhereStepsEnd) {
   }
 }
 
+// What a picture takes: rows as right as any at times, and nothing else is another one for them.
+TEST(Run, HandsRowsAtTimesOfItsOwnToAnObserver) {
+  for (const Method method : {Method::gauss, Method::radau, Method::rk4, Method::dopri5, Method::taylor}) {
+    for (const bool adaptive : {false, true}) {
+      if (is_explicit(method) && is_adaptive(method) != adaptive) continue;
+      RunSetup setup = double_pendulum(2);
+      setup.options.method = method;
+      setup.options.stages = method == Method::radau ? 3 : 8;
+      setup.options.step = adaptive ? 0 : 0.013;
+      setup.options.tolerance = adaptive ? 1e-9 : 0;
+      setup.every = 7;
+      Keeper alone, beside, own, at_times;
+      const RunReport plain = run_on(setup, 2.0, 0, alone);
+      pendula::Run run(setup);
+      run.add(beside);
+      run.add(own, {0.0137, {}});
+      const RunReport report = run.go();
+      EXPECT_TRUE(beside.rows == alone.rows) << method;
+      EXPECT_TRUE(beside.kept->integrator == alone.kept->integrator) << method;
+      EXPECT_EQ(report.rows, plain.rows) << method;
+      EXPECT_EQ(report.statistics.newton_iterations, plain.statistics.newton_iterations) << method;
+      EXPECT_EQ(report.energy_error.largest, plain.energy_error.largest) << method;
+      setup.rows.interval = 0.0137;
+      run_on(setup, 2.0, 0, at_times);
+      at_times.rows.push_back(alone.rows.back());  // the last state
+      EXPECT_TRUE(own.rows == at_times.rows) << method;
+    }
+  }
+}
+
+// Wherever a run ends, that is the last row; one that goes on has those that are new.
+TEST(Run, HandsTheLastStateToAnObserverWithTimesOfItsOwn) {
+  RunSetup setup = double_pendulum(1);
+  const RowTimes times{0.07, {}};
+  const auto go = [&](Keeper& own, int steps = 0) {
+    pendula::Run run(setup);
+    run.add(own, times);
+    return own.kept ? run.go_on(*own.kept) : run.go([&] { return --steps == 0; });
+  };
+  Keeper whole, stopped, ended;
+  go(whole);
+  ASSERT_EQ(whole.rows.size(), 16U);  // 0, 0.07, …, 0.98, and 1
+  EXPECT_EQ(whole.rows.back()[0], 1);
+  const RunReport report = go(stopped, 25);
+  ASSERT_EQ(stopped.rows.size(), 5U);
+  EXPECT_EQ(stopped.motions.back().q, report.last.q);
+  stopped.rows.pop_back();
+  go(stopped);
+  EXPECT_TRUE(stopped.rows == whole.rows);
+  setup.events = {{"early", [](const Motion& motion) { return motion.time - 0.123; }, Direction::both, true}};
+  go(ended);
+  ASSERT_EQ(ended.rows.size(), 3U);
+  EXPECT_NEAR(ended.rows.back()[0], 0.123, 1e-15);
+}
+
 TEST(Run, KeepsCheckpointsNowAndThen) {
   RunSetup setup = double_pendulum(1);
   setup.checkpoint = 0;

@@ -1,12 +1,14 @@
-"""Command line: python -m pendula_codegen {kernel,link,tableaux,refresh,counts} … --output WHERE."""
+"""Command line: python -m pendula_codegen COMMAND …; COMMAND --help tells the rest."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
 from pendula_codegen.counts import as_json, count_table
+from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.links import LINKS
 from pendula_codegen.model import read_model
@@ -62,6 +64,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     model.add_argument("--links", type=int, help="number of links, from 1, where the model has links")
     model.set_defaults(run=_run_model)
+
+    what = commands.add_parser("describe", help="what a model has, as JSON")
+    what.add_argument("--model", required=True, help="as of model")
+    what.add_argument("--links", type=int, help="as of model")
+    what.set_defaults(
+        run=lambda options: print(json.dumps(describe(find_model(options.model), options.links)))
+    )
+
+    everything = commands.add_parser("models", help="what the built-in models have, as JSON")
+    everything.set_defaults(run=lambda _: print(json.dumps(describe_all())))
 
     tableaux = commands.add_parser("tableaux", help="Gauss–Legendre coefficients")
     tableaux.set_defaults(run=_run_tableaux)

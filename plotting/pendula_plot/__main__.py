@@ -8,6 +8,9 @@ import warnings
 from pathlib import Path
 
 REQUIREMENTS = Path(__file__).resolve().parents[1] / "requirements.txt"
+ROOT = REQUIREMENTS.parents[1]
+# Of an install, or of a checkout.
+SETUP = next((path for path in (ROOT / "setup", ROOT / "scripts/setup") if path.exists()), "scripts/setup")
 
 try:
     import h5py  # noqa: F401
@@ -18,8 +21,8 @@ try:
     from .run import read_run
 except ImportError as missing:
     print(
-        f"pendula: pictures take a Python with the packages of {REQUIREMENTS}; {sys.executable}: {missing} "
-        "(PENDULA_PYTHON names another one)",
+        f"pendula: pictures take a Python with the packages of {REQUIREMENTS}, which {SETUP} installs; "
+        f"{sys.executable}: {missing} (PENDULA_PYTHON names another one)",
         file=sys.stderr,
     )
     sys.exit(2)

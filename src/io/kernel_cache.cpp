@@ -25,6 +25,7 @@
 #include "io/descriptor.hpp"
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
+#include "io/nearest_name.hpp"
 #include "io/process.hpp"
 #include "io/scenario.hpp"
 #include "io/trusted_folder.hpp"
@@ -98,7 +99,8 @@ fs::path find_model(const std::string& model, const fs::path& folder, const Tool
   std::string text;
   for (const std::string& name : names) text += ", " + name;
   throw ModelError("expected a model file ending in .py, or a built-in model" +
-                   (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model);
+                   (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model +
+                   did_you_mean(nearest_name(model, std::vector<std::string_view>(names.begin(), names.end()))));
 }
 
 /// planar_2 as Planar2: the generator's name of the structure.
@@ -166,18 +168,31 @@ std::string last_line(const std::string& text) {
                      end - (begin == std::string::npos ? 0 : begin + 1) + 1);
 }
 
-void derive(const fs::path& model, std::optional<int> links, const fs::path& header, const Toolchain& toolchain) {
+/// What the generator prints. Throws ModelError, also where no Python can run it.
+std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
   std::vector<std::string> command = toolchain.module(toolchain.codegen, "pendula_codegen");
-  command.insert(command.end(), {"model", "--model", model.string()});
-  if (links) command.insert(command.end(), {"--links", std::to_string(*links)});
-  command.insert(command.end(), {"--output", header.string()});
+  command.insert(command.end(), arguments.begin(), arguments.end());
   const Ended ended = run_process(command);
-  if (ended.status == 0) return;
+  if (ended.status == 0) return ended.output;
   constexpr std::string_view told = "pendula_codegen: error: ";
   const std::string line = last_line(ended.output);
   if (ended.status == 2 && line.starts_with(told)) throw ModelError(line.substr(told.size()));
   throw ModelError("models take a Python with the packages of " + (toolchain.codegen / "requirements.txt").string() +
-                   "; " + toolchain.python + ": " + line + " (PENDULA_PYTHON names another one)");
+                   ", which " + toolchain.setup().string() + " installs; " + toolchain.python + ": " + line +
+                   " (PENDULA_PYTHON names another one)");
+}
+
+/// The arguments of a command of the generator that is about a model.
+std::vector<std::string> about(const char* command, const fs::path& model, std::optional<int> links) {
+  std::vector<std::string> arguments{command, "--model", model.string()};
+  if (links) arguments.insert(arguments.end(), {"--links", std::to_string(*links)});
+  return arguments;
+}
+
+void derive(const fs::path& model, std::optional<int> links, const fs::path& header, const Toolchain& toolchain) {
+  std::vector<std::string> arguments = about("model", model, links);
+  arguments.insert(arguments.end(), {"--output", header.string()});
+  run_generator(arguments, toolchain);
 }
 
 void compile(const std::string& name, const fs::path& folder, const fs::path& object, const Toolchain& toolchain) {
@@ -316,7 +331,8 @@ Toolchain Toolchain::of_this_program() {
     }
     while (std::getline(beside, line)) toolchain.includes.emplace_back(line);
   } else {
-    toolchain.python = "python3";
+    const fs::path own = prefix / configured::installed_python;  // made by setup()
+    toolchain.python = fs::exists(own) ? own.string() : "python3";
     toolchain.codegen = prefix / configured::installed_codegen;
     toolchain.plotting = prefix / configured::installed_plotting;
     toolchain.examples = prefix / configured::installed_examples;
@@ -340,6 +356,11 @@ std::vector<std::string> Toolchain::module(const fs::path& folder, const std::st
   return {python, "-E", "-B", "-c", start, folder.string(), name};
 }
 
+fs::path Toolchain::setup() const {
+  const fs::path root = codegen.parent_path();
+  return fs::exists(root / "setup") ? root / "setup" : root / "scripts" / "setup";
+}
+
 std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   std::vector<std::string> names;
   std::error_code none;
@@ -348,6 +369,16 @@ std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   }
   std::ranges::sort(names);
   return names;
+}
+
+std::string describe_model(const std::string& model, std::optional<int> links, const Toolchain& toolchain) {
+  const fs::path file = find_model(model, "", toolchain);
+  read_model(file);
+  return last_line(run_generator(about("describe", file, links), toolchain));
+}
+
+std::string describe_models(const Toolchain& toolchain) {
+  return last_line(run_generator({"models"}, toolchain));
 }
 
 std::string model_source(const std::string& model, std::optional<int> links, const fs::path& folder,

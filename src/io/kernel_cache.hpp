@@ -30,6 +30,8 @@ struct Toolchain {
 
   /// The command line that runs a Python package of `folder`, and nothing out of the working folder or PYTHONPATH.
   std::vector<std::string> module(const std::filesystem::path& folder, const std::string& name) const;
+  /// The command that installs the Python packages.
+  std::filesystem::path setup() const;
 };
 
 /// A compiled kernel of a model.
@@ -48,6 +50,12 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
 /// The text of a model's file; empty where its kernel is part of this program. Throws as find_kernel.
 std::string model_source(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
                          const Toolchain& toolchain);
+
+/// What a model has, as JSON: coordinates, parameters, inputs, points, with units. Throws ModelError.
+std::string describe_model(const std::string& model, std::optional<int> links, const Toolchain& toolchain);
+
+/// An array of the same of all built-in models.
+std::string describe_models(const Toolchain& toolchain);
 
 /// Names of the built-in models.
 std::vector<std::string> built_in_models(const Toolchain& toolchain);

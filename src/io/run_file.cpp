@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <cstdio>
@@ -20,27 +21,26 @@
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
 #include "io/process.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Of a row of the table of checkpoints; after them the numbers of the two members.
-enum Place : std::size_t {
-  check,
-  serial,
-  at_time,
-  kept_rows,
-  rows_check,
-  since_row,
-  integrator_size,
-  record_size,
-  numbers
-};
+// Of a row of the table of checkpoints; after them the numbers of the two members, and three of RunSoFar, which tables
+// of old have not.
+enum Place : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
+constexpr std::size_t numbers_so_far = 3;
 
 /// Slots for checkpoints: what is being written is never the last that is whole.
 constexpr std::size_t slots = 2;
+
+/// What a run file says that it was not written with.
+class Changed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// Of numbers to the last bit, `before` being that of those before them.
 std::uint64_t fingerprint_of(std::span<const double> numbers, std::uint64_t before = empty_fingerprint) {
@@ -64,27 +64,36 @@ double checksum(std::span<const double> row) {
 
 /// Of what a run began with, but for what whoever goes on compares with itself.
 std::uint64_t fingerprint_of(const RunOrigin& origin) {
-  std::vector<std::string> texts = {origin.scenario_name, origin.scenario, origin.model};
+  std::vector<std::string> texts = {origin.history, origin.scenario_name, origin.scenario, origin.model};
   texts.insert(texts.end(), origin.overrides.begin(), origin.overrides.end());
   std::uint64_t hash = empty_fingerprint;
   for (const std::string& text : texts) hash = fingerprint(text, fingerprint(std::to_string(text.size()) + ':', hash));
   return hash;
 }
 
-std::vector<double> to_row(const Checkpoint& checkpoint, std::uint64_t rows, std::uint64_t count) {
+std::vector<double> to_row(const Checkpoint& checkpoint, const RunSoFar& so_far, std::uint64_t count) {
   std::vector<double> row(numbers);
   row[serial] = static_cast<double>(count);
   row[at_time] = checkpoint.time;
   row[kept_rows] = static_cast<double>(checkpoint.rows);
-  row[rows_check] = as_number(rows);
   row[since_row] = static_cast<double>(checkpoint.since_row);
   row[integrator_size] = static_cast<double>(checkpoint.integrator.numbers.size());
   row[record_size] = static_cast<double>(checkpoint.record.numbers.size());
   for (const Member* member : {&checkpoint.integrator, &checkpoint.record}) {
     row.insert(row.end(), member->numbers.begin(), member->numbers.end());
   }
+  row.insert(row.end(), {static_cast<double>(so_far.events), so_far.rows_check, so_far.events_check});
   row[check] = checksum(row);
   return row;
+}
+
+/// None in a table of old.
+std::optional<RunSoFar> so_far_in(std::span<const double> row) {
+  const auto before = static_cast<std::size_t>(row[integrator_size] + row[record_size]) + numbers;
+  if (row.size() == before) return std::nullopt;
+  if (row.size() != before + numbers_so_far) throw Changed("one whose places to go on from are of another layout");
+  const auto last = row.last(numbers_so_far);
+  return RunSoFar{static_cast<std::size_t>(last[0]), last[1], last[2]};
 }
 
 Checkpoint from_row(std::span<const double> row) {
@@ -115,12 +124,6 @@ std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& run, doub
   return last;
 }
 
-/// What a run file says that it was not written with.
-class Changed : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// A word, such as the name of a kernel; may be empty. Throws Changed.
 std::string read_word(const hdf5::Handle& object, const std::string& name) {
   std::string word = hdf5::read_attribute(object, name);
@@ -136,14 +139,18 @@ RunOrigin read_origin(const hdf5::Handle& file, const hdf5::Handle& run) {
   origin.instruction_set = read_word(file, "instruction_set");
   origin.solver = read_word(file, "solver");
   origin.kernel = read_word(file, "kernel");
+  if (hdf5::has_attribute(file, "history")) origin.history = hdf5::read_attribute(file, "history");
   origin.scenario_name = hdf5::read_attribute(run, "scenario_file");
   origin.scenario = hdf5::read_text(run, "scenario");
   origin.overrides = nlohmann::json::parse(hdf5::read_text(run, "set")).get<std::vector<std::string>>();
   origin.model = hdf5::read_text(run, "model");
-  if (static_cast<std::uint64_t>(hdf5::read_number(run, "checksum")) != fingerprint_of(origin)) {
-    throw Changed("one whose scenario, settings or model are not what it was written with");
-  }
   return origin;
+}
+
+/// Throws Changed unless the file has been written with them.
+void require_written(const RunOrigin& origin, const hdf5::Handle& run) {
+  if (static_cast<std::uint64_t>(hdf5::read_number(run, "checksum")) == fingerprint_of(origin)) return;
+  throw Changed("one whose scenario, settings or model are not what it was written with");
 }
 
 /// Does it to a run file that a run goes on from. Throws InputError where the file is damaged.
@@ -165,6 +172,57 @@ auto guarded_source(const std::string& file, Do it) {
     reject(error.what());
   }
   throw std::logic_error("guarded_source");  // not reached
+}
+
+/// A scale of the axis of links, where anything has one.
+hdf5::Handle create_links(const hdf5::Handle& file, const RunContents& contents) {
+  std::size_t links = 0;
+  for (const Quantity& quantity : contents.quantities) links = std::max(links, quantity.links);
+  for (const Constant& constant : contents.constants) {
+    if (constant.per_link) links = std::max(links, constant.values.size());
+  }
+  if (links == 0) return {};
+  hdf5::Handle scale = hdf5::create_numbering(file, "link", links);
+  hdf5::write_attribute(scale, "long_name", "number of the link, from the pivot outwards");
+  hdf5::write_attribute(scale, "units", "1");
+  hdf5::make_scale(scale, "link");
+  return scale;
+}
+
+/// The array of a quantity in a file, by the name that it has there; empty where it has none.
+std::string name_in(const hdf5::Handle& where, const Quantity& quantity) {
+  for (const std::string& name : {quantity.name, former_rate_name(quantity.name)}) {
+    if (hdf5::has(where, name)) return name;
+  }
+  return {};
+}
+
+std::size_t columns_in(const std::vector<Quantity>& quantities) {
+  std::size_t columns = 0;
+  for (const Quantity& quantity : quantities) columns += quantity.size();
+  return columns;
+}
+
+/// Rows of quantities, one after the other; NaN where a file of old does not have one.
+std::vector<double> read_block(const hdf5::Handle& where, const std::vector<Quantity>& quantities, std::size_t first,
+                               std::size_t rows) {
+  const std::size_t columns = columns_in(quantities);
+  std::vector<double> block(rows * columns, std::numeric_limits<double>::quiet_NaN());
+  for (const Quantity& quantity : quantities) {
+    const std::string name = name_in(where, quantity);
+    if (name.empty()) continue;
+    const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(where, name), first, rows);
+    const std::size_t size = quantity.size();
+    if (read.size() != rows * size) throw Changed("one whose rows are not those of its scenario");
+    for (std::size_t i = 0; i < read.size(); ++i) block[i / size * columns + quantity.column(i % size)] = read[i];
+  }
+  return block;
+}
+
+/// What a file has of a run that goes on: events only where it had them from the beginning.
+RunContents going_on(RunContents contents, const SavedRun& saved) {
+  if (saved.checkpoint && !saved.has_events) contents.events.clear();
+  return contents;
 }
 
 /// Of numbers that all runs of this kind have; a chunk of a quantity has about 32 kB where there are few.
@@ -189,8 +247,12 @@ SavedRun read_saved_run(const std::string& file) {
     if (saved.has_rows) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(opened, "t"))[0]);
     if (const auto last = last_checkpoint(run, rows)) {
       saved.checkpoint = from_row(*last);
-      saved.rows_check = (*last)[rows_check];
+      saved.so_far = so_far_in(*last);
     }
+    // Files of old have no checksums.
+    const bool is_old = saved.checkpoint ? !saved.so_far : !hdf5::has_attribute(run, "checksum");
+    if (!is_old) require_written(saved.origin, run);
+    saved.has_events = hdf5::has(opened, "events");
     return saved;
   });
 }
@@ -199,6 +261,118 @@ void write_saved_run(const std::string& file, const RunOrigin& origin, const Che
   RunFile written(file, origin, {});
   written.keep(checkpoint);
   written.finish();
+  written.conclude("");
+}
+
+void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& natural, const std::string& unit) {
+  const std::string own = in_units(natural, unit);
+  hdf5::write_attribute(array, "units", own == unit ? unit : "1");
+  if (own != unit) hdf5::write_attribute(array, "natural_unit", own);
+}
+
+namespace {
+
+/// Arrays that tell of an event, before those of its row.
+constexpr std::array<const char*, 3> told = {"event_number", "event_name", "event_direction"};
+
+}  // namespace
+
+void EventList::create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links) {
+  if (contents.events.empty() || contents.quantities.empty()) return;
+  using hdf5::Type;
+  const hdf5::Handle group = hdf5::create_group(file, "events");
+  quantities_ = contents.quantities;
+  constexpr std::size_t block = std::size_t{1} << 13, most_rows = 256;
+  const std::size_t rows = std::clamp<std::size_t>(block / columns_in(quantities_), 1, most_rows);
+  const auto add = [&](const std::string& name, std::size_t size, Type type, const std::string& meaning) {
+    datasets_.push_back(hdf5::create_list(group, name, size, rows, type));
+    hdf5::write_attribute(datasets_.back(), "long_name", meaning);
+    if (datasets_.size() == 1) hdf5::make_scale(datasets_[0], "event_number");
+    if (datasets_.size() > 1) hdf5::attach_scale(datasets_.back(), datasets_[0], 0);
+    if (size > 0) hdf5::attach_scale(datasets_.back(), links, 1);
+  };
+  add(told[0], 0, Type::whole, "number of the event, in order of time");
+  add(told[1], 0, Type::whole, "which event it is");
+  hdf5::write_flags(datasets_.back(), Type::whole, 1, contents.events);
+  add(told[2], 0, Type::byte, "whether its expression went up or down through zero");
+  hdf5::write_flags(datasets_.back(), Type::byte, 0, std::vector<std::string>{"down", "up"});
+  for (const Quantity& quantity : quantities_) {
+    add(quantity.name, quantity.links, Type::real, quantity.meaning);
+    write_unit(datasets_.back(), contents.natural, quantity.unit);
+  }
+  names_ = contents.events;
+}
+
+void EventList::take_over(const hdf5::Handle& file, std::size_t count) {
+  if (!is_there()) return;
+  const hdf5::Handle group = hdf5::open_group(file, "events");
+  const std::size_t columns = columns_in(quantities_);
+  constexpr std::size_t at_once = 1024;
+  for (std::size_t first = 0; first < count; first += at_once) {
+    const std::size_t rows = std::min(at_once, count - first);
+    const std::vector<double> block = read_block(group, quantities_, first, rows);
+    std::vector<std::vector<double>> events(rows);
+    for (const char* name : told) {
+      const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(group, name), first, rows);
+      if (read.size() != rows) throw Changed("one whose events are not those of its scenario");
+      for (std::size_t k = 0; k < rows; ++k) events[k].push_back(read[k]);
+    }
+    for (std::size_t k = 0; k < rows; ++k) {
+      const auto begin = block.begin() + static_cast<std::ptrdiff_t>(k * columns);
+      events[k].insert(events[k].end(), begin, begin + static_cast<std::ptrdiff_t>(columns));
+      add(std::move(events[k]));
+    }
+    write();
+  }
+}
+
+void EventList::add(const EventRow& happened) {
+  if (!is_there()) return;
+  const auto which = std::ranges::find(names_, happened.event.name) - names_.begin();
+  std::vector<double> row{static_cast<double>(count() + 1), static_cast<double>(which + 1), happened.up ? 1.0 : 0.0};
+  row.insert(row.end(), happened.row.numbers.begin(), happened.row.numbers.end());
+  add(std::move(row));
+}
+
+void EventList::add(std::vector<double> row) {
+  hash_ = fingerprint_of(row, hash_);
+  pending_.push_back(std::move(row));
+}
+
+double EventList::check() const {
+  return as_number(hash_);
+}
+
+void EventList::append(std::size_t dataset, const std::vector<double>& numbers) {
+  hdf5::set_rows(datasets_[dataset], count());
+  hdf5::write_rows(datasets_[dataset], written_, numbers);
+}
+
+void EventList::write() {
+  if (pending_.empty()) return;
+  constexpr std::size_t before = told.size();
+  for (std::size_t k = 0; k < datasets_.size(); ++k) {
+    std::vector<double> numbers;
+    for (const std::vector<double>& row : pending_) {
+      if (k < before) {
+        numbers.push_back(row[k]);
+        continue;
+      }
+      const Quantity& quantity = quantities_[k - before];
+      for (std::size_t i = 0; i < quantity.size(); ++i) numbers.push_back(row[before + quantity.column(i)]);
+    }
+    append(k, numbers);
+  }
+  written_ = count();
+  pending_.clear();
+}
+
+void EventList::close() {
+  for (hdf5::Handle& dataset : datasets_) dataset.close();
+}
+
+void EventList::abandon() {
+  for (hdf5::Handle& dataset : datasets_) dataset.abandon();
 }
 
 RunFile::Lock::~Lock() {
@@ -217,15 +391,15 @@ void RunFile::Lock::take(const std::string& file, const std::string& name) {
   }
 }
 
-RunFile::RunFile(const std::string& name, const RunOrigin& origin, std::vector<Quantity> quantities)
-    : quantities_(std::move(quantities)) {
+RunFile::RunFile(const std::string& name, const RunOrigin& origin, RunContents contents)
+    : contents_(std::move(contents)) {
   open_part(name);
   guarded([&] { create(origin); });
 }
 
 RunFile::RunFile(const std::string& name, const std::string& from, const SavedRun& saved, const RunOrigin& origin,
-                 std::vector<Quantity> quantities)
-    : RunFile(name, origin, std::move(quantities)) {
+                 RunContents contents)
+    : RunFile(name, origin, going_on(std::move(contents), saved)) {
   if (saved.checkpoint) guarded_source(from, [&] { take_over(from, saved); });
 }
 
@@ -252,8 +426,7 @@ void RunFile::open_part(const std::string& name) {
   if (descriptor < 0) reject_output(name, target_, errno);
   ::close(descriptor);
   lock_.take(path_, name);
-  for (const Quantity& quantity : quantities_) columns_ += quantity.size();
-  chunk_rows_ = chunk_rows(columns_);
+  columns_ = columns_in(contents_.quantities);
   hdf5::begin();
 }
 
@@ -270,6 +443,13 @@ void RunFile::guarded(Action action) {
 
 void RunFile::create(const RunOrigin& origin) {
   file_ = hdf5::create_file(path_);
+  hdf5::write_attribute(file_, "Conventions", "CF-1.11");
+  hdf5::write_attribute(file_, "title", origin.title);
+  RunOrigin written = origin;
+  if (!written.history.empty()) written.history += '\n';
+  written.history += history_line(origin.command);
+  hdf5::write_attribute(file_, "history", written.history);
+  hdf5::write_attribute(file_, "source", "pendula " + origin.version);
   hdf5::write_attribute(file_, "pendula", origin.version);
   hdf5::write_attribute(file_, "instruction_set", origin.instruction_set);
   hdf5::write_attribute(file_, "solver", origin.solver);
@@ -279,45 +459,54 @@ void RunFile::create(const RunOrigin& origin) {
   hdf5::write_text(run_, "scenario", origin.scenario);
   hdf5::write_text(run_, "set", nlohmann::json(origin.overrides).dump());
   hdf5::write_text(run_, "model", origin.model);
-  hdf5::write_attribute(run_, "checksum", static_cast<std::int64_t>(fingerprint_of(origin)));
-  hdf5::Handle links;
-  for (const Quantity& quantity : quantities_) {
+  hdf5::write_attribute(run_, "checksum", static_cast<std::int64_t>(fingerprint_of(written)));
+  if (contents_.quantities.empty()) return;
+  // Of an event a name, a count, two times and a warning; of all else far less than the rest.
+  constexpr std::size_t room = std::size_t{1} << 16, room_of_event = 1024;
+  summary_ = hdf5::create_late_text(run_, "summary", room + room_of_event * contents_.events.size());
+  const hdf5::Handle links = create_links(file_, contents_);
+  create_rows(links);
+  create_constants(links);
+  events_.create(file_, contents_, links);
+}
+
+void RunFile::create_rows(const hdf5::Handle& links) {
+  chunk_rows_ = chunk_rows(columns_);
+  for (const Quantity& quantity : contents_.quantities) {
     datasets_.push_back(hdf5::create_rows(file_, quantity.name, quantity.links, chunk_rows_));
-    hdf5::write_attribute(datasets_.back(), "units", quantity.unit);
-    if (quantity.links > 0 && links.get() < 0) {
-      links = hdf5::create_numbering(file_, "link", quantity.links);
-      hdf5::make_scale(links, "link");
-    }
+    write_unit(datasets_.back(), contents_.natural, quantity.unit);
+    hdf5::write_attribute(datasets_.back(), "long_name", quantity.meaning);
+    if (datasets_.size() == 1) hdf5::make_scale(datasets_[0], "t");
+    if (datasets_.size() > 1) hdf5::attach_scale(datasets_.back(), datasets_[0], 0);
+    if (quantity.links > 0) hdf5::attach_scale(datasets_.back(), links, 1);
   }
-  if (quantities_.empty()) return;
-  hdf5::make_scale(datasets_[0], "t");
-  for (std::size_t k = 1; k < datasets_.size(); ++k) {
-    hdf5::attach_scale(datasets_[k], datasets_[0], 0);
-    if (quantities_[k].links > 0) hdf5::attach_scale(datasets_[k], links, 1);
+}
+
+void RunFile::create_constants(const hdf5::Handle& links) const {
+  for (const Constant& constant : contents_.constants) {
+    const hdf5::Handle array = constant.per_link ? hdf5::create_vector(file_, constant.name, constant.values)
+                                                 : hdf5::create_number(file_, constant.name, constant.values.front());
+    write_unit(array, contents_.natural, constant.unit);
+    hdf5::write_attribute(array, "long_name", constant.meaning);
+    if (constant.per_link) hdf5::attach_scale(array, links, 0);
   }
 }
 
 // Row by row, so that what is damaged is noticed, and not handed on.
 void RunFile::take_over(const std::string& from, const SavedRun& saved) {
   const hdf5::Handle source = hdf5::open_file(from);
-  std::vector<hdf5::Handle> datasets;
-  for (const Quantity& quantity : quantities_) datasets.push_back(hdf5::open_dataset(source, quantity.name));
   const auto rows = static_cast<std::size_t>(saved.checkpoint->rows);
-  for (std::size_t first = 0; first < rows; first += chunk_rows_) {
-    const std::size_t count = std::min(chunk_rows_, rows - first);
-    block_.resize(count * columns_);
-    for (std::size_t k = 0; k < datasets.size(); ++k) {
-      const std::vector<double> read = hdf5::read_rows(datasets[k], first, count);
-      const std::size_t size = quantities_[k].size();
-      for (std::size_t i = 0; i < read.size(); ++i) {
-        block_[i / size * columns_ + quantities_[k].column(i % size)] = read[i];
-      }
-    }
+  for (std::size_t first = 0; first < rows && columns_ > 0; first += chunk_rows_) {
+    block_ = read_block(source, contents_.quantities, first, std::min(chunk_rows_, rows - first));
     rows_hash_ = fingerprint_of(block_, rows_hash_);
     write_if_full();
   }
-  if (as_number(rows_hash_) != saved.rows_check) throw Changed("one whose rows are not those that were written");
+  events_.take_over(source, saved.so_far ? saved.so_far->events : 0);
   waits_ = !block_.empty();
+  if (!saved.so_far) return;
+  if (as_number(rows_hash_) != saved.so_far->rows_check)
+    throw Changed("one whose rows are not those that were written");
+  if (events_.check() != saved.so_far->events_check) throw Changed("one whose events are not those that were written");
 }
 
 void RunFile::take(const Row& row) {
@@ -332,12 +521,16 @@ bool RunFile::write_if_full() {
   return true;
 }
 
+void RunFile::happen(const EventRow& happened) {
+  events_.add(happened);
+}
+
 void RunFile::keep(const Checkpoint& checkpoint) {
   kept_ = checkpoint;
-  kept_hash_ = rows_hash_;
+  so_far_ = {events_.count(), as_number(rows_hash_), events_.check()};
   if (checkpoint_.get() < 0) {
     guarded([&] {
-      checkpoint_ = hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, 0, 0).size());
+      checkpoint_ = hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, {}, 0).size());
       hdf5::let_others_read(file_);
       flush();
     });
@@ -356,7 +549,7 @@ void RunFile::write_rows() {
   const std::size_t count = block_rows();
   if (count == 0) return;
   for (std::size_t k = 0; k < datasets_.size(); ++k) {
-    const Quantity& quantity = quantities_[k];
+    const Quantity& quantity = contents_.quantities[k];
     const std::size_t size = quantity.size();
     numbers_.assign(chunk_rows_ * size, std::numeric_limits<double>::quiet_NaN());
     for (std::size_t row = 0; row < count; ++row) {
@@ -382,10 +575,11 @@ void RunFile::flush() {
 }
 
 void RunFile::flush(std::size_t rows) {
+  events_.write();
   const bool has_its_rows = kept_ && (columns_ == 0 || static_cast<std::size_t>(kept_->rows) <= rows);
   if (has_its_rows && checkpoint_.get() >= 0) {
     ++serial_;
-    hdf5::write_row(checkpoint_, serial_ % slots, to_row(*kept_, kept_hash_, serial_));
+    hdf5::write_rows(checkpoint_, serial_ % slots, to_row(*kept_, so_far_, serial_));
     kept_.reset();
   }
   hdf5::flush(file_, path_);
@@ -412,14 +606,29 @@ void RunFile::put_in_place() {
 
 void RunFile::finish() {
   if (file_.get() < 0) return;
-  close();
+  guarded([&] {
+    if (checkpoint_.get() < 0) hdf5::let_others_read(file_);
+    write_rest();
+  });
   put_in_place();
+  finished_ = true;
+}
+
+void RunFile::conclude(const std::string& summary) {
+  if (file_.get() < 0) return;
+  guarded([&] {
+    if (summary_.get() >= 0) hdf5::write_late_text(summary_, summary);
+    hdf5::flush(file_, path_);
+  });
+  close();
 }
 
 void RunFile::close() {
   if (file_.get() < 0) return;
-  guarded([&] { write_rest(); });
+  if (!finished_) guarded([&] { write_rest(); });
   checkpoint_.close();
+  summary_.close();
+  events_.close();
   for (hdf5::Handle& dataset : datasets_) dataset.close();
   run_.close();
   const bool closed = file_.close();
@@ -432,6 +641,8 @@ void RunFile::close() {
 /// Leaves the file as it was flushed last.
 void RunFile::abandon() {
   checkpoint_.abandon();
+  summary_.abandon();
+  events_.abandon();
   for (hdf5::Handle& dataset : datasets_) dataset.abandon();
   run_.abandon();
   file_.abandon();

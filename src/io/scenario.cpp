@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <pendula/chain/momenta.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <stdexcept>
@@ -28,12 +27,12 @@ constexpr std::array<std::string_view, 2> angle_keys = {"theta", "phi"};
 constexpr std::array<std::string_view, 2> rate_keys = {"theta_dot", "phi_dot"};
 constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
-constexpr std::array<std::string_view, 9> run_keys = {"method", "stages",    "form",     "solver",  "iteration",
-                                                      "step",   "tolerance", "accuracy", "duration"};
+constexpr std::array<std::string_view, 10> run_keys = {"method", "stages",    "form",     "solver",   "iteration",
+                                                       "step",   "tolerance", "accuracy", "duration", "estimate"};
 constexpr std::array<std::string_view, 4> output_keys = {"every", "interval", "times", "checkpoint"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 49> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 50> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -69,6 +68,7 @@ constexpr std::array<std::string_view, 49> all_keys = {"chain.space",
                                                        "run.tolerance",
                                                        "run.accuracy",
                                                        "run.duration",
+                                                       "run.estimate",
                                                        "output.every",
                                                        "output.interval",
                                                        "output.times",
@@ -298,22 +298,15 @@ State<Space> read_start(const Section& start, const LinkCount& count, const Chai
   return {0, q, read_coordinates<Space>(start, rate_keys, count, rates)};
 }
 
-/// Angles that are given without a unit and beyond two turns: degrees, most likely.
-void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
-  const auto check = [&](const Entry& entry) {
-    const double angle = entry.is_number() ? entry.number() : 0;
-    if (std::abs(angle) <= 4 * std::numbers::pi) return false;
-    warnings.push_back(entry.place() + ": " + shortest(angle) + " rad is more than two turns; did you mean \"" +
-                       shortest(angle) + " deg\"?");
-    return true;
-  };
+/// Of each key once.
+std::vector<std::string> degree_warnings(const Section& start) {
+  std::vector<std::string> warnings;
   for (const std::string_view key : angle_keys) {
     const std::optional<Entry> entry = start.find(key);
-    if (!entry || check(*entry)) continue;
-    for (std::size_t i = 0; i < entry->size(); ++i) {
-      if (check(entry->element(i))) break;  // once a key
-    }
+    const std::optional<std::string> warning = entry ? warning_of_degrees(*entry) : std::nullopt;
+    if (warning) warnings.push_back(*warning);
   }
+  return warnings;
 }
 
 /// An error that something is asked for: no method tells smaller ones from rounding.
@@ -415,6 +408,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
   plan.accuracy = read_accuracy(sections.run, plan.run);
   plan.duration = read_duration(sections.run, plan.run);
+  if (const auto estimate = sections.run.find("estimate")) plan.estimate = estimate->truth();
   const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
   const auto every = sections.output.find("every");
@@ -439,7 +433,7 @@ Scenario<Space> read(const Sections& sections) {
   Scenario<Space> scenario(chain, read_start(sections.start, count, chain, natural ? natural->time : 1));
   read_plan(sections, scenario);
   scenario.natural = natural;
-  warn_of_degrees(sections.start, scenario.warnings);
+  for (std::string& warning : degree_warnings(sections.start)) scenario.warnings.push_back(std::move(warning));
   scenario.places["links"] = count.place;
   return scenario;
 }

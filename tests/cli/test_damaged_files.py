@@ -36,13 +36,13 @@ ENSEMBLE = DOUBLE.replace("theta = 1.5707963267948966", "theta = [0.0, 2.0]") + 
 
 
 def contents(file: Path) -> dict[str, object]:
-    """All data sets but places to go on from, and what is said of them."""
+    """All data sets and what is said of them, but for places to go on from, and times and wall times."""
     found: dict[str, object] = {}
 
     def add(name: str, item: h5py.Group | h5py.Dataset) -> None:
-        axes = ("DIMENSION_LIST", "REFERENCE_LIST")
-        found[name] = {key: str(value) for key, value in item.attrs.items() if key not in axes}
-        if isinstance(item, h5py.Dataset) and name != "run/checkpoint":
+        left_out = ("DIMENSION_LIST", "REFERENCE_LIST", "history", "checksum")
+        found[name] = {key: str(value) for key, value in item.attrs.items() if key not in left_out}
+        if isinstance(item, h5py.Dataset) and name not in ("run/checkpoint", "run/summary"):
             found[f"{name}: "] = item[()] if item.dtype.kind == "O" else item[()].tobytes()
 
     with h5py.File(file) as opened:

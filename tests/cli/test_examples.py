@@ -30,7 +30,9 @@ def test_examples_run_without_a_warning(example, file):
     summary, trajectory = example(file.stem)
     assert summary["outcome"] == {"status": "ok"}
     assert len(trajectory.rows) == summary["rows"] > 20
-    assert (summary["expected_error"] is None) == (summary["trusted_until"] is not None) == (file.stem in CHAOS)
+    assert (
+        (summary["expected_error"] is None) == (summary["trusted_until"] is not None) == (file.stem in CHAOS)
+    )
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)

@@ -2,8 +2,8 @@
 
 import pytest
 
-# Ends near rest, where rates are nothing that errors could be compared with; whole periods; a pivot that is shaken while
-# nothing else moves.
+# Ends near rest, where rates are nothing that errors could be compared with; whole periods; a pivot that is shaken
+# while nothing else moves.
 RIGHT = {
     "a damped rod at rest": {"model": "rods", "parameters": "{damping=0.3}", "theta_1": 1, "duration": 200},
     "a rod after ten swings": {"model": "rods", "theta_1": 1e-4, "duration": 16.379848, "accuracy": 1e-12},

@@ -12,7 +12,7 @@ from pendula_plot import map as ensemble_map
 from pendula_plot.__main__ import main
 from pendula_plot.errors import PlotError, told_of_numbers
 from pendula_plot.figure import Choice, write
-from pendula_plot.film import frames
+from pendula_plot.film import Film
 from pendula_plot.run import read_run
 
 MAP = """
@@ -42,7 +42,7 @@ def draw_map(file):
 
 
 def film(file):
-    next(frames([read_run(file)], 30, 64))
+    next(Film([read_run(file)], 30, 64).frames())
 
 
 def kinds(folder, pendula):

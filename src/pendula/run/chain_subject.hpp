@@ -50,23 +50,43 @@ class ChainSubject : public Subject {
 
   /// `t`, per link `theta_i` (`phi_i`) `theta_dot_i` (`phi_dot_i`), bobs `x_i` `y_i` (`z_i`), `energy`.
   std::vector<Quantity> quantities() const override {
-    constexpr std::array<std::string_view, 2> angles = {"theta", "phi"};
-    constexpr std::array<std::string_view, 3> axes = {"x", "y", "z"};
+    constexpr std::array<std::array<std::string_view, 2>, 2> angles = {
+        {{"theta", "angle of the rod from the downward vertical"}, {"phi", "angle of the rod around the vertical"}}};
     const auto links = static_cast<std::size_t>(chain_.links());
-    std::vector<Quantity> quantities{{"t", "s"}};
+    std::vector<Quantity> quantities{{"t", "s", Role::time, "time"}};
     std::size_t first = 1;
     for (std::size_t a = 0; a < Space::dof; ++a) {
-      quantities.push_back({std::string(angles[a]), "rad", first++, links, 2 * Space::dof});
+      quantities.push_back({std::string(angles[a][0]), "rad", Role::coordinate, std::string(angles[a][1]), first++,
+                            links, 2 * Space::dof});
     }
     for (std::size_t a = 0; a < Space::dof; ++a) {
-      quantities.push_back({std::string(angles[a]) + "_dot", "rad/s", first++, links, 2 * Space::dof});
+      const std::string angle(angles[a][0]);
+      quantities.push_back({rate_name(angle), "rad/s", Role::rate, "rate of " + angle, first++, links, 2 * Space::dof});
     }
     first = 1 + 2 * Space::dof * links;
-    for (std::size_t axis = 0; axis < Space::dimension; ++axis) {
-      quantities.push_back({std::string(axes[axis]), "m", first++, links, Space::dimension});
+    for (const std::string_view axis : axes()) {
+      quantities.push_back({std::string(axis), "m", Role::point, std::string(axis).append(" of the bob"), first++,
+                            links, Space::dimension});
     }
-    quantities.push_back({"energy", "J", 1 + (2 * Space::dof + Space::dimension) * links});
+    const std::size_t last = 1 + (2 * Space::dof + Space::dimension) * links;
+    quantities.push_back({"energy", "J", Role::energy, "energy T + U", last});
     return quantities;
+  }
+
+  /// Masses, lengths, gravity, damping and the constant part of torques; drives are not among them.
+  std::vector<Constant> constants() const override {
+    const auto numbers = [](const auto& vector) { return std::vector<double>(vector.begin(), vector.end()); };
+    std::vector<Constant> constants{{"masses", "kg", "mass of the bob", numbers(chain_.masses()), true},
+                                    {"lengths", "m", "length of the rod", numbers(chain_.lengths()), true},
+                                    {"gravity", "m/s^2", "acceleration of gravity", {chain_.gravity()}},
+                                    {"damping", "N m s/rad", "what the angular velocity of the link is damped by",
+                                     numbers(chain_.damping()), true}};
+    for (std::size_t k = 0; k < Space::torque_components; ++k) {
+      const std::string of = Space::torque_components == 1 ? "" : std::string("_").append(axes()[k]);
+      constants.push_back({"torque" + of, "N m", "constant torque on the link, without drives",
+                           numbers(chain_.constant_torque().row(static_cast<Eigen::Index>(k))), true});
+    }
+    return constants;
   }
 
   void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
@@ -108,6 +128,11 @@ class ChainSubject : public Subject {
   }
 
  private:
+  static std::span<const std::string_view> axes() {
+    static constexpr std::array<std::string_view, 3> all = {"x", "y", "z"};
+    return std::span(all).first(Space::dimension);
+  }
+
   /// What rods differ by, and the fastest of the first state.
   struct Turned {
     double angle = 0, rate = 0, fastest = 0;

@@ -20,6 +20,7 @@
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/simulation.hpp>
 #include <pendula/run/track.hpp>
+#include <pendula/run/viewer.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -33,6 +34,12 @@ namespace detail {
 inline int glance_degree(const RunOptions& options) {
   if (options.method == Method::taylor) return 8;
   return is_explicit(options.method) ? 3 : options.stages;
+}
+
+/// How far rows are apart; 0 where steps tell it.
+inline double row_spacing(const RunSetup& setup) {
+  if (setup.rows.any()) return setup.rows.interval;
+  return is_adaptive(setup.options) ? 0 : static_cast<double>(setup.every) * setup.options.step;
 }
 
 }  // namespace detail
@@ -50,7 +57,16 @@ class Run {
   Description description() const { return integrator_->describe(); }
 
   /// Hands every row to `observer`, which must outlive the run.
-  void add(Observer& observer) { observers_.push_back(&observer); }
+  void add(Observer& observer) {
+    observers_.push_back(&observer);
+    takers_.push_back(&observer);
+  }
+
+  /// The same, with rows at times of its own in place of those of the run.
+  void add(Observer& observer, const RowTimes& times) {
+    observers_.push_back(&observer);
+    viewers_.emplace_back(*setup_.subject, observer, times);
+  }
 
   /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons to doubt what came out,
   /// which may take a second run with longer steps. A run that fails throws nothing: the report says so.
@@ -77,6 +93,7 @@ class Run {
   void take(const Motion& motion, double work);
   std::optional<Motion> take_events(RunReport& report);
   void tell(const Occurrence& happened);
+  void view(const std::optional<Motion>& end);
   Observation look_at(const Motion& motion, double work);
   void look_at_end(const RunResult& result);
   void come_by(const RowPlace& place, bool last);
@@ -99,7 +116,9 @@ class Run {
 
   RunSetup setup_;
   std::unique_ptr<Integrator> integrator_;
-  std::vector<Observer*> observers_;
+  std::vector<Observer*> observers_, takers_;  // all; those that take the rows of the run
+  std::vector<Viewer> viewers_;                // of the others
+  double viewing_seconds_ = 0;
   std::optional<Track> track_;  // of this run, where another is compared with it
   Kept kept_;
   std::int64_t rows_ = 0;           // that there were
@@ -111,7 +130,7 @@ class Run {
 inline Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
       integrator_(setup_.subject->make_integrator(setup_.options)),
-      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration),
+      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, detail::row_spacing(setup_)),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
             {}} {}
 
@@ -231,21 +250,27 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
     step_ = integrator_->time() - std::exchange(step_end_, integrator_->time());
     std::optional<Motion> end = take_events(report);
     if (track_) track_->follow(*integrator_, end);
+    if (!viewers_.empty()) view(end);
     return end;
   };
-  integrator_->remember_steps(!setup_.events.empty() || (track_ && track_->looks()));
+  integrator_->remember_steps(!setup_.events.empty() || (track_ && track_->looks()) || !viewers_.empty());
   rows_ = from == nullptr ? 0 : from->rows;
   step_end_ = from == nullptr ? setup_.start.time : from->time;
   try {
     if (from == nullptr && setup_.rows.any() && setup_.rows.at(0) != 0) look_at(setup_.start, 0);
     from == nullptr ? kept_.watch.start(setup_.start) : kept_.watch.resume(integrator_->state());
-    if (track_) track_->begin(from == nullptr ? setup_.start : integrator_->state());
+    const Motion begin = from == nullptr ? setup_.start : integrator_->state();
+    if (track_) track_->begin(begin);
+    for (Viewer& viewer : viewers_) viewer.begin(begin, setup_.start.time);
     const RunResult result = from == nullptr
                                  ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way, on_step)
                                  : pendula::go_on(*integrator_, setup_.start.time, schedule,
                                                   {from->rows, from->since_row}, on_row, stop, on_way, on_step);
     if (setup_.rows.any()) look_at_end(result);
-    report.stepping_seconds = result.stepping_seconds;
+    if (step_end_ > begin.time) {
+      for (Viewer& viewer : viewers_) viewer.finish(result.end ? *result.end : integrator_->state());
+    }
+    report.stepping_seconds = result.stepping_seconds - viewing_seconds_;
     report.step = result.outcome;
     report.end = !result.outcome  ? RunEnd::step_failed
                  : result.end     ? RunEnd::event
@@ -263,7 +288,7 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
 inline void Run::take(const Motion& motion, double work) {
   const Observation seen = look_at(motion, work);
   ++rows_;
-  for (Observer* observer : observers_) observer->take({motion, seen, row_, step_});
+  for (Observer* observer : takers_) observer->take({motion, seen, row_, step_});
 }
 
 // The first event that ends the run does so, and is the last one that is told.
@@ -285,6 +310,14 @@ inline void Run::tell(const Occurrence& happened) {
   setup_.subject->append_row(happened.motion, seen, event_row_);
   const EventRow row{setup_.events[happened.event], happened.up, {happened.motion, seen, event_row_, step_}};
   for (Observer* observer : observers_) observer->happen(row);
+}
+
+// Between steps, but no part of stepping.
+inline void Run::view(const std::optional<Motion>& end) {
+  using Clock = std::chrono::steady_clock;
+  const auto before = Clock::now();
+  for (Viewer& viewer : viewers_) viewer.follow(*integrator_, end, step_);
+  viewing_seconds_ += std::chrono::duration<double>(Clock::now() - before).count();
 }
 
 // The energy is not finite wherever anything else is not.

@@ -146,7 +146,7 @@ struct Course {
   void to_next_times() {
     while (goes_on() && !is_over()) {
       step();
-      if (result.outcome && is_reached(schedule.rows.at(place.rows))) return;
+      if (result.outcome && is_reached(schedule.rows.at(place.rows), elapsed())) return;
     }
   }
   void take_times() {
@@ -154,7 +154,7 @@ struct Course {
     constexpr std::chrono::milliseconds long_time(200);  // for the rows of one step: then they are cut off
     if (!result.outcome) return come_by();
     const auto began = Clock::now();
-    for (double time = 0; is_reached(time = schedule.rows.at(place.rows));) {
+    for (double time = 0; is_reached(time = schedule.rows.at(place.rows), elapsed());) {
       if (result.end && begin + time > result.end->time) break;
       if (!row_at(begin + time)) return;
       if (Clock::now() - began > long_time && stop()) return cut_off();
@@ -176,10 +176,6 @@ struct Course {
     }
     return bool(looked);
   }
-
-  // But for rounding, whatever the end of the run is.
-  double slack() const { return 8 * std::numeric_limits<double>::epsilon() * elapsed(); }
-  bool is_reached(double time) const { return time <= elapsed() + slack(); }
 
   double last_row = std::numeric_limits<double>::quiet_NaN();
 };

@@ -49,9 +49,12 @@ class Subject {
   /// Whether the dense solver's coordinates fail somewhere.
   virtual bool has_poles() const = 0;
 
-  /// What a trajectory has: time, coordinates, rates, points, energy; and the numbers of one row.
+  /// What a trajectory has: time, coordinates, rates, inputs, points, energy; and the numbers of one row.
   virtual std::vector<Quantity> quantities() const = 0;
   virtual void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
+
+  /// Masses, lengths and the like, in SI as quantities are.
+  virtual std::vector<Constant> constants() const = 0;
 
   /// Names of the numbers of a row.
   std::vector<std::string> columns() const { return columns_of(quantities()); }

@@ -22,7 +22,8 @@ class Track {
   /// too, and a multiple of three.
   static constexpr std::int64_t apart = 6;
 
-  /// At the end of every so many steps, `apart` of constant ones; of a run of many steps at fewer of them.
+  /// At the end of each of the first steps, in which what is stiff dies away, and of every so many later ones, `apart`
+  /// of constant ones; of a run of many steps at fewer of them.
   explicit Track(std::int64_t every) : every_(every) {}
 
   /// At the times of `other`.
@@ -62,18 +63,20 @@ class Track {
   const Motion& last() const { return last_; }
 
  private:
-  // States of a run of few steps, as dense as that; what is kept of any run, about 64 MB.
-  static constexpr std::size_t few = 64, most_numbers = std::size_t{1} << 23, numbers_besides = 16;
+  // The first steps; states of a run of few steps, as dense as that; what is kept of any run, about 64 MB.
+  static constexpr std::size_t first = 12, few = 64, most_numbers = std::size_t{1} << 23, numbers_besides = 16;
 
   void count_step(const Integrator& integrator) {
-    if (++steps_ % every_ != 0) return;
+    ++steps_;
+    if (steps_ > static_cast<std::int64_t>(first) && steps_ % every_ != 0) return;
     states_.push_back(integrator.state());
     const std::size_t numbers = 2 * static_cast<std::size_t>(states_.back().q.size()) + numbers_besides;
     if (states_.size() < (every_ < apart ? few : std::max(few, most_numbers / numbers))) return;
-    every_ *= 2;
-    std::size_t kept = 1;  // the start, and every other one
-    for (std::size_t k = 2; k < states_.size(); k += 2) std::swap(states_[kept++], states_[k]);
+    std::size_t kept = first + 1;                                           // and the start
+    const std::size_t next = first / static_cast<std::size_t>(every_) + 1;  // that many times `every` steps
+    for (std::size_t k = kept + next % 2; k < states_.size(); k += 2) std::swap(states_[kept++], states_[k]);
     states_.resize(kept);
+    every_ *= 2;
   }
 
   std::int64_t every_, steps_ = 0;
