@@ -136,5 +136,33 @@ TEST(ChainNewtonInALongStep, IsExact) {
   }
 }
 
+// Of long chains what is found inward is kept for some links at a time.
+template <class Space>
+void expect_newton_in_blocks_to_be_the_same() {
+  constexpr int S = 3, n = 23;
+  Random random(5);
+  const Chain<Space> chain = driven_chain<Space>(random, n);
+  const State<Space> start = random_state<Space>(random, n);
+  ChainStages<Space, S> whole(chain), in_blocks(chain);
+  ChainNewton<Space, S> newton(n), newton_in_blocks(n, 5);
+  for (ChainStages<Space, S>* stages : {&whole, &in_blocks}) {
+    stages->start(start);
+    stages->prepare(0, 0.02);
+  }
+  for (int iteration = 1; iteration <= 3; ++iteration) {
+    EXPECT_EQ(newton.correct(whole).relative, newton_in_blocks.correct(in_blocks).relative) << iteration;
+    EXPECT_EQ(newton.positive(), newton_in_blocks.positive());
+  }
+  EXPECT_EQ(newton.worst_link(whole), newton_in_blocks.worst_link(in_blocks));
+  whole.accept();
+  in_blocks.accept();
+  EXPECT_EQ(distance(whole.state(0.02), in_blocks.state(0.02)), 0);
+}
+
+TEST(ChainNewtonInBlocks, IsTheSameToTheLastBit) {
+  expect_newton_in_blocks_to_be_the_same<Planar>();
+  expect_newton_in_blocks_to_be_the_same<Spatial>();
+}
+
 }  // namespace
 }  // namespace pendula::test

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import warnings
 from pathlib import Path
 
 REQUIREMENTS = Path(__file__).resolve().parents[1] / "requirements.txt"
@@ -16,7 +17,8 @@ try:
     import matplotlib as mpl
     import PIL  # noqa: F401
 
-    from .run import PlotError, read_run
+    from .errors import PlotError, told_of_numbers
+    from .run import read_run
 except ImportError as missing:
     print(
         f"pendula: pictures take a Python with the packages of {REQUIREMENTS}, which {SETUP} installs; "
@@ -40,7 +42,8 @@ def plot(arguments: argparse.Namespace) -> None:
         tuple(filter(None, arguments.coordinates.split(","))),
         arguments.wrapped,
     )
-    write(draw(files, choice), output)
+    with told_of_numbers(files[0].name):
+        write(draw(files, choice), output)
 
 
 def draw_map(arguments: argparse.Namespace) -> None:
@@ -49,7 +52,9 @@ def draw_map(arguments: argparse.Namespace) -> None:
 
     contour, _, level = arguments.contour.rpartition("=")
     choice = MapChoice(arguments.scale, float(level) if contour else None)
-    write(figure(read(Path(arguments.file), arguments.key, contour), choice), Path(arguments.output))
+    ensemble = read(Path(arguments.file), arguments.key, contour)
+    with told_of_numbers(ensemble.name):
+        write(figure(ensemble, choice), Path(arguments.output))
 
 
 def film(arguments: argparse.Namespace) -> None:
@@ -58,13 +63,9 @@ def film(arguments: argparse.Namespace) -> None:
     check(Path(arguments.output))
     if arguments.run is None:
         return
-    write(
-        read_run(Path(arguments.run)),
-        Path(arguments.output),
-        arguments.fps,
-        arguments.size,
-        arguments.seconds,
-    )
+    run = read_run(Path(arguments.run))
+    with told_of_numbers(run.name):
+        write(run, Path(arguments.output), arguments.fps, arguments.size, arguments.seconds)
 
 
 def gallery(arguments: argparse.Namespace) -> None:
@@ -110,7 +111,9 @@ def parse() -> argparse.Namespace:
 
 def main() -> int:
     arguments = parse()
+    mpl.rcdefaults()  # whatever a matplotlibrc of the working folder says
     mpl.use("agg")
+    warnings.simplefilter("ignore")  # of NumPy and Matplotlib, about numbers that are large
     try:
         arguments.run_command(arguments)
     except PlotError as error:

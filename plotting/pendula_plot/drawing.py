@@ -7,8 +7,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from . import figure, section, spectrum
+from .errors import PlotError, told_of
 from .figure import Choice
-from .run import PlotError, Run, read_run
+from .run import Run, read_run
 from .section import Section
 from .spectrum import Spectrum
 
@@ -19,12 +20,13 @@ FIGURES = {Run: figure.figure, Section: section.figure, Spectrum: spectrum.figur
 
 def read(path: Path) -> Drawable:
     """Reads a trajectory, events or Lyapunov exponents. Raises PlotError."""
-    header = first_line(path).split(",")
-    if section.is_header(header):
-        return section.read(path)
-    if spectrum.is_header(header):
-        return spectrum.read(path)
-    return read_run(path)
+    with told_of(path, "a trajectory"):
+        header = first_line(path).split(",")
+        if section.is_header(header):
+            return section.read(path)
+        if spectrum.is_header(header):
+            return spectrum.read(path)
+        return read_run(path)
 
 
 def first_line(path: Path) -> str:

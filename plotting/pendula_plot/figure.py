@@ -205,7 +205,8 @@ PANELS: dict[str, Callable[[Axes, list[Run], Choice], None]] = {
 
 
 def possible(run: Run, panel: str) -> bool:
-    return panel != "trace" or run.dimension >= 2
+    has = {"trace": run.dimension >= 2, "energy": "energy" in run.columns, "steps": True}
+    return has.get(panel, bool(run.coordinates))
 
 
 def steps_differ(run: Run) -> bool:
@@ -243,7 +244,7 @@ def figure(runs: list[Run], choice: Choice) -> Figure:
     """All panels in one figure, two to a row."""
     panels = panels_of(runs, choice)
     if not panels:
-        raise PlotError(f"{runs[0].name}: expected points to trace, got a run without any")
+        raise PlotError(f"{runs[0].name}: expected columns to draw, got {', '.join(runs[0].columns)}")
     width = min(len(panels), 2)
     height = (len(panels) + 1) // 2
     with style():

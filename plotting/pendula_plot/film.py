@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -220,17 +221,24 @@ def check(path: Path) -> None:
 
 
 def encode_by_ffmpeg(images: Iterator[Image.Image], path: Path, fps: float, size: int) -> None:
+    # Under a name of its own, told as that of a file: ffmpeg takes -y.mp4 for an option, tcp:x.mp4 for a server.
+    part = path.absolute().with_name(f".film{os.getpid()}{path.suffix}")
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size}x{size}", "-r", f"{fps:g}", "-i", "-"]
-    command = ["ffmpeg", "-y", "-loglevel", "error", *source, *FFMPEG[path.suffix], str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
-        try:
-            for image in images:
-                encoder.stdin.write(image.tobytes())
-        except BrokenPipeError:
-            pass  # it tells why
-        _, complaint = encoder.communicate()
-    if encoder.returncode != 0:
-        raise PlotError(f"{path}: ffmpeg could not write it: {complaint.decode(errors='replace').strip()}")
+    command = ["ffmpeg", "-y", "-loglevel", "error", *source, *FFMPEG[path.suffix], f"file:{part}"]
+    try:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
+            try:
+                for image in images:
+                    encoder.stdin.write(image.tobytes())
+            except BrokenPipeError:
+                pass  # it tells why
+            _, complaint = encoder.communicate()
+        if encoder.returncode != 0:
+            told = " ".join(complaint.decode(errors="replace").split())
+            raise PlotError(f"{path}: ffmpeg could not write it: {told}")
+        part.replace(path.resolve())
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def write(run: Run, path: Path, fps: float, size: int, seconds: float = math.inf) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 
+from .errors import PlotError, require_end_of_reading, told_of
 from .figure import GREEK, style, symbol
-from .run import PlotError, keys_of, unit_of
+from .run import keys_of, unit_of
 
 WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
 FEW_DECADES = 1e4  # on which 1, 2, 5, … are numbered, not powers of ten alone
@@ -53,7 +55,8 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
     """Reads a key of an ensemble's file, and the one that a contour is of. Raises PlotError."""
     import h5py
 
-    try:
+    with told_of(path, "a file of pendula ensemble"):
+        require_end_of_reading(path)
         with h5py.File(path, "r") as file:
             if str(file.attrs.get("kind", "")) != "ensemble":
                 raise reject(path, "a file of pendula ensemble", "another HDF5 file")
@@ -77,15 +80,13 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
                 bool(file.attrs["complete"]),
                 duration_of(file.attrs, [name for name, _, _ in axes], unit),
             )
-    except OSError as error:
-        raise reject(path, "a file of pendula ensemble", f"{error.strerror or error}") from None
 
 
 def duration_of(attributes: Mapping, axes: list[str], unit: str) -> str:
     """How long members are moved, by the attributes of a file; `unit` is of the number that is shown."""
     if "run.duration" in axes:
         return "its duration"
-    keys = keys_of(str(attributes["scenario"]), json.loads(attributes["set"]))
+    keys = keys_of(tomllib.loads(str(attributes["scenario"])), json.loads(attributes["set"]))
     time = unit if unit not in ("", "1") else "s"
     return f"{float(keys.get('run.duration') or DURATION):g} {time}"
 

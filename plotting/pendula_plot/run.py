@@ -13,12 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import PlotError, require_end_of_reading, told_of
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # of a column
 FIRST_UNITS = {"t": "s", "energy": "J"}
 STEPS_A_ROW = 10  # what output.every is where the step is constant and a scenario does not say; else 1
-
-
-class PlotError(Exception):
-    """A message for people: what was expected, and what there is."""
 
 
 @dataclass(frozen=True)
@@ -116,11 +115,16 @@ class Run:
         return places
 
     @cached_property
+    def document(self) -> dict:
+        """The scenario, parsed."""
+        return tomllib.loads(self.scenario)
+
+    @cached_property
     def steps_a_row(self) -> int | None:
         """Accepted steps from row to row, 0 where rows are at times; None where no scenario tells."""
         if not self.scenario:
             return None
-        keys = keys_of(self.scenario, self.settings)
+        keys = keys_of(self.document, self.settings)
         if {"output.interval", "output.times"} & keys.keys():
             return 0
         is_constant = "run.step" in keys or str(keys.get("run.method")).strip("\"'") == "rk4"
@@ -129,11 +133,7 @@ class Run:
     @cached_property
     def masses(self) -> np.ndarray | None:
         """Of a chain's bobs, as far as its scenario tells them."""
-        try:
-            chain = tomllib.loads(self.scenario).get("chain", {})
-        except tomllib.TOMLDecodeError:
-            return None
-        masses = chain.get("masses")
+        masses = self.document.get("chain", {}).get("masses")
         if masses is None or not self.is_chain:
             return None
         masses = np.ravel(np.asarray(masses, dtype=float))
@@ -152,9 +152,8 @@ class Run:
         return replace(self, columns={name: values[wanted] for name, values in self.columns.items()})
 
 
-def keys_of(scenario: str, settings: list[str]) -> dict[str, object]:
+def keys_of(document: dict, settings: list[str]) -> dict[str, object]:
     """What [run] and [output] say, by `run.step`, …: of a scenario, and in its place what `--set` said, as text."""
-    document = tomllib.loads(scenario)
     told = {
         f"{table}.{key}": value
         for table in ("run", "output")
@@ -166,22 +165,20 @@ def keys_of(scenario: str, settings: list[str]) -> dict[str, object]:
 
 def read_run(path: Path) -> Run:
     """Reads a trajectory, CSV or HDF5, also one that is still growing. Raises PlotError."""
-    try:
+    with told_of(path, "a trajectory"):
         with path.open("rb") as stream:
             is_hdf5 = stream.read(8) == b"\x89HDF\r\n\x1a\n"
         run = read_hdf5(path) if is_hdf5 else read_csv(path)
-    except OSError as error:
-        raise PlotError(
-            f"{path}: expected a trajectory that can be read, got: {error.strerror or error}"
-        ) from None
-    if len(run.time) == 0:
-        raise PlotError(f"{path}: expected rows, got none")
-    return run
+        if len(run.time) == 0:
+            raise PlotError(f"{path}: expected rows, got none")
+        _ = run.steps_a_row, run.masses  # what the scenario of a damaged file tells is wrong here, not later
+        return run
 
 
 def read_hdf5(path: Path) -> Run:
     import h5py
 
+    require_end_of_reading(path)
     columns, units = {}, {}
     with h5py.File(path, "r") as file:
         if "t" not in file or "run" not in file:
@@ -207,7 +204,7 @@ def unit_of(attributes: Mapping[str, object]) -> str:
 
 def read_csv(path: Path) -> Run:
     header, rows = read_lines(path)
-    if header[:1] != ["t"]:
+    if header[:1] != ["t"] or not all(map(NAME.fullmatch, header)):
         text = ",".join(header)
         got = "an empty file" if not text else text if len(text) <= 60 else text[:60] + "…"
         raise PlotError(f"{path}: expected a trajectory with columns t, …, got {got}")

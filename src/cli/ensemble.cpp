@@ -336,7 +336,7 @@ class Session {
 }  // namespace
 
 ExitStatus ensemble(const EnsembleOptions& options) {
-  Ranks ranks;
+  Ranks ranks(options.shard.has_value());
   if (ranks.size() == 1) return Session(options, ranks).run();
   try {
     return Session(options, ranks).run();

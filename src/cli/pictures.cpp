@@ -14,10 +14,9 @@ namespace {
 /// Runs the Python package pendula_plot, which says itself what is wrong.
 ExitStatus draw(const std::vector<std::string>& arguments) {
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
-  std::vector<std::string> command{toolchain.python, "-m", "pendula_plot"};
+  std::vector<std::string> command = toolchain.module(toolchain.plotting, "pendula_plot");
   command.insert(command.end(), arguments.begin(), arguments.end());
-  const int status =
-      io::run_attached(command, {"PYTHONPATH=" + toolchain.plotting.string(), "PYTHONDONTWRITEBYTECODE=1"});
+  const int status = io::run_attached(command);
   if (status == 127) {
     throw io::InputError("pictures take a Python, which " + toolchain.setup().string() + " installs; " +
                          toolchain.python + " could not be started (PENDULA_PYTHON names another one)");

@@ -1,24 +1,30 @@
 #include "cli/ranks.hpp"
 
 #include <cstdlib>
-#include <memory>
+#include <initializer_list>
+#include <string>
 
 #ifdef PENDULA_MPI
 #define OMPI_SKIP_MPICXX 1
 #include <mpi.h>
+
+#include <mutex>
+#else
+#include "io/input_error.hpp"
 #endif
 
 namespace pendula::cli {
 
 #ifdef PENDULA_MPI
 
-namespace {
-
-/// A number that all ranks add to.
-struct Counter {
+/// A number that all ranks add to: rank 0 has it, the others reach into its memory.
+struct Ranks::Shared {
   std::int64_t* number = nullptr;
   MPI_Win window = MPI_WIN_NULL;
+  std::mutex guard;
 };
+
+namespace {
 
 /// Whether a launcher of MPI has started this process: Open MPI, Slurm's, MPICH and those that come from it.
 bool is_launched() {
@@ -30,48 +36,45 @@ bool is_launched() {
 
 }  // namespace
 
-Ranks::Ranks() {
+Ranks::Ranks(bool /*has_shard*/) {
   if (!is_launched()) return;
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided);
   MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
   MPI_Comm_size(MPI_COMM_WORLD, &size_);
-  auto counter = std::make_unique<Counter>();
+  shared_ = std::make_unique<Shared>();
   MPI_Win_allocate(rank_ == 0 ? sizeof(std::int64_t) : 0, sizeof(std::int64_t), MPI_INFO_NULL, MPI_COMM_WORLD,
-                   static_cast<void*>(&counter->number), &counter->window);
-  MPI_Win_lock_all(0, counter->window);
-  if (rank_ == 0) *counter->number = 0;
-  MPI_Win_sync(counter->window);
+                   static_cast<void*>(&shared_->number), &shared_->window);
+  MPI_Win_lock_all(0, shared_->window);
+  if (rank_ == 0) *shared_->number = 0;
+  MPI_Win_sync(shared_->window);
   MPI_Barrier(MPI_COMM_WORLD);
-  shared_ = counter.release();
 }
 
 Ranks::~Ranks() {
-  if (shared_ == nullptr) return;
-  const std::unique_ptr<Counter> counter(static_cast<Counter*>(shared_));
-  MPI_Win_unlock_all(counter->window);
-  MPI_Win_free(&counter->window);
+  if (!shared_) return;
+  MPI_Win_unlock_all(shared_->window);
+  MPI_Win_free(&shared_->window);
   MPI_Finalize();
 }
 
 std::int64_t Ranks::claim() {
-  if (shared_ == nullptr) return next_.fetch_add(1);
-  const std::scoped_lock lock(guard_);
-  const Counter& counter = *static_cast<const Counter*>(shared_);
+  if (!shared_) return next_.fetch_add(1);
+  const std::scoped_lock lock(shared_->guard);
   const std::int64_t one = 1;
   std::int64_t mine = 0;
-  MPI_Fetch_and_op(&one, &mine, MPI_INT64_T, 0, 0, MPI_SUM, counter.window);
-  MPI_Win_flush(0, counter.window);
+  MPI_Fetch_and_op(&one, &mine, MPI_INT64_T, 0, 0, MPI_SUM, shared_->window);
+  MPI_Win_flush(0, shared_->window);
   return mine;
 }
 
 void Ranks::abort(int status) {
-  if (shared_ != nullptr) MPI_Abort(MPI_COMM_WORLD, status);
+  if (shared_) MPI_Abort(MPI_COMM_WORLD, status);
   std::_Exit(status);
 }
 
 bool Ranks::all(bool mine) {
-  if (shared_ == nullptr) return mine;
+  if (!shared_) return mine;
   const int here = mine ? 1 : 0;
   int everywhere = 0;
   MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
@@ -80,7 +83,39 @@ bool Ranks::all(bool mine) {
 
 #else
 
-Ranks::Ranks() = default;
+struct Ranks::Shared {};
+
+namespace {
+
+/// The first of some variables that a launcher has set to a number, and to at least so much; empty where none is.
+std::string variable_of_at_least(int least, std::initializer_list<const char*> names) {
+  for (const char* const name : names) {
+    const char* const value = std::getenv(name);
+    if (value != nullptr && std::atoi(value) >= least) return std::string(name) + '=' + value;
+  }
+  return {};
+}
+
+/// What tells that this process is one of several. How many tasks Slurm has for a job says nothing of a program that
+/// its script calls without srun.
+std::string sign_of_others() {
+  std::string size =
+      variable_of_at_least(2, {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS"});
+  if (!size.empty()) return size;
+  return variable_of_at_least(1, {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"});
+}
+
+}  // namespace
+
+Ranks::Ranks(bool has_shard) {
+  const std::string sign = has_shard ? "" : sign_of_others();
+  if (sign.empty()) return;
+  throw io::InputError(
+      "ensemble: expected one process, since this build of pendula does not know MPI, got one of several (" + sign +
+      "); install MPI (Debian: libopenmpi-dev) and build again with -DPENDULA_MPI=ON, or give "
+      "each process a part of its own by --shard I/N");
+}
+
 Ranks::~Ranks() = default;
 
 std::int64_t Ranks::claim() {

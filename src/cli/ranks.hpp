@@ -2,14 +2,16 @@
 
 #include <atomic>
 #include <cstdint>
-#include <mutex>
+#include <memory>
 
 namespace pendula::cli {
 
 /// The processes that share one job: those that mpirun has started, where this build knows MPI, or this one alone.
 class Ranks {
  public:
-  Ranks();
+  /// Throws io::InputError where a launcher has started several processes and this build does not know MPI: each would
+  /// think itself alone. That is right for those that have a shard of their own.
+  explicit Ranks(bool has_shard);
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
@@ -27,10 +29,11 @@ class Ranks {
   bool all(bool mine);
 
  private:
+  struct Shared;
+
   int rank_ = 0, size_ = 1;
-  std::mutex guard_;
   std::atomic<std::int64_t> next_ = 0;  // of one process
-  void* shared_ = nullptr;              // of several: rank 0 has it, others reach into its memory
+  std::unique_ptr<Shared> shared_;      // of several
 };
 
 }  // namespace pendula::cli

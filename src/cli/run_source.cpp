@@ -18,9 +18,13 @@ namespace {
 /// What may be another than it was: everything else decides how the run has come to where it is.
 constexpr std::array<std::string_view, 2> free_keys = {"run.duration", "output.checkpoint"};
 
+std::string key_of(const std::string& change) {
+  return change.substr(0, change.find_first_of("= "));
+}
+
 void require_free(const std::vector<std::string>& overrides) {
   for (const std::string& change : overrides) {
-    const std::string key = change.substr(0, change.find_first_of("= "));
+    const std::string key = key_of(change);
     if (std::ranges::find(free_keys, key) != free_keys.end()) continue;
     std::string message = "--set " + change;
     message += ": expected run.duration or output.checkpoint, which a run that goes on may have anew, got " + key;
@@ -60,6 +64,9 @@ RunSource read_run_source(const SimulateOptions& options) {
   }
   source.text = {origin.scenario_name, origin.scenario};
   source.overrides = origin.overrides;
+  for (const std::string& change : options.overrides) {
+    std::erase_if(source.overrides, [&](const std::string& before) { return key_of(before) == key_of(change); });
+  }
   source.overrides.insert(source.overrides.end(), options.overrides.begin(), options.overrides.end());
   return source;
 }
@@ -89,7 +96,10 @@ io::RunOrigin origin_of(const RunSource& source, const Description& description,
   origin.scenario = source.text.text;
   origin.overrides = source.overrides;
   origin.model = model;
-  if (source.saved) require_same_solver(source.saved->origin, origin);
+  if (source.saved) {
+    require_same_solver(source.saved->origin, origin);
+    origin.history = source.saved->origin.history;
+  }
   return origin;
 }
 

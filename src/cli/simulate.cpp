@@ -104,12 +104,13 @@ std::optional<std::string> output_of(const RunSource& source, const SimulateOpti
   return options.output;
 }
 
-/// Opens the file for the rows; a run file that goes on begins as a copy. Throws io::InputError.
+/// Opens the file for the rows; a run file that goes on begins with those that are there. Throws io::InputError.
 std::unique_ptr<io::RowsFile> open_rows(const std::string& file, const SimulateOptions& options,
-                                        const io::RunOrigin& origin, const io::RunContents& contents) {
+                                        const io::RunOrigin& origin, const std::optional<io::SavedRun>& saved,
+                                        const io::RunContents& contents) {
   if (!is_run_file(file, options)) return std::make_unique<io::TrajectoryFile>(file, columns_of(contents.quantities));
-  if (!options.resume) return std::make_unique<io::RunFile>(file, origin, contents);
-  return std::make_unique<io::RunFile>(file, *options.resume, origin, contents);
+  if (!saved) return std::make_unique<io::RunFile>(file, origin, contents);
+  return std::make_unique<io::RunFile>(file, *options.resume, *saved, origin, contents);
 }
 
 /// The same where one is asked for, and says what it replaces.
@@ -202,7 +203,7 @@ class Session {
         origin_(origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
-        file_(open_rows(output_, options, origin_, contents_of(setup_, plan))),
+        file_(open_rows(output_, options, origin_, source.saved, contents_of(setup_, plan))),
         events_(open_events(options, setup_)),
         film_rows_(open_film_rows(contents_of(setup_, plan, false))),
         progress_(setup_, !options.quiet) {

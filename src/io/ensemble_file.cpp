@@ -16,6 +16,7 @@
 #include <set>
 #include <utility>
 
+#include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
@@ -170,7 +171,7 @@ void write_origin(const hdf5::Handle& file, const EnsembleHead& head, const Ense
   hdf5::write_attribute(file, "scenario", origin.scenario);
   hdf5::write_attribute(file, "set", nlohmann::json(origin.overrides).dump());
   hdf5::write_attribute(file, "model", origin.model);
-  hdf5::write_attribute(file, "ensemble", std::to_string(head.kind().ensemble));
+  hdf5::write_attribute(file, "ensemble", static_cast<std::int64_t>(head.kind().ensemble));
   hdf5::write_attribute(file, "members", head.plan.count);
   hdf5::write_attribute(file, "members_done", tally.done);
   hdf5::write_attribute(file, "complete", std::int64_t{tally.done == head.plan.count});
@@ -301,8 +302,8 @@ bool is_complete(const std::string& file, const EnsembleHead& head) {
   if (!std::filesystem::is_regular_file(file, unknown)) return false;
   hdf5::begin();
   try {
-    const hdf5::Handle opened = hdf5::open_file(file, false);
-    return hdf5::read_attribute(opened, "ensemble") == std::to_string(head.kind().ensemble) &&
+    const hdf5::Handle opened = hdf5::open_file(file);
+    return hdf5::read_number(opened, "ensemble") == static_cast<std::int64_t>(head.kind().ensemble) &&
            hdf5::read_number(opened, "complete") == 1;
   } catch (const hdf5::Error&) {
     return false;

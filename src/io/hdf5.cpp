@@ -15,6 +15,8 @@
 #include <cstring>
 #include <numeric>
 
+#include "io/descriptor.hpp"
+
 namespace pendula::io::hdf5 {
 namespace {
 
@@ -176,14 +178,6 @@ std::uint32_t checksum(std::span<const unsigned char> bytes) {
   return c;
 }
 
-/// A file of the system, closed when it goes.
-struct Descriptor {
-  int number;
-  ~Descriptor() {
-    if (number >= 0) close(number);
-  }
-};
-
 std::uint64_t number_in(std::span<const unsigned char> bytes) {
   std::uint64_t number = 0;
   for (std::size_t k = bytes.size(); k-- > 0;) number = number << 8 | bytes[k];
@@ -201,10 +195,10 @@ void put_number(std::uint64_t number, std::span<unsigned char> bytes) {
 void make_room(const Handle& file, const std::string& name) {
   hsize_t wanted = 0;
   struct stat status {};
-  const Descriptor descriptor{open(name.c_str(), O_RDWR | O_CLOEXEC)};
-  if (descriptor.number < 0 || fstat(descriptor.number, &status) != 0) return;
+  const Descriptor descriptor(open(name.c_str(), O_RDWR | O_CLOEXEC));
+  if (descriptor.get() < 0 || fstat(descriptor.get(), &status) != 0) return;
   if (H5Fget_filesize(file.get(), &wanted) < 0 || static_cast<hsize_t>(status.st_size) > wanted) return;
-  if (ftruncate(descriptor.number, static_cast<off_t>(wanted)) == 0) mark_as_closed(name);
+  if (ftruncate(descriptor.get(), static_cast<off_t>(wanted)) == 0) mark_as_closed(name);
 }
 
 }  // namespace
@@ -224,10 +218,14 @@ Handle create_file(const std::string& file) {
   return {H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), file_access().get()), H5Fclose};
 }
 
-Handle open_file(const std::string& file, bool writable) {
+Handle open_file(const std::string& file) {
   errno = 0;
-  const unsigned mode = writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY | H5F_ACC_SWMR_READ;
-  return {H5Fopen(file.c_str(), mode, file_access().get()), H5Fclose};
+  // A part that does not fit its checksum is read again, after a pause that doubles each time: 2¹⁶ ns in all. By itself
+  // the library goes on for longer than anybody lives.
+  constexpr unsigned attempts = 16;
+  const Handle access = file_access();
+  require(H5Pset_metadata_read_attempts(access.get(), attempts));
+  return {H5Fopen(file.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.get()), H5Fclose};
 }
 
 void let_others_read(const Handle& file) {
@@ -247,16 +245,16 @@ void mark_as_closed(const std::string& file) {
   constexpr std::size_t version_at = 8, flags_at = 11, end_at = 28, checksum_at = 44;
   std::array<unsigned char, 48> block{};
   struct stat status {};
-  const Descriptor descriptor{open(file.c_str(), O_RDWR | O_CLOEXEC)};
-  if (descriptor.number < 0 || pread(descriptor.number, block.data(), block.size(), 0) != ssize_t{48}) return;
-  if (block[version_at] != 3 || fstat(descriptor.number, &status) != 0) return;
+  const Descriptor descriptor(open(file.c_str(), O_RDWR | O_CLOEXEC));
+  if (descriptor.get() < 0 || pread(descriptor.get(), block.data(), block.size(), 0) != ssize_t{48}) return;
+  if (block[version_at] != 3 || fstat(descriptor.get(), &status) != 0) return;
   const std::array<unsigned char, 48> before = block;
   block[flags_at] = 0;
   const auto end = static_cast<std::uint64_t>(status.st_size);
   if (number_in(std::span(block).subspan(end_at, 8)) < end) put_number(end, std::span(block).subspan(end_at, 8));
   if (block == before) return;
   put_number(checksum(std::span(block).first(checksum_at)), std::span(block).subspan(checksum_at, 4));
-  if (pwrite(descriptor.number, block.data(), block.size(), 0) != ssize_t{48}) return;  // then it stays as it was
+  if (pwrite(descriptor.get(), block.data(), block.size(), 0) != ssize_t{48}) return;  // then it stays as it was
 }
 
 Handle create_group(const Handle& where, const std::string& name) {
@@ -268,7 +266,7 @@ Handle open_group(const Handle& where, const std::string& name) {
 }
 
 bool has(const Handle& where, const std::string& name) {
-  return H5Lexists(where.get(), name.c_str(), H5P_DEFAULT) > 0;
+  return require(H5Lexists(where.get(), name.c_str(), H5P_DEFAULT)) > 0;
 }
 
 void write_attribute(const Handle& object, const std::string& name, const std::string& text) {

@@ -56,8 +56,8 @@ class Handle {
 void begin();
 
 Handle create_file(const std::string& file);
-/// To be written, or to be read, also while it is written.
-Handle open_file(const std::string& file, bool writable);
+/// To be read, also while it is written.
+Handle open_file(const std::string& file);
 
 /// From here on others may read the file while it is written; objects can no longer be added to it.
 void let_others_read(const Handle& file);

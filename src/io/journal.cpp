@@ -13,6 +13,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "io/fingerprint.hpp"
 #include "io/output_error.hpp"
 
 namespace pendula::io {
@@ -131,12 +132,6 @@ bool read_record(Reader& reader, const JournalKind& kind, DoneChunk& chunk) {
 }
 
 }  // namespace
-
-std::uint64_t fingerprint(std::string_view text) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  return hash;
-}
 
 Journal::Journal(const std::string& folder, const JournalKind& kind) {
   std::error_code unknown;

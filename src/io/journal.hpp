@@ -29,9 +29,6 @@ struct JournalKind {
   std::uint64_t width = 0;     ///< numbers of a member
 };
 
-/// A 64-bit hash of a text (FNV-1a), to tell ensembles and records from others.
-std::uint64_t fingerprint(std::string_view text);
-
 /// A file that chunks are appended to by several threads. What `add` returned from is there after a `kill -9`; after a
 /// loss of power what `sync` was called for, which `add` does once a second at most. A record that was cut short is
 /// noticed when it is read.

@@ -1,6 +1,8 @@
 #include "io/kernel_cache.hpp"
 
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,16 +14,21 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <iomanip>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
+#include "io/descriptor.hpp"
+#include "io/fingerprint.hpp"
+#include "io/input_file.hpp"
 #include "io/nearest_name.hpp"
 #include "io/process.hpp"
 #include "io/scenario.hpp"
+#include "io/trusted_folder.hpp"
 #include "toolchain.hpp"
 
 namespace pendula::io {
@@ -39,19 +46,20 @@ fs::path this_program() {
   return fs::read_symlink("/proc/self/exe", none);
 }
 
+/// Empty where the environment names none. A path that is not absolute counts for nothing, as XDG has it: it would lead
+/// into whatever folder the program is started in.
 fs::path cache_folder() {
-  const std::string kept = environment("XDG_CACHE_HOME", "");
-  if (!kept.empty()) return fs::path(kept) / "pendula";
-  const std::string home = environment("HOME", "");
-  return (home.empty() ? fs::temp_directory_path() : fs::path(home) / ".cache") / "pendula";
+  const fs::path kept = environment("XDG_CACHE_HOME", ""), home = environment("HOME", "");
+  if (kept.is_absolute()) return kept / "pendula";
+  return home.is_absolute() ? home / ".cache" / "pendula" : fs::path();
 }
 
-/// FNV-1a, of whatever decides what a compiled kernel is.
+/// Of whatever decides what a compiled kernel is.
 class Key {
  public:
   Key& add(std::string_view text) {
-    for (const char byte : text) hash_ = (hash_ ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
-    hash_ = (hash_ ^ 0x1ffU) * 0x100000001b3U;  // an end that no text has
+    hash_ = fingerprint(std::to_string(text.size()) + ':', hash_);
+    hash_ = fingerprint(text, hash_);
     return *this;
   }
   /// Size and time of a file.
@@ -68,15 +76,16 @@ class Key {
   }
 
  private:
-  std::uint64_t hash_ = 0xcbf29ce484222325U;
+  std::uint64_t hash_ = empty_fingerprint;
 };
 
 std::string read_model(const fs::path& file) {
-  if (fs::is_directory(file)) throw ModelError("expected a model file, got the folder " + file.string());
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw ModelError("expected a model file that can be read, got " + file.string() + ": " + std::strerror(errno));
-  return {std::istreambuf_iterator<char>(stream), {}};
+  constexpr std::size_t most = std::size_t{16} << 20;
+  std::error_code unknown;
+  InputFile read{{}, "neither a file nor a link to one"};  // Python reads it, too: no pipe
+  if (fs::is_regular_file(file, unknown) || !fs::exists(file, unknown)) read = read_input_file(file, most);
+  if (read.problem.empty()) return std::move(read.text);
+  throw ModelError("expected a model file that can be read, got " + file.string() + ": " + read.problem);
 }
 
 fs::path models_folder(const Toolchain& toolchain) {
@@ -116,16 +125,26 @@ std::vector<std::string> architecture_flags() {
   return {};
 }
 
+/// Kernels are programs: the folder that they are kept in, if nobody else can put one there.
+fs::path require_cache(const fs::path& folder) {
+  const auto reject = [](const std::string& got) {
+    throw ModelError("expected a folder of your own for compiled kernels, got " + got +
+                     " (XDG_CACHE_HOME names another one)");
+  };
+  if (folder.empty()) reject("none by XDG_CACHE_HOME, nor by HOME");
+  const TrustedFolder found = trusted_folder(folder);
+  if (!found.problem.empty()) reject(found.problem);
+  return found.path;
+}
+
 /// A folder that is gone when it is done with.
 class Workshop {
  public:
   explicit Workshop(const fs::path& parent) {
-    std::error_code error;
-    fs::create_directories(parent, error);
     std::string name = (parent / "making-XXXXXX").string();
-    if (error || mkdtemp(name.data()) == nullptr) {
-      throw ModelError("expected to write compiled kernels to " + parent.string() + ", got: " +
-                       (error ? error.message() : std::strerror(errno)) + " (XDG_CACHE_HOME names another folder)");
+    if (mkdtemp(name.data()) == nullptr) {
+      throw ModelError("expected to write compiled kernels to " + parent.string() + ", got: " + std::strerror(errno) +
+                       " (XDG_CACHE_HOME names another folder)");
     }
     folder_ = name;
   }
@@ -151,9 +170,9 @@ std::string last_line(const std::string& text) {
 
 /// What the generator prints. Throws ModelError, also where no Python can run it.
 std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
-  std::vector<std::string> command{toolchain.python, "-m", "pendula_codegen"};
+  std::vector<std::string> command = toolchain.module(toolchain.codegen, "pendula_codegen");
   command.insert(command.end(), arguments.begin(), arguments.end());
-  const Ended ended = run_process(command, {"PYTHONPATH=" + toolchain.codegen.string(), "PYTHONDONTWRITEBYTECODE=1"});
+  const Ended ended = run_process(command);
   if (ended.status == 0) return ended.output;
   constexpr std::string_view told = "pendula_codegen: error: ";
   const std::string line = last_line(ended.output);
@@ -208,16 +227,69 @@ void compile(const std::string& name, const fs::path& folder, const fs::path& ob
   throw ModelError("the compiler " + toolchain.compiler + " refuses the kernel of " + name + ": " + last_line(error));
 }
 
-std::shared_ptr<const SystemEntry> load(const fs::path& object) {
-  void* handle = dlopen(object.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) throw ModelError("the kernel " + object.string() + " cannot be loaded: " + dlerror());
-  const auto* interface = static_cast<const int*>(dlsym(handle, "pendula_interface"));
-  const auto* entry = static_cast<const SystemEntry*>(dlsym(handle, "pendula_system"));
-  if (interface == nullptr || entry == nullptr || *interface != system_interface) {
-    dlclose(handle);
-    throw ModelError("the kernel " + object.string() + " is of another pendula; remove it to have it made again");
+constexpr std::size_t largest_object = std::size_t{256} << 20;
+
+/// What a kept kernel ends in, behind the shared object, whose loader does not look there: a hash of that.
+std::string seal_of(std::string_view object) {
+  std::ostringstream seal;
+  seal << "pendula kernel " << std::hex << std::setw(16) << std::setfill('0') << fingerprint(object) << '\n';
+  return seal.str();
+}
+
+/// Whether a file is whole: a disk may have been full, or lose what was not yet written when the power went.
+bool is_sealed(std::string_view file) {
+  const std::size_t size = seal_of({}).size();
+  if (file.size() < size) return false;
+  return file.substr(file.size() - size) == seal_of(file.substr(0, file.size() - size));
+}
+
+void seal(const fs::path& object) {
+  const InputFile made = read_input_file(object, largest_object);
+  std::ofstream stream(object, std::ios::binary | std::ios::app);
+  stream << seal_of(made.text);
+  stream.close();
+  if (!made.problem.empty() || !stream) {
+    throw ModelError("expected to write the kernel " + object.string() +
+                     ", got: " + (made.problem.empty() ? std::strerror(errno) : made.problem));
   }
-  return {entry, [handle](const SystemEntry*) { dlclose(handle); }};
+}
+
+/// A kernel in use, and its file: as long as that is open, no other has its name.
+struct Loaded {
+  Descriptor file;
+  void* handle = nullptr;
+
+  explicit Loaded(Descriptor opened) : file(std::move(opened)), handle(dlopen(name().c_str(), RTLD_NOW | RTLD_LOCAL)) {}
+  Loaded(const Loaded&) = delete;
+  Loaded& operator=(const Loaded&) = delete;
+  ~Loaded() {
+    if (handle != nullptr) dlclose(handle);
+  }
+
+  /// Of what was looked at, whatever its path leads to by now.
+  std::string name() const { return "/proc/self/fd/" + std::to_string(file.get()); }
+};
+
+/// A kept kernel; none, and why in `problem`, where there is none that is whole, the user's own, and of this pendula.
+std::shared_ptr<const SystemEntry> load(const fs::path& object, std::string& problem) {
+  Descriptor opened(open(object.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  struct stat status {};
+  const auto none = [&](const std::string& why) {
+    problem = object.string() + ": " + why;
+    return nullptr;
+  };
+  if (opened.get() < 0 || fstat(opened.get(), &status) != 0) return none(std::strerror(errno));
+  if (status.st_uid != geteuid() && status.st_uid != 0) return none("it belongs to somebody else");
+  const InputFile file = read_input_file("/proc/self/fd/" + std::to_string(opened.get()), largest_object);
+  if (!file.problem.empty()) return none(file.problem);
+  if (!is_sealed(file.text)) return none("it is not what was written");
+  const auto loaded = std::make_shared<Loaded>(std::move(opened));
+  if (loaded->handle == nullptr) return none(dlerror());
+  const auto* interface = static_cast<const int*>(dlsym(loaded->handle, "pendula_interface"));
+  const auto* entry = static_cast<const SystemEntry*>(dlsym(loaded->handle, "pendula_system"));
+  if (interface == nullptr || entry == nullptr || *interface != system_interface)
+    return none("it is of another pendula");
+  return {loaded, entry};
 }
 
 /// Removes kernels that no run has taken for a quarter of a year: each version of a model and of pendula has its own.
@@ -275,6 +347,15 @@ Toolchain Toolchain::of_this_program() {
   return toolchain;
 }
 
+// Python would look for modules in the folder that it is started in before it looks anywhere else, and in those of
+// PYTHONPATH (-E): somebody else's sympy.py would run. `-P`, which is made for that, is no older than Python 3.11.
+std::vector<std::string> Toolchain::module(const fs::path& folder, const std::string& name) const {
+  constexpr const char* start =
+      "import sys; sys.path[:] = [sys.argv[1], *filter(None, sys.path)]; name = sys.argv[2]; del sys.argv[1:3]; "
+      "import runpy; runpy.run_module(name, run_name='__main__', alter_sys=True)";
+  return {python, "-E", "-B", "-c", start, folder.string(), name};
+}
+
 fs::path Toolchain::setup() const {
   const fs::path root = codegen.parent_path();
   return fs::exists(root / "setup") ? root / "setup" : root / "scripts" / "setup";
@@ -318,19 +399,24 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   for (const auto& part : fs::recursive_directory_iterator(toolchain.codegen / "pendula_codegen", none)) {
     if (part.path().extension() == ".py" || part.path().extension() == ".j2") key.add_file(part.path());
   }
-  const fs::path object = toolchain.cache / (name + "-" + key.text() + ".so");
-  const bool was_there = fs::exists(object);
+  const fs::path cache = require_cache(toolchain.cache), object = cache / (name + "-" + key.text() + ".so");
+  std::string problem;
+  std::shared_ptr<const SystemEntry> entry = load(object, problem);
+  const bool was_there = entry != nullptr;
   if (was_there) {
     fs::last_write_time(object, fs::file_time_type::clock::now(), none);  // used again
   } else {
-    const Workshop workshop(toolchain.cache);
+    const Workshop workshop(cache);
     tell("deriving and compiling the kernel of " + name + ", once");
     derive(file, links, workshop.folder() / (name + ".hpp"), toolchain);
     compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
+    seal(workshop.folder() / "kernel.so");
     fs::rename(workshop.folder() / "kernel.so", object);
+    entry = load(object, problem);
+    if (!entry) throw ModelError("the kernel cannot be loaded: " + problem);
   }
-  remove_unused_kernels(toolchain.cache);
-  return {object, load(object), was_there};
+  remove_unused_kernels(cache);
+  return {object, entry, was_there};
 }
 
 }  // namespace pendula::io

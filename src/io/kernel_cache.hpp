@@ -21,13 +21,15 @@ struct Toolchain {
   std::filesystem::path plotting;               ///< folder of the Python package pendula_plot
   std::filesystem::path examples;               ///< folder of the scenarios that come with pendula
   std::vector<std::filesystem::path> includes;  ///< of pendula, its generated headers, Eigen and xsimd
-  std::filesystem::path cache;                  ///< folder of compiled kernels
+  std::filesystem::path cache;                  ///< folder of compiled kernels; empty where none is named
 
   /// That of this program: of its build, told by the file pendula.toolchain beside it, or of where it is installed;
   /// PENDULA_PYTHON and CXX in the environment go before, and CXXFLAGS has the flags. The cache is
   /// $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
   static Toolchain of_this_program();
 
+  /// The command line that runs a Python package of `folder`, and nothing out of the working folder or PYTHONPATH.
+  std::vector<std::string> module(const std::filesystem::path& folder, const std::string& name) const;
   /// The command that installs the Python packages.
   std::filesystem::path setup() const;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,10 +12,14 @@ struct Ended {
   std::string output;  ///< standard output and standard error
 };
 
-/// Runs a program and waits for it; `environment` are NAME=VALUE beside the present ones.
-Ended run_process(const std::vector<std::string>& command, const std::vector<std::string>& environment = {});
+/// Runs a program and waits for it.
+Ended run_process(const std::vector<std::string>& command);
 
 /// The same with this program's standard streams; its exit status.
-int run_attached(const std::vector<std::string>& command, const std::vector<std::string>& environment = {});
+int run_attached(const std::vector<std::string>& command);
+
+/// Whether `action` ends, however it ends, in a copy of this process, within half a second of processor time. For what
+/// other people's libraries do with damaged files. No other thread may run.
+bool comes_to_an_end(const std::function<void()>& action);
 
 }  // namespace pendula::io

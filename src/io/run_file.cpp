@@ -5,18 +5,22 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "io/fingerprint.hpp"
 #include "io/input_error.hpp"
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
+#include "io/process.hpp"
 #include "io/provenance.hpp"
 
 namespace pendula::io {
@@ -24,25 +28,50 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of a row of the table of checkpoints; after them the numbers of the two members, and the count of events.
+// Of a row of the table of checkpoints; after them the numbers of the two members, and three of RunSoFar, which tables
+// of old have not.
 enum Place : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
+constexpr std::size_t numbers_so_far = 3;
 
 /// Slots for checkpoints: what is being written is never the last that is whole.
 constexpr std::size_t slots = 2;
 
-/// A number that tells whether all others came through.
-double checksum(std::span<const double> row) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const double number : row.subspan(check + 1)) {
+/// What a run file says that it was not written with.
+class Changed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Of numbers to the last bit, `before` being that of those before them.
+std::uint64_t fingerprint_of(std::span<const double> numbers, std::uint64_t before = empty_fingerprint) {
+  std::uint64_t hash = before;
+  for (const double number : numbers) {
     hash = (hash ^ std::bit_cast<std::uint64_t>(number)) * 0x100000001b3U;
     hash ^= hash >> 32;
   }
-  return static_cast<double>(hash >> 12);
+  return hash;
 }
 
-/// `size` is that of the table's rows, if there is one: tables of old have no count of events.
-std::vector<double> to_row(const Checkpoint& checkpoint, std::size_t events, std::uint64_t count,
-                           std::optional<std::size_t> size = std::nullopt) {
+/// What a double holds of it.
+double as_number(std::uint64_t fingerprint) {
+  return static_cast<double>(fingerprint >> 12);
+}
+
+/// A number that tells whether all others came through.
+double checksum(std::span<const double> row) {
+  return as_number(fingerprint_of(row.subspan(check + 1)));
+}
+
+/// Of what a run began with, but for what whoever goes on compares with itself.
+std::uint64_t fingerprint_of(const RunOrigin& origin) {
+  std::vector<std::string> texts = {origin.history, origin.scenario_name, origin.scenario, origin.model};
+  texts.insert(texts.end(), origin.overrides.begin(), origin.overrides.end());
+  std::uint64_t hash = empty_fingerprint;
+  for (const std::string& text : texts) hash = fingerprint(text, fingerprint(std::to_string(text.size()) + ':', hash));
+  return hash;
+}
+
+std::vector<double> to_row(const Checkpoint& checkpoint, const RunSoFar& so_far, std::uint64_t count) {
   std::vector<double> row(numbers);
   row[serial] = static_cast<double>(count);
   row[at_time] = checkpoint.time;
@@ -53,16 +82,18 @@ std::vector<double> to_row(const Checkpoint& checkpoint, std::size_t events, std
   for (const Member* member : {&checkpoint.integrator, &checkpoint.record}) {
     row.insert(row.end(), member->numbers.begin(), member->numbers.end());
   }
-  row.push_back(static_cast<double>(events));
-  if (size) row.resize(*size);
+  row.insert(row.end(), {static_cast<double>(so_far.events), so_far.rows_check, so_far.events_check});
   row[check] = checksum(row);
   return row;
 }
 
-/// Events of the run until then.
-std::size_t events_in(std::span<const double> row) {
-  const auto size = static_cast<std::size_t>(row[integrator_size] + row[record_size]) + numbers;
-  return size < row.size() ? static_cast<std::size_t>(row[size]) : 0;
+/// None in a table of old.
+std::optional<RunSoFar> so_far_in(std::span<const double> row) {
+  const auto before = static_cast<std::size_t>(row[integrator_size] + row[record_size]) + numbers;
+  if (row.size() == before) return std::nullopt;
+  if (row.size() != before + numbers_so_far) throw Changed("one whose places to go on from are of another layout");
+  const auto last = row.last(numbers_so_far);
+  return RunSoFar{static_cast<std::size_t>(last[0]), last[1], last[2]};
 }
 
 Checkpoint from_row(std::span<const double> row) {
@@ -81,10 +112,8 @@ bool is_whole(std::span<const double> row) {
 }
 
 /// The last checkpoint that is whole, of rows that are there; none where none is.
-std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& file, const hdf5::Handle& run) {
+std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& run, double rows) {
   if (!hdf5::has(run, "checkpoint")) return std::nullopt;
-  double rows = std::numeric_limits<double>::infinity();
-  if (hdf5::has(file, "t")) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(file, "t"))[0]);
   const hdf5::Handle table = hdf5::open_dataset(run, "checkpoint");
   std::optional<std::vector<double>> last;
   for (std::size_t slot = 0; slot < slots; ++slot) {
@@ -95,17 +124,54 @@ std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& file, con
   return last;
 }
 
+/// A word, such as the name of a kernel; may be empty. Throws Changed.
+std::string read_word(const hdf5::Handle& object, const std::string& name) {
+  std::string word = hdf5::read_attribute(object, name);
+  if (!std::ranges::all_of(word, [](char c) { return c > ' ' && c < '\x7f'; })) {
+    throw Changed("one whose attribute \"" + name + "\" is damaged");
+  }
+  return word;
+}
+
 RunOrigin read_origin(const hdf5::Handle& file, const hdf5::Handle& run) {
   RunOrigin origin;
-  origin.version = hdf5::read_attribute(file, "pendula");
-  origin.instruction_set = hdf5::read_attribute(file, "instruction_set");
-  origin.solver = hdf5::read_attribute(file, "solver");
-  origin.kernel = hdf5::read_attribute(file, "kernel");
+  origin.version = read_word(file, "pendula");
+  origin.instruction_set = read_word(file, "instruction_set");
+  origin.solver = read_word(file, "solver");
+  origin.kernel = read_word(file, "kernel");
+  if (hdf5::has_attribute(file, "history")) origin.history = hdf5::read_attribute(file, "history");
   origin.scenario_name = hdf5::read_attribute(run, "scenario_file");
   origin.scenario = hdf5::read_text(run, "scenario");
   origin.overrides = nlohmann::json::parse(hdf5::read_text(run, "set")).get<std::vector<std::string>>();
   origin.model = hdf5::read_text(run, "model");
   return origin;
+}
+
+/// Throws Changed unless the file has been written with them.
+void require_written(const RunOrigin& origin, const hdf5::Handle& run) {
+  if (static_cast<std::uint64_t>(hdf5::read_number(run, "checksum")) == fingerprint_of(origin)) return;
+  throw Changed("one whose scenario, settings or model are not what it was written with");
+}
+
+/// Does it to a run file that a run goes on from. Throws InputError where the file is damaged.
+template <class Do>
+auto guarded_source(const std::string& file, Do it) {
+  const auto reject = [&](const std::string& what) {
+    throw InputError(file + ": expected a run file to go on from, got " + what);
+  };
+  std::error_code unknown;
+  if (!fs::exists(file, unknown)) reject("a file that is not there");
+  hdf5::begin();
+  try {
+    return it();
+  } catch (const hdf5::Error& error) {
+    reject(std::string("one that HDF5 cannot read: ") + error.what());
+  } catch (const nlohmann::json::exception&) {
+    reject("one whose list of settings is damaged");
+  } catch (const Changed& error) {
+    reject(error.what());
+  }
+  throw std::logic_error("guarded_source");  // not reached
 }
 
 /// A scale of the axis of links, where anything has one.
@@ -137,6 +203,28 @@ std::size_t columns_in(const std::vector<Quantity>& quantities) {
   return columns;
 }
 
+/// Rows of quantities, one after the other; NaN where a file of old does not have one.
+std::vector<double> read_block(const hdf5::Handle& where, const std::vector<Quantity>& quantities, std::size_t first,
+                               std::size_t rows) {
+  const std::size_t columns = columns_in(quantities);
+  std::vector<double> block(rows * columns, std::numeric_limits<double>::quiet_NaN());
+  for (const Quantity& quantity : quantities) {
+    const std::string name = name_in(where, quantity);
+    if (name.empty()) continue;
+    const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(where, name), first, rows);
+    const std::size_t size = quantity.size();
+    if (read.size() != rows * size) throw Changed("one whose rows are not those of its scenario");
+    for (std::size_t i = 0; i < read.size(); ++i) block[i / size * columns + quantity.column(i % size)] = read[i];
+  }
+  return block;
+}
+
+/// What a file has of a run that goes on: events only where it had them from the beginning.
+RunContents going_on(RunContents contents, const SavedRun& saved) {
+  if (saved.checkpoint && !saved.has_events) contents.events.clear();
+  return contents;
+}
+
 /// Of numbers that all runs of this kind have; a chunk of a quantity has about 32 kB where there are few.
 std::size_t chunk_rows(std::size_t columns) {
   constexpr std::size_t block = std::size_t{1} << 17;
@@ -146,27 +234,27 @@ std::size_t chunk_rows(std::size_t columns) {
 }  // namespace
 
 SavedRun read_saved_run(const std::string& file) {
-  const auto reject = [&](const std::string& what) {
-    throw InputError(file + ": expected a run file to go on from, got " + what);
-  };
-  std::error_code unknown;
-  if (!fs::exists(file, unknown)) reject("a file that is not there");
-  hdf5::begin();
-  try {
-    const hdf5::Handle opened = hdf5::open_file(file, false);
-    if (!hdf5::has(opened, "run")) reject("a file without the group \"run\"");
+  return guarded_source(file, [&] {
+    const hdf5::Handle opened = hdf5::open_file(file);
+    if (!hdf5::has(opened, "run")) throw Changed("a file without the group \"run\"");
     const hdf5::Handle run = hdf5::open_group(opened, "run");
     SavedRun saved;
+    // Where texts are, HDF5 has no checksums, and goes in circles through what is damaged.
+    if (!comes_to_an_end([&] { read_origin(opened, run); })) throw Changed("one that is damaged");
     saved.origin = read_origin(opened, run);
     saved.has_rows = hdf5::has(opened, "t");
-    if (const auto last = last_checkpoint(opened, run)) saved.checkpoint = from_row(*last);
+    double rows = std::numeric_limits<double>::infinity();
+    if (saved.has_rows) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(opened, "t"))[0]);
+    if (const auto last = last_checkpoint(run, rows)) {
+      saved.checkpoint = from_row(*last);
+      saved.so_far = so_far_in(*last);
+    }
+    // Files of old have no checksums.
+    const bool is_old = saved.checkpoint ? !saved.so_far : !hdf5::has_attribute(run, "checksum");
+    if (!is_old) require_written(saved.origin, run);
+    saved.has_events = hdf5::has(opened, "events");
     return saved;
-  } catch (const hdf5::Error& error) {
-    reject(std::string("one that HDF5 cannot read: ") + error.what());
-  } catch (const nlohmann::json::exception& error) {
-    reject(error.what());
-  }
-  return {};
+  });
 }
 
 void write_saved_run(const std::string& file, const RunOrigin& origin, const Checkpoint& checkpoint) {
@@ -182,6 +270,13 @@ void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& na
   if (own != unit) hdf5::write_attribute(array, "natural_unit", own);
 }
 
+namespace {
+
+/// Arrays that tell of an event, before those of its row.
+constexpr std::array<const char*, 3> told = {"event_number", "event_name", "event_direction"};
+
+}  // namespace
+
 void EventList::create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links) {
   if (contents.events.empty() || contents.quantities.empty()) return;
   using hdf5::Type;
@@ -196,10 +291,10 @@ void EventList::create(const hdf5::Handle& file, const RunContents& contents, co
     if (datasets_.size() > 1) hdf5::attach_scale(datasets_.back(), datasets_[0], 0);
     if (size > 0) hdf5::attach_scale(datasets_.back(), links, 1);
   };
-  add("event_number", 0, Type::whole, "number of the event, in order of time");
-  add("event_name", 0, Type::whole, "which event it is");
+  add(told[0], 0, Type::whole, "number of the event, in order of time");
+  add(told[1], 0, Type::whole, "which event it is");
   hdf5::write_flags(datasets_.back(), Type::whole, 1, contents.events);
-  add("event_direction", 0, Type::byte, "whether its expression went up or down through zero");
+  add(told[2], 0, Type::byte, "whether its expression went up or down through zero");
   hdf5::write_flags(datasets_.back(), Type::byte, 0, std::vector<std::string>{"down", "up"});
   for (const Quantity& quantity : quantities_) {
     add(quantity.name, quantity.links, Type::real, quantity.meaning);
@@ -208,18 +303,27 @@ void EventList::create(const hdf5::Handle& file, const RunContents& contents, co
   names_ = contents.events;
 }
 
-void EventList::reopen(const hdf5::Handle& file, const RunContents& contents, std::size_t kept) {
-  if (!hdf5::has(file, "events") || contents.events.empty()) return;
+void EventList::take_over(const hdf5::Handle& file, std::size_t count) {
+  if (!is_there()) return;
   const hdf5::Handle group = hdf5::open_group(file, "events");
-  for (const char* name : {"event_number", "event_name", "event_direction"})
-    datasets_.push_back(hdf5::open_dataset(group, name));
-  for (const Quantity& quantity : contents.quantities) {
-    datasets_.push_back(hdf5::open_dataset(group, name_in(group, quantity)));
+  const std::size_t columns = columns_in(quantities_);
+  constexpr std::size_t at_once = 1024;
+  for (std::size_t first = 0; first < count; first += at_once) {
+    const std::size_t rows = std::min(at_once, count - first);
+    const std::vector<double> block = read_block(group, quantities_, first, rows);
+    std::vector<std::vector<double>> events(rows);
+    for (const char* name : told) {
+      const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(group, name), first, rows);
+      if (read.size() != rows) throw Changed("one whose events are not those of its scenario");
+      for (std::size_t k = 0; k < rows; ++k) events[k].push_back(read[k]);
+    }
+    for (std::size_t k = 0; k < rows; ++k) {
+      const auto begin = block.begin() + static_cast<std::ptrdiff_t>(k * columns);
+      events[k].insert(events[k].end(), begin, begin + static_cast<std::ptrdiff_t>(columns));
+      add(std::move(events[k]));
+    }
+    write();
   }
-  quantities_ = contents.quantities;
-  names_ = contents.events;
-  written_ = kept;
-  for (const hdf5::Handle& dataset : datasets_) hdf5::set_rows(dataset, written_);
 }
 
 void EventList::add(const EventRow& happened) {
@@ -227,7 +331,16 @@ void EventList::add(const EventRow& happened) {
   const auto which = std::ranges::find(names_, happened.event.name) - names_.begin();
   std::vector<double> row{static_cast<double>(count() + 1), static_cast<double>(which + 1), happened.up ? 1.0 : 0.0};
   row.insert(row.end(), happened.row.numbers.begin(), happened.row.numbers.end());
+  add(std::move(row));
+}
+
+void EventList::add(std::vector<double> row) {
+  hash_ = fingerprint_of(row, hash_);
   pending_.push_back(std::move(row));
+}
+
+double EventList::check() const {
+  return as_number(hash_);
 }
 
 void EventList::append(std::size_t dataset, const std::vector<double>& numbers) {
@@ -237,7 +350,7 @@ void EventList::append(std::size_t dataset, const std::vector<double>& numbers) 
 
 void EventList::write() {
   if (pending_.empty()) return;
-  constexpr std::size_t before = 3;  // numbers before those of the row
+  constexpr std::size_t before = told.size();
   for (std::size_t k = 0; k < datasets_.size(); ++k) {
     std::vector<double> numbers;
     for (const std::vector<double>& row : pending_) {
@@ -284,14 +397,10 @@ RunFile::RunFile(const std::string& name, const RunOrigin& origin, RunContents c
   guarded([&] { create(origin); });
 }
 
-RunFile::RunFile(const std::string& name, const std::string& from, const RunOrigin& origin, RunContents contents)
-    : contents_(std::move(contents)) {
-  open_part(name);
-  std::error_code error;
-  fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
-  if (error) throw OutputError(name_, error.value());
-  hdf5::mark_as_closed(path_);
-  guarded([&] { reopen(origin); });
+RunFile::RunFile(const std::string& name, const std::string& from, const SavedRun& saved, const RunOrigin& origin,
+                 RunContents contents)
+    : RunFile(name, origin, going_on(std::move(contents), saved)) {
+  if (saved.checkpoint) guarded_source(from, [&] { take_over(from, saved); });
 }
 
 RunFile::~RunFile() {
@@ -336,7 +445,10 @@ void RunFile::create(const RunOrigin& origin) {
   file_ = hdf5::create_file(path_);
   hdf5::write_attribute(file_, "Conventions", "CF-1.11");
   hdf5::write_attribute(file_, "title", origin.title);
-  hdf5::write_attribute(file_, "history", history_line(origin.command));
+  RunOrigin written = origin;
+  if (!written.history.empty()) written.history += '\n';
+  written.history += history_line(origin.command);
+  hdf5::write_attribute(file_, "history", written.history);
   hdf5::write_attribute(file_, "source", "pendula " + origin.version);
   hdf5::write_attribute(file_, "pendula", origin.version);
   hdf5::write_attribute(file_, "instruction_set", origin.instruction_set);
@@ -347,6 +459,7 @@ void RunFile::create(const RunOrigin& origin) {
   hdf5::write_text(run_, "scenario", origin.scenario);
   hdf5::write_text(run_, "set", nlohmann::json(origin.overrides).dump());
   hdf5::write_text(run_, "model", origin.model);
+  hdf5::write_attribute(run_, "checksum", static_cast<std::int64_t>(fingerprint_of(written)));
   if (contents_.quantities.empty()) return;
   // Of an event a name, a count, two times and a warning; of all else far less than the rest.
   constexpr std::size_t room = std::size_t{1} << 16, room_of_event = 1024;
@@ -379,52 +492,33 @@ void RunFile::create_constants(const hdf5::Handle& links) const {
   }
 }
 
-// A file keeps the names that it began with, and what it has of a row.
-void RunFile::reopen(const RunOrigin& origin) {
-  file_ = hdf5::open_file(path_, true);
-  run_ = hdf5::open_group(file_, "run");
-  if (hdf5::has_attribute(file_, "history")) {
-    const std::string before = hdf5::read_attribute(file_, "history");
-    hdf5::write_attribute(file_, "history", before + "\n" + history_line(origin.command));
+// Row by row, so that what is damaged is noticed, and not handed on.
+void RunFile::take_over(const std::string& from, const SavedRun& saved) {
+  const hdf5::Handle source = hdf5::open_file(from);
+  const auto rows = static_cast<std::size_t>(saved.checkpoint->rows);
+  for (std::size_t first = 0; first < rows && columns_ > 0; first += chunk_rows_) {
+    block_ = read_block(source, contents_.quantities, first, std::min(chunk_rows_, rows - first));
+    rows_hash_ = fingerprint_of(block_, rows_hash_);
+    write_if_full();
   }
-  if (hdf5::has(run_, "summary")) {
-    summary_ = hdf5::open_dataset(run_, "summary");
-    hdf5::set_rows(summary_, 0);
-  }
-  const auto last = last_checkpoint(file_, run_);
-  if (last) serial_ = static_cast<std::uint64_t>((*last)[serial]);
-  if (last) in_file_ = static_cast<std::size_t>((*last)[kept_rows]);
-  std::erase_if(contents_.quantities, [&](const Quantity& quantity) { return name_in(file_, quantity).empty(); });
-  if (contents_.quantities.empty()) return;
-  for (const Quantity& quantity : contents_.quantities) {
-    datasets_.push_back(hdf5::open_dataset(file_, name_in(file_, quantity)));
-  }
-  events_.reopen(file_, contents_, last ? events_in(*last) : 0);
-  chunk_rows_ = chunk_rows(columns_in(contents_.quantities));
-  read_begun_block();
-}
-
-/// Rows of a chunk that is not full are taken back into the block.
-void RunFile::read_begun_block() {
-  begun_ = in_file_ - in_file_ % chunk_rows_;
-  const std::size_t pending = in_file_ - begun_;
-  block_.resize(pending * columns_);
-  for (std::size_t k = 0; k < datasets_.size(); ++k) {
-    hdf5::set_rows(datasets_[k], in_file_);
-    if (pending == 0) continue;
-    const std::vector<double> read = hdf5::read_rows(datasets_[k], begun_, pending);
-    const Quantity& quantity = contents_.quantities[k];
-    for (std::size_t i = 0; i < read.size(); ++i) {
-      block_[i / quantity.size() * columns_ + quantity.column(i % quantity.size())] = read[i];
-    }
-  }
+  events_.take_over(source, saved.so_far ? saved.so_far->events : 0);
+  waits_ = !block_.empty();
+  if (!saved.so_far) return;
+  if (as_number(rows_hash_) != saved.so_far->rows_check)
+    throw Changed("one whose rows are not those that were written");
+  if (events_.check() != saved.so_far->events_check) throw Changed("one whose events are not those that were written");
 }
 
 void RunFile::take(const Row& row) {
   block_.insert(block_.end(), row.numbers.begin(), row.numbers.end());
-  const bool full = block_.size() == chunk_rows_ * columns_;
-  if (full) guarded([&] { write_rows(); });
-  if (full || is_due()) guarded([&] { flush(); });
+  rows_hash_ = fingerprint_of(row.numbers, rows_hash_);
+  if (write_if_full() || is_due()) guarded([&] { flush(); });
+}
+
+bool RunFile::write_if_full() {
+  if (block_.size() < chunk_rows_ * columns_) return false;
+  guarded([&] { write_rows(); });
+  return true;
 }
 
 void RunFile::happen(const EventRow& happened) {
@@ -433,12 +527,10 @@ void RunFile::happen(const EventRow& happened) {
 
 void RunFile::keep(const Checkpoint& checkpoint) {
   kept_ = checkpoint;
-  kept_events_ = events_.count();
+  so_far_ = {events_.count(), as_number(rows_hash_), events_.check()};
   if (checkpoint_.get() < 0) {
     guarded([&] {
-      checkpoint_ = hdf5::has(run_, "checkpoint")
-                        ? hdf5::open_dataset(run_, "checkpoint")
-                        : hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, 0, 0).size());
+      checkpoint_ = hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, {}, 0).size());
       hdf5::let_others_read(file_);
       flush();
     });
@@ -487,7 +579,7 @@ void RunFile::flush(std::size_t rows) {
   const bool has_its_rows = kept_ && (columns_ == 0 || static_cast<std::size_t>(kept_->rows) <= rows);
   if (has_its_rows && checkpoint_.get() >= 0) {
     ++serial_;
-    hdf5::write_rows(checkpoint_, serial_ % slots, to_row(*kept_, kept_events_, serial_, hdf5::extent(checkpoint_)[1]));
+    hdf5::write_rows(checkpoint_, serial_ % slots, to_row(*kept_, so_far_, serial_));
     kept_.reset();
   }
   hdf5::flush(file_, path_);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/natural_units.hpp"
 #include "io/rows_file.hpp"
@@ -24,6 +25,7 @@ struct RunOrigin {
   std::string solver, kernel;          ///< as in a summary; may be empty
   std::string title;                   ///< one line
   std::string command;                 ///< that began it, or goes on with it
+  std::string history;                 ///< of the commands before that; a line each
   std::string scenario_name;           ///< its file, by its public name
   std::string scenario;                ///< its text
   std::vector<std::string> overrides;  ///< `key.path=value`
@@ -41,14 +43,22 @@ struct RunContents {
 /// Writes the unit of an array: one that udunits knows, and beside it that of natural numbers.
 void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& natural, const std::string& unit);
 
-/// What a run goes on from.
-struct SavedRun {
-  RunOrigin origin;
-  std::optional<Checkpoint> checkpoint;  ///< none where it had just begun
-  bool has_rows = true;                  ///< whether the file keeps the trajectory, too
+/// What a run file had by a checkpoint.
+struct RunSoFar {
+  std::size_t events = 0;
+  double rows_check = 0, events_check = 0;  ///< what rows and events are known by
 };
 
-/// Reads all that a run needs to go on. Throws InputError where the file has none.
+/// What a run goes on from.
+struct SavedRun {
+  RunOrigin origin;                      ///< `history` is that of the file
+  std::optional<Checkpoint> checkpoint;  ///< none where it had just begun
+  std::optional<RunSoFar> so_far;        ///< nor in files of old
+  bool has_rows = true;                  ///< whether the file keeps the trajectory, too
+  bool has_events = true;
+};
+
+/// Reads all that a run needs to go on. Throws InputError where the file has none, or is damaged.
 SavedRun read_saved_run(const std::string& file);
 
 /// Writes a file that has only what a run needs to go on. Throws InputError where it cannot be opened, OutputError.
@@ -59,16 +69,20 @@ class EventList {
  public:
   /// Where a file has none, nothing is written.
   void create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links);
-  void reopen(const hdf5::Handle& file, const RunContents& contents, std::size_t kept);
+  /// Begins with the first events of another file.
+  void take_over(const hdf5::Handle& file, std::size_t count);
 
   void add(const EventRow& happened);
   bool is_there() const { return !datasets_.empty(); }
   std::size_t count() const { return written_ + pending_.size(); }
+  /// What they are known by.
+  double check() const;
   void write();
   void close();
   void abandon();
 
  private:
+  void add(std::vector<double> row);
   void append(std::size_t dataset, const std::vector<double>& numbers);
 
   std::vector<Quantity> quantities_;
@@ -76,6 +90,7 @@ class EventList {
   std::vector<hdf5::Handle> datasets_;  // number, event, direction, quantities
   std::vector<std::vector<double>> pending_;
   std::size_t written_ = 0;
+  std::uint64_t hash_ = empty_fingerprint;
 };
 
 /// A run as an HDF5 file: quantities with units, the scenario, and where to go on from. It can be read at any time, and
@@ -86,8 +101,10 @@ class RunFile : public RowsFile {
   /// written or is just being written by somebody else.
   RunFile(const std::string& name, const RunOrigin& origin, RunContents contents);
 
-  /// Goes on with a copy of the file `from`, after what it had at the checkpoint.
-  RunFile(const std::string& name, const std::string& from, const RunOrigin& origin, RunContents contents);
+  /// Begins with the rows and events of the file `from` up to its checkpoint. Throws InputError also where those are
+  /// not what was written.
+  RunFile(const std::string& name, const std::string& from, const SavedRun& saved, const RunOrigin& origin,
+          RunContents contents);
 
   ~RunFile() override;
 
@@ -122,10 +139,10 @@ class RunFile : public RowsFile {
   void create(const RunOrigin& origin);
   void create_rows(const hdf5::Handle& links);
   void create_constants(const hdf5::Handle& links) const;
-  void reopen(const RunOrigin& origin);
-  void read_begun_block();
+  void take_over(const std::string& from, const SavedRun& saved);
   void put_in_place();
   void close();
+  bool write_if_full();
   void write_rows();
   void write_rest();
   void reserve();
@@ -153,8 +170,9 @@ class RunFile : public RowsFile {
   bool unpacked_ = false;        // it was written before it was full, and so stays: its place could not be used again
   bool finished_ = false;        // all rows are written
   int full_ = 0;                 // errno: the disk has room only for what is to be written last
+  std::uint64_t rows_hash_ = empty_fingerprint;
   std::optional<Checkpoint> kept_;  // and not yet written
-  std::size_t kept_events_ = 0;     // that there were then
+  RunSoFar so_far_;                 // by then
   std::uint64_t serial_ = 0;        // of checkpoints
   Clock::time_point flushed_ = Clock::now();
 };

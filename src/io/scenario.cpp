@@ -1,18 +1,15 @@
 #include "io/scenario.hpp"
 
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
-#include <fstream>
-#include <iostream>
 #include <limits>
 #include <pendula/chain/momenta.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "io/input_file.hpp"
 #include "io/system_reader.hpp"
 #include "io/toml_reader.hpp"
 
@@ -448,23 +445,9 @@ constexpr std::size_t max_text = std::size_t{256} << 20;
   throw InputError(name + ": expected a scenario file that can be read, got: " + why);
 }
 
-std::string read_stream(std::istream& stream, const std::string& name) {
-  std::string text;
-  std::vector<char> block(std::size_t{1} << 16);
-  do {
-    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
-    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > max_text) reject_file(name, "more than " + std::to_string(max_text >> 20) + " MiB");
-  } while (stream);
-  if (stream.bad()) reject_file(name, "a read error");
-  return text;
-}
-
-std::string read_text(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file)) reject_file(file.string(), "a folder");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) reject_file(file.string(), std::strerror(errno));
-  return read_stream(stream, file.string());
+std::string checked(InputFile file, const std::string& name) {
+  if (!file.problem.empty()) reject_file(name, file.problem);
+  return std::move(file.text);
 }
 
 AnyScenario read_document(const toml::table& document, std::string_view name, const FindSystem& find) {
@@ -507,8 +490,8 @@ AnyScenario ScenarioDocument::with(std::span<const std::string> keys, std::span<
 
 ScenarioText read_scenario_text(const std::filesystem::path& file) {
   const std::string standard_input = "standard input";
-  if (file == "-") return {standard_input, read_stream(std::cin, standard_input)};
-  return {file.string(), read_text(file)};
+  if (file == "-") return {standard_input, checked(read_standard_input(max_text), standard_input)};
+  return {file.string(), checked(read_input_file(file, max_text), file.string())};
 }
 
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides,

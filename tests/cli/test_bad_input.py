@@ -3,6 +3,8 @@
 Every kind is tested on the parser itself (scenario_test.cpp); here they are as users meet them.
 """
 
+import os
+import subprocess
 import sys
 
 import pytest
@@ -124,6 +126,23 @@ def test_a_scenario_without_end_is_refused(pendula):
     assert run.status == 2
     reason = "expected a scenario file that can be read, got: more than 256 MiB"
     assert run.err == f"pendula: /dev/zero: {reason}\n"
+
+
+def test_a_scenario_that_is_too_long_is_not_read(pendula, tmp_path):
+    (tmp_path / "long.toml").touch()
+    os.truncate(tmp_path / "long.toml", 10**10)
+    run = pendula("simulate", "long.toml")
+    reason = "expected a scenario file that can be read, got: more than 256 MiB"
+    assert (run.status, run.err) == (2, f"pendula: long.toml: {reason}\n")
+
+
+def test_a_scenario_may_be_a_pipe_that_somebody_writes_to(pendula, double, tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    run = pendula("simulate", "pipe.toml")
+    reason = "expected a scenario file that can be read, got: a pipe that nobody writes to"
+    assert (run.status, run.err) == (2, f"pendula: pipe.toml: {reason}\n")
+    with subprocess.Popen(["sh", "-c", "sleep 0.3; exec cat double.toml > pipe.toml"], cwd=tmp_path):
+        assert pendula("simulate", "pipe.toml").status == 0
 
 
 def test_an_output_that_cannot_be_opened(pendula, double):

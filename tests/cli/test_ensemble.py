@@ -143,7 +143,10 @@ def test_killed_at_any_time_it_goes_on(whole, tmp_path):
     resume: tuple[str, ...] = ()
     while kills < 20:
         process = subprocess.Popen(
-            command(tmp_path, "--threads", "2", *resume), cwd=tmp_path, stderr=subprocess.PIPE, text=True
+            command(tmp_path, "--threads", "2", *resume),
+            cwd=tmp_path,
+            stderr=subprocess.PIPE,
+            text=True,
         )
         time.sleep(moments.uniform(0.005, 0.15))
         process.kill()
@@ -185,7 +188,10 @@ def test_asked_to_end_it_leaves_what_it_has(whole, tmp_path):
 
 def test_a_journal_that_was_cut_short_is_made_whole(whole, tmp_path):
     assert run(tmp_path, "--shard", "1/2").status == 3
-    journal = max((tmp_path / "out.h5.parts").glob("*.journal"), key=lambda file: file.stat().st_size)
+    journal = max(
+        (tmp_path / "out.h5.parts").glob("*.journal"),
+        key=lambda file: file.stat().st_size,
+    )
     text = journal.read_bytes()
     journal.write_bytes(text[:-5])
     broken = bytearray(text)
@@ -239,6 +245,43 @@ def test_a_rank_that_fails_ends_the_job_and_loses_nothing(whole, tmp_path):
     assert "rank 1: " in done.stderr and "File too large" in done.stderr
     assert run(tmp_path, "--resume").status == 0
     assert contents(tmp_path / "out.h5") == whole
+
+
+LAUNCHED = {
+    "Open MPI": {"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "0"},
+    "MPICH": {"PMI_SIZE": "2", "PMI_RANK": "0"},
+    "Slurm": {"SLURM_STEP_NUM_TASKS": "8", "SLURM_PROCID": "0"},
+    "a second rank": {"PMIX_RANK": "1"},
+}
+
+
+def without_mpi(folder: Path, launcher: dict[str, str], *arguments: str) -> Result:
+    """What a build without MPI says, which a launcher has started."""
+    words = [os.environ["PENDULA_WITHOUT_MPI"], *command(folder, *arguments)[1:]]
+    done = subprocess.run(words, cwd=folder, env=os.environ | launcher, capture_output=True, text=True)
+    return Result(done.returncode, done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize("name", LAUNCHED)
+def test_ranks_that_do_not_know_of_each_other_are_refused(name, tmp_path):
+    refused = without_mpi(tmp_path, LAUNCHED[name])
+    assert (refused.status, refused.out, refused.err.count("\n")) == (2, "", 1)
+    assert "this build of pendula does not know MPI" in refused.err
+    assert (
+        "build again with -DPENDULA_MPI=ON, or give each process a part of its own by --shard I/N"
+        in refused.err
+    )
+    assert not (tmp_path / "out.h5").exists()
+
+
+@pytest.mark.parametrize("launcher", [{"OMPI_COMM_WORLD_SIZE": "1", "PMIX_RANK": "0"}, {"SLURM_NTASKS": "8"}])
+def test_one_process_needs_no_mpi(launcher, whole, tmp_path):
+    assert without_mpi(tmp_path, launcher).status == 0
+    assert contents(tmp_path / "out.h5") == whole
+
+
+def test_ranks_with_a_shard_each_need_no_mpi(tmp_path):
+    assert without_mpi(tmp_path, LAUNCHED["Slurm"], "--shard", "1/8").status == 3
 
 
 def test_natural_units_are_named(tmp_path):
@@ -353,7 +396,8 @@ def test_draws_are_those_of_the_seed(tmp_path):
 
 def test_a_member_that_cannot_be_moved_loses_nobody_else(tmp_path):
     scenario = MAP.replace(
-        'key   = "start.theta[2]"\nfrom  = -2.9', 'key   = "chain.masses[2]"\nfrom  = -2.9'
+        'key   = "start.theta[2]"\nfrom  = -2.9',
+        'key   = "chain.masses[2]"\nfrom  = -2.9',
     )
     done = run(tmp_path, scenario=scenario)
     assert done.status == 0
@@ -433,7 +477,10 @@ def test_threads_are_counted(tmp_path):
 
 
 def test_an_axis_may_be_a_key_of_a_drive(tmp_path):
-    driven = MAP.replace("[start]", "[[chain.drive]]\nlink = 1\namplitude = 1.0\nfrequency = 2.0\n\n[start]")
+    driven = MAP.replace(
+        "[start]",
+        "[[chain.drive]]\nlink = 1\namplitude = 1.0\nfrequency = 2.0\n\n[start]",
+    )
     driven = driven.replace('"start.theta[1]"\nfrom  = -3.0', '"chain.drive[1].amplitude"\nfrom  = 0.0')
     done = run(tmp_path, "--set", "start.theta=[1.0, 0.0]", scenario=driven)
     assert done.status == 0, done.err

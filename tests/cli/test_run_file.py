@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import xarray
 from conftest import DOUBLE, SPHERICAL, Trajectory, program, settings
+from old_run_file import forget_checksums
 
 WHIP = """\
 [chain]
@@ -373,17 +374,50 @@ def test_a_file_that_is_replaced_is_told(pendula, scenario, tmp_path):
     assert run.status == 2 and file.read_text() == DOUBLE
 
 
-def test_a_file_that_cannot_be_gone_on_with_stays_as_it_is(pendula, scenario, tmp_path):
-    """A member that does not fit is found when the new file is begun already."""
-    text = DOUBLE.replace("step     =", 'solver = "chain"\nstages = 2\nstep =')
-    assert pendula("simulate", scenario(text), "-o", "run.h5").status == 0
+CHANGES = {
+    "masses": ("run/scenario", DOUBLE.replace("[1.0, 1.0]", "[1.0, 2.0]")),
+    "stages": ("run/scenario", DOUBLE.replace("step     =", "stages = 5\nstep =")),
+    "settings": ("run/set", '["run.duration=2.0", "chain.gravity=1.62"]'),
+    "model": ("run/model", "import os"),
+}
+ANOTHER_RUN = "one whose scenario, settings or model are not what it was written with"
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_file_that_tells_of_another_run_is_refused_and_stays_as_it_is(name, pendula, scenario, tmp_path):
+    assert pendula("simulate", scenario(DOUBLE), "--set", "run.duration=1.0", "-o", "run.h5").status == 0
+    dataset, text = CHANGES[name]
     with h5py.File(tmp_path / "run.h5", "a") as run:
-        run["run/scenario"][()] = text.replace("stages = 2", "stages = 5")
+        run[dataset][()] = text
     before = (tmp_path / "run.h5").read_bytes()
     resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=2")
-    assert resumed.status != 0 and "member: expected" in resumed.err, resumed.err
+    assert resumed.status == 2
+    assert resumed.err == f"pendula: run.h5: expected a run file to go on from, got {ANOTHER_RUN}\n"
     assert (tmp_path / "run.h5").read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.toml"]
+
+
+def test_rows_that_are_not_those_of_the_run_are_refused(pendula, scenario, tmp_path):
+    """That is found when the new file is begun already."""
+    assert pendula("simulate", scenario(DOUBLE), "-o", "run.h5").status == 0
+    with h5py.File(tmp_path / "run.h5", "a") as run:
+        run["theta"][3, 1] = np.nextafter(run["theta"][3, 1], 0)
+    before = (tmp_path / "run.h5").read_bytes()
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=2")
+    expected = "expected a run file to go on from, got one whose rows are not those that were written"
+    assert (resumed.status, resumed.err) == (2, f"pendula: run.h5: {expected}\n")
+    assert (tmp_path / "run.h5").read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.toml"]
+
+
+def test_a_run_that_went_on_says_how_long_it_is(pendula, scenario, tmp_path):
+    """The file is the one that a run of this duration would have written, so it goes on to there once more."""
+    assert pendula("simulate", scenario(DOUBLE), "--set", "chain.gravity=1.62", "-o", "run.h5").status == 0
+    for duration in ("2", "3"):
+        assert pendula("simulate", "--resume", "run.h5", "--set", f"run.duration={duration}").status == 0
+    with h5py.File(tmp_path / "run.h5") as run:
+        assert run["run/set"].asstr()[()] == '["chain.gravity=1.62","run.duration=3"]'
+    assert pendula("simulate", "--resume", "run.h5").status == 0
 
 
 def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monkeypatch):
@@ -483,36 +517,41 @@ def test_a_summary_stands_in_the_file_of_a_run_that_failed(pendula, scenario, tm
         assert json.loads(saved["run/summary"].asstr()[0])["outcome"]["status"] != "ok"
 
 
-def checksum(row: np.ndarray) -> float:
-    """Of a place to go on from, but for its first number."""
-    value = 0xCBF29CE484222325
-    for number in row[1:].view(np.uint64).tolist():
-        value = (value ^ number) * 0x100000001B3 % 2**64
-        value ^= value >> 32
-    return float(value >> 12)
-
-
 def make_old(file: Path) -> None:
-    """As run files were before they had constants, events, summaries, and counts of events at places to go on from."""
+    """As run files were before they had constants, events, summaries, checksums, and counts of events at places to go
+    on from."""
     with h5py.File(file, "a") as run:
         for name in ["masses", "lengths", "gravity", "damping", "torque", "events", "run/summary"]:
             del run[name]
         for name in ("Conventions", "title", "history", "source"):
             del run.attrs[name]
         run["run"].attrs["scenario_file"] = str(file.with_name("run.toml"))
-        places = run["run/checkpoint"][:, :-1].copy()
-        places[:, 0] = [checksum(place) for place in places]
-        del run["run/checkpoint"]
-        run["run/checkpoint"] = places
+        forget_checksums(run)
 
 
 def test_files_of_old_go_on(pendula, scenario, tmp_path):
+    """They become files of today, but for events, which are told only by those that have them from the beginning."""
     file = scenario(DOUBLE + EVENTS)
     pendula("simulate", file, "--set", "run.duration=8", "-o", "whole.h5")
     pendula("simulate", file, "--set", "run.duration=3.3", "-o", "part.h5")
-    for name in ("whole.h5", "part.h5"):
-        make_old(tmp_path / name)
+    make_old(tmp_path / "part.h5")
     for end in ("5.5", "8"):
         resumed = pendula("simulate", "--resume", "part.h5", "--set", f"run.duration={end}", "--json")
         assert resumed.status == 0, resumed.err
+    with h5py.File(tmp_path / "whole.h5", "a") as whole:
+        del whole["events"]
     assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
+
+
+def test_what_files_of_old_lack_is_not_a_number(pendula, scenario, tmp_path):
+    """Here the energy. The last row, which the end cut short, is taken back."""
+    pendula("simulate", scenario(DOUBLE + EVENTS), "-o", "run.h5")
+    make_old(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "a") as run:
+        rows = run["t"].shape[0]
+        del run["energy"]
+    for end in ("2", "3"):
+        resumed = pendula("simulate", "--resume", "run.h5", "--set", f"run.duration={end}")
+        assert (resumed.status, resumed.err) == (0, "")
+    with h5py.File(tmp_path / "run.h5") as run:
+        assert np.isnan(run["energy"][: rows - 1]).all() and np.isfinite(run["energy"][rows:]).all()

@@ -3,12 +3,14 @@
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
+sys.path.insert(0, str(ROOT / "tests/support"))
 
 
 @pytest.fixture(scope="session")

@@ -92,6 +92,35 @@ def test_it_is_told_in_one_line(name, pendula, tmp_path):
     assert ended.stdout == ""
 
 
+@pytest.mark.parametrize("name", ["sympy", "mpmath", "pendula_codegen", "runpy", "argparse", "usercustomize"])
+def test_modules_of_the_working_folder_are_not_run(name, pendula, tmp_path):
+    """Nor those of PYTHONPATH: whoever unpacks somebody's files and works beside them has not asked for it."""
+    (tmp_path / f"{name}.py").write_text("raise SystemExit('it ran')\n")
+    body, expected = WRONG["no kinetic energy"]
+    (tmp_path / "wrong.py").write_text(HEAD + body)
+    ended = pendula("build", "wrong.py", cwd=tmp_path, XDG_CACHE_HOME=str(tmp_path), PYTHONPATH=str(tmp_path))
+    assert ended.returncode == 2
+    assert "it ran" not in ended.stderr and expected in ended.stderr
+
+
+def test_a_model_that_is_no_file_is_told_at_once(pendula, tmp_path):
+    os.mkfifo(tmp_path / "pipe.py")
+    (tmp_path / "zero.py").symlink_to("/dev/zero")
+    (tmp_path / "folder.py").mkdir()
+    (tmp_path / "long.py").touch()
+    os.truncate(tmp_path / "long.py", 2**34)
+    for name, reason in {
+        "pipe.py": "neither a file nor a link to one",
+        "zero.py": "neither a file nor a link to one",
+        "folder.py": "neither a file nor a link to one",
+        "long.py": "more than 16 MiB",
+        "none.py": "No such file or directory",
+    }.items():
+        ended = pendula("build", name, cwd=tmp_path)
+        assert ended.stderr == f"pendula: expected a model file that can be read, got {name}: {reason}\n"
+        assert ended.returncode == 2
+
+
 def scenario(tmp_path, text):
     file = tmp_path / "run.toml"
     file.write_text(text)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "plotting"))
+sys.path[:0] = [str(ROOT / "plotting"), str(ROOT / "tests/support")]
 
 DOUBLE = """\
 [chain]

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FAKE_FFMPEG = """#!/bin/sh
 for last; do :; done
 echo "$@" > arguments.txt
-cat > "$last"
+case $last in file:/*) cat > "${last#file:}" ;; *) exit 1 ;; esac
 """
 
 
@@ -137,19 +137,39 @@ def test_a_film_of_a_run_file_leaves_the_file(runs, pendula):
     assert film.returncode == 0 and (runs / "kept.h5").exists() and len(frames_of(runs / "film.gif")) == 7
 
 
-@pytest.mark.parametrize("ending", ["mp4", "webm"])
-def test_ffmpeg_gets_every_frame(ending, runs, pendula):
+@pytest.fixture
+def with_ffmpeg(runs) -> str:
+    """A path on which there is an ffmpeg, which keeps its arguments and the frames as they are."""
     tools = runs / "tools"
     tools.mkdir()
     (tools / "ffmpeg").write_text(FAKE_FFMPEG)
     (tools / "ffmpeg").chmod(0o755)
-    path = f"{tools}:{os.environ['PATH']}"
+    return f"{tools}:{os.environ['PATH']}"
+
+
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
+def test_ffmpeg_gets_every_frame(ending, runs, pendula, with_ffmpeg):
     film = pendula(
-        "simulate", "double.toml", "--set", "run.duration=0.2", "--video", f"film.{ending}", PATH=path
+        "simulate", "double.toml", "--set", "run.duration=0.2", "--video", f"film.{ending}", PATH=with_ffmpeg
     )
     assert film.returncode == 0, film.stderr
     assert (runs / f"film.{ending}").stat().st_size == 7 * 640 * 640 * 3
     assert re.search(r"-s 640x640 -r 30 -i - .*-pix_fmt yuv420p", (runs / "arguments.txt").read_text())
+
+
+@pytest.mark.parametrize(
+    "name", ["-y.mp4", "tcp:127.0.0.1:9.mp4", "film_%03d.mp4", "a:b|c\nd.webm", "link.mp4"]
+)
+def test_ffmpeg_takes_a_name_for_that_of_a_file(name, runs, with_ffmpeg, monkeypatch):
+    from pendula_plot.film import encode_by_ffmpeg
+
+    monkeypatch.chdir(runs)
+    monkeypatch.setenv("PATH", with_ffmpeg)
+    (runs / "there").mkdir()
+    (runs / "link.mp4").symlink_to("there/real.mp4")
+    encode_by_ffmpeg(iter([Image.new("RGB", (64, 64))] * 2), Path(name), 30, 64)
+    assert (runs / name).stat().st_size == 2 * 64 * 64 * 3
+    assert (runs / "link.mp4").is_symlink() and not list(runs.glob(".film*"))
 
 
 def test_what_cannot_be_filmed_is_told_before_the_run(runs, pendula):

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <pendula/chain/chain_elimination.hpp>
 #include <pendula/chain/chain_stages.hpp>
 #include <pendula/chain/stage_change.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/numeric/block.hpp>
+#include <pendula/system/stop_sign.hpp>
+#include <vector>
 
 namespace pendula {
 
@@ -24,7 +27,15 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
  public:
   using Stages = ChainStages<Space, S, N, Real, Arch>;
 
-  explicit ChainNewton(int links) : gains_(links) {}
+  /// Gains are kept of so many links: those of a long chain would take more room than all else. The others are found
+  /// again when it is their turn outward, to the same bits, from what was carried to where they begin.
+  static constexpr int most_kept = 4096;
+
+  explicit ChainNewton(int links, int kept = most_kept)
+      : block_(kept), gains_(std::min(links, kept)), below_(static_cast<std::size_t>(std::max(links - 1, 0) / kept)) {}
+
+  /// Asked from now on after every `most_kept` links; what an iteration finds that ends by it is of no use.
+  void heed(StopSign stop) { stop_ = stop; }
 
   /// Improves increments and multipliers once.
   Correction correct(Stages& stages) {
@@ -74,9 +85,10 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     PerStage residual[D], slip[1];
   };
 
-  struct Carried {  // δG = P δw + g
+  struct Carried {  // δG = P δw + g, and G
     Block<vectors, vectors> P;
     Real g[vectors] = {};
+    Vector G = zero();
   };
 
   struct Gain {  // δV = v₀ + Z (K δw + k)
@@ -99,16 +111,26 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     positive_ = true;
     Carried carried;
-    Vector G = zero();
-    Terms terms;
     const int last = stages.links() - 1;
     for (std::size_t k = 0; k < vectors; ++k) carried.P.set_row(k, carried.P.unit(k, stages.constants(last).mass));
-    for (int i = last; i >= 0; --i) {
+    for (int end = stages.links(); end > 0 && !stop_();) {
+      const int begin = (end - 1) / block_ * block_;
+      if (begin > 0) below_[static_cast<std::size_t>(begin / block_ - 1)] = carried;
+      inward(stages, begin, end, carried);
+      end = begin;
+    }
+  }
+
+  PENDULA_IN_REGISTERS void inward(Stages& stages, int begin, int end, Carried& carried) {
+    Vector G = carried.G;
+    Terms terms;
+    for (int i = end; i-- > begin;) {
       G = sum(G, scaled(L(stages.constants(i).mass), stages.kept_freed(i)));
       terms.slip[0] = set_directions(stages, i, stages.kept_rod(i), terms);
       find_multiplier(stages, i, G, terms);
-      eliminate(stages, i, terms, carried);
+      eliminate(stages, i, terms, carried, gains_[i - begin]);
     }
+    carried.G = G;
   }
 
   // τ, −E₂⁻¹ and the residual q.
@@ -135,9 +157,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   }
 
   // Nothing moves before the first link; below the last one there is its own bob, P = m I.
-  void eliminate(const Stages& stages, int i, const Terms& terms, Carried& carried) {
+  void eliminate(const Stages& stages, int i, const Terms& terms, Carried& carried, Gain& gain) {
     const bool first = i == 0, last = i + 1 == stages.links();
-    Gain& gain = gains_[i];
     Tangents BZ, own;
     Block<unknowns, vectors> across;       // L
     Block<unknowns, unknowns + 1> pivots;  // S, and what k is made of
@@ -179,12 +200,27 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   // lanes: what a link waits for is short then.
   template <class Visit>
   PENDULA_IN_REGISTERS Correction outward(Stages& stages, Visit visit) {
-    const auto& columns = stages.columns();
     Real dw[vectors] = {};
     detail::StageChange<S, L> change;
-    for (int i = 0; i < stages.links(); ++i) {
+    for (int begin = 0; begin < stages.links() && !stop_(); begin += block_) {
+      const int end = std::min(begin + block_, stages.links());
+      if (begin > 0) {
+        Carried again = below_[static_cast<std::size_t>(begin / block_ - 1)];
+        inward(stages, begin, end, again);
+      }
+      outward(stages, begin, end, dw, change, visit);
+    }
+    stages.set_turn(change.turn());
+    return {change.relative(), -1};
+  }
+
+  template <class Visit>
+  PENDULA_IN_REGISTERS void outward(Stages& stages, int begin, int end, Real (&dw)[vectors],
+                                    detail::StageChange<S, L>& change, Visit& visit) {
+    const auto& columns = stages.columns();
+    for (int i = begin; i < end; ++i) {
       alignas(pack_alignment) Real dV[D][Lanes] = {};
-      stage_changes(gains_[i], dw, dV);
+      stage_changes(gains_[i - begin], dw, dV);
       Vector U = stages.increments(i), dU;
       for (std::size_t d = 0; d < D; ++d) {
         for (std::size_t k = 0; k < s; ++k) dw[d * s + k] += dV[d][k];
@@ -194,8 +230,6 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
       stages.set_increments(i, U);
       visit(i, change.add(stages.kept_rod(i), dU, stages.advance(i), stages.constants(i).inverse_square));
     }
-    stages.set_turn(change.turn());
-    return {change.relative(), -1};
   }
 
   static void stage_changes(const Gain& gain, const Real* dw, Real (&dV)[D][Lanes]) {
@@ -216,7 +250,10 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  detail::PerLink<Gain, N> gains_;
+  StopSign stop_;
+  int block_;
+  detail::PerLink<Gain, N> gains_;  // of one block
+  std::vector<Carried> below_;      // from each block but the first to the one before
 };
 
 }  // namespace pendula

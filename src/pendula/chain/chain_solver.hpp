@@ -14,6 +14,7 @@
 #include <pendula/system/forcing_look.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/stop_sign.hpp>
 
 namespace pendula {
 
@@ -80,6 +81,7 @@ class ChainSolver {
   }
 
   void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
+  void heed(StopSign stop) { newton_.heed(stop); }
 
   Convergence convergence() const {
     return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;

@@ -11,6 +11,7 @@
 #include <pendula/explicit/explicit_integrator.hpp>
 #include <pendula/explicit/forced_steps.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/system/stop_sign.hpp>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -27,14 +28,6 @@ using Vector = std::vector<double>;  // (q, q̇)
 /// rate = d/dt (q, q̇) = (q̇, q̈) at x and time.
 using RightHandSide = std::function<void(const Vector& x, Vector& rate, double time)>;
 
-RightHandSide right_hand_side_of(ForwardDynamics& dynamics, std::size_t coordinates) {
-  const auto k = static_cast<std::ptrdiff_t>(coordinates);
-  return [&dynamics, k](const Vector& x, Vector& rate, double time) {
-    std::copy(x.begin() + k, x.end(), rate.begin());
-    dynamics.acceleration(time, x.data(), x.data() + k, rate.data() + k);
-  };
-}
-
 /// What fixed and adaptive steps share.
 class ExplicitIntegrator : public PlainIntegrator {
  public:
@@ -44,7 +37,7 @@ class ExplicitIntegrator : public PlainIntegrator {
         dynamics_(std::move(dynamics)),
         parts_(parts),
         kernel_(kernel),
-        right_hand_side_(right_hand_side_of(*dynamics_, x_.size() / 2)) {}
+        right_hand_side_([this](const Vector& x, Vector& rate, double at) { find_rate(x, rate, at); }) {}
 
   Outcome start(double time, const double* q, const double* v) override {
     time_.assign(time);
@@ -90,10 +83,16 @@ class ExplicitIntegrator : public PlainIntegrator {
     Vector x = before_.x;
     const double h = time - before_.time;
     advance(x, before_.time, h);
+    if (is_stopped()) return interrupted(h);
     if (!is_finite(x)) return {.status = Status::not_finite, .time = before_.time, .step = h};
     const std::size_t k = x.size() / 2;
     for (std::size_t i = 0; i < x.size(); ++i) (i < k ? q[i] : v[i - k]) = x[i];
     return {.status = Status::ok, .time = time, .step = h};
+  }
+
+  void heed(StopSign stop) override {
+    constexpr std::size_t quick = 2000;  // numbers whose rates take less than it takes to ask
+    stop_ = x_.size() > quick ? stop : StopSign{};
   }
 
   const Statistics& statistics() const override { return statistics_; }
@@ -130,6 +129,10 @@ class ExplicitIntegrator : public PlainIntegrator {
     return {.status = status, .time = time(), .step = h, .part = non_finite_part(at)};
   }
 
+  /// Whether it is to end; then rates that were found since are of no use.
+  bool is_stopped() const { return stop_(); }
+  Outcome interrupted(double h) const { return {.status = Status::interrupted, .time = time(), .step = h}; }
+
   static bool is_finite(const Vector& x) {
     return std::all_of(x.begin(), x.end(), [](double value) { return std::isfinite(value); });
   }
@@ -139,6 +142,13 @@ class ExplicitIntegrator : public PlainIntegrator {
   Statistics statistics_;
 
  private:
+  void find_rate(const Vector& x, Vector& rate, double time) {
+    if (is_stopped()) return;
+    const auto k = static_cast<std::ptrdiff_t>(x.size() / 2);
+    std::copy(x.begin() + k, x.end(), rate.begin());
+    dynamics_->acceleration(time, x.data(), x.data() + k, rate.data() + k);
+  }
+
   // At a pole the accelerations are infinite: better to say so than to start.
   Outcome require_finite_rate() {
     right_hand_side()(x_, rate_, time());
@@ -170,6 +180,7 @@ class ExplicitIntegrator : public PlainIntegrator {
   std::unique_ptr<ForwardDynamics> dynamics_;
   int parts_;
   std::string kernel_;
+  StopSign stop_;
   RightHandSide right_hand_side_;
   Compensated<double> time_{};
   bool remembers_ = false;
@@ -183,7 +194,9 @@ class FixedStepIntegrator : public ExplicitIntegrator {
   // A step that ends nowhere is taken in ever smaller parts.
   Outcome step(double h) override {
     for (int parts = 1; parts <= most_parts; parts *= 2) {
-      if (try_in(parts, h)) {
+      const bool is_good = try_in(parts, h);
+      if (is_stopped()) return interrupted(h);
+      if (is_good) {
         x_.swap(next_);
         parts_of_last_ = parts;
         return accept(h, next_);
@@ -249,6 +262,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
       is_cut = !trial.is_accepted || trial.size >= h;
       if (is_cut) trial = find_step(h);
     }
+    if (is_stopped()) return interrupted(trial.size);
     statistics_.rejected_steps += trial.rejected;
     if (!trial.is_accepted) return failure(Status::tolerance_not_met, trial.proposed, next_);
     x_.swap(next_);
@@ -278,7 +292,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   /// Tries steps, shorter and shorter from this one on.
   Trial find_step(double longest, int tries = max_attempts) {
     Trial trial{.proposed = longest};
-    for (int attempt = 0; attempt < tries && trial.proposed > smallest_step(); ++attempt) {
+    for (int attempt = 0; attempt < tries && trial.proposed > smallest_step() && !is_stopped(); ++attempt) {
       trial.size = trial.proposed;
       trial.is_accepted = try_step(trial.proposed);
       if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(trial.proposed)) {

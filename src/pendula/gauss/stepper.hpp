@@ -13,6 +13,7 @@
 #include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/stop_sign.hpp>
 #include <utility>
 #include <vector>
 
@@ -133,6 +134,13 @@ class GaussStepper {
     return outcome;
   }
 
+  /// Asked from now on between iterations, where there is much to iterate on. A step that ends by it leaves the state
+  /// as it was, but not all that the next steps depend on.
+  void heed(StopSign stop) {
+    stop_ = solver_.parts() > quick_parts ? stop : StopSign{};
+    if constexpr (requires { solver_.heed(stop_); }) solver_.heed(stop_);
+  }
+
   double time() const { return time_.value; }
   State state() const { return solver_.state(time()); }
   const Statistics& statistics() const { return statistics_; }
@@ -172,6 +180,9 @@ class GaussStepper {
 
   // Halvings of a step that cost less by fixed point than the whole by Newton. Where they do not help, it is Newton's.
   static constexpr int fixed_point_worth = 3;
+
+  // Links or coordinates on which iterations take less than it takes to ask.
+  static constexpr int quick_parts = 1000;
 
   // A step of the controller's choice that is smaller than this, of the time so far, does not move it; nor has one a
   // chance that was shortened so often.
@@ -229,7 +240,8 @@ class GaussStepper {
         solver_.forget();
         if (shorter > 0 && --shorter == 0) controller_ = before;
       }
-      if (h < smallest_chosen * std::abs(time()) || attempts == tries) return outcome;
+      const bool is_last = attempts == tries || outcome.status == Status::interrupted;
+      if (h < smallest_chosen * std::abs(time()) || is_last) return outcome;
     }
   }
 
@@ -248,6 +260,7 @@ class GaussStepper {
     for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
       correction = solver_.correct();
       ++statistics_.newton_iterations;
+      if (stop_()) return failure(Status::interrupted, h, iteration, {});
       if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
       if (iteration == 1) first = correction.relative;
       if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
@@ -318,7 +331,7 @@ class GaussStepper {
         done += part;
         const bool fits = std::fmod(done, 2 * part) == 0 && part < 0.5;
         if (fits) part *= 2;
-      } else if (part > smallest_part) {
+      } else if (part > smallest_part && outcome.status != Status::interrupted) {
         part /= 2;
       } else {
         solver_.restore();
@@ -398,6 +411,7 @@ class GaussStepper {
   Compensated<double> time_{};
   double defect_ = 0;  // of the last solution
   Statistics statistics_;
+  StopSign stop_;
   bool remembers_ = false, looks_ = false;
   Remembered before_;
   std::vector<double> member_;  // to come back to: of the end of the step, while `look` is in it, or of its start

@@ -13,6 +13,7 @@
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/stop_sign.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -80,6 +81,13 @@ class Integrator {
     return integrator_->look(time, motion.q.data(), motion.v.data(), work);
   }
 
+  /// From now on steps and looks that take long end by Status::interrupted where `stop` says so, and what it was before
+  /// no longer does; gives that.
+  StopSign heed(StopSign stop) {
+    integrator_->heed(stop);
+    return std::exchange(stop_, stop);
+  }
+
   const Statistics& statistics() const { return integrator_->statistics(); }
 
   /// A copy of all that the next steps depend on.
@@ -121,6 +129,20 @@ class Integrator {
   std::unique_ptr<PlainIntegrator> integrator_;
   Eigen::Index coordinates_;
   std::string system_;
+  StopSign stop_;
+};
+
+/// Has an integrator heed a sign for as long as it lives.
+class Heeding {
+ public:
+  Heeding(Integrator& integrator, StopSign stop) : integrator_(integrator), before_(integrator.heed(stop)) {}
+  ~Heeding() { integrator_.heed(before_); }
+  Heeding(const Heeding&) = delete;
+  Heeding& operator=(const Heeding&) = delete;
+
+ private:
+  Integrator& integrator_;
+  StopSign before_;
 };
 
 /// Thrown where a run needs a fixed-n kernel that this build does not have.

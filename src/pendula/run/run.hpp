@@ -295,6 +295,7 @@ inline void Run::take(const Motion& motion, double work) {
 // The first event that ends the run does so, and is the last one that is told.
 inline std::optional<Motion> Run::take_events(RunReport& report) {
   if (setup_.events.empty()) return {};
+  const Heeding nothing(*integrator_, {});  // what is found has to be right
   for (const Occurrence& happened : kept_.watch.after_step(*integrator_)) {
     tell(happened);
     if (!setup_.events[happened.event].stop) continue;

@@ -87,7 +87,8 @@ struct Course {
   OnWay on_way;
   OnStep on_step;
   RunResult result = {};
-  bool near_end = false;  // the end may have had a say in a step since: a longer run would not come by here
+  bool is_cut_off = false;  // it was stopped within a step or its rows: from there nothing goes on
+  bool near_end = false;    // the end may have had a say in a step since: a longer run would not come by here
 
   double elapsed() const { return integrator.time() - begin; }
   bool is_over() const { return at_end(schedule, elapsed()); }
@@ -98,8 +99,14 @@ struct Course {
     const bool was_near = std::exchange(near_end, may_be_cut(schedule, h, result.outcome.step));
     if (near_end && !was_near) on_way(place, true);
     result.outcome = integrator.step(h);
+    if (result.outcome.status == Status::interrupted) return cut_off();
     if (result.outcome) result.end = on_step();
     result.stopped = stop();
+  }
+
+  void cut_off() {
+    result.outcome = {};
+    result.stopped = is_cut_off = true;
   }
 
   void row(const Motion& motion, double work) {
@@ -114,14 +121,14 @@ struct Course {
   }
 
   void come_by() {
-    if (!near_end && !result.end) on_way(place, !goes_on() || is_over());
+    if (!near_end && !result.end && !is_cut_off) on_way(place, !goes_on() || is_over());
   }
 
   /// A row every so many steps, and at the last state.
   void to_next_row() {
     while (place.since_row < schedule.every && goes_on() && !is_over()) {
       step();
-      if (result.outcome) ++place.since_row;
+      if (result.outcome && !is_cut_off) ++place.since_row;
     }
   }
   void take_row() {
@@ -143,10 +150,14 @@ struct Course {
     }
   }
   void take_times() {
+    using Clock = std::chrono::steady_clock;
+    constexpr std::chrono::milliseconds long_time(200);  // for the rows of one step: then they are cut off
     if (!result.outcome) return come_by();
+    const auto began = Clock::now();
     for (double time = 0; is_reached(time = schedule.rows.at(place.rows), elapsed());) {
       if (result.end && begin + time > result.end->time) break;
       if (!row_at(begin + time)) return;
+      if (Clock::now() - began > long_time && stop()) return cut_off();
     }
     come_by();
   }
@@ -158,6 +169,8 @@ struct Course {
     const Outcome looked = integrator.look(time, motion, work);
     if (looked) {
       row(motion, work);
+    } else if (looked.status == Status::interrupted) {
+      cut_off();
     } else {
       result.outcome = looked;
     }
@@ -184,6 +197,7 @@ RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, 
   detail::Course<OnRow, Stop, OnWay, OnStep> course{integrator, begin, schedule, place, on_row, stop, on_way, on_step};
   const bool at_times = schedule.rows.any();
   if (at_times) integrator.remember_steps(true);
+  const Heeding heeding(integrator, stop_sign(stop));
   on_way(place, true);
   while (course.goes_on() && !course.is_over()) {
     const auto before = Clock::now();

@@ -66,6 +66,6 @@ struct SystemEntry {
 };
 
 /// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
-inline constexpr int system_interface = 7;
+inline constexpr int system_interface = 8;
 
 }  // namespace pendula

@@ -18,6 +18,7 @@ enum class Status {
   tolerance_not_met,     ///< an explicit method shrank its step to nothing
   not_finite,            ///< a value became infinite or NaN
   singular_mass_matrix,  ///< a coordinate fails: φ in (θ, φ) where sin θ = 0
+  interrupted,           ///< it was asked to stop
 };
 
 constexpr std::string_view name_of(Status status) {
@@ -34,6 +35,8 @@ constexpr std::string_view name_of(Status status) {
       return "not finite";
     case Status::singular_mass_matrix:
       return "singular mass matrix";
+    case Status::interrupted:
+      return "interrupted";
   }
   return "unknown status";
 }
@@ -92,6 +95,9 @@ inline std::string message(const Outcome& outcome, std::span<const std::string_v
       } else {
         out << "the mass matrix is singular" << where(": no inertia is left in ") << ", which has no meaning there";
       }
+      break;
+    case Status::interrupted:
+      out << "interrupted";
       break;
     case Status::ok:
       break;

@@ -2,6 +2,7 @@
 
 #include <pendula/system/member.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/stop_sign.hpp>
 #include <string_view>
 
 namespace pendula {
@@ -32,6 +33,10 @@ class PlainIntegrator {
   /// The same at the full order of the method: by a step from where the last one began. Leaves the integrator as it is.
   /// `work` is what loads have brought by then  [J].
   virtual Outcome look(double time, double* q, double* v, double& work) = 0;
+
+  /// Steps and looks that take long end by Status::interrupted where `stop` says so; what comes next does not follow
+  /// from where that was. Methods and systems whose steps are short need not ask.
+  virtual void heed(StopSign /*stop*/) {}
 
   virtual const Statistics& statistics() const = 0;
   virtual Description describe() const = 0;

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace pendula::io {
+
+inline constexpr std::uint64_t empty_fingerprint = 0xcbf29ce484222325U;
+
+/// A 64-bit hash of a text (FNV-1a), to tell it from others and to notice damage: one changed byte always changes it.
+/// `before` is that of what comes before the text.
+constexpr std::uint64_t fingerprint(std::string_view text, std::uint64_t before = empty_fingerprint) {
+  std::uint64_t hash = before;
+  for (const char byte : text) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+  return hash;
+}
+
+}  // namespace pendula::io
