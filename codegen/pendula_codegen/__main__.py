@@ -1,4 +1,4 @@
-"""Command line: python -m pendula_codegen {kernel,link,tableaux,refresh,counts} … --output WHERE."""
+"""Command line: python -m pendula_codegen {kernel,link,model,written,tableaux,refresh,counts} … --output WHERE."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.links import LINKS
@@ -63,6 +64,22 @@ def _parser() -> argparse.ArgumentParser:
     model.add_argument("--links", type=int, help="number of links, from 1, where the model has links")
     model.set_defaults(run=_run_model)
 
+    written = commands.add_parser(
+        "written", help="what a model says at points about a start, for pendula check"
+    )
+    written.add_argument("--model", required=True, help="as of the command model")
+    written.add_argument("--links", type=int, help="as of the command model")
+    for name, words in (
+        ("parameters", "numbers of all parameters, those of links first"),
+        ("q", "coordinates of the start"),
+        ("v", "rates of the start"),
+    ):
+        written.add_argument(f"--{name}", required=True, type=_numbers, help=f"{words}, with commas")
+    written.add_argument("--time", required=True, type=float, help="of the start")
+    written.add_argument("--seed", required=True, type=int, help="of the points")
+    written.add_argument("--output", required=True, type=Path, help="a text file")
+    written.set_defaults(run=_run_written)
+
     tableaux = commands.add_parser("tableaux", help="Gauss–Legendre coefficients")
     tableaux.set_defaults(run=_run_tableaux)
 
@@ -96,6 +113,16 @@ def _run_link(options: argparse.Namespace) -> None:
 def _run_model(options: argparse.Namespace) -> None:
     model = read_model(find_model(options.model), options.links)
     _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name))
+
+
+def _run_written(options: argparse.Namespace) -> None:
+    model = read_model(find_model(options.model), options.links)
+    start = Start(options.parameters, options.time, options.q, options.v)
+    write_atomically(options.output, comparison(model, start, options.seed))
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(number) for number in text.split(",") if number]
 
 
 def _run_tableaux(options: argparse.Namespace) -> None:

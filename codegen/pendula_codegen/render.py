@@ -60,11 +60,14 @@ KINDS = {
     "mechanics.py": {"kernel", "model"},
     "simplify.py": {"kernel", "model"},
     "templates/kernel.hpp.j2": {"kernel", "model"},
+    "comparison.py": set(),
+    "exact.py": {"model"},
     "model.py": {"model"},
     "model_kernel.py": {"model"},
     "link.py": {"link"},
     "templates/link.hpp.j2": {"link"},
     "tableau.py": {"tableaux"},
+    "written.py": set(),
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
     "__main__.py": set(),
     "counts.py": set(),
@@ -196,7 +199,7 @@ def render_chain(kernel: ChainKernel) -> Header:
 def render_model(model: Model, source: str) -> Header:
     """The header of a model; `source` is how the banner names its file."""
     kernel = ModelKernel(model)
-    ordered = sorted(model.parameters, key=lambda parameter: not parameter.per_link)
+    ordered = model.ordered_parameters
     inputs, points = len(model.inputs), sum(len(p.components) for p in model.points)
     names = [c.symbol.name for c in model.coordinates]
     holds_time = _holds_time(model)
