@@ -62,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
         "--model", required=True, help="a file that defines define(model, links), or a built-in model's name"
     )
     model.add_argument("--links", type=int, help="number of links, from 1, where the model has links")
+    model.add_argument("--alias", default="", help="a further name of its structure, for programs")
     model.set_defaults(run=_run_model)
 
     written = commands.add_parser(
@@ -112,7 +113,7 @@ def _run_link(options: argparse.Namespace) -> None:
 
 def _run_model(options: argparse.Namespace) -> None:
     model = read_model(find_model(options.model), options.links)
-    _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name))
+    _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name, options.alias))
 
 
 def _run_written(options: argparse.Namespace) -> None:

@@ -126,6 +126,7 @@ class SystemKernel(ABC):
     parameters = Argument("parameters", "parameters")
     inputs = Argument("inputs", "inputs")
     equation = "E = d/dt ∂L/∂v − ∂L/∂q − Q"
+    suffix = ""  # of variables that are called after something of the model
     force_unit = ""
     momentum_unit = ""
     mass_unit = ""

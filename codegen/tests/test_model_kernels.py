@@ -178,7 +178,7 @@ def test_rates_of_expressions_are_their_derivatives():
 
 def test_a_header_says_what_its_model_says():
     text = render_model(read("cart_chain", 2), "cart_chain.py").text
-    assert "struct CartChain2 {" in text
+    assert "struct cart_chain_2_kernel {" in text
     assert 'coordinate_names = {"x", "theta_1", "theta_2"};' in text
     assert "coordinate_is_angle = {false, true, true};" in text
     assert "coordinate_is_periodic = {false, true, true};" in text
@@ -188,8 +188,8 @@ def test_a_header_says_what_its_model_says():
     assert 'input_names = {"push"};' in text
     assert "constant_masses = true;" in text
     assert "constant_masses = false;" in render_model(read("furuta", None), "furuta.py").text
-    assert "Real time;" in render_model(read("driven_chain", 1), "driven_chain.py").text
-    assert "Real time;" not in text
+    assert "_real time;" in render_model(read("driven_chain", 1), "driven_chain.py").text
+    assert "_real time;" not in text
 
 
 def test_names_that_mean_something_in_the_code_are_no_obstacle(tmp_path):

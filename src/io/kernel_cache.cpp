@@ -92,17 +92,6 @@ fs::path find_model(const std::string& model, const fs::path& folder, const Tool
                    (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model);
 }
 
-/// planar_2 as Planar2: the generator's name of the structure.
-std::string struct_name(const std::string& name) {
-  std::string text;
-  bool first = true;
-  for (const char letter : name) {
-    if (letter != '_') text += first ? static_cast<char>(std::toupper(static_cast<unsigned char>(letter))) : letter;
-    first = letter == '_';
-  }
-  return text;
-}
-
 /// Flags for the instruction set that the library runs with, as in cmake/PendulaLibrary.cmake.
 std::vector<std::string> architecture_flags() {
   const std::string_view set = library().instruction_set;
@@ -167,7 +156,7 @@ void compile(const std::string& name, const fs::path& folder, const fs::path& ob
                         << "#define EXPORTED extern \"C\" __attribute__((visibility(\"default\")))\n"
                         << "EXPORTED constinit const int pendula_interface = pendula::system_interface;\n"
                         << "EXPORTED constinit const pendula::SystemEntry pendula_system =\n"
-                        << "    pendula::system_entry<pendula::kernels::" << struct_name(name) << ">();\n";
+                        << "    pendula::system_entry<pendula::kernels::" << name << "_kernel>();\n";
   std::vector<std::string> command{toolchain.compiler,
                                    "-std=c++20",
                                    "-O3",
