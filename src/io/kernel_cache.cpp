@@ -13,8 +13,10 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
+#include <span>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -136,10 +138,13 @@ std::string last_line(const std::string& text) {
                      end - (begin == std::string::npos ? 0 : begin + 1) + 1);
 }
 
-void derive(const fs::path& model, std::optional<int> links, const fs::path& header, const Toolchain& toolchain) {
-  std::vector<std::string> command{toolchain.python, "-m", "pendula_codegen", "model", "--model", model.string()};
+/// Runs a command of the generator on a model, which writes to `output`.
+void generate(const std::string& what, const fs::path& model, std::optional<int> links,
+              const std::vector<std::string>& arguments, const fs::path& output, const Toolchain& toolchain) {
+  std::vector<std::string> command{toolchain.python, "-m", "pendula_codegen", what, "--model", model.string()};
   if (links) command.insert(command.end(), {"--links", std::to_string(*links)});
-  command.insert(command.end(), {"--output", header.string()});
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  command.insert(command.end(), {"--output", output.string()});
   const Ended ended = run_process(command, {"PYTHONPATH=" + toolchain.codegen.string(), "PYTHONDONTWRITEBYTECODE=1"});
   if (ended.status == 0) return;
   constexpr std::string_view told = "pendula_codegen: error: ";
@@ -201,6 +206,17 @@ void remove_unused_kernels(const fs::path& cache) {
     const fs::file_time_type used = entry.last_write_time(none);
     if (!none && entry.path().extension() == ".so" && used < oldest) fs::remove(entry.path(), none);
   }
+}
+
+/// Numbers with commas between them.
+template <class Numbers>
+std::string listed(const Numbers& numbers) {
+  std::string text;
+  for (const double number : numbers) {
+    if (!text.empty()) text += ',';
+    text += shortest(number);
+  }
+  return text;
 }
 
 std::string kernel_name(const std::string& model, std::optional<int> links) {
@@ -282,12 +298,28 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   } else {
     const Workshop workshop(toolchain.cache);
     tell("deriving and compiling the kernel of " + name + ", once");
-    derive(file, links, workshop.folder() / (name + ".hpp"), toolchain);
+    generate("model", file, links, {}, workshop.folder() / (name + ".hpp"), toolchain);
     compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
     fs::rename(workshop.folder() / "kernel.so", object);
   }
   remove_unused_kernels(toolchain.cache);
   return {object, load(object), was_there};
+}
+
+std::vector<double> written_values(const std::string& model, std::optional<int> links, const fs::path& folder,
+                                   const Toolchain& toolchain, std::span<const double> parameters, const Motion& start,
+                                   unsigned seed) {
+  const Workshop workshop(toolchain.cache);
+  const fs::path file = workshop.folder() / "written.txt";
+  const auto option = [](std::string name, const std::string& value) { return name.append(value); };
+  generate("written", find_model(model, folder, toolchain), links,
+           {option("--parameters=", listed(parameters)), option("--time=", shortest(start.time)),
+            option("--q=", listed(start.q)), option("--v=", listed(start.v)), option("--seed=", std::to_string(seed))},
+           file, toolchain);
+  std::ifstream stream(file);
+  std::vector<double> numbers;
+  for (std::string word; stream >> word;) numbers.push_back(std::strtod(word.c_str(), nullptr));
+  return numbers;
 }
 
 }  // namespace pendula::io
