@@ -1,5 +1,5 @@
 # What an install holds: the library, its headers with the kernels of this build, the generator for more of them, the
-# program with its pictures and scenarios, and the CMake package.
+# program with its pictures and scenarios, the script that installs what these take, and the CMake package.
 include(CMakePackageConfigHelpers)
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pendula")
@@ -11,6 +11,7 @@ if(PENDULA_BUILD_PROGRAM)
   set(data_dir "${CMAKE_INSTALL_DATADIR}/pendula")
   install(TARGETS pendula_cli)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/plotting" DESTINATION "${data_dir}" PATTERN "__pycache__" EXCLUDE)
+  install(PROGRAMS "${PROJECT_SOURCE_DIR}/cmake/installed_setup" DESTINATION "${data_dir}" RENAME setup)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/examples" DESTINATION "${data_dir}" FILES_MATCHING PATTERN "*.toml")
 endif()
 

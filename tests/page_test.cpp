@@ -199,6 +199,34 @@ TEST_F(PageTest, ThinsLongRuns) {
   EXPECT_LE(html.size(), 1'500'000u);  // measured 1,331,206
 }
 
+// So many that motion is even, so few that none is thinned away; those of later runs are among those of the first.
+TEST_F(PageTest, WantsRowsAtTimesThatItCanKeep) {
+  for (const int links : {1, 3, 100}) {
+    for (const std::size_t runs : {1U, 3U, 50U}) {
+      const Scene scene = chain_scene<Spatial>(links);
+      for (const double duration : {1e-9, 0.1, 7.3, 10.0, 1000.0}) {
+        Page page(file(), scene, runs);
+        const double first = page.times(duration).interval, later = page.times(duration, 1).interval;
+        EXPECT_GT(duration / first, 100) << links << ' ' << runs << ' ' << duration;
+        EXPECT_LE(duration / first, 10000);
+        EXPECT_EQ(std::exp2(std::round(std::log2(later / first))), later / first);
+        for (std::size_t run = 0; run < runs; ++run) {
+          page.begin_run("");
+          const RowTimes times = page.times(duration, run);
+          std::vector<double> row(scene.columns.size());
+          for (std::int64_t k = 0; (row[0] = times.at(k)) <= duration; ++k) page.add_row(row);
+          row[0] = duration;
+          page.add_row(row);
+        }
+        page.close();
+        for (const nlohmann::json& run : description(text_of(file()))["runs"]) EXPECT_EQ(run["stride"], 1);
+      }
+    }
+  }
+  EXPECT_EQ(Page(file(), chain_scene<Planar>(1)).times(0).at(1), 1);  // a run of one row
+  EXPECT_EQ(Page(file(), chain_scene<Planar>(2)).times(10).interval, 0.004);
+}
+
 TEST_F(PageTest, LongRowsAreFloatsOfWhatIsDrawn) {
   const std::string html = page_of(file(), chain_scene<Planar>(1000), 400);
   const nlohmann::json run = description(html)["runs"][0];

@@ -208,7 +208,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       // not the right tables
       {"[output]\nevery = 3", "output = 3",
        "file.toml:32: run.output: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, "
-       "duration, "
+       "duration, estimate, "
        "got "
        "the unknown key \"output\""},
       {"[output]", "[outputs]",
@@ -425,13 +425,14 @@ TEST(Scenario, MomentaThatMakeNoSenseAreTold) {
 TEST(Scenario, AnglesThatLookLikeDegreesAreWarnedOf) {
   const auto warnings = [](const Overrides& overrides) { return parsed<Spatial>(spatial_text, overrides).warnings; };
   EXPECT_EQ(warnings({"start.theta=90"}),
-            Overrides{"--set start.theta=90: start.theta: 90 rad is more than two turns; did you mean \"90 deg\"?"});
+            Overrides{"--set start.theta=90: start.theta: 90 rad is more than a turn; did you mean \"90 deg\"?"});
   EXPECT_EQ(warnings({"start.theta=[1, -45.5, 90]", "start.phi=[1, 2, 12.6]"}),
-            (Overrides{"--set start.theta=[1, -45.5, 90]: start.theta[2]: -45.5 rad is more than two turns; did you "
+            (Overrides{"--set start.theta=[1, -45.5, 90]: start.theta[2]: -45.5 rad is more than a turn; did you "
                        "mean \"-45.5 deg\"?",
-                       "--set start.phi=[1, 2, 12.6]: start.phi[3]: 12.6 rad is more than two turns; did you mean "
+                       "--set start.phi=[1, 2, 12.6]: start.phi[3]: 12.6 rad is more than a turn; did you mean "
                        "\"12.6 deg\"?"}));
-  EXPECT_TRUE(warnings({"start.theta=[12.56, \"90 deg\", \"90 rad\"]"}).empty());
+  EXPECT_TRUE(warnings({"start.theta=[6.28, \"90 deg\", \"90 rad\"]"}).empty());
+  EXPECT_TRUE(warnings({"start.theta=[9.42477796076938, -56.5486677646, 0]"}).empty());  // where a run has ended
 }
 
 TEST(Scenario, PlanarChainsHaveNoPhi) {
@@ -472,7 +473,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step=nan", "--set run.step=nan: run.step: expected a finite number > 0, got nan"},
       {"run.stpe=1",
        "--set run.stpe=1: run.stpe: expected one of method, stages, form, solver, iteration, step, "
-       "tolerance, accuracy, duration, got the unknown key \"stpe\" (did you mean step?)"},
+       "tolerance, accuracy, duration, estimate, got the unknown key \"stpe\" (did you mean step?)"},
       {"step=1",
        "--set step=1: step: expected one of chain, system, start, run, output, event, ensemble, got the unknown key "
        "\"step\" "
@@ -481,7 +482,9 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step", "--set run.step: expected KEY=VALUE such as run.step=1e-4, got \"run.step\""},
       {"=1", "--set =1: expected KEY=VALUE such as run.step=1e-4, got \"=1\""},
       {"run..step=1", "--set run..step=1: expected KEY=VALUE such as run.step=1e-4, got \"run..step=1\""},
-      {"run.step=", "--set run.step=: expected a TOML value after '=', got \"\""},
+      {"run.step=", "--set run.step=: run.step: expected a key of the scenario, to take it out, got none"},
+      {"chain.masses[3]=",
+       "--set chain.masses[3]=: chain.masses[3]: expected an array of at least 3 elements, got [1.0, 2.0]"},
       {"run.step=1e-", "--set run.step=1e-: expected a TOML value after '=', got \"1e-\""},
       {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
@@ -494,7 +497,8 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"chain.masses[3]=1",
        "--set chain.masses[3]=1: chain.masses[3]: expected an array of at least 3 elements, got [1.0, 2.0]"},
       {"chain.masses[0]=1",
-       "--set chain.masses[0]=1: expected KEY=VALUE such as run.step=1e-4, got \"chain.masses[0]=1\""},
+       "--set chain.masses[0]=1: expected KEY=VALUE such as run.step=1e-4, got \"chain.masses[0]=1\" "
+       "(elements of arrays count from 1)"},
       {"chain.drive[1].phase=1",
        "--set chain.drive[1].phase=1: chain.drive[1].phase: expected an array of at least 1 elements, got none"},
       {"chain.masses=[1, -2]", "--set chain.masses=[1, -2]: chain.masses[2]: expected a finite number > 0, got -2"},
@@ -513,6 +517,28 @@ TEST(Scenario, OverridesReachElementsAndTablesInArrays) {
   EXPECT_EQ(scenario.chain.constant_torque()(2, 0), 1);
   EXPECT_EQ(error_of(spatial_text, {"chain.drive[1].frequency=nan"}),
             "--set chain.drive[1].frequency=nan: chain.drive[1].frequency: expected a finite number, got nan");
+}
+
+TEST(Scenario, OverridesWithoutAValueTakeKeysOut) {
+  const auto scenario = parsed<Spatial>(spatial_text, {"chain.drive[1]=", "chain.gravity=", "run.step = "});
+  EXPECT_TRUE(scenario.chain.drives().empty());
+  EXPECT_EQ(scenario.chain.gravity(), 9.81);
+  EXPECT_TRUE(is_adaptive(scenario.run));
+  EXPECT_EQ(parsed<Planar>(planar_text, {"chain.masses[2]=", "start.theta[2]="}).chain.links(), 1);
+}
+
+TEST(Scenario, AnglesMayHaveTheSignForDegrees) {
+  const double quarter = std::numbers::pi / 2;
+  EXPECT_EQ(parsed<Planar>(planar_text, {"start.theta=90°"}).start.theta(), Eigen::Vector2d(quarter, quarter));
+  EXPECT_EQ(parsed<Planar>(planar_text, {"start.theta=[\"90 °\", \"-90°\"]"}).start.theta(),
+            Eigen::Vector2d(quarter, -quarter));
+  EXPECT_EQ(parsed<Planar>(planar_text, {"start.theta_dot=180°/s"}).start.theta_dot(),
+            Eigen::Vector2d(2 * quarter, 2 * quarter));
+}
+
+TEST(Scenario, TheEstimateIsWantedUnlessItIsNot) {
+  EXPECT_TRUE(parsed<Planar>(planar_text).estimate);
+  EXPECT_FALSE(parsed<Planar>(planar_text, {"run.estimate=false"}).estimate);
 }
 
 TEST(Scenario, WithoutAStepThereAreAsManyStagesAsTheToleranceWants) {

@@ -111,7 +111,9 @@ TEST(Summary, PlanarStatesHaveNoPhi) {
   const json final = json::parse(to_json(summary)).at("final");
   std::set<std::string> keys;
   for (const auto& [key, value] : final.items()) keys.insert(key);
-  EXPECT_EQ(keys, (std::set<std::string>{"t", "theta", "theta_dot", "bobs", "velocities"}));
+  EXPECT_EQ(keys, (std::set<std::string>{"t", "q", "v", "points", "theta", "theta_dot", "bobs", "velocities"}));
+  EXPECT_EQ(final.at("q"), json({{"theta_1", final.at("theta").at(0)}, {"theta_2", final.at("theta").at(1)}}));
+  EXPECT_EQ(final.at("points").at("bob_2"), final.at("bobs").at(1));
   EXPECT_EQ(final.at("bobs").at(0).size(), 2u);
 }
 
@@ -254,6 +256,18 @@ TEST(RunRecord, TheTableIsThinAndEndsInTheLastRow) {
   for (int i = 0; i <= 10; ++i) EXPECT_DOUBLE_EQ(table[static_cast<std::size_t>(i)].time, i);
   add(record, chain, spatial_state(), 10.5, 0);
   EXPECT_EQ(record.table().back().time, 10.5);
+}
+
+TEST(RunRecord, TheTableHasRoundTimesWhereThereAreRows) {
+  EXPECT_EQ(table_interval(10, 0.01), 1);
+  EXPECT_EQ(table_interval(7, 0.1), 0.5);
+  EXPECT_EQ(table_interval(25, 0.5), 2.5);
+  EXPECT_EQ(table_interval(20, 0.8), 5 * 0.8);  // there are none at multiples of 2
+  EXPECT_EQ(table_interval(3.6, 0.3), 0.3);
+  EXPECT_EQ(table_interval(3, 1), 1);
+  EXPECT_EQ(table_interval(10.05, 0.05), 1);
+  EXPECT_EQ(table_interval(0.777, 0), 0.777 / 10);  // it is not known where there are any
+  EXPECT_EQ(table_interval(0, 0.1), 0);
 }
 
 TEST(RunRecord, ARunWithoutDurationHasOneTableRow) {

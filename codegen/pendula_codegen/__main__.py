@@ -1,13 +1,15 @@
-"""Command line: python -m pendula_codegen {kernel,link,model,written,tableaux,refresh,counts} … --output WHERE."""
+"""Command line: python -m pendula_codegen COMMAND …; COMMAND --help tells the rest."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
 from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
+from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.links import LINKS
 from pendula_codegen.model import read_model
@@ -66,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     model.set_defaults(run=_run_model)
 
     written = commands.add_parser(
-        "written", help="what a model says at points about a start, for pendula check"
+        "written", help="what a model says at points about a start, for pendula check: numbers in a line"
     )
     written.add_argument("--model", required=True, help="as of the command model")
     written.add_argument("--links", type=int, help="as of the command model")
@@ -78,8 +80,17 @@ def _parser() -> argparse.ArgumentParser:
         written.add_argument(f"--{name}", required=True, type=_numbers, help=f"{words}, with commas")
     written.add_argument("--time", required=True, type=float, help="of the start")
     written.add_argument("--seed", required=True, type=int, help="of the points")
-    written.add_argument("--output", required=True, type=Path, help="a text file")
     written.set_defaults(run=_run_written)
+
+    what = commands.add_parser("describe", help="what a model has, as JSON")
+    what.add_argument("--model", required=True, help="as of model")
+    what.add_argument("--links", type=int, help="as of model")
+    what.set_defaults(
+        run=lambda options: print(json.dumps(describe(find_model(options.model), options.links)))
+    )
+
+    everything = commands.add_parser("models", help="what the built-in models have, as JSON")
+    everything.set_defaults(run=lambda _: print(json.dumps(describe_all())))
 
     tableaux = commands.add_parser("tableaux", help="Gauss–Legendre coefficients")
     tableaux.set_defaults(run=_run_tableaux)
@@ -119,7 +130,7 @@ def _run_model(options: argparse.Namespace) -> None:
 def _run_written(options: argparse.Namespace) -> None:
     model = read_model(find_model(options.model), options.links)
     start = Start(options.parameters, options.time, options.q, options.v)
-    write_atomically(options.output, comparison(model, start, options.seed))
+    print(comparison(model, start, options.seed))
 
 
 def _numbers(text: str) -> list[float]:

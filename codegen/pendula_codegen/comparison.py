@@ -1,4 +1,4 @@
-"""Points to compare a kernel at with what its model says, and what it says there: a text that `pendula check` reads.
+"""Points to compare a kernel at with what its model says, and what it says there: numbers that `pendula check` reads.
 
 Points are drawn about a start, and aimed at: a pulse that lasts for a millisecond is nothing at a time drawn at random.
 """
@@ -33,21 +33,21 @@ class Start:
 
 
 def comparison(model: Model, start: Start, seed: int) -> str:
-    """The text: how many points; of each the time, q, v, a, parameters, inputs, and values with their errors.
+    """In one line: how many points; of each the time, q, v, a, parameters, inputs, and values with their errors.
 
     An error is what a value may be off by, were each operation of the model rounded once. Where there is no value that
     a double can hold, both are nan.
     """
-    functions = written(model)
-    symbols = _Symbols(model)
-    lines = []
-    for numbers in points(model, start, seed):
+    functions, symbols = written(model), _Symbols(model)
+    found = points(model, start, seed)
+    words = [str(len(found))]
+    for numbers in found:
         evaluate = Evaluator(numbers, [c.symbol for c in model.coordinates if c.is_angle])
-        lines.append(" ".join(repr(numbers[symbol]) for symbol in symbols.all))
+        words += [repr(numbers[symbol]) for symbol in symbols.all]
         for of_one in fields(Written):
-            pairs = [_pair(evaluate, value) for value in getattr(functions, of_one.name)]
-            lines.append(" ".join(f"{value} {error}" for value, error in pairs))
-    return "\n".join([str(len(lines) // (1 + len(fields(Written)))), *lines]) + "\n"
+            for value in getattr(functions, of_one.name):
+                words += _pair(evaluate, value)
+    return " ".join(words)
 
 
 def _pair(evaluate: Evaluator, expression: Expr) -> tuple[str, str]:

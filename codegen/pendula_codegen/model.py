@@ -42,7 +42,9 @@ _KEYWORDS = (
 )
 CPP_KEYWORDS = frozenset(_KEYWORDS.split())
 # What the columns of a file and the members of a kernel are called anyhow.
-TAKEN = frozenset({"t", "time", "energy", "links", "name", "inputs", "points", "coordinates"})
+TAKEN = frozenset(
+    {"t", "time", "energy", "links", "link", "name", "inputs", "points", "coordinates", "run", "events"}
+)
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,8 @@ class Model:
     def coordinate(self, name: str, unit: str) -> Symbol:
         """A coordinate. Of the unit "rad" it is an angle; anything else is not."""
         symbol = self._declare(name, "a coordinate")
-        self._declare(f"{name}_dot", f"the rate of {name}")
+        for rate in dict.fromkeys([rate_name(name), f"{name}_dot"]):
+            self._declare(rate, f"the rate of {name}")
         self.coordinates.append(Coordinate(symbol, self._text(unit, "a unit")))
         return symbol
 
@@ -267,12 +270,12 @@ class Model:
         for q, row in zip(system.coordinates, mass, strict=True):
             if all(entry == 0 for entry in row):
                 raise GenerationError(
-                    f"{where}: lagrangian: the coordinate {q} has no kinetic energy: its rate {q}_dot does not "
-                    "stand in it with the power 2"
+                    f"{where}: lagrangian: the coordinate {q} has no kinetic energy: its rate {rate_name(q.name)} "
+                    "does not stand in it with the power 2"
                 )
             if any(entry.free_symbols & rates for entry in row):
                 raise GenerationError(
-                    f"{where}: lagrangian: expected powers of the rates up to 2, got others of {q}_dot"
+                    f"{where}: lagrangian: expected powers of the rates up to 2, got others of {rate_name(q.name)}"
                 )
         if _is_singular(mass):
             raise GenerationError(f"{where}: lagrangian: its mass matrix is singular everywhere")
@@ -345,8 +348,14 @@ class Model:
         return self.file
 
 
+def rate_name(coordinate: str) -> str:
+    """x_dot of x, theta_dot_1 of theta_1: an index stays last."""
+    stem, index = re.fullmatch(r"(.+?)(_\d+)?", coordinate).groups("")
+    return f"{stem}_dot{index}"
+
+
 def _rate_symbol(q: Symbol) -> Symbol:
-    return Symbol(f"{q.name}_dot", real=True)
+    return Symbol(rate_name(q.name), real=True)
 
 
 def _is_singular(mass: list[list[Expr]]) -> bool:

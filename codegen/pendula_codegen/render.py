@@ -50,7 +50,7 @@ class Header:
     counts: Mapping[str, Counts] = field(default_factory=dict)
 
 
-# Sources that only some kinds of headers are made from; all others go into each. __main__ and counts write none.
+# Sources that only some kinds of headers are made from; all others go into each. Those of no kind write none.
 KINDS = {
     "blocks.py": {"kernel"},
     "chain.py": {"kernel"},
@@ -71,6 +71,7 @@ KINDS = {
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
     "__main__.py": set(),
     "counts.py": set(),
+    "describe.py": set(),
 }
 
 

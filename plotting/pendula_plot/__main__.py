@@ -7,6 +7,9 @@ import sys
 from pathlib import Path
 
 REQUIREMENTS = Path(__file__).resolve().parents[1] / "requirements.txt"
+ROOT = REQUIREMENTS.parents[1]
+# Of an install, or of a checkout.
+SETUP = next((path for path in (ROOT / "setup", ROOT / "scripts/setup") if path.exists()), "scripts/setup")
 
 try:
     import h5py  # noqa: F401
@@ -16,8 +19,8 @@ try:
     from .run import PlotError, read_run
 except ImportError as missing:
     print(
-        f"pendula: pictures take a Python with the packages of {REQUIREMENTS}; {sys.executable}: {missing} "
-        "(PENDULA_PYTHON names another one)",
+        f"pendula: pictures take a Python with the packages of {REQUIREMENTS}, which {SETUP} installs; "
+        f"{sys.executable}: {missing} (PENDULA_PYTHON names another one)",
         file=sys.stderr,
     )
     sys.exit(2)

@@ -72,12 +72,13 @@ def shown(run: Run, column: str, choice: Choice) -> np.ndarray:
 
 
 def chosen(runs: list[Run], choice: Choice) -> list[str]:
-    """Coordinates to show: those asked for, else as many of the first run as are told apart."""
+    """Columns to show: those asked for, else as many coordinates of the first run as are told apart."""
     there = [coordinate.name for coordinate in runs[0].coordinates]
     for name in choice.coordinates:
         for run in runs:
-            if name not in [coordinate.name for coordinate in run.coordinates]:
-                raise PlotError(f"{run.name}: expected a coordinate, one of {', '.join(there)}, got {name}")
+            if name not in run.columns:
+                expected = f"a coordinate, one of {', '.join(there)}, or another column"
+                raise PlotError(f"{run.name}: expected {expected}, got {name}")
     if choice.coordinates:
         return list(choice.coordinates)
     if len(runs) > 1:
@@ -113,8 +114,8 @@ def draw_series(axes: Axes, runs: list[Run], choice: Choice) -> None:
 
 
 def draw_phase(axes: Axes, runs: list[Run], choice: Choice) -> None:
-    name = (choice.coordinates or [runs[0].coordinates[-1].name])[-1]
     rates = {coordinate.name: coordinate.rate for coordinate in runs[0].coordinates}
+    name = ([name for name in choice.coordinates if name in rates] or list(rates))[-1]
     for run, column, colour, text in curves(runs, [name]):
         axes.plot(
             shown(run, column, choice), run.columns[rates[name]], color=colour, label=text, linewidth=0.7

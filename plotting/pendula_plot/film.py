@@ -1,4 +1,4 @@
-"""Films of runs: frames drawn here, encoded by ffmpeg (mp4, webm) or by Pillow (gif, webp)."""
+"""Films of runs, written as their frames are drawn: by ffmpeg (mp4, webm), or without it (gif, webp)."""
 
 from __future__ import annotations
 
@@ -7,27 +7,43 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image
 
+from . import animation
+from .canvas import Canvas, Colour
 from .run import PlotError, Run
 
-BACKGROUND, TRACE_OLD, TRACE_NEW = (16, 20, 31), (58, 76, 140), (255, 184, 77)
-ROD, BOB, FLOOR, SHADOW = (150, 162, 190), (207, 216, 234), (36, 43, 60), (8, 10, 16)
+# What is large has multiples of 4: these colours Pillow finds exactly in a palette.
+BACKGROUND, FLOOR, SHADOW, ROD, BOB = (16, 20, 32), (36, 44, 60), (8, 8, 16), (152, 164, 192), (208, 216, 236)
+TRACE_OLD, TRACE_NEW, WHITE = (58, 76, 140), (255, 184, 77), (255, 255, 255)
 FIRST_RUN, LAST_RUN = (86, 180, 233), (255, 222, 90)
-FINER = 2  # each way; frames are drawn larger and made smaller, which smooths edges
-TRACE_SECONDS = 3.0
-FFMPEG = {
-    ".mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-crf", "20"],
-    ".webm": ["-c:v", "libvpx-vp9", "-pix_fmt", "yuv420p", "-crf", "32", "-b:v", "0"],
+TRACE_SECONDS, TRACE_PIECES = 3.0, 24
+SAMPLES = 6
+X264_IN_TIME = ["-preset", "veryfast"]
+VP9_IN_TIME = ["-deadline", "realtime", "-cpu-used", "5", "-lag-in-frames", "0"]
+FFMPEG = {  # in less time than a film takes to see, with few frames in memory
+    ".mp4": [
+        "-c:v",
+        "libx264",
+        *X264_IN_TIME,
+        "-pix_fmt",
+        "yuv420p",
+        "-movflags",
+        "+faststart",
+        "-crf",
+        "20",
+    ],
+    ".webm": ["-c:v", "libvpx-vp9", *VP9_IN_TIME, "-pix_fmt", "yuv420p", "-crf", "32", "-b:v", "0"],
 }
 
 
 @dataclass
 class Stage:
-    """Where points appear: from `right`, `up` and `toward` the eye to pixels."""
+    """Where points appear: from `right`, `up` and `toward` the eye to pixels, y up."""
 
     axes: np.ndarray  # (3, 3), rows right, up, toward
     middle: np.ndarray
@@ -58,9 +74,8 @@ class Stage:
         return Stage(axes, (low + high) / 2, 0.86 * size / extent, size, floor)
 
     def pixels(self, places: np.ndarray) -> np.ndarray:
-        """(…, dimension) to (…, 2), y down."""
-        seen = (places @ self.axes[:2].T - self.middle) * self.scale
-        return np.stack([self.size / 2 + seen[..., 0], self.size / 2 - seen[..., 1]], axis=-1)
+        """(…, dimension) to (…, 2)."""
+        return (places @ self.axes[:2].T - self.middle) * self.scale + self.size / 2
 
 
 @dataclass
@@ -95,87 +110,103 @@ def rows_at(run: Run, fps: float, seconds: float) -> np.ndarray:
     return np.clip(np.searchsorted(run.time, frames + 1e-9, side="right") - 1, 0, None)
 
 
-def colour_between(old: tuple, new: tuple, place: float) -> tuple[int, ...]:
+def colour_between(old: Colour, new: Colour, place: float) -> Colour:
     return tuple(round(a + (b - a) * place) for a, b in zip(old, new, strict=True))
 
 
-def draw_floor(draw: ImageDraw.ImageDraw, stage: Stage, body: Body, row: int) -> None:
-    """A grid under the motion, and the shadow of it that falls straight down."""
-    if stage.floor is None:
-        return
-    reach = float(np.abs(body.places[..., :2]).max()) * 1.05
-    for place in np.linspace(-reach, reach, 9):
-        for line in ([(-reach, place), (reach, place)], [(place, -reach), (place, reach)]):
-            ends = stage.pixels(np.array([[*end, stage.floor] for end in line]))
-            draw.line([tuple(end) for end in ends], fill=FLOOR, width=FINER)
-    fallen = body.places[row].copy()
-    fallen[:, 2] = stage.floor
-    pixels = stage.pixels(fallen)
-    for first, second in body.rods:
-        draw.line([tuple(pixels[first]), tuple(pixels[second])], fill=SHADOW, width=3 * FINER)
-    for (x, y), radius in zip(pixels[1:], body.radii * stage.size, strict=True):
-        draw.ellipse([x - radius, y - radius / 3, x + radius, y + radius / 3], fill=SHADOW)
+def trace_strokes() -> list[tuple[Colour, float]]:
+    """Colour and width of each piece of the trace, the oldest first."""
+    strokes = []
+    for fresh in (np.arange(TRACE_PIECES) + 0.5) / TRACE_PIECES:
+        colour = colour_between(TRACE_OLD, TRACE_NEW, fresh)
+        strokes.append((colour_between(BACKGROUND, colour, min(1, 0.15 + fresh)), 1 + 1.5 * fresh))
+    return strokes
 
 
-def draw_trace(
-    draw: ImageDraw.ImageDraw, stage: Stage, body: Body, rows: np.ndarray, ages: np.ndarray
-) -> None:
-    """The path of the last point, old parts fading."""
-    path = stage.pixels(body.places[rows, -1])
-    for k in range(1, len(path)):
-        fresh = 1 - ages[k] / TRACE_SECONDS
-        colour = colour_between(BACKGROUND, colour_between(TRACE_OLD, TRACE_NEW, fresh), min(1, 0.15 + fresh))
-        draw.line([tuple(path[k - 1]), tuple(path[k])], fill=colour, width=round((1 + 1.5 * fresh) * FINER))
+TRACE_STROKES = trace_strokes()
 
 
-def draw_body(draw: ImageDraw.ImageDraw, stage: Stage, body: Body, row: int, colour: tuple[int, ...]) -> None:
-    """Rods, then bobs, those that are far away first."""
-    pixels = stage.pixels(body.places[row])
-    width = max(1, min(3, round(120 / len(pixels)))) * FINER
-    for first, second in body.rods:
-        draw.line([tuple(pixels[first]), tuple(pixels[second])], fill=ROD, width=width)
-    order = (
-        np.argsort(body.places[row, 1:] @ stage.axes[2])
-        if stage.floor is not None
-        else range(len(pixels) - 1)
-    )
-    for k in order:
-        x, y = pixels[k + 1]
-        radius = body.radii[k] * stage.size
-        draw.ellipse([x - radius, y - radius, x + radius, y + radius], fill=colour)
-    x, y = pixels[0]
-    draw.ellipse([x - 3 * FINER, y - 3 * FINER, x + 3 * FINER, y + 3 * FINER], fill=(255, 255, 255))
+def looks(count: int) -> list[tuple[Colour, Colour, float]]:
+    """Of each run the colours of its bobs and of its rods, and their part of the full size."""
+    if count == 1:
+        return [(BOB, ROD, 1.0)]
+    colours = [colour_between(FIRST_RUN, LAST_RUN, k / (count - 1)) for k in range(count)]
+    return [(colour, colour_between(BACKGROUND, colour, 0.6), 0.6) for colour in colours]
 
 
-def frame(stage: Stage, bodies: list[Body], runs: list[Run], row: int) -> Image.Image:
-    """All runs at one row, in colours of their own where they are several; the first one has a trace."""
-    image = Image.new("RGB", (stage.size, stage.size), BACKGROUND)
-    draw = ImageDraw.Draw(image)
-    draw_floor(draw, stage, bodies[0], row)
-    time = runs[0].time
-    since = int(np.searchsorted(time, time[row] - TRACE_SECONDS))
-    rows = np.append(np.arange(since, row, max(1, (row - since) // 240)), row)
-    draw_trace(draw, stage, bodies[0], rows, time[row] - time[rows])
-    for k in reversed(range(len(bodies))):
-        place = k / max(1, len(bodies) - 1)
-        draw_body(
-            draw,
-            stage,
-            bodies[k],
-            row,
-            BOB if len(bodies) == 1 else colour_between(FIRST_RUN, LAST_RUN, place),
-        )
-    return image.resize((stage.size // FINER, stage.size // FINER), Image.Resampling.LANCZOS)
+class Film:
+    """Runs that have the same rows, in real time; the first has a trace, several have colours of their own."""
 
+    def __init__(self, runs: list[Run], fps: float, size: int, seconds: float = math.inf) -> None:
+        self.time = runs[0].time
+        self.rows = rows_at(runs[0], fps, seconds)
+        self.bodies = [body_of(run) for run in runs]
+        self.looks = looks(len(runs))
+        seen = [body.places[: self.rows[-1] + 1] for body in self.bodies]
+        self.stage = Stage.around(np.concatenate(seen), size)
+        self.canvas = Canvas(size, BACKGROUND)
+        self._draw_grid()
+        self.canvas.keep()
 
-def frames(runs: list[Run], fps: float, size: int, seconds: float = math.inf) -> Iterator[Image.Image]:
-    """Frames in real time, of runs that have the same rows."""
-    bodies = [body_of(run) for run in runs]
-    rows = rows_at(runs[0], fps, seconds)
-    last = int(rows[-1])
-    stage = Stage.around(np.concatenate([body.places[: last + 1] for body in bodies]), size * FINER)
-    for row in rows:
-        yield frame(stage, bodies, runs, int(row))
+    def frames(self) -> Iterator[Image.Image]:
+        return map(self._frame, self.rows)
+
+    def samples(self) -> list[Image.Image]:
+        """A few of the frames, which show what colours there are."""
+        return [self._frame(row) for row in self.rows[:: max(1, len(self.rows) // SAMPLES)]]
+
+    def still(self) -> Image.Image:
+        """The frame in the middle."""
+        return self._frame(self.rows[len(self.rows) // 2])
+
+    def _frame(self, row: int) -> Image.Image:
+        self.canvas.clear()
+        self._draw_shadow(self.bodies[0], row)
+        self._draw_trace(self.bodies[0], row)
+        for body, look in reversed([*zip(self.bodies, self.looks, strict=True)]):
+            self._draw_body(body, row, *look)
+        self.canvas.discs(
+            self.stage.pixels(self.bodies[0].places[row, :1]), np.array([3.0]), WHITE
+        )  # where it hangs
+        return self.canvas.image()
+
+    def _draw_grid(self) -> None:
+        """The floor under the motion."""
+        if self.stage.floor is None:
+            return
+        reach = max(float(np.abs(body.places[..., :2]).max()) for body in self.bodies) * 1.05
+        lines = []
+        for place in np.linspace(-reach, reach, 9):
+            for ends in ([(-reach, place), (reach, place)], [(place, -reach), (place, reach)]):
+                lines.append(self.stage.pixels(np.array([[*end, self.stage.floor] for end in ends])))
+        self.canvas.lines(lines, FLOOR, 1)
+
+    def _draw_shadow(self, body: Body, row: int) -> None:
+        """It falls straight down."""
+        if self.stage.floor is None:
+            return
+        fallen = body.places[row].copy()
+        fallen[:, 2] = self.stage.floor
+        pixels = self.stage.pixels(fallen)
+        self.canvas.lines([pixels[[*rod]] for rod in body.rods], SHADOW, 3)
+        radii = body.radii[:, None] * self.stage.size * (1, 1 / 3)
+        self.canvas.discs(pixels[1:], radii, SHADOW)
+
+    def _draw_trace(self, body: Body, row: int) -> None:
+        """The path of the last point, old parts fading: in pieces of one brightness each, the oldest first."""
+        ages = np.linspace(TRACE_SECONDS, 0, TRACE_PIECES + 1)
+        rows = np.searchsorted(self.time, self.time[row] - ages).clip(max=row)
+        for (begin, end), (colour, width) in zip(pairwise(rows), TRACE_STROKES, strict=True):
+            if begin < end:
+                path = self.stage.pixels(body.places[begin : end + 1, -1])
+                self.canvas.lines([path], colour, width)
+
+    def _draw_body(self, body: Body, row: int, bob: Colour, rod: Colour, share: float) -> None:
+        """Rods, then bobs; `share` of their full size."""
+        pixels = self.stage.pixels(body.places[row])
+        width = share * max(1, min(3, round(120 / len(pixels))))
+        self.canvas.lines([pixels[[*ends]] for ends in body.rods], rod, width)
+        self.canvas.discs(pixels[1:], share * body.radii * self.stage.size, bob)
 
 
 def check(path: Path) -> None:
@@ -202,26 +233,10 @@ def encode_by_ffmpeg(images: Iterator[Image.Image], path: Path, fps: float, size
         raise PlotError(f"{path}: ffmpeg could not write it: {complaint.decode(errors='replace').strip()}")
 
 
-def encode_by_pillow(images: Iterator[Image.Image], path: Path, fps: float) -> None:
-    save_frames(list(images), path, fps)
-
-
-def save_frames(images: list[Image.Image], path: Path, fps: float) -> None:
-    first, *rest = images
-    # GIF counts in hundredths of a second.
-    duration = round(100 / fps) * 10 if path.suffix == ".gif" else round(1000 / fps)
-    kept = {"quality": 60, "method": 2} if path.suffix == ".webp" else {"optimize": True}
-    try:
-        first.save(path, save_all=True, append_images=rest, duration=duration, loop=0, **kept)
-    except OSError as error:
-        raise PlotError(
-            f"{path}: expected a file that can be written, got: {error.strerror or error}"
-        ) from None
-
-
 def write(run: Run, path: Path, fps: float, size: int, seconds: float = math.inf) -> None:
     """Writes a film in the format that its name ends in. Raises PlotError."""
+    film = Film([run], fps, size, seconds)
     if path.suffix in FFMPEG:
-        encode_by_ffmpeg(frames([run], fps, size, seconds), path, fps, size)
+        encode_by_ffmpeg(film.frames(), path, fps, size)
     else:
-        encode_by_pillow(frames([run], fps, size, seconds), path, fps)
+        animation.write(film.frames(), path, fps, film.samples())

@@ -8,15 +8,22 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice, zip_longest
 from pathlib import Path
 
 from PIL import Image
 
-from .film import frames, save_frames
+from . import animation
+from .film import Film
 from .run import PlotError, Run, read_run
 
 FPS, SIZE = 20, 320
+STRIP_FILMS, STRIP_SIZE = 4, 240
+ROWS_A_FRAME = 4  # for the traces
+ABREAST = 2  # cases that are made at once: of one the program runs while the other is drawn
 TITLE = "<title>pendula: a gallery</title>"
 
 
@@ -67,11 +74,11 @@ CASES = (
 
 
 def settings(scenario: Path, seconds: float) -> list[str]:
-    """Rows close enough for a film, no longer than it."""
+    """Rows at the frames and between them, no longer than the film."""
     run = tomllib.loads(scenario.read_text(encoding="utf-8"))["run"]
-    every = max(1, int(0.02 / run.get("step", 1e-3)))
     duration = min(seconds, run.get("duration", 10.0))
-    return ["--set", f"output.every={every}", "--set", f"run.duration={duration}"]
+    interval = 1 / (FPS * ROWS_A_FRAME)
+    return ["--set", f"output.interval={interval}", "--set", f"run.duration={duration}"]
 
 
 def starts(scenario: Path, copies: int) -> list[list[str]]:
@@ -99,24 +106,33 @@ def runs_of(program: str, scenario: Path, case: Case) -> list[Run]:
     return runs
 
 
-def make(program: str, scenario: Path, case: Case, folder: Path) -> list[Image.Image]:
-    """The film, a still of it, and the page of one case; gives the film's frames."""
-    images = list(frames(runs_of(program, scenario, case), FPS, SIZE))
-    images[len(images) // 2].save(folder / f"{case.name}.png", optimize=True)
-    save_frames(images, folder / f"{case.name}.webp", FPS)
+def make(program: str, scenario: Path, case: Case, folder: Path) -> list[Run]:
+    """The film, a still of it, and the page of one case; gives its runs."""
+    print(f"{case.title} …", file=sys.stderr, flush=True)
+    runs = runs_of(program, scenario, case)
+    film = Film(runs, FPS, SIZE)
+    film.still().save(folder / f"{case.name}.png", optimize=True)
+    animation.write(film.frames(), folder / f"{case.name}.webp", FPS, film.samples())
     copies = ["--copies", str(case.copies)] if case.copies else []
     simulate(program, scenario, ["--view", str(folder / f"{case.name}.html"), *copies])
-    return images
+    return runs
 
 
-def strip(films: list[list[Image.Image]]) -> list[Image.Image]:
+def write_strip(films: list[Film], path: Path) -> None:
     """Films side by side, as long as the longest; the others wait at their ends."""
-    return [
-        join([film[min(k, len(film) - 1)] for film in films]) for k in range(max(len(film) for film in films))
-    ]
+    samples = [join(images) for images in zip(*(film.samples() for film in films), strict=False)]
+    animation.write(map(join, side_by_side(films)), path, FPS, samples)
 
 
-def join(images: list[Image.Image]) -> Image.Image:
+def side_by_side(films: list[Film]) -> Iterator[list[Image.Image]]:
+    """The frames of all films at once."""
+    shown = [None] * len(films)
+    for images in zip_longest(*(film.frames() for film in films)):
+        shown = [new or old for new, old in zip(images, shown, strict=True)]
+        yield shown
+
+
+def join(images: Sequence[Image.Image]) -> Image.Image:
     joined = Image.new("RGB", (sum(image.width for image in images), images[0].height))
     for k, image in enumerate(images):
         joined.paste(image, (sum(other.width for other in images[:k]), 0))
@@ -145,20 +161,20 @@ def write(folder: Path, scenarios: Path, program: str, only: str = "") -> None:
     cases = [case for case in CASES if not only or case.name in only.split(",")]
     template = (Path(__file__).parent / "gallery.html").read_text(encoding="utf-8")
     index = folder / "index.html"
-    cards, films = [], []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if index.exists() and TITLE not in index.read_text(encoding="utf-8", errors="replace"):
             raise PlotError(
                 f"{index}: expected a folder for the gallery, got one with a page of another kind"
             )
-        for case in cases:
-            print(f"{case.title} …", file=sys.stderr, flush=True)
-            scenario = scenarios / f"{case.scenario}.toml"
-            films.append(make(program, scenario, case, folder))
-            cards.append(card(case, scenario.read_text(encoding="utf-8")))
-        shown = [[image.resize((240, 240), Image.Resampling.LANCZOS) for image in film] for film in films[:4]]
-        save_frames(strip(shown), folder / "strip.webp", FPS)
+        files = [scenarios / f"{case.scenario}.toml" for case in cases]
+        with ThreadPoolExecutor(ABREAST) as pool:
+            made = pool.map(lambda case, file: make(program, file, case, folder), cases, files)
+            strip = [Film(runs, FPS, STRIP_SIZE) for runs in islice(made, STRIP_FILMS)]
+            write_strip(strip, folder / "strip.webp")
+            list(made)  # raises what went wrong
+        texts = [file.read_text(encoding="utf-8") for file in files]
+        cards = [card(case, text) for case, text in zip(cases, texts, strict=True)]
         index.write_text(template.replace("<!-- cards -->", "".join(cards)), encoding="utf-8")
     except OSError as error:
         raise PlotError(

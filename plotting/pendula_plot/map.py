@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
 
 from .figure import GREEK, style, symbol
-from .run import PlotError
+from .run import PlotError, keys_of, unit_of
 
 WIDE_RANGE = 100  # times that differ by more are on a logarithmic scale
+FEW_DECADES = 1e4  # on which 1, 2, 5, … are numbered, not powers of ten alone
 SIDE = 5.2  # inches, of the longer side of a map
 DOTS = 200  # an inch, as pictures are written
+DURATION = 10.0  # s, of a run whose scenario does not say
 NEVER, FAILED = "#e8e8e8", "#b00020"
 
 
@@ -32,6 +38,7 @@ class Ensemble:
     axes: list[tuple[str, str, np.ndarray]]  # name, unit, values; the first one slowest
     contour: np.ndarray | None
     complete: bool
+    duration: str  # of a member's run, as a legend says it
 
     def lost(self) -> np.ndarray:
         """Members that were not moved, or failed."""
@@ -51,28 +58,52 @@ def read(path: Path, key: str, contour: str = "") -> Ensemble:
             if str(file.attrs.get("kind", "")) != "ensemble":
                 raise reject(path, "a file of pendula ensemble", "another HDF5 file")
             status = file["status"]
-            names = sorted(
-                name for name in file if file[name].shape == status.shape and not file[name].is_scale
-            )
-            for name in filter(None, (key, contour)):
-                if name not in names:
-                    raise reject(path, f"one of {', '.join(names)}", f'"{name}"')
-            axes = [
-                (scale.name[1:], str(scale.attrs.get("units", "")), scale[:])
-                for scale in (file[key].dims[k][0] for k in range(status.ndim))
-            ]
+            kept = {
+                name: file[name]
+                for name in sorted(file)
+                if file[name].shape == status.shape and not file[name].is_scale
+            }
+            key, contour = (called(path, kept, name) if name else "" for name in (key, contour))
+            axes = [scale_of(kept[key].dims[k][0]) for k in range(status.ndim)]
+            unit = unit_of(kept[key].attrs)
             return Ensemble(
                 str(path),
                 key,
-                counted(file[key][...]),
-                str(file[key].attrs.get("units", "")),
+                counted(kept[key][...]),
+                unit,
                 status[...],
                 axes,
-                file[contour][...] if contour else None,
+                kept[contour][...] if contour else None,
                 bool(file.attrs["complete"]),
+                duration_of(file.attrs, [name for name, _, _ in axes], unit),
             )
     except OSError as error:
         raise reject(path, "a file of pendula ensemble", f"{error.strerror or error}") from None
+
+
+def duration_of(attributes: Mapping, axes: list[str], unit: str) -> str:
+    """How long members are moved, by the attributes of a file; `unit` is of the number that is shown."""
+    if "run.duration" in axes:
+        return "its duration"
+    keys = keys_of(str(attributes["scenario"]), json.loads(attributes["set"]))
+    time = unit if unit not in ("", "1") else "s"
+    return f"{float(keys.get('run.duration') or DURATION):g} {time}"
+
+
+def called(path: Path, kept: Mapping[str, Any], name: str) -> str:
+    """The data set of that name; or of what the scenario calls it, `event:flip` of event_flip. Raises PlotError."""
+    if name in kept:
+        return name
+    typed = {str(data.attrs.get("long_name", "")): word for word, data in kept.items()}
+    if name in typed:
+        return typed[name]
+    raise reject(path, f"one of {', '.join(kept)}", f'"{name}"')
+
+
+def scale_of(scale: Any) -> tuple[str, str, np.ndarray]:
+    """Key of the scenario, unit and values of an axis; in files of old the key is the name."""
+    key = str(scale.attrs.get("long_name", scale.name[1:]))
+    return key, unit_of(scale.attrs), scale[:]
 
 
 def counted(values: np.ndarray) -> np.ndarray:
@@ -134,7 +165,9 @@ def draw_map(drawn: Figure, axes: Axes, ensemble: Ensemble, choice: MapChoice) -
     marks = np.where(ensemble.lost().T[..., None], rgba(FAILED), rgba(NEVER))
     axes.imshow(marks, **place)
     image = axes.imshow(np.ma.masked_invalid(values.T), cmap=cmap, norm=norm, **place)
-    drawn.colorbar(image, ax=axes, label=named(ensemble.key, ensemble.unit))
+    few_decades = isinstance(norm, LogNorm) and norm.vmax < FEW_DECADES * norm.vmin
+    ticks = {"ticks": LogLocator(subs=(1, 2, 5)), "format": "%g"} if few_decades else {}
+    drawn.colorbar(image, ax=axes, label=named(ensemble.key, ensemble.unit), **ticks)
     if choice.level is not None:
         first, second = (axis[2] for axis in ensemble.axes)
         axes.contour(first, second, ensemble.contour.T, levels=[choice.level], colors="k", linewidths=0.8)
@@ -161,7 +194,7 @@ def legend(axes: Axes, ensemble: Ensemble, values: np.ndarray) -> None:
     lost = ensemble.lost()
     patches = []
     if (np.isnan(values) & ~lost).any():
-        patches.append(Patch(color=NEVER, label="never"))
+        patches.append(Patch(color=NEVER, label=f"not within {ensemble.duration}"))
     if lost.any():
         text = "failed" if ensemble.complete else "failed, or not run yet"
         patches.append(Patch(color=FAILED, label=text))

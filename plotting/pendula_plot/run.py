@@ -6,6 +6,7 @@ import json
 import math
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -58,7 +59,7 @@ class Run:
 
     @cached_property
     def coordinates(self) -> list[Coordinate]:
-        """Of a chain by link: `theta_1` with `theta_dot_1`; of a model `x` with `x_dot`."""
+        """`theta_1` with `theta_dot_1`, `x` with `x_dot`; in files of old models `theta_1` with `theta_1_dot`."""
         found = []
         for name in self.columns:
             base, _, link = name.rpartition("_")
@@ -119,16 +120,7 @@ class Run:
         """Accepted steps from row to row, 0 where rows are at times; None where no scenario tells."""
         if not self.scenario:
             return None
-        document = tomllib.loads(self.scenario)
-        keys = {
-            f"{table}.{key}": value
-            for table in ("run", "output")
-            for key, value in document.get(table, {}).items()
-        }
-        keys |= {
-            key.strip(): value.strip()
-            for key, _, value in (setting.partition("=") for setting in self.settings)
-        }
+        keys = keys_of(self.scenario, self.settings)
         if {"output.interval", "output.times"} & keys.keys():
             return 0
         is_constant = "run.step" in keys or str(keys.get("run.method")).strip("\"'") == "rk4"
@@ -160,6 +152,18 @@ class Run:
         return replace(self, columns={name: values[wanted] for name, values in self.columns.items()})
 
 
+def keys_of(scenario: str, settings: list[str]) -> dict[str, object]:
+    """What [run] and [output] say, by `run.step`, …: of a scenario, and in its place what `--set` said, as text."""
+    document = tomllib.loads(scenario)
+    told = {
+        f"{table}.{key}": value
+        for table in ("run", "output")
+        for key, value in document.get(table, {}).items()
+    }
+    changes = (setting.partition("=") for setting in settings)
+    return told | {key.strip(): value.strip() for key, _, value in changes}
+
+
 def read_run(path: Path) -> Run:
     """Reads a trajectory, CSV or HDF5, also one that is still growing. Raises PlotError."""
     try:
@@ -182,17 +186,23 @@ def read_hdf5(path: Path) -> Run:
     with h5py.File(path, "r") as file:
         if "t" not in file or "run" not in file:
             raise PlotError(f"{path}: expected a trajectory, got an HDF5 file without t and run")
-        rows = min(file[name].shape[0] for name in file if name not in ("run", "link"))
-        for name in file:
-            if name in ("run", "link"):
-                continue
-            data, unit = file[name][:rows], str(file[name].attrs.get("units", ""))
+        # Arrays without an end have rows; others are numbers of the whole run.
+        arrays = {name: data for name, data in file.items() if isinstance(data, h5py.Dataset)}
+        arrays = {name: data for name, data in arrays.items() if data.maxshape[:1] == (None,)}
+        rows = min(data.shape[0] for data in arrays.values())
+        for name, array in arrays.items():
+            data, unit = array[:rows], unit_of(array.attrs)
             links = [""] if data.ndim == 1 else [f"_{k + 1}" for k in range(data.shape[1])]
             for k, link in enumerate(links):
                 columns[name + link] = data if data.ndim == 1 else data[:, k]
                 units[name + link] = unit
         scenario, settings = (file["run"][name].asstr()[()] for name in ("scenario", "set"))
     return Run(str(path), columns, units, scenario, json.loads(settings))
+
+
+def unit_of(attributes: Mapping[str, object]) -> str:
+    """Of an array; that of a scenario in natural units stands beside what CF allows for one. Empty for none."""
+    return str(attributes.get("natural_unit", attributes.get("units", "")))
 
 
 def read_csv(path: Path) -> Run:

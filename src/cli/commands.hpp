@@ -15,17 +15,18 @@ enum ExitStatus {
 };
 
 struct SimulateOptions {
+  std::string command;                 ///< as it was typed, for files to tell
   std::string scenario;                ///< the file; empty where a run goes on
   std::optional<std::string> resume;   ///< run file that it goes on with
   std::vector<std::string> overrides;  ///< `key.path=value`
-  std::optional<std::string> output;   ///< trajectory file, HDF5 where it ends in .h5; "-" is standard output
-  std::optional<std::string> events;   ///< file for its events
+  std::optional<std::string> output;   ///< trajectory file, CSV or HDF5 by its ending; "-" is standard output
+  std::optional<std::string> events;   ///< file for its events, CSV
   std::optional<std::string> view;     ///< page to look at the run
   std::optional<std::string> video;    ///< film of the run
   int copies = 0;                      ///< further runs in the page, from starts that differ
   double apart = 1e-9;                 ///< by this, in the first coordinate, from one to the next
   bool json = false;                   ///< summary as JSON
-  bool quiet = false;                  ///< no summary, progress or warnings; JSON is still printed where asked for
+  bool quiet = false;                  ///< no summary and no progress; warnings, errors and the JSON object remain
 };
 
 /// Runs a scenario: trajectory to the file, summary to standard output (or to standard error where that is the file),
@@ -50,6 +51,18 @@ struct BuildOptions {
 
 /// Makes the kernel of a model, or finds it made; says where it is on standard output. Throws io::InputError.
 ExitStatus build(const BuildOptions& options);
+
+struct DescribeOptions {
+  std::string model;         ///< a model file, or a built-in model
+  std::optional<int> links;  ///< where the model has some
+  bool json = false;
+};
+
+/// Tells on standard output what a model has: coordinates, parameters, inputs, points. Throws io::InputError.
+ExitStatus describe(const DescribeOptions& options);
+
+/// Lists the built-in models on standard output. Throws io::InputError.
+ExitStatus models(bool json);
 
 /// Writes NAME.py, a model to start from. Throws io::InputError where that cannot be.
 ExitStatus new_model(const std::string& name);
@@ -103,6 +116,7 @@ struct Shard {
 };
 
 struct EnsembleOptions {
+  std::string command;                 ///< as it was typed, for the file to tell
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::string output;                  ///< HDF5 file

@@ -30,11 +30,13 @@
 #include "cli/terminal_line.hpp"
 #include "io/ensemble_file.hpp"
 #include "io/ensemble_plan.hpp"
+#include "io/file_format.hpp"
 #include "io/input_error.hpp"
 #include "io/journal.hpp"
 #include "io/link_target.hpp"
 #include "io/natural_units.hpp"
 #include "io/output_error.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::cli {
 namespace {
@@ -73,7 +75,7 @@ std::int64_t chunk_of(std::int64_t members, bool in_lanes) {
 
 template <class Scenario>
 Kept kept_of(const Scenario& scenario, const io::EnsemblePlan& plan) {
-  return Kept(plan, *subject_of(scenario), scenario.events, scenario.natural);
+  return Kept(plan, *subject_of(scenario), scenario.events);
 }
 
 /// An ensemble from its scenario to its file.
@@ -94,6 +96,7 @@ class Session {
     if (ranks_.all((options_.resume || options_.shard) && io::is_complete(options_.output, head_)))
       return leave_alone();
     const std::vector<std::int64_t> missing = find_missing();
+    tell_what_is_replaced();
     const auto began = Clock::now();
     work(missing);
     seconds_ = std::chrono::duration<double>(Clock::now() - began).count();
@@ -118,7 +121,10 @@ class Session {
     io::RunOrigin origin;
     origin.version = version;
     origin.instruction_set = library().instruction_set;
-    origin.scenario_name = fs::absolute(scenarios_.text().name).string();
+    const std::string& name = scenarios_.text().name;
+    origin.title = fs::path(name).stem().string() + ": " + std::to_string(plan_.count) + " members";
+    origin.command = options_.command;
+    origin.scenario_name = io::public_name(name);
     origin.scenario = scenarios_.text().text;
     origin.overrides = scenarios_.overrides();
     origin.model = scenarios_.model();
@@ -129,6 +135,7 @@ class Session {
   void require_output() const {
     std::error_code unknown;
     if (options_.output == "-") io::reject_output(options_.output, "standard output");
+    io::require_format(options_.output, io::FileFormat::hdf5, "an ensemble (HDF5)");
     if (fs::is_directory(options_.output, unknown)) io::reject_output(options_.output, "a folder");
     if (fs::exists(options_.output, unknown) && !fs::is_regular_file(options_.output, unknown)) {
       io::reject_output(options_.output, "a device, a pipe or a socket, whose place a file would take");
@@ -139,6 +146,13 @@ class Session {
     if (fs::equivalent(options_.output, options_.scenario, unknown)) {
       throw io::InputError(options_.output + ": expected a file for the ensemble, got the scenario itself");
     }
+  }
+
+  /// Nothing of a file that shards share, or that an interrupted ensemble has left.
+  void tell_what_is_replaced() const {
+    std::error_code unknown;
+    if (ranks_.rank() != 0 || options_.resume || options_.shard || !fs::exists(options_.output, unknown)) return;
+    std::cerr << "pendula: replacing " << options_.output << '\n';
   }
 
   /// The file is complete: of several that end at once, one has written it, or it was there before.

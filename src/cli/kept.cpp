@@ -13,32 +13,20 @@ namespace {
 
 constexpr std::string_view event_prefix = "event:";
 
-/// Whether a quantity tells where points are: coordinates have rates.
-bool is_point(const Quantity& quantity, const std::vector<Quantity>& all) {
-  const auto named = [&](const std::string& name) {
-    return std::ranges::find(all, name, &Quantity::name) != all.end();
-  };
-  const bool is_rate = quantity.name.ends_with("_dot") && named(quantity.name.substr(0, quantity.name.size() - 4));
-  return quantity.name != "t" && quantity.name != "energy" && !is_rate && !named(quantity.name + "_dot");
-}
-
 }  // namespace
 
-Kept::Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events,
-           const std::optional<io::NaturalUnits>& natural) {
-  std::vector<Quantity> quantities = subject.quantities();
-  for (Quantity& quantity : quantities) quantity.unit = io::in_units(natural, quantity.unit);
+Kept::Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events) {
+  const std::vector<Quantity> quantities = subject.quantities();
   std::vector<std::string> keep = plan.keep;
   if (keep.empty()) {
     keep = {"final", "energy_error", "steps"};
     for (const io::EventPlan& event : events) keep.push_back(std::string(event_prefix) + event.name);
   }
-  for (const std::string& what : keep) add(what, plan.keep_place, quantities, events, natural);
+  for (const std::string& what : keep) add(what, plan.keep_place, quantities, events);
 }
 
 void Kept::add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
-               const std::vector<io::EventPlan>& events, const std::optional<io::NaturalUnits>& natural) {
-  const std::string second = io::in_units(natural, "s"), energy = io::in_units(natural, "J");
+               const std::vector<io::EventPlan>& events) {
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(columns_, [&](const Column& each) { return each.column.name == name; });
   };
@@ -48,9 +36,9 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
   }
   const std::array<std::pair<std::string_view, Column>, 5> single = {{
       {"energy_error", {{"energy_error", "1"}, Source::energy_error}},
-      {"energy", {{"energy_start", energy}, Source::energy_start}},
+      {"energy", {{"energy_start", "J"}, Source::energy_start}},
       {"steps", {{"steps", "1", true}, Source::steps}},
-      {"ftle", {{"ftle", "1/" + second}, Source::ftle}},
+      {"ftle", {{"ftle", "1/s"}, Source::ftle}},
       {"megno", {{"megno", "1"}, Source::megno}},
   }};
   for (const auto& [name, column] : single) {
@@ -60,8 +48,8 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
   }
   if (has(what)) return;
   if (what == "lyapunov") {
-    columns_.push_back({{what, "1/" + second}, Source::exponent});
-    columns_.push_back({{what + ":error", "1/" + second}, Source::exponent_error});
+    columns_.push_back({{what, "1/s"}, Source::exponent});
+    columns_.push_back({{what + ":error", "1/s"}, Source::exponent_error});
     return;
   }
   const auto event = std::ranges::find_if(
@@ -72,17 +60,19 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
     throw io::InputError(place + ": expected some of " + known + ", got \"" + what + '"');
   }
   const auto index = static_cast<std::size_t>(event - events.begin());
-  columns_.push_back({{what, second}, Source::event_time, index});
+  columns_.push_back({{what, "s"}, Source::event_time, index});
   columns_.push_back({{what + ":count", "1", true}, Source::event_count, index});
 }
 
 void Kept::add_last(const std::vector<Quantity>& quantities, bool points) {
   const std::vector<std::string> names = columns_of(quantities);
   for (const Quantity& quantity : quantities) {
-    if ((is_point(quantity, quantities) || quantity.name == "energy") != points) continue;
+    const bool is_place = quantity.role == Role::point || quantity.role == Role::energy;
+    if (is_place != points || quantity.role == Role::input) continue;
     for (std::size_t k = 0; k < quantity.size(); ++k) {
       const std::size_t column = quantity.column(k);
-      columns_.push_back({{names[column], quantity.unit}, Source::last, column});
+      columns_.push_back(
+          {{names[column], quantity.unit, false, quantity.meaning + " at the end"}, Source::last, column});
     }
   }
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/subject.hpp>
@@ -10,7 +9,6 @@
 #include "io/ensemble_file.hpp"
 #include "io/ensemble_plan.hpp"
 #include "io/event_reader.hpp"
-#include "io/natural_units.hpp"
 
 namespace pendula::cli {
 
@@ -18,8 +16,7 @@ namespace pendula::cli {
 class Kept {
  public:
   /// Throws io::InputError where the ensemble asks for what there is not.
-  Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events,
-       const std::optional<io::NaturalUnits>& natural);
+  Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events);
 
   std::vector<io::EnsembleColumn> columns() const;
   /// Whether anything is kept that tangents tell.
@@ -50,7 +47,7 @@ class Kept {
   };
 
   void add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
-           const std::vector<io::EventPlan>& events, const std::optional<io::NaturalUnits>& natural);
+           const std::vector<io::EventPlan>& events);
   void add_last(const std::vector<Quantity>& quantities, bool points);
 
   std::vector<Column> columns_;

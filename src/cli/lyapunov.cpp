@@ -14,6 +14,7 @@
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/scenario_subject.hpp"
+#include "io/file_format.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/line_file.hpp"
 #include "io/scenario.hpp"
@@ -120,6 +121,7 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
 }  // namespace
 
 ExitStatus lyapunov(const LyapunovOptions& options) {
+  if (options.output) io::require_format(*options.output, io::FileFormat::csv, "exponents as they converge");
   return std::visit(
       [&](const auto& scenario) {
         return told_at_keys(scenario, options.scenario, [&] { return run(scenario, options); });

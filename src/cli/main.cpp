@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <csignal>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -14,16 +15,19 @@
 #include <optional>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "cli/commands.hpp"
 #include "io/input_error.hpp"
 #include "io/nearest_name.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::cli {
 namespace {
@@ -46,6 +50,8 @@ struct CommandLine {
   CLI::App* simulate;
   CLI::App* check;
   CLI::App* kernels;
+  CLI::App* models;
+  CLI::App* describe;
   CLI::App* build;
   CLI::App* new_model;
   CLI::App* plot;
@@ -55,6 +61,8 @@ struct CommandLine {
   CLI::App* map;
   SimulateOptions simulate_options;
   CheckOptions check_options;
+  DescribeOptions describe_options;
+  bool models_as_json = false;
   BuildOptions build_options;
   std::string model_name;
   PlotOptions plot_options;
@@ -133,17 +141,19 @@ CommandLine::CommandLine() {
     if (simulate_options.scenario.empty() && !simulate_options.resume) throw CLI::RequiredError("SCENARIO");
   });
   simulate
-      ->add_option("--set", simulate_options.overrides,
-                   "Replace a key of the scenario, as in --set run.step=1e-4 or --set run.method=rk4; repeatable")
+      ->add_option(
+          "--set", simulate_options.overrides,
+          "Replace a key of the scenario, as in --set run.step=1e-4 or --set run.method=rk4, or take it out, as "
+          "in --set run.step=; repeatable")
       ->type_name("KEY=VALUE")
       ->expected(1)
       ->take_all()
       ->allow_extra_args(false);
   simulate
-      ->add_option("-o,--output", simulate_options.output,
-                   "Write the trajectory to this file, as HDF5 where it ends in .h5, else as CSV; - is standard "
-                   "output, and standard error then has the "
-                   "summary")
+      ->add_option(
+          "-o,--output", simulate_options.output,
+          "Write the trajectory to this file, as CSV where it ends in .csv, as HDF5 where in .h5, .hdf5 or .nc; "
+          "- is standard output, and standard error then has the summary")
       ->type_name("FILE")
       ->check(not_empty);
   simulate->add_option("--events", simulate_options.events, "Write what the scenario's [[event]] find to this CSV file")
@@ -172,7 +182,8 @@ CommandLine::CommandLine() {
                      }))
       ->needs(copies);
   simulate->add_flag("--json", simulate_options.json, "Print the summary as one JSON object");
-  simulate->add_flag("--quiet", simulate_options.quiet, "Print errors only (and the JSON object, where asked for)");
+  simulate->add_flag("--quiet", simulate_options.quiet,
+                     "Print no summary and no progress, but warnings, errors and what --json asks for");
   simulate->footer("Example: pendula simulate double.toml --set run.step=1e-4 -o out.csv");
 
   check = app.add_subcommand("check", "Test the kernels and methods of this build, or a model, on themselves");
@@ -187,6 +198,19 @@ CommandLine::CommandLine() {
       ->check(one_or_more);
 
   kernels = app.add_subcommand("kernels", "List the kernels of this build");
+
+  models = app.add_subcommand("models", "List the built-in models");
+  models->add_flag("--json", models_as_json, "Print them as one JSON array");
+
+  describe = app.add_subcommand("describe", "Tell what a model has: coordinates, parameters, inputs, points");
+  describe->add_option("MODEL", describe_options.model, "A model file (.py), or a built-in model")
+      ->required()
+      ->check(not_empty);
+  describe->add_option("--links", describe_options.links, "Number of links, where the model has some")
+      ->type_name("N")
+      ->check(one_or_more);
+  describe->add_flag("--json", describe_options.json, "Print it as one JSON object");
+  describe->footer("Example: pendula describe furuta");
 
   build = app.add_subcommand("build", "Derive and compile the kernel of a model, and keep it");
   build->add_option("MODEL", build_options.model, "A model file (.py), or a built-in model")
@@ -284,6 +308,8 @@ CommandLine::CommandLine() {
 
   gallery = app.add_subcommand("gallery", "Make a page of striking motions, each with its scenario");
   gallery->add_option("DIR", gallery_folder, "The folder for it")->required()->check(not_empty);
+
+  app.add_subcommand("help", "Print the help of a command: pendula help COMMAND");
 }
 
 /// What an unknown word may have been meant for: an option of `app`, or a command.
@@ -315,9 +341,14 @@ std::string complaint(const CommandLine& line, const std::string& what) {
   return command + ": " + text + "\nTry '" + command + " --help'.\n";
 }
 
-ExitStatus dispatch(const CommandLine& line) {
+/// `command` is the whole line.
+ExitStatus dispatch(const CommandLine& line, const std::string& command) {
   instruction_set();  // whether it is wrong, before anything else is
-  if (*line.simulate) return simulate(line.simulate_options);
+  if (*line.simulate) {
+    SimulateOptions options = line.simulate_options;
+    options.command = command;
+    return simulate(options);
+  }
   if (*line.check) return check(line.check_options);
   if (*line.kernels) return kernels();
   if (*line.build) return build(line.build_options);
@@ -326,13 +357,18 @@ ExitStatus dispatch(const CommandLine& line) {
   if (*line.lyapunov) return lyapunov(line.lyapunov_options);
   if (*line.ensemble) {
     EnsembleOptions options = line.ensemble_options;
+    options.command = command;
     options.shard = shard_of(line.shard);
     return ensemble(options);
   }
   if (*line.map) return map(line.map_options);
   if (*line.gallery) return gallery(line.gallery_folder);
+  if (*line.models) return models(line.models_as_json);
+  if (*line.describe) return describe(line.describe_options);
   std::cerr << complaint(
-      line, "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, check, kernels, build or new-model");
+      line,
+      "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, models, describe, check, kernels, build, "
+      "new-model or help");
   return wrong_input;
 }
 
@@ -356,13 +392,26 @@ void write_messages_by_line() {
   std::cerr << std::nounitbuf;
 }
 
+/// What was typed after the program's name; `help COMMAND` is `COMMAND --help`.
+std::vector<std::string> words_of(int argc, char** argv, const CLI::App& app) {
+  std::vector<std::string> words(argv + 1, argv + std::max(argc, 1));
+  if (words.empty() || words.front() != "help") return words;
+  if (words.size() == 1) return {"--help"};
+  words.erase(words.begin());
+  const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == words.front(); };
+  if (!app.get_subcommands(is_asked_for).empty()) words.insert(words.begin() + 1, "--help");
+  return words;
+}
+
 ExitStatus run(int argc, char** argv) {
   keep_standard_streams();
   write_messages_by_line();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is a full disk: writing fails, the run ends in order
   CommandLine line;
   try {
-    line.app.parse(argc, argv);
+    std::vector<std::string> words = words_of(argc, argv, line.app);
+    std::ranges::reverse(words);  // as CLI11 takes them
+    line.app.parse(std::move(words));
   } catch (const CLI::Success& asked) {  // --help, --version
     line.app.exit(asked);
     return flushed(done);
@@ -370,7 +419,7 @@ ExitStatus run(int argc, char** argv) {
     std::cerr << complaint(line, error.what());
     return wrong_input;
   }
-  return flushed(dispatch(line));
+  return flushed(dispatch(line, io::command_line(std::span(argv, static_cast<std::size_t>(argc)))));
 }
 
 }  // namespace

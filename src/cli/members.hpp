@@ -37,7 +37,8 @@ RunSetup member_setup(const Scenario& scenario) {
           .duration = scenario.duration,
           .every = scenario.every,
           .accuracy = scenario.places.contains("accuracy") ? scenario.accuracy : Accuracy{},
-          .doubted = false};
+          .doubted = false,
+          .estimate = scenario.estimate};
 }
 
 /// The scenario of an ensemble, and those of its members: the same with other numbers.

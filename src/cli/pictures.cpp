@@ -19,8 +19,8 @@ ExitStatus draw(const std::vector<std::string>& arguments) {
   const int status =
       io::run_attached(command, {"PYTHONPATH=" + toolchain.plotting.string(), "PYTHONDONTWRITEBYTECODE=1"});
   if (status == 127) {
-    throw io::InputError("pictures take a Python, and " + toolchain.python +
-                         " could not be started (PENDULA_PYTHON names another one)");
+    throw io::InputError("pictures take a Python, which " + toolchain.setup().string() + " installs; " +
+                         toolchain.python + " could not be started (PENDULA_PYTHON names another one)");
   }
   return status == 0 ? done : status == 2 ? wrong_input : failed;
 }

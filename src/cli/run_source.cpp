@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "io/input_error.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::cli {
 namespace {
@@ -68,15 +69,23 @@ void require_same_model(const RunSource& source, const std::string& model) {
   throw io::ModelError("the model is no longer the one that the run began with");
 }
 
-io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model) {
+std::filesystem::path model_folder(const std::string& run_file, const std::string& model,
+                                   const std::filesystem::path& folder) {
+  std::error_code unknown;
+  if (std::filesystem::exists(folder / model, unknown)) return folder;
+  return std::filesystem::path(run_file).parent_path() / folder;
+}
+
+io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
+                        const std::string& command, const std::string& title) {
   io::RunOrigin origin;
+  origin.title = title;
+  origin.command = command;
   origin.version = version;
   origin.instruction_set = library().instruction_set;
   origin.solver = description.solver;
   origin.kernel = description.kernel;
-  std::error_code unknown;
-  const std::string& name = source.text.name;
-  origin.scenario_name = std::filesystem::exists(name, unknown) ? std::filesystem::absolute(name).string() : name;
+  origin.scenario_name = io::public_name(source.text.name);
   origin.scenario = source.text.text;
   origin.overrides = source.overrides;
   origin.model = model;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <pendula/run/integrator.hpp>
 #include <string>
@@ -24,8 +25,14 @@ RunSource read_run_source(const SimulateOptions& options);
 /// Throws io::ModelError where a saved run is of another model; `model` is the text of its file.
 void require_same_model(const RunSource& source, const std::string& model);
 
+/// Where the model's file of a run that goes on is looked for: in `folder`, as the scenario named it, from where the
+/// program is called, or from where the run file lies.
+std::filesystem::path model_folder(const std::string& run_file, const std::string& model,
+                                   const std::filesystem::path& folder);
+
 /// What a run file is to say of the run.
-io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model);
+io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
+                        const std::string& command, const std::string& title);
 
 /// What a run goes on from, of a scenario that was checked. Throws io::InputError where it ends before that.
 std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end);

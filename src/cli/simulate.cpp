@@ -27,6 +27,7 @@
 #include "cli/scenario_subject.hpp"
 #include "io/event_file.hpp"
 #include "io/event_reader.hpp"
+#include "io/file_format.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/natural_units.hpp"
@@ -74,8 +75,21 @@ void spare_scenario(const std::string& file, const char* what, const SimulateOpt
   throw io::InputError(file + ": expected a file for the " + what + ", got the scenario itself");
 }
 
-bool is_run_file(const std::string& file) {
-  return file.ends_with(".h5") || file.ends_with(".hdf5");
+/// Whether rows go to a run file: to what a run goes on with, whatever it is called, or by the ending of the name.
+bool is_run_file(const std::string& file, const SimulateOptions& options) {
+  return file == options.resume || io::format_of(file) == io::FileFormat::hdf5;
+}
+
+/// Throws io::InputError where the names of files are wrong, before anything takes long.
+void check_names(const SimulateOptions& options) {
+  if (options.output) {
+    spare_scenario(*options.output, "trajectory", options);
+    is_run_file(*options.output, options);
+  }
+  if (!options.events) return;
+  spare_scenario(*options.events, "events", options);
+  if (*options.events == "-") throw io::InputError("-: expected a file of its own for the events");
+  io::require_format(*options.events, io::FileFormat::csv, "events (a run file, -o run.h5, has them, too)");
 }
 
 /// The file for the rows: of a run that goes on the one that it goes on with, unless that has no rows. Throws
@@ -83,7 +97,7 @@ bool is_run_file(const std::string& file) {
 std::optional<std::string> output_of(const RunSource& source, const SimulateOptions& options) {
   const bool without_rows = source.saved && !source.saved->has_rows;
   if (!options.output) return without_rows ? std::nullopt : options.resume;
-  if (without_rows && is_run_file(*options.output)) {
+  if (without_rows && is_run_file(*options.output, options)) {
     throw io::InputError(*options.output + ": expected a CSV file, got a run file, which begins with rows that " +
                          *options.resume + " does not have");
   }
@@ -92,11 +106,10 @@ std::optional<std::string> output_of(const RunSource& source, const SimulateOpti
 
 /// Opens the file for the rows; a run file that goes on begins as a copy. Throws io::InputError.
 std::unique_ptr<io::RowsFile> open_rows(const std::string& file, const SimulateOptions& options,
-                                        const io::RunOrigin& origin, const std::optional<Checkpoint>& from,
-                                        const std::vector<Quantity>& quantities) {
-  if (!is_run_file(file)) return std::make_unique<io::TrajectoryFile>(file, columns_of(quantities));
-  if (!options.resume) return std::make_unique<io::RunFile>(file, origin, quantities);
-  return std::make_unique<io::RunFile>(file, *options.resume, from ? from->rows : 0, quantities);
+                                        const io::RunOrigin& origin, const io::RunContents& contents) {
+  if (!is_run_file(file, options)) return std::make_unique<io::TrajectoryFile>(file, columns_of(contents.quantities));
+  if (!options.resume) return std::make_unique<io::RunFile>(file, origin, contents);
+  return std::make_unique<io::RunFile>(file, *options.resume, origin, contents);
 }
 
 /// The same where one is asked for, and says what it replaces.
@@ -104,7 +117,6 @@ template <class... Rest>
 std::unique_ptr<io::RowsFile> open_rows(const std::optional<std::string>& file, const SimulateOptions& options,
                                         const Rest&... rest) {
   if (!file) return nullptr;
-  spare_scenario(*file, "trajectory", options);
   std::error_code unknown;
   const bool replaces = file != options.resume && std::filesystem::is_regular_file(*file, unknown);
   auto opened = open_rows(*file, options, rest...);
@@ -132,11 +144,10 @@ std::vector<std::string> event_names(const RunSetup& setup) {
 /// Throws io::InputError where there can be no file for events.
 void check_events(const SimulateOptions& options, const RunSetup& setup) {
   if (!options.events) return;
-  spare_scenario(*options.events, "events", options);
   const auto is_taken = [&](const std::optional<std::string>& file) {
     return file && is_same_file(*options.events, *file);
   };
-  if (*options.events == "-" || is_taken(options.output) || is_taken(options.view) || is_taken(options.resume)) {
+  if (is_taken(options.output) || is_taken(options.view) || is_taken(options.resume)) {
     throw io::InputError(*options.events + ": expected a file of its own for the events");
   }
   if (!setup.events.empty()) return;
@@ -161,12 +172,14 @@ view::Scene scene_of(const Scenario& scenario, const RunSource& source) {
   return scene;
 }
 
-/// Quantities in the units of the scenario.
-std::vector<Quantity> quantities_of(const Subject& subject, const std::optional<io::NaturalUnits>& natural) {
-  std::vector<Quantity> quantities = subject.quantities();
-  for (Quantity& quantity : quantities) quantity.unit = io::in_units(natural, quantity.unit);
-  return quantities;
+/// What a run file has of a run. Quantities of a file are those that it begins with: events only where they are wanted.
+io::RunContents contents_of(const RunSetup& setup, const io::RunPlan& plan, bool with_events = true) {
+  return {setup.subject->quantities(), setup.subject->constants(),
+          with_events ? event_names(setup) : std::vector<std::string>(), plan.natural};
 }
+
+/// Rows of a film: four to each frame of pendula_plot, so that traces are smooth between them.
+const RowTimes film_times{1.0 / 120, {}};
 
 /// The last place that a run may go on from.
 class LastCheckpoint : public Observer {
@@ -186,17 +199,17 @@ class Session {
         options_(options),
         from_(checkpoint_of(source, setup_.start.time + setup_.duration)),
         run_(told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
-        origin_(origin_of(source, run_.description(), model)),
+        origin_(origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
-        file_(open_rows(output_, options, origin_, from_, quantities_of(*setup_.subject, plan.natural))),
+        file_(open_rows(output_, options, origin_, contents_of(setup_, plan))),
         events_(open_events(options, setup_)),
-        film_rows_(open_film_rows(quantities_of(*setup_.subject, plan.natural))),
+        film_rows_(open_film_rows(contents_of(setup_, plan, false))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
-    if (page_) run_.add(*page_);
+    if (page_) run_.add(*page_, page_->times(setup_.duration));
     if (events_) run_.add(*events_);
-    if (film_rows_) run_.add(*film_rows_);
+    if (film_rows_) run_.add(*film_rows_, film_times);
     run_.add(last_);
     run_.add(progress_);
     warn(plan.warnings);
@@ -231,6 +244,17 @@ class Session {
     return summary;
   }
 
+  /// Puts the summary into the run file, which is closed then. Where that cannot be, the summary says so.
+  void conclude(io::Summary& summary) {
+    auto* const file = dynamic_cast<io::RunFile*>(file_.get());
+    if (file == nullptr) return;
+    try {
+      file->conclude(io::to_json_of_file(summary));
+    } catch (const io::OutputError& error) {
+      if (summary.ending.ok()) summary.ending = {"output_failed", error.what(), {}, {}};
+    }
+  }
+
  private:
   /// Runs the copies, and writes the page.
   void finish_page(const std::function<bool()>& interrupted, io::Summary& summary) {
@@ -246,11 +270,14 @@ class Session {
     }
   }
 
-  /// A film is made of a run file: of the one that is asked for, or of one that goes again.
-  std::unique_ptr<io::RunFile> open_film_rows(const std::vector<Quantity>& quantities) const {
-    if (!options_.video || (output_ && is_run_file(*output_))) return nullptr;
-    return std::make_unique<io::RunFile>(film_rows_name(), origin_, quantities);
+  /// A film is made of a run file that goes again, with rows for each frame; one of a run that goes on, of that run's,
+  /// which has the rows of before.
+  std::unique_ptr<io::RunFile> open_film_rows(const io::RunContents& contents) const {
+    if (!options_.video || (from_ && keeps_run_file())) return nullptr;
+    return std::make_unique<io::RunFile>(film_rows_name(), origin_, contents);
   }
+
+  bool keeps_run_file() const { return output_ && is_run_file(*output_, options_); }
 
   std::string film_rows_name() const { return *options_.video + ".rows" + std::to_string(getpid()) + ".h5"; }
 
@@ -266,7 +293,7 @@ class Session {
   /// In the run file, or in one that has nothing else.
   void tell_how_to_go_on(io::Summary& summary) {
     if (!last_.kept) return;
-    std::string file = output_ && is_run_file(*output_) ? *output_ : "";
+    std::string file = keeps_run_file() ? *output_ : "";
     if (file.empty()) {
       const std::filesystem::path beside = output_ && output_ != "-" ? *output_ : origin_.scenario_name;
       const std::filesystem::path folder = output_ && output_ != "-" ? beside.parent_path() : "";
@@ -287,9 +314,9 @@ class Session {
     setup.options = by;
     setup.accuracy.error = 0;
     setup.doubted = false;
-    page_->begin_run("start + " + shortest(copy * options_.apart));
+    page_->begin_run("start + " + rounded(copy * options_.apart));
     Run run(setup);
-    run.add(*page_);
+    run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));
     const RunReport report = run.go(interrupted);
     page_->end_run(report.energy_error);
     const io::Ending ending = io::ending_of(report, setup.subject->coordinates(), event_names(setup));
@@ -301,7 +328,7 @@ class Session {
   /// Each is told on standard error as it comes and kept for the summary.
   void warn(const std::vector<std::string>& sentences) {
     for (const std::string& sentence : sentences) {
-      if (!options_.quiet) std::cerr << "pendula: warning: " << sentence << '\n';
+      std::cerr << "pendula: warning: " << sentence << '\n';
       warnings_.push_back(sentence);
     }
   }
@@ -324,6 +351,7 @@ class Session {
 }  // namespace
 
 ExitStatus simulate(const SimulateOptions& options) {
+  check_names(options);
   const RunSource source = read_run_source(options);
   if (options.video) {
     spare_scenario(*options.video, "film", options);
@@ -331,8 +359,9 @@ ExitStatus simulate(const SimulateOptions& options) {
   }
   std::string model;
   const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
-                                  const std::filesystem::path& folder) {
+                                  const std::filesystem::path& beside) {
     const io::Toolchain toolchain = io::Toolchain::of_this_program();
+    const std::filesystem::path folder = options.resume ? model_folder(*options.resume, name, beside) : beside;
     model = io::model_source(name, links, folder, toolchain);
     require_same_model(source, model);
     return io::find_kernel(name, links, folder, toolchain,
@@ -352,11 +381,14 @@ ExitStatus simulate(const SimulateOptions& options) {
                              .every = scenario.every,
                              .rows = scenario.rows,
                              .accuracy = scenario.accuracy,
+                             .estimate = scenario.estimate,
                              .checkpoint = scenario.checkpoint,
                              .events = io::events_of(scenario.events, subject, scenario.start)};
         check_events(options, setup);
-        io::Summary summary = Session(setup, scene_of(scenario, source), scenario, source, model, options).run();
+        Session session(setup, scene_of(scenario, source), scenario, source, model, options);
+        io::Summary summary = session.run();
         describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);
+        session.conclude(summary);
         std::ostream& out = options.output == "-" ? std::cerr : std::cout;
         if (options.json) {
           out << io::to_json(summary);

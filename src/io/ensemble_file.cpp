@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -12,11 +13,13 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <pendula/numeric/number_text.hpp>
+#include <set>
 #include <utility>
 
 #include "io/hdf5.hpp"
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {
@@ -135,8 +138,31 @@ Found look_through(const std::string& folder, const EnsembleHead& head) {
   return found;
 }
 
+/// Names of data sets, out of what was typed: letters, digits and single underscores, and none of them twice.
+class Words {
+ public:
+  std::string of(const std::string& typed) {
+    std::string word;
+    for (const char c : typed) {
+      const bool fits = std::isalnum(static_cast<unsigned char>(c)) != 0;
+      if (fits || (!word.empty() && word.back() != '_')) word += fits ? c : '_';
+    }
+    if (word.ends_with('_')) word.pop_back();
+    std::string other = word;
+    for (int number = 2; !taken_.insert(other).second; ++number) other = word + "_" + std::to_string(number);
+    return other;
+  }
+
+ private:
+  std::set<std::string> taken_ = {"status", "member", "failed_member", "message"};
+};
+
 void write_origin(const hdf5::Handle& file, const EnsembleHead& head, const EnsembleTally& tally) {
   const RunOrigin& origin = head.origin;
+  hdf5::write_attribute(file, "Conventions", "CF-1.11");
+  hdf5::write_attribute(file, "title", origin.title);
+  hdf5::write_attribute(file, "history", history_line(origin.command));
+  hdf5::write_attribute(file, "source", "pendula " + origin.version);
   hdf5::write_attribute(file, "pendula", origin.version);
   hdf5::write_attribute(file, "kind", "ensemble");
   hdf5::write_attribute(file, "instruction_set", origin.instruction_set);
@@ -150,48 +176,61 @@ void write_origin(const hdf5::Handle& file, const EnsembleHead& head, const Ense
   hdf5::write_attribute(file, "complete", std::int64_t{tally.done == head.plan.count});
 }
 
+/// What a number is in words, and its unit where it is known.
+void describe(const hdf5::Handle& array, const std::string& meaning, const EnsembleHead& head,
+              const std::string& unit) {
+  hdf5::write_attribute(array, "long_name", meaning);
+  if (!unit.empty()) write_unit(array, head.natural, unit);
+}
+
 /// Scales of the axes; or of the members, whose numbers are written later: there may be more than fit into memory.
-std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleHead& head) {
+std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleHead& head, Words& words) {
   const EnsemblePlan& plan = head.plan;
   std::vector<hdf5::Handle> scales;
   for (const EnsembleAxis& axis : plan.axes) {
     std::vector<double> values(static_cast<std::size_t>(axis.count));
     for (std::size_t k = 0; k < values.size(); ++k) values[k] = axis.at(static_cast<std::int64_t>(k));
-    scales.push_back(hdf5::create_vector(file, axis.key, values));
-    hdf5::write_attribute(scales.back(), "units", in_units(head.natural, unit_of_key(axis.key)));
-    hdf5::make_scale(scales.back(), axis.key);
+    const std::string name = words.of(axis.key);
+    scales.push_back(hdf5::create_vector(file, name, values));
+    describe(scales.back(), axis.key, head, unit_of_key(axis.key));
+    hdf5::make_scale(scales.back(), name);
   }
   if (!scales.empty()) return scales;
   scales.push_back(hdf5::create_array(file, "member", plan.shape(), Type::whole));
+  describe(scales.back(), "number of the member", head, "1");
   hdf5::make_scale(scales.back(), "member");
   return scales;
 }
 
 /// The data sets, empty, and where each lies: of the status, the columns; of members at random their numbers and keys.
 std::vector<Place> create_columns(const hdf5::Handle& file, const EnsembleHead& head) {
-  const std::vector<hdf5::Handle> scales = write_scales(file, head);
+  Words words;
+  const std::vector<hdf5::Handle> scales = write_scales(file, head, words);
   const std::vector<std::int64_t> shape = head.plan.shape();
   std::vector<Place> places;
-  const auto create = [&](const std::string& name, const std::string& unit, Type type) {
+  const auto create = [&](const std::string& name, const std::string& meaning, const std::string& unit, Type type) {
     hdf5::Handle dataset = hdf5::create_array(file, name, shape, type);
-    if (!unit.empty()) hdf5::write_attribute(dataset, "units", unit);
+    describe(dataset, meaning, head, unit);
     for (unsigned k = 0; k < scales.size(); ++k) hdf5::attach_scale(dataset, scales[k], k);
     places.push_back({hdf5::offset_of(dataset), type});
     return dataset;
   };
-  const hdf5::Handle status = create("status", "", Type::byte);
-  std::string meanings = "not_run";
-  for (const std::string_view name : member_statuses) meanings.append(" ").append(name);
-  hdf5::write_attribute(status, "flag_meanings", meanings);
-  std::vector<double> flags(member_statuses.size() + 1);
-  std::iota(flags.begin(), flags.end(), double{not_run});
-  hdf5::write_attribute(status, "flag_values", flags);
+  const hdf5::Handle status = create("status", "how the member ended", "", Type::byte);
+  std::vector<std::string> meanings{"not_run"};
+  meanings.insert(meanings.end(), member_statuses.begin(), member_statuses.end());
+  hdf5::write_flags(status, Type::byte, not_run, meanings);
+  std::vector<Place> drawn;
+  for (const EnsembleDraw& draw : head.plan.draws) {
+    create(words.of(draw.key), draw.key, unit_of_key(draw.key), Type::real);
+    drawn.push_back(places.back());
+    places.pop_back();
+  }
   for (const EnsembleColumn& column : head.columns) {
-    create(column.name, column.unit, column.whole ? Type::whole : Type::real);
+    create(words.of(column.name), column.meaning.empty() ? column.name : column.meaning, column.unit,
+           column.whole ? Type::whole : Type::real);
   }
   if (head.plan.axes.empty()) places.push_back({hdf5::offset_of(scales.front()), Type::whole});
-  for (const EnsembleDraw& draw : head.plan.draws)
-    create(draw.key, in_units(head.natural, unit_of_key(draw.key)), Type::real);
+  places.insert(places.end(), drawn.begin(), drawn.end());
   return places;
 }
 

@@ -30,8 +30,11 @@ constexpr bool is_ok(int status) {
 
 /// A number that is kept of every member.
 struct EnsembleColumn {
-  std::string name, unit;
+  std::string name;    ///< as it is asked for, `event:flip`: a data set is called so in letters, digits and underscores
+  std::string unit;    ///< in SI
   bool whole = false;  ///< a count: an integer in the file, −1 where there is none
+  /// In words, where the name has none.
+  std::string meaning = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
 /// What an ensemble's file says besides what came of the members.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <pendula/run/quantity.hpp>
 #include <string_view>
 
 #include "io/nearest_name.hpp"
@@ -76,14 +77,16 @@ Expression::Expression(const std::string& text, std::span<const std::string> nam
   if (assigns(text)) throw ExpressionError(expected + ", which sets nothing", quoted(text));
   try {
     parser_->SetExpr(text);
-    for (const auto& [name, unused] : parser_->GetUsedVar()) {
-      const auto found = std::ranges::find(names, name);
-      if (found == names.end()) reject_name(name, names);
+    std::vector<std::string> used;
+    for (const auto& [name, unused] : parser_->GetUsedVar()) used.push_back(name);
+    values_.resize(used.size());
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      auto found = std::ranges::find(names, used[k]);
+      if (found == names.end()) found = std::ranges::find(names, present_name(used[k]));
+      if (found == names.end()) reject_name(used[k], names);
       columns_.push_back(static_cast<std::size_t>(found - names.begin()));
+      parser_->DefineVar(used[k], &values_[k]);
     }
-    std::ranges::sort(columns_);
-    values_.resize(columns_.size());
-    for (std::size_t k = 0; k < columns_.size(); ++k) parser_->DefineVar(names[columns_[k]], &values_[k]);
     parser_->Eval();
     if (parser_->GetNumResults() != 1) throw ExpressionError(expected, quoted(text) + ", which is several");
   } catch (const mu::Parser::exception_type& error) {

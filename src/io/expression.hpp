@@ -21,13 +21,13 @@ struct ExpressionError : std::runtime_error {
 /// pi.
 class Expression {
  public:
-  /// Throws ExpressionError.
+  /// Rates may have their names of old, `theta_1_dot`. Throws ExpressionError.
   Expression(const std::string& text, std::span<const std::string> names);
   ~Expression();
   Expression(const Expression&) = delete;
   Expression& operator=(const Expression&) = delete;
 
-  /// Columns that it uses, in ascending order.
+  /// Columns that it uses.
   const std::vector<std::size_t>& columns() const { return columns_; }
 
   /// Its value for a row; NaN where it has none.

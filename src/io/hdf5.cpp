@@ -59,6 +59,15 @@ Handle text_type() {
   return type;
 }
 
+/// Of a length that every text has, with zeros at its end.
+Handle padded_text_type(std::size_t room) {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  require(H5Tset_size(type.get(), room));
+  require(H5Tset_strpad(type.get(), H5T_STR_NULLPAD));
+  require(H5Tset_cset(type.get(), H5T_CSET_UTF8));
+  return type;
+}
+
 /// A text that the library has read, and given away.
 std::string taken(char* text) {
   std::string copy(text == nullptr ? "" : text);
@@ -68,6 +77,36 @@ std::string taken(char* text) {
 
 Handle space_of(std::span<const hsize_t> extent, const hsize_t* most = nullptr) {
   return {H5Screate_simple(static_cast<int>(extent.size()), extent.data(), most), H5Sclose};
+}
+
+/// In place of one that is there.
+Handle create_attribute(const Handle& object, const std::string& name, hid_t type, const Handle& space) {
+  if (H5Aexists(object.get(), name.c_str()) > 0) require(H5Adelete(object.get(), name.c_str()));
+  return {H5Acreate2(object.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+}
+
+hid_t stored_as(Type type) {
+  return type == Type::real ? H5T_IEEE_F64LE : type == Type::whole ? H5T_STD_I64LE : H5T_STD_I8LE;
+}
+
+/// What an array of that type has where nothing was written: NaN, or −1.
+void set_fill(const Handle& properties, Type type) {
+  const double none = std::nan("");
+  const std::int64_t no_count = -1;
+  require(type == Type::real ? H5Pset_fill_value(properties.get(), H5T_NATIVE_DOUBLE, &none)
+                             : H5Pset_fill_value(properties.get(), H5T_NATIVE_INT64, &no_count));
+}
+
+/// Rows of `size` numbers, or numbers where that is 0, without an end, in chunks.
+Handle growing_space(std::size_t size) {
+  const std::array<hsize_t, 2> extent{0, size}, most{H5S_UNLIMITED, size};
+  return space_of(std::span(extent).first(size == 0 ? 1 : 2), most.data());
+}
+Handle growing_properties(std::size_t size, std::size_t chunk_rows) {
+  const std::array<hsize_t, 2> chunk{chunk_rows, size};
+  Handle properties = property_list(H5P_DATASET_CREATE);
+  require(H5Pset_chunk(properties.get(), size == 0 ? 1 : 2, chunk.data()));
+  return properties;
 }
 
 /// Bytes of one significance after the other: those of the same end are alike, and pack well.
@@ -233,26 +272,19 @@ bool has(const Handle& where, const std::string& name) {
 }
 
 void write_attribute(const Handle& object, const std::string& name, const std::string& text) {
-  const Handle type = text_type(), space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle attribute(H5Acreate2(object.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT),
-                         H5Aclose);
+  const Handle type = text_type();
   const char* const begin = text.c_str();
+  const Handle attribute = create_attribute(object, name, type.get(), Handle(H5Screate(H5S_SCALAR), H5Sclose));
   require(H5Awrite(attribute.get(), type.get(), &begin));
 }
 
 void write_attribute(const Handle& object, const std::string& name, std::int64_t number) {
-  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle attribute(H5Acreate2(object.get(), name.c_str(), H5T_STD_I64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
-                         H5Aclose);
+  const Handle attribute = create_attribute(object, name, H5T_STD_I64LE, Handle(H5Screate(H5S_SCALAR), H5Sclose));
   require(H5Awrite(attribute.get(), H5T_NATIVE_INT64, &number));
 }
 
-void write_attribute(const Handle& object, const std::string& name, std::span<const double> numbers) {
-  const std::array<hsize_t, 1> extent{numbers.size()};
-  const Handle space = space_of(extent);
-  const Handle attribute(H5Acreate2(object.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
-                         H5Aclose);
-  require(H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, numbers.data()));
+bool has_attribute(const Handle& object, const std::string& name) {
+  return H5Aexists(object.get(), name.c_str()) > 0;
 }
 
 std::string read_attribute(const Handle& object, const std::string& name) {
@@ -296,6 +328,15 @@ Handle create_numbering(const Handle& where, const std::string& name, std::size_
   return dataset;
 }
 
+Handle create_number(const Handle& where, const std::string& name, double number) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  Handle dataset(
+      H5Dcreate2(where.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+      H5Dclose);
+  require(H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, &number));
+  return dataset;
+}
+
 Handle create_vector(const Handle& where, const std::string& name, std::span<const double> numbers) {
   const std::array<hsize_t, 1> extent{numbers.size()};
   const Handle space = space_of(extent);
@@ -320,15 +361,12 @@ Handle create_texts(const Handle& where, const std::string& name, std::span<cons
 Handle create_array(const Handle& where, const std::string& name, std::span<const std::int64_t> extent, Type type) {
   const std::vector<hsize_t> sizes(extent.begin(), extent.end());
   const Handle space = space_of(sizes), properties = property_list(H5P_DATASET_CREATE);
-  const double none = std::nan("");
-  const std::int64_t no_count = -1;
   require(H5Pset_alloc_time(properties.get(), H5D_ALLOC_TIME_EARLY));
-  require(type == Type::real ? H5Pset_fill_value(properties.get(), H5T_NATIVE_DOUBLE, &none)
-                             : H5Pset_fill_value(properties.get(), H5T_NATIVE_INT64, &no_count));
-  const hid_t stored = type == Type::real ? H5T_IEEE_F64LE : type == Type::whole ? H5T_STD_I64LE : H5T_STD_I8LE;
+  set_fill(properties, type);
   errno = 0;
-  return {H5Dcreate2(where.get(), name.c_str(), stored, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
-          H5Dclose};
+  return {
+      H5Dcreate2(where.get(), name.c_str(), stored_as(type), space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+      H5Dclose};
 }
 
 std::uint64_t offset_of(const Handle& array) {
@@ -337,18 +375,32 @@ std::uint64_t offset_of(const Handle& array) {
   return offset;
 }
 
+void write_flags(const Handle& array, Type type, int first, std::span<const std::string> meanings) {
+  std::vector<int> values(meanings.size());
+  std::iota(values.begin(), values.end(), first);
+  std::string words;
+  for (const std::string& meaning : meanings) words += (words.empty() ? "" : " ") + meaning;
+  const std::array<hsize_t, 1> extent{values.size()};
+  const Handle attribute = create_attribute(array, "flag_values", stored_as(type), space_of(extent));
+  require(H5Awrite(attribute.get(), H5T_NATIVE_INT, values.data()));
+  write_attribute(array, "flag_meanings", words);
+}
+
 Handle create_rows(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows) {
-  const int rank = size == 0 ? 1 : 2;
-  const std::array<hsize_t, 2> extent{0, size}, most{H5S_UNLIMITED, size}, chunk{chunk_rows, size};
-  const Handle space = space_of(std::span(extent).first(static_cast<std::size_t>(rank)), most.data());
-  const Handle properties = property_list(H5P_DATASET_CREATE);
-  const double none = std::nan("");
-  require(H5Pset_chunk(properties.get(), rank, chunk.data()));
+  const Handle space = growing_space(size), properties = growing_properties(size, chunk_rows);
   require(H5Pset_shuffle(properties.get()));
   require(H5Pset_deflate(properties.get(), 1));
-  require(H5Pset_fill_value(properties.get(), H5T_NATIVE_DOUBLE, &none));
+  set_fill(properties, Type::real);
   return {
       H5Dcreate2(where.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+      H5Dclose};
+}
+
+Handle create_list(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows, Type type) {
+  const Handle space = growing_space(size), properties = growing_properties(size, chunk_rows);
+  set_fill(properties, type);
+  return {
+      H5Dcreate2(where.get(), name.c_str(), stored_as(type), space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
       H5Dclose};
 }
 
@@ -418,13 +470,35 @@ std::vector<double> read_rows(const Handle& dataset, std::size_t first, std::siz
   return numbers;
 }
 
-void write_row(const Handle& table, std::size_t row, std::span<const double> numbers) {
-  const std::array<hsize_t, 2> offset{row, 0}, count{1, numbers.size()};
+void write_rows(const Handle& table, std::size_t first, std::span<const double> numbers) {
+  const std::vector<std::size_t> all = extent(table);
+  std::vector<hsize_t> count(all.begin(), all.end()), offset(count.size(), 0);
+  count[0] = numbers.size() / (all.size() == 1 ? 1 : all[1]);
+  offset[0] = first;
   const Handle wanted(H5Dget_space(table.get()), H5Sclose);
   require(H5Sselect_hyperslab(wanted.get(), H5S_SELECT_SET, offset.data(), nullptr, count.data(), nullptr));
   const Handle memory = space_of(count);
   errno = 0;
   require(H5Dwrite(table.get(), H5T_NATIVE_DOUBLE, memory.get(), wanted.get(), H5P_DEFAULT, numbers.data()));
+}
+
+// A text of its own length would lie in a heap, which cannot grow while others read the file. Mostly zeros, it packs
+// well.
+Handle create_late_text(const Handle& where, const std::string& name, std::size_t room) {
+  const Handle type = padded_text_type(room), space = growing_space(0), properties = growing_properties(0, 1);
+  require(H5Pset_deflate(properties.get(), 1));
+  return {H5Dcreate2(where.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+          H5Dclose};
+}
+
+void write_late_text(const Handle& dataset, const std::string& text) {
+  const Handle type(H5Dget_type(dataset.get()), H5Tclose);
+  std::string padded = text;
+  if (padded.size() > H5Tget_size(type.get())) return;
+  padded.resize(H5Tget_size(type.get()));
+  set_rows(dataset, 1);
+  errno = 0;
+  require(H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()));
 }
 
 }  // namespace pendula::io::hdf5

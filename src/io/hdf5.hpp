@@ -74,9 +74,10 @@ Handle create_group(const Handle& where, const std::string& name);
 Handle open_group(const Handle& where, const std::string& name);
 bool has(const Handle& where, const std::string& name);
 
+/// In place of one that is there.
 void write_attribute(const Handle& object, const std::string& name, const std::string& text);
 void write_attribute(const Handle& object, const std::string& name, std::int64_t number);
-void write_attribute(const Handle& object, const std::string& name, std::span<const double> numbers);
+bool has_attribute(const Handle& object, const std::string& name);
 std::string read_attribute(const Handle& object, const std::string& name);
 std::int64_t read_number(const Handle& object, const std::string& name);
 
@@ -85,6 +86,9 @@ std::string read_text(const Handle& where, const std::string& name);
 
 /// Whole numbers 1, 2, … that count the links.
 Handle create_numbering(const Handle& where, const std::string& name, std::size_t count);
+
+/// One number.
+Handle create_number(const Handle& where, const std::string& name, double number);
 
 /// A vector of numbers, or of texts.
 Handle create_vector(const Handle& where, const std::string& name, std::span<const double> numbers);
@@ -96,8 +100,14 @@ enum class Type { real, whole, byte };
 Handle create_array(const Handle& where, const std::string& name, std::span<const std::int64_t> extent, Type type);
 std::uint64_t offset_of(const Handle& array);
 
+/// What the values first, first + 1, … of an array mean, as CF has it: `flag_values`, of its own type, and
+/// `flag_meanings`, a word each.
+void write_flags(const Handle& array, Type type, int first, std::span<const std::string> meanings);
+
 /// A table of rows of `size` numbers each (a vector where `size` is 0) that grows by chunks of `chunk_rows`.
 Handle create_rows(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows);
+/// The same of any type, whose rows are written in place, and not packed.
+Handle create_list(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows, Type type);
 /// One that neither grows nor moves: it can be written in place.
 Handle create_table(const Handle& where, const std::string& name, std::size_t rows, std::size_t columns);
 /// Makes a vector the scale of an axis of others, as netCDF has it.
@@ -112,6 +122,12 @@ void set_rows(const Handle& dataset, std::size_t rows);
 /// Writes the chunk that begins with `row`; a whole one as the dataset's filters would, if it is `packed`.
 void write_chunk(const Handle& dataset, std::size_t row, std::span<const double> numbers, bool packed);
 std::vector<double> read_rows(const Handle& dataset, std::size_t first, std::size_t rows);
-void write_row(const Handle& table, std::size_t row, std::span<const double> numbers);
+/// Writes whole rows from the row `first` on.
+void write_rows(const Handle& table, std::size_t first, std::span<const double> numbers);
+
+/// A text of up to `room` bytes that can be written while others read the file; none yet.
+Handle create_late_text(const Handle& where, const std::string& name, std::size_t room);
+/// Writes it, or leaves it as it is where there is no room.
+void write_late_text(const Handle& dataset, const std::string& text);
 
 }  // namespace pendula::io::hdf5

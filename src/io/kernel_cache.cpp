@@ -21,6 +21,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "io/nearest_name.hpp"
 #include "io/process.hpp"
 #include "io/scenario.hpp"
 #include "toolchain.hpp"
@@ -91,7 +92,8 @@ fs::path find_model(const std::string& model, const fs::path& folder, const Tool
   std::string text;
   for (const std::string& name : names) text += ", " + name;
   throw ModelError("expected a model file ending in .py, or a built-in model" +
-                   (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model);
+                   (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model +
+                   did_you_mean(nearest_name(model, std::vector<std::string_view>(names.begin(), names.end()))));
 }
 
 /// Flags for the instruction set that the library runs with, as in cmake/PendulaLibrary.cmake.
@@ -138,20 +140,31 @@ std::string last_line(const std::string& text) {
                      end - (begin == std::string::npos ? 0 : begin + 1) + 1);
 }
 
-/// Runs a command of the generator on a model, which writes to `output`.
-void generate(const std::string& what, const fs::path& model, std::optional<int> links,
-              const std::vector<std::string>& arguments, const fs::path& output, const Toolchain& toolchain) {
-  std::vector<std::string> command{toolchain.python, "-m", "pendula_codegen", what, "--model", model.string()};
-  if (links) command.insert(command.end(), {"--links", std::to_string(*links)});
+/// What the generator prints. Throws ModelError, also where no Python can run it.
+std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
+  std::vector<std::string> command{toolchain.python, "-m", "pendula_codegen"};
   command.insert(command.end(), arguments.begin(), arguments.end());
-  command.insert(command.end(), {"--output", output.string()});
   const Ended ended = run_process(command, {"PYTHONPATH=" + toolchain.codegen.string(), "PYTHONDONTWRITEBYTECODE=1"});
-  if (ended.status == 0) return;
+  if (ended.status == 0) return ended.output;
   constexpr std::string_view told = "pendula_codegen: error: ";
   const std::string line = last_line(ended.output);
   if (ended.status == 2 && line.starts_with(told)) throw ModelError(line.substr(told.size()));
   throw ModelError("models take a Python with the packages of " + (toolchain.codegen / "requirements.txt").string() +
-                   "; " + toolchain.python + ": " + line + " (PENDULA_PYTHON names another one)");
+                   ", which " + toolchain.setup().string() + " installs; " + toolchain.python + ": " + line +
+                   " (PENDULA_PYTHON names another one)");
+}
+
+/// The arguments of a command of the generator that is about a model.
+std::vector<std::string> about(const char* command, const fs::path& model, std::optional<int> links) {
+  std::vector<std::string> arguments{command, "--model", model.string()};
+  if (links) arguments.insert(arguments.end(), {"--links", std::to_string(*links)});
+  return arguments;
+}
+
+void derive(const fs::path& model, std::optional<int> links, const fs::path& header, const Toolchain& toolchain) {
+  std::vector<std::string> arguments = about("model", model, links);
+  arguments.insert(arguments.end(), {"--output", header.string()});
+  run_generator(arguments, toolchain);
 }
 
 void compile(const std::string& name, const fs::path& folder, const fs::path& object, const Toolchain& toolchain) {
@@ -248,7 +261,8 @@ Toolchain Toolchain::of_this_program() {
     }
     while (std::getline(beside, line)) toolchain.includes.emplace_back(line);
   } else {
-    toolchain.python = "python3";
+    const fs::path own = prefix / configured::installed_python;  // made by setup()
+    toolchain.python = fs::exists(own) ? own.string() : "python3";
     toolchain.codegen = prefix / configured::installed_codegen;
     toolchain.plotting = prefix / configured::installed_plotting;
     toolchain.examples = prefix / configured::installed_examples;
@@ -263,6 +277,11 @@ Toolchain Toolchain::of_this_program() {
   return toolchain;
 }
 
+fs::path Toolchain::setup() const {
+  const fs::path root = codegen.parent_path();
+  return fs::exists(root / "setup") ? root / "setup" : root / "scripts" / "setup";
+}
+
 std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   std::vector<std::string> names;
   std::error_code none;
@@ -271,6 +290,16 @@ std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   }
   std::ranges::sort(names);
   return names;
+}
+
+std::string describe_model(const std::string& model, std::optional<int> links, const Toolchain& toolchain) {
+  const fs::path file = find_model(model, "", toolchain);
+  read_model(file);
+  return last_line(run_generator(about("describe", file, links), toolchain));
+}
+
+std::string describe_models(const Toolchain& toolchain) {
+  return last_line(run_generator({"models"}, toolchain));
 }
 
 std::string model_source(const std::string& model, std::optional<int> links, const fs::path& folder,
@@ -298,7 +327,7 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   } else {
     const Workshop workshop(toolchain.cache);
     tell("deriving and compiling the kernel of " + name + ", once");
-    generate("model", file, links, {}, workshop.folder() / (name + ".hpp"), toolchain);
+    derive(file, links, workshop.folder() / (name + ".hpp"), toolchain);
     compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
     fs::rename(workshop.folder() / "kernel.so", object);
   }
@@ -309,16 +338,16 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
 std::vector<double> written_values(const std::string& model, std::optional<int> links, const fs::path& folder,
                                    const Toolchain& toolchain, std::span<const double> parameters, const Motion& start,
                                    unsigned seed) {
-  const Workshop workshop(toolchain.cache);
-  const fs::path file = workshop.folder() / "written.txt";
-  const auto option = [](std::string name, const std::string& value) { return name.append(value); };
-  generate("written", find_model(model, folder, toolchain), links,
-           {option("--parameters=", listed(parameters)), option("--time=", shortest(start.time)),
-            option("--q=", listed(start.q)), option("--v=", listed(start.v)), option("--seed=", std::to_string(seed))},
-           file, toolchain);
-  std::ifstream stream(file);
+  std::vector<std::string> arguments = about("written", find_model(model, folder, toolchain), links);
+  const auto add = [&](const char* name, const std::string& value) { arguments.push_back(name + ('=' + value)); };
+  add("--parameters", listed(parameters));
+  add("--time", shortest(start.time));
+  add("--q", listed(start.q));
+  add("--v", listed(start.v));
+  add("--seed", std::to_string(seed));
+  std::istringstream words(last_line(run_generator(arguments, toolchain)));
   std::vector<double> numbers;
-  for (std::string word; stream >> word;) numbers.push_back(std::strtod(word.c_str(), nullptr));
+  for (std::string word; words >> word;) numbers.push_back(std::strtod(word.c_str(), nullptr));
   return numbers;
 }
 

@@ -29,6 +29,9 @@ struct Toolchain {
   /// PENDULA_PYTHON and CXX in the environment go before, and CXXFLAGS has the flags. The cache is
   /// $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
   static Toolchain of_this_program();
+
+  /// The command that installs the Python packages.
+  std::filesystem::path setup() const;
 };
 
 /// A compiled kernel of a model.
@@ -53,6 +56,12 @@ std::string model_source(const std::string& model, std::optional<int> links, con
 std::vector<double> written_values(const std::string& model, std::optional<int> links,
                                    const std::filesystem::path& folder, const Toolchain& toolchain,
                                    std::span<const double> parameters, const Motion& start, unsigned seed);
+
+/// What a model has, as JSON: coordinates, parameters, inputs, points, with units. Throws ModelError.
+std::string describe_model(const std::string& model, std::optional<int> links, const Toolchain& toolchain);
+
+/// An array of the same of all built-in models.
+std::string describe_models(const Toolchain& toolchain);
 
 /// Names of the built-in models.
 std::vector<std::string> built_in_models(const Toolchain& toolchain);

@@ -24,6 +24,15 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
+/// The candidate that `name` is the beginning of: masses of mass.
+std::string_view begun_name(std::string_view name, std::span<const std::string_view> candidates) {
+  constexpr std::size_t fewest_letters = 3;
+  if (name.size() < fewest_letters) return {};
+  const auto begins = [&](std::string_view candidate) { return candidate.starts_with(name); };
+  const auto found = std::ranges::find_if(candidates, begins);
+  return found == candidates.end() ? std::string_view() : *found;
+}
+
 }  // namespace
 
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> candidates) {
@@ -37,7 +46,7 @@ std::string_view nearest_name(std::string_view name, std::span<const std::string
     best = distance;
     nearest = candidate;
   }
-  return nearest;
+  return nearest.empty() ? begun_name(name, candidates) : nearest;
 }
 
 std::string did_you_mean(std::string_view name) {

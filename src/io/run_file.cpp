@@ -17,13 +17,14 @@
 #include "io/input_error.hpp"
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Of a row of the table of checkpoints; after them the numbers of the two members.
+// Of a row of the table of checkpoints; after them the numbers of the two members, and the count of events.
 enum Place : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
 
 /// Slots for checkpoints: what is being written is never the last that is whole.
@@ -39,7 +40,9 @@ double checksum(std::span<const double> row) {
   return static_cast<double>(hash >> 12);
 }
 
-std::vector<double> to_row(const Checkpoint& checkpoint, std::uint64_t count) {
+/// `size` is that of the table's rows, if there is one: tables of old have no count of events.
+std::vector<double> to_row(const Checkpoint& checkpoint, std::size_t events, std::uint64_t count,
+                           std::optional<std::size_t> size = std::nullopt) {
   std::vector<double> row(numbers);
   row[serial] = static_cast<double>(count);
   row[at_time] = checkpoint.time;
@@ -50,8 +53,16 @@ std::vector<double> to_row(const Checkpoint& checkpoint, std::uint64_t count) {
   for (const Member* member : {&checkpoint.integrator, &checkpoint.record}) {
     row.insert(row.end(), member->numbers.begin(), member->numbers.end());
   }
+  row.push_back(static_cast<double>(events));
+  if (size) row.resize(*size);
   row[check] = checksum(row);
   return row;
+}
+
+/// Events of the run until then.
+std::size_t events_in(std::span<const double> row) {
+  const auto size = static_cast<std::size_t>(row[integrator_size] + row[record_size]) + numbers;
+  return size < row.size() ? static_cast<std::size_t>(row[size]) : 0;
 }
 
 Checkpoint from_row(std::span<const double> row) {
@@ -70,8 +81,10 @@ bool is_whole(std::span<const double> row) {
 }
 
 /// The last checkpoint that is whole, of rows that are there; none where none is.
-std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& run, double rows) {
+std::optional<std::vector<double>> last_checkpoint(const hdf5::Handle& file, const hdf5::Handle& run) {
   if (!hdf5::has(run, "checkpoint")) return std::nullopt;
+  double rows = std::numeric_limits<double>::infinity();
+  if (hdf5::has(file, "t")) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(file, "t"))[0]);
   const hdf5::Handle table = hdf5::open_dataset(run, "checkpoint");
   std::optional<std::vector<double>> last;
   for (std::size_t slot = 0; slot < slots; ++slot) {
@@ -93,6 +106,35 @@ RunOrigin read_origin(const hdf5::Handle& file, const hdf5::Handle& run) {
   origin.overrides = nlohmann::json::parse(hdf5::read_text(run, "set")).get<std::vector<std::string>>();
   origin.model = hdf5::read_text(run, "model");
   return origin;
+}
+
+/// A scale of the axis of links, where anything has one.
+hdf5::Handle create_links(const hdf5::Handle& file, const RunContents& contents) {
+  std::size_t links = 0;
+  for (const Quantity& quantity : contents.quantities) links = std::max(links, quantity.links);
+  for (const Constant& constant : contents.constants) {
+    if (constant.per_link) links = std::max(links, constant.values.size());
+  }
+  if (links == 0) return {};
+  hdf5::Handle scale = hdf5::create_numbering(file, "link", links);
+  hdf5::write_attribute(scale, "long_name", "number of the link, from the pivot outwards");
+  hdf5::write_attribute(scale, "units", "1");
+  hdf5::make_scale(scale, "link");
+  return scale;
+}
+
+/// The array of a quantity in a file, by the name that it has there; empty where it has none.
+std::string name_in(const hdf5::Handle& where, const Quantity& quantity) {
+  for (const std::string& name : {quantity.name, former_rate_name(quantity.name)}) {
+    if (hdf5::has(where, name)) return name;
+  }
+  return {};
+}
+
+std::size_t columns_in(const std::vector<Quantity>& quantities) {
+  std::size_t columns = 0;
+  for (const Quantity& quantity : quantities) columns += quantity.size();
+  return columns;
 }
 
 /// Of numbers that all runs of this kind have; a chunk of a quantity has about 32 kB where there are few.
@@ -117,9 +159,7 @@ SavedRun read_saved_run(const std::string& file) {
     SavedRun saved;
     saved.origin = read_origin(opened, run);
     saved.has_rows = hdf5::has(opened, "t");
-    double rows = std::numeric_limits<double>::infinity();
-    if (saved.has_rows) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(opened, "t"))[0]);
-    if (const auto last = last_checkpoint(run, rows)) saved.checkpoint = from_row(*last);
+    if (const auto last = last_checkpoint(opened, run)) saved.checkpoint = from_row(*last);
     return saved;
   } catch (const hdf5::Error& error) {
     reject(std::string("one that HDF5 cannot read: ") + error.what());
@@ -133,6 +173,93 @@ void write_saved_run(const std::string& file, const RunOrigin& origin, const Che
   RunFile written(file, origin, {});
   written.keep(checkpoint);
   written.finish();
+  written.conclude("");
+}
+
+void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& natural, const std::string& unit) {
+  const std::string own = in_units(natural, unit);
+  hdf5::write_attribute(array, "units", own == unit ? unit : "1");
+  if (own != unit) hdf5::write_attribute(array, "natural_unit", own);
+}
+
+void EventList::create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links) {
+  if (contents.events.empty() || contents.quantities.empty()) return;
+  using hdf5::Type;
+  const hdf5::Handle group = hdf5::create_group(file, "events");
+  quantities_ = contents.quantities;
+  constexpr std::size_t block = std::size_t{1} << 13, most_rows = 256;
+  const std::size_t rows = std::clamp<std::size_t>(block / columns_in(quantities_), 1, most_rows);
+  const auto add = [&](const std::string& name, std::size_t size, Type type, const std::string& meaning) {
+    datasets_.push_back(hdf5::create_list(group, name, size, rows, type));
+    hdf5::write_attribute(datasets_.back(), "long_name", meaning);
+    if (datasets_.size() == 1) hdf5::make_scale(datasets_[0], "event_number");
+    if (datasets_.size() > 1) hdf5::attach_scale(datasets_.back(), datasets_[0], 0);
+    if (size > 0) hdf5::attach_scale(datasets_.back(), links, 1);
+  };
+  add("event_number", 0, Type::whole, "number of the event, in order of time");
+  add("event_name", 0, Type::whole, "which event it is");
+  hdf5::write_flags(datasets_.back(), Type::whole, 1, contents.events);
+  add("event_direction", 0, Type::byte, "whether its expression went up or down through zero");
+  hdf5::write_flags(datasets_.back(), Type::byte, 0, std::vector<std::string>{"down", "up"});
+  for (const Quantity& quantity : quantities_) {
+    add(quantity.name, quantity.links, Type::real, quantity.meaning);
+    write_unit(datasets_.back(), contents.natural, quantity.unit);
+  }
+  names_ = contents.events;
+}
+
+void EventList::reopen(const hdf5::Handle& file, const RunContents& contents, std::size_t kept) {
+  if (!hdf5::has(file, "events") || contents.events.empty()) return;
+  const hdf5::Handle group = hdf5::open_group(file, "events");
+  for (const char* name : {"event_number", "event_name", "event_direction"})
+    datasets_.push_back(hdf5::open_dataset(group, name));
+  for (const Quantity& quantity : contents.quantities) {
+    datasets_.push_back(hdf5::open_dataset(group, name_in(group, quantity)));
+  }
+  quantities_ = contents.quantities;
+  names_ = contents.events;
+  written_ = kept;
+  for (const hdf5::Handle& dataset : datasets_) hdf5::set_rows(dataset, written_);
+}
+
+void EventList::add(const EventRow& happened) {
+  if (!is_there()) return;
+  const auto which = std::ranges::find(names_, happened.event.name) - names_.begin();
+  std::vector<double> row{static_cast<double>(count() + 1), static_cast<double>(which + 1), happened.up ? 1.0 : 0.0};
+  row.insert(row.end(), happened.row.numbers.begin(), happened.row.numbers.end());
+  pending_.push_back(std::move(row));
+}
+
+void EventList::append(std::size_t dataset, const std::vector<double>& numbers) {
+  hdf5::set_rows(datasets_[dataset], count());
+  hdf5::write_rows(datasets_[dataset], written_, numbers);
+}
+
+void EventList::write() {
+  if (pending_.empty()) return;
+  constexpr std::size_t before = 3;  // numbers before those of the row
+  for (std::size_t k = 0; k < datasets_.size(); ++k) {
+    std::vector<double> numbers;
+    for (const std::vector<double>& row : pending_) {
+      if (k < before) {
+        numbers.push_back(row[k]);
+        continue;
+      }
+      const Quantity& quantity = quantities_[k - before];
+      for (std::size_t i = 0; i < quantity.size(); ++i) numbers.push_back(row[before + quantity.column(i)]);
+    }
+    append(k, numbers);
+  }
+  written_ = count();
+  pending_.clear();
+}
+
+void EventList::close() {
+  for (hdf5::Handle& dataset : datasets_) dataset.close();
+}
+
+void EventList::abandon() {
+  for (hdf5::Handle& dataset : datasets_) dataset.abandon();
 }
 
 RunFile::Lock::~Lock() {
@@ -151,20 +278,20 @@ void RunFile::Lock::take(const std::string& file, const std::string& name) {
   }
 }
 
-RunFile::RunFile(const std::string& name, const RunOrigin& origin, std::vector<Quantity> quantities)
-    : quantities_(std::move(quantities)) {
+RunFile::RunFile(const std::string& name, const RunOrigin& origin, RunContents contents)
+    : contents_(std::move(contents)) {
   open_part(name);
   guarded([&] { create(origin); });
 }
 
-RunFile::RunFile(const std::string& name, const std::string& from, std::int64_t rows, std::vector<Quantity> quantities)
-    : quantities_(std::move(quantities)) {
+RunFile::RunFile(const std::string& name, const std::string& from, const RunOrigin& origin, RunContents contents)
+    : contents_(std::move(contents)) {
   open_part(name);
   std::error_code error;
   fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
   if (error) throw OutputError(name_, error.value());
   hdf5::mark_as_closed(path_);
-  guarded([&] { reopen(rows); });
+  guarded([&] { reopen(origin); });
 }
 
 RunFile::~RunFile() {
@@ -190,8 +317,7 @@ void RunFile::open_part(const std::string& name) {
   if (descriptor < 0) reject_output(name, target_, errno);
   ::close(descriptor);
   lock_.take(path_, name);
-  for (const Quantity& quantity : quantities_) columns_ += quantity.size();
-  chunk_rows_ = chunk_rows(columns_);
+  columns_ = columns_in(contents_.quantities);
   hdf5::begin();
 }
 
@@ -208,6 +334,10 @@ void RunFile::guarded(Action action) {
 
 void RunFile::create(const RunOrigin& origin) {
   file_ = hdf5::create_file(path_);
+  hdf5::write_attribute(file_, "Conventions", "CF-1.11");
+  hdf5::write_attribute(file_, "title", origin.title);
+  hdf5::write_attribute(file_, "history", history_line(origin.command));
+  hdf5::write_attribute(file_, "source", "pendula " + origin.version);
   hdf5::write_attribute(file_, "pendula", origin.version);
   hdf5::write_attribute(file_, "instruction_set", origin.instruction_set);
   hdf5::write_attribute(file_, "solver", origin.solver);
@@ -217,28 +347,65 @@ void RunFile::create(const RunOrigin& origin) {
   hdf5::write_text(run_, "scenario", origin.scenario);
   hdf5::write_text(run_, "set", nlohmann::json(origin.overrides).dump());
   hdf5::write_text(run_, "model", origin.model);
-  hdf5::Handle links;
-  for (const Quantity& quantity : quantities_) {
+  if (contents_.quantities.empty()) return;
+  // Of an event a name, a count, two times and a warning; of all else far less than the rest.
+  constexpr std::size_t room = std::size_t{1} << 16, room_of_event = 1024;
+  summary_ = hdf5::create_late_text(run_, "summary", room + room_of_event * contents_.events.size());
+  const hdf5::Handle links = create_links(file_, contents_);
+  create_rows(links);
+  create_constants(links);
+  events_.create(file_, contents_, links);
+}
+
+void RunFile::create_rows(const hdf5::Handle& links) {
+  chunk_rows_ = chunk_rows(columns_);
+  for (const Quantity& quantity : contents_.quantities) {
     datasets_.push_back(hdf5::create_rows(file_, quantity.name, quantity.links, chunk_rows_));
-    hdf5::write_attribute(datasets_.back(), "units", quantity.unit);
-    if (quantity.links > 0 && links.get() < 0) {
-      links = hdf5::create_numbering(file_, "link", quantity.links);
-      hdf5::make_scale(links, "link");
-    }
-  }
-  if (quantities_.empty()) return;
-  hdf5::make_scale(datasets_[0], "t");
-  for (std::size_t k = 1; k < datasets_.size(); ++k) {
-    hdf5::attach_scale(datasets_[k], datasets_[0], 0);
-    if (quantities_[k].links > 0) hdf5::attach_scale(datasets_[k], links, 1);
+    write_unit(datasets_.back(), contents_.natural, quantity.unit);
+    hdf5::write_attribute(datasets_.back(), "long_name", quantity.meaning);
+    if (datasets_.size() == 1) hdf5::make_scale(datasets_[0], "t");
+    if (datasets_.size() > 1) hdf5::attach_scale(datasets_.back(), datasets_[0], 0);
+    if (quantity.links > 0) hdf5::attach_scale(datasets_.back(), links, 1);
   }
 }
 
-void RunFile::reopen(std::int64_t rows) {
+void RunFile::create_constants(const hdf5::Handle& links) const {
+  for (const Constant& constant : contents_.constants) {
+    const hdf5::Handle array = constant.per_link ? hdf5::create_vector(file_, constant.name, constant.values)
+                                                 : hdf5::create_number(file_, constant.name, constant.values.front());
+    write_unit(array, contents_.natural, constant.unit);
+    hdf5::write_attribute(array, "long_name", constant.meaning);
+    if (constant.per_link) hdf5::attach_scale(array, links, 0);
+  }
+}
+
+// A file keeps the names that it began with, and what it has of a row.
+void RunFile::reopen(const RunOrigin& origin) {
   file_ = hdf5::open_file(path_, true);
   run_ = hdf5::open_group(file_, "run");
-  for (const Quantity& quantity : quantities_) datasets_.push_back(hdf5::open_dataset(file_, quantity.name));
-  in_file_ = static_cast<std::size_t>(rows);
+  if (hdf5::has_attribute(file_, "history")) {
+    const std::string before = hdf5::read_attribute(file_, "history");
+    hdf5::write_attribute(file_, "history", before + "\n" + history_line(origin.command));
+  }
+  if (hdf5::has(run_, "summary")) {
+    summary_ = hdf5::open_dataset(run_, "summary");
+    hdf5::set_rows(summary_, 0);
+  }
+  const auto last = last_checkpoint(file_, run_);
+  if (last) serial_ = static_cast<std::uint64_t>((*last)[serial]);
+  if (last) in_file_ = static_cast<std::size_t>((*last)[kept_rows]);
+  std::erase_if(contents_.quantities, [&](const Quantity& quantity) { return name_in(file_, quantity).empty(); });
+  if (contents_.quantities.empty()) return;
+  for (const Quantity& quantity : contents_.quantities) {
+    datasets_.push_back(hdf5::open_dataset(file_, name_in(file_, quantity)));
+  }
+  events_.reopen(file_, contents_, last ? events_in(*last) : 0);
+  chunk_rows_ = chunk_rows(columns_in(contents_.quantities));
+  read_begun_block();
+}
+
+/// Rows of a chunk that is not full are taken back into the block.
+void RunFile::read_begun_block() {
   begun_ = in_file_ - in_file_ % chunk_rows_;
   const std::size_t pending = in_file_ - begun_;
   block_.resize(pending * columns_);
@@ -246,13 +413,11 @@ void RunFile::reopen(std::int64_t rows) {
     hdf5::set_rows(datasets_[k], in_file_);
     if (pending == 0) continue;
     const std::vector<double> read = hdf5::read_rows(datasets_[k], begun_, pending);
-    const std::size_t size = quantities_[k].size();
+    const Quantity& quantity = contents_.quantities[k];
     for (std::size_t i = 0; i < read.size(); ++i) {
-      block_[i / size * columns_ + quantities_[k].column(i % size)] = read[i];
+      block_[i / quantity.size() * columns_ + quantity.column(i % quantity.size())] = read[i];
     }
   }
-  const auto last = last_checkpoint(run_, static_cast<double>(rows));
-  if (last) serial_ = static_cast<std::uint64_t>((*last)[serial]);
 }
 
 void RunFile::take(const Row& row) {
@@ -262,13 +427,18 @@ void RunFile::take(const Row& row) {
   if (full || is_due()) guarded([&] { flush(); });
 }
 
+void RunFile::happen(const EventRow& happened) {
+  events_.add(happened);
+}
+
 void RunFile::keep(const Checkpoint& checkpoint) {
   kept_ = checkpoint;
+  kept_events_ = events_.count();
   if (checkpoint_.get() < 0) {
     guarded([&] {
       checkpoint_ = hdf5::has(run_, "checkpoint")
                         ? hdf5::open_dataset(run_, "checkpoint")
-                        : hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, 0).size());
+                        : hdf5::create_table(run_, "checkpoint", slots, to_row(checkpoint, 0, 0).size());
       hdf5::let_others_read(file_);
       flush();
     });
@@ -287,7 +457,7 @@ void RunFile::write_rows() {
   const std::size_t count = block_rows();
   if (count == 0) return;
   for (std::size_t k = 0; k < datasets_.size(); ++k) {
-    const Quantity& quantity = quantities_[k];
+    const Quantity& quantity = contents_.quantities[k];
     const std::size_t size = quantity.size();
     numbers_.assign(chunk_rows_ * size, std::numeric_limits<double>::quiet_NaN());
     for (std::size_t row = 0; row < count; ++row) {
@@ -313,10 +483,11 @@ void RunFile::flush() {
 }
 
 void RunFile::flush(std::size_t rows) {
+  events_.write();
   const bool has_its_rows = kept_ && (columns_ == 0 || static_cast<std::size_t>(kept_->rows) <= rows);
   if (has_its_rows && checkpoint_.get() >= 0) {
     ++serial_;
-    hdf5::write_row(checkpoint_, serial_ % slots, to_row(*kept_, serial_));
+    hdf5::write_rows(checkpoint_, serial_ % slots, to_row(*kept_, kept_events_, serial_, hdf5::extent(checkpoint_)[1]));
     kept_.reset();
   }
   hdf5::flush(file_, path_);
@@ -343,14 +514,29 @@ void RunFile::put_in_place() {
 
 void RunFile::finish() {
   if (file_.get() < 0) return;
-  close();
+  guarded([&] {
+    if (checkpoint_.get() < 0) hdf5::let_others_read(file_);
+    write_rest();
+  });
   put_in_place();
+  finished_ = true;
+}
+
+void RunFile::conclude(const std::string& summary) {
+  if (file_.get() < 0) return;
+  guarded([&] {
+    if (summary_.get() >= 0) hdf5::write_late_text(summary_, summary);
+    hdf5::flush(file_, path_);
+  });
+  close();
 }
 
 void RunFile::close() {
   if (file_.get() < 0) return;
-  guarded([&] { write_rest(); });
+  if (!finished_) guarded([&] { write_rest(); });
   checkpoint_.close();
+  summary_.close();
+  events_.close();
   for (hdf5::Handle& dataset : datasets_) dataset.close();
   run_.close();
   const bool closed = file_.close();
@@ -363,6 +549,8 @@ void RunFile::close() {
 /// Leaves the file as it was flushed last.
 void RunFile::abandon() {
   checkpoint_.abandon();
+  summary_.abandon();
+  events_.abandon();
   for (hdf5::Handle& dataset : datasets_) dataset.abandon();
   run_.abandon();
   file_.abandon();

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
-#include <numbers>
 #include <pendula/chain/momenta.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <stdexcept>
@@ -31,12 +30,12 @@ constexpr std::array<std::string_view, 2> angle_keys = {"theta", "phi"};
 constexpr std::array<std::string_view, 2> rate_keys = {"theta_dot", "phi_dot"};
 constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
-constexpr std::array<std::string_view, 9> run_keys = {"method", "stages",    "form",     "solver",  "iteration",
-                                                      "step",   "tolerance", "accuracy", "duration"};
+constexpr std::array<std::string_view, 10> run_keys = {"method", "stages",    "form",     "solver",   "iteration",
+                                                       "step",   "tolerance", "accuracy", "duration", "estimate"};
 constexpr std::array<std::string_view, 4> output_keys = {"every", "interval", "times", "checkpoint"};
 
 /// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 49> all_keys = {"chain.space",
+constexpr std::array<std::string_view, 50> all_keys = {"chain.space",
                                                        "chain.links",
                                                        "chain.masses",
                                                        "chain.lengths",
@@ -72,6 +71,7 @@ constexpr std::array<std::string_view, 49> all_keys = {"chain.space",
                                                        "run.tolerance",
                                                        "run.accuracy",
                                                        "run.duration",
+                                                       "run.estimate",
                                                        "output.every",
                                                        "output.interval",
                                                        "output.times",
@@ -301,22 +301,23 @@ State<Space> read_start(const Section& start, const LinkCount& count, const Chai
   return {0, q, read_coordinates<Space>(start, rate_keys, count, rates)};
 }
 
-/// Angles that are given without a unit and beyond two turns: degrees, most likely.
-void warn_of_degrees(const Section& start, std::vector<std::string>& warnings) {
-  const auto check = [&](const Entry& entry) {
-    const double angle = entry.is_number() ? entry.number() : 0;
-    if (std::abs(angle) <= 4 * std::numbers::pi) return false;
-    warnings.push_back(entry.place() + ": " + shortest(angle) + " rad is more than two turns; did you mean \"" +
-                       shortest(angle) + " deg\"?");
-    return true;
-  };
+/// Of each key once.
+std::vector<std::string> degree_warnings(const Section& start) {
+  std::vector<std::string> warnings;
   for (const std::string_view key : angle_keys) {
     const std::optional<Entry> entry = start.find(key);
-    if (!entry || check(*entry)) continue;
-    for (std::size_t i = 0; i < entry->size(); ++i) {
-      if (check(entry->element(i))) break;  // once a key
-    }
+    const std::optional<std::string> warning = entry ? warning_of_degrees(*entry) : std::nullopt;
+    if (warning) warnings.push_back(*warning);
   }
+  return warnings;
+}
+
+/// An error that something is asked for: no method tells smaller ones from rounding.
+double error_number(const Section& run, std::string_view key, double otherwise) {
+  constexpr double finest = 1e-16;
+  const double error = number(run, key, otherwise, Sign::positive);
+  if (error < finest && error != otherwise) run.find(key)->fail("a number of at least " + shortest(finest));
+  return error;
 }
 
 RunOptions read_run(const Section& run) {
@@ -330,7 +331,7 @@ RunOptions read_run(const Section& run) {
   options.solver = choice(run, "solver", options.solver);
   options.iteration = choice(run, "iteration", options.iteration);
   options.step = number(run, "step", options.step, Sign::positive);
-  options.tolerance = number(run, "tolerance", options.tolerance, Sign::positive);
+  options.tolerance = error_number(run, "tolerance", options.tolerance);
   if (!is_explicit(options.method) && !run.find("step")) {
     options.step = 0;
     if (!stages) options.stages = stages_for(options.method, options.tolerance);
@@ -344,7 +345,7 @@ Accuracy read_accuracy(const Section& run, const RunOptions& options) {
   const auto accuracy = run.find("accuracy");
   if (accuracy && run.find("tolerance")) accuracy->fail("nothing beside run.tolerance, which follows from it");
   const bool is_asked = !is_explicit(options.method) && !run.find("step") && !run.find("tolerance");
-  return {number(run, "accuracy", is_asked ? options.tolerance : 0, Sign::positive), !run.find("stages").has_value()};
+  return {error_number(run, "accuracy", is_asked ? options.tolerance : 0), !run.find("stages").has_value()};
 }
 
 double read_duration(const Section& run, const RunOptions& options) {
@@ -410,6 +411,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
   plan.accuracy = read_accuracy(sections.run, plan.run);
   plan.duration = read_duration(sections.run, plan.run);
+  if (const auto estimate = sections.run.find("estimate")) plan.estimate = estimate->truth();
   const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
   const auto every = sections.output.find("every");
@@ -434,7 +436,7 @@ Scenario<Space> read(const Sections& sections) {
   Scenario<Space> scenario(chain, read_start(sections.start, count, chain, natural ? natural->time : 1));
   read_plan(sections, scenario);
   scenario.natural = natural;
-  warn_of_degrees(sections.start, scenario.warnings);
+  for (std::string& warning : degree_warnings(sections.start)) scenario.warnings.push_back(std::move(warning));
   scenario.places["links"] = count.place;
   return scenario;
 }

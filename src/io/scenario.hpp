@@ -37,6 +37,7 @@ inline constexpr double max_steps = 9e15;
 struct RunPlan {
   RunOptions run;
   Accuracy accuracy;
+  bool estimate = true;  ///< whether to look how far the rows can be trusted
   double duration = 10;
   std::int64_t every = 10;  ///< steps from row to row
   std::vector<EventPlan> events;

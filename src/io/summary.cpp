@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "io/output_error.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {
@@ -43,9 +44,23 @@ Json columns(const Eigen::MatrixXd& matrix) {
   return array;
 }
 
+/// Adds the numbers of all links by name, theta_1, theta_2, …
+void add_named(Json& json, const std::string& name, const Eigen::VectorXd& values) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) json[name + "_" + std::to_string(i + 1)] = values[i];
+}
+
+/// As every system has it, and the same in arrays of one element a link.
 Json to_json(const Snapshot& snapshot) {
   const bool planar = snapshot.phi.size() == 0;
-  Json json{{"t", snapshot.time}, {"theta", to_array(snapshot.theta)}};
+  Json q = Json::object(), v = Json::object(), points = Json::object();
+  add_named(q, "theta", snapshot.theta);
+  add_named(q, "phi", snapshot.phi);
+  add_named(v, "theta", snapshot.theta_dot);
+  add_named(v, "phi", snapshot.phi_dot);
+  for (Eigen::Index i = 0; i < snapshot.bobs.cols(); ++i) {
+    points["bob_" + std::to_string(i + 1)] = to_array(snapshot.bobs.col(i));
+  }
+  Json json{{"t", snapshot.time}, {"q", q}, {"v", v}, {"points", points}, {"theta", to_array(snapshot.theta)}};
   if (!planar) json["phi"] = to_array(snapshot.phi);
   json["theta_dot"] = to_array(snapshot.theta_dot);
   if (!planar) json["phi_dot"] = to_array(snapshot.phi_dot);
@@ -170,10 +185,6 @@ std::string what_was_moved(const ModelSummary& model) {
                            ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
 }
 
-std::string aim_text(const AccuracyAim& aim) {
-  return std::isfinite(aim.error) ? "expected at the end: " + rounded(aim.error, 1) : "";
-}
-
 std::string settings(const Summary& summary) {
   const ModelSummary& model = summary.model;
   const UnitNames unit = unit_names(model.natural);
@@ -190,7 +201,7 @@ std::string settings(const Summary& summary) {
   if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
-  if (summary.aimed) text += line("accuracy", shortest(summary.accuracy), aim_text(*summary.aimed));
+  if (summary.aimed) text += line("accuracy", shortest(summary.accuracy));
   text += is_adaptive(summary.options) ? line("tolerance", summary.aimed ? rounded(summary.options.tolerance, 3)
                                                                          : shortest(summary.options.tolerance))
                                        : line("step", shortest(summary.options.step) + time);
@@ -208,14 +219,15 @@ std::string error_name(const Summary& summary) {
 }
 
 std::string table(const Summary& summary) {
-  constexpr std::size_t width = 15;
+  constexpr std::size_t width = 15;  // of a number of nine digits with its sign and its exponent
+  const auto cell = [](const std::string& text) { return std::string(" ").append(right(text, width)); };
   std::string text = right("t", value_width);
-  for (const std::string& column : summary.shown) text += right(column, width);
-  text += right("energy " + error_name(summary), width) + "\n";
+  for (const std::string& column : summary.shown) text += cell(column);
+  text += cell("energy " + error_name(summary)) + "\n";
   for (const TableRow& row : summary.table) {
     text += right(rounded(row.time), value_width);
-    for (const double coordinate : row.shown) text += right(rounded(coordinate, 9), width);
-    text += right(shown_or_dash(row.energy_error, 3), width) + "\n";
+    for (const double coordinate : row.shown) text += cell(rounded(coordinate, 9));
+    text += cell(shown_or_dash(row.energy_error, 3)) + "\n";
   }
   return text;
 }
@@ -246,6 +258,20 @@ std::string energies(const Summary& summary) {
          line("energy at end", shown_or_dash(summary.energy_final, 12) + unit) +
          line("largest " + error_name(summary), shown_or_dash(summary.energy_error.largest, 3),
               of + ", over " + plural(summary.rows, "row"));
+}
+
+/// How far rows can be trusted.
+std::string trust(const Summary& summary) {
+  const Trust& trust = summary.trust;
+  std::string text;
+  if (std::isfinite(trust.expected_error)) {
+    const std::string of = summary.model.space.empty() ? "size of the motion" : "length of the chain, or radians";
+    text += line("expected error", rounded(trust.expected_error, 1), "of the " + of + ", in every row");
+  }
+  if (std::isfinite(trust.until)) {
+    text += line("trusted until", rounded(trust.until, 4) + std::string(unit_names(summary.model.natural).time));
+  }
+  return text;
 }
 
 /// Where the last bob is, or of a system what its table shows.
@@ -302,6 +328,49 @@ Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coord
   const bool is_named = outcome.part >= 0 && !coordinates.empty();
   const auto part = static_cast<std::size_t>(outcome.part);
   return {status, message(outcome, coordinates), outcome, is_named ? std::string(coordinates[part]) : ""};
+}
+
+/// Everything but the last state.
+Json json_of(const Summary& summary) {
+  const bool staged = has_stages(summary);
+  const bool adaptive = is_adaptive(summary.options);
+  Json json{{"pendula", version}, {"scenario", summary.model.scenario}};
+  json.update(to_json(summary.model));
+  json.update(Json{{"method", name_of(summary.options.method)},
+                   {"stages", where(staged, summary.options.stages)},
+                   {"form", where(staged, name_of(summary.options.form))},
+                   {"solver", or_null(summary.description.solver)},
+                   {"iteration", or_null(summary.description.iteration)},
+                   {"kernel", or_null(summary.description.kernel)},
+                   {"step", where(!adaptive, summary.options.step)},
+                   {"tolerance", where(adaptive, summary.options.tolerance)},
+                   {"accuracy", where(summary.aimed.has_value(), summary.accuracy)},
+                   {"expected_error", summary.trust.expected_error},
+                   {"trusted_until", summary.trust.until},
+                   {"duration", summary.duration},
+                   {"every", where(!summary.at.any(), summary.every)},
+                   {"interval", where(summary.at.interval > 0, summary.at.interval)},
+                   {"steps", summary.statistics.steps},
+                   {"smallest_step", where(adaptive, summary.statistics.smallest_step)},
+                   {"largest_step", where(adaptive, summary.statistics.largest_step)},
+                   {"rejected_steps", summary.statistics.rejected_steps},
+                   {"newton_iterations", summary.statistics.newton_iterations},
+                   {"rows", summary.trajectory ? summary.rows_written : summary.rows},
+                   {"trajectory", or_null(summary.trajectory.value_or(""))},
+                   {"view", or_null(summary.view.value_or(""))},
+                   {"energy_initial", summary.energy_error.initial},
+                   {"energy_final", summary.energy_final},
+                   {"energy_error_max", summary.energy_error.largest},
+                   {"wall_seconds", summary.stepping_seconds},
+                   {"outcome", to_json(summary.ending)},
+                   {"events", events_json(summary)},
+                   {"warnings", summary.warnings}});
+  return json;
+}
+
+std::string one_line(const Json& json) {
+  constexpr int without_indent = -1;
+  return json.dump(without_indent, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -364,47 +433,24 @@ SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion) {
 }
 
 std::string to_json(const Summary& summary) {
-  const bool staged = has_stages(summary);
-  const bool adaptive = is_adaptive(summary.options);
-  Json json{{"pendula", version}, {"scenario", summary.model.scenario}};
-  json.update(to_json(summary.model));
-  json.update(Json{{"method", name_of(summary.options.method)},
-                   {"stages", where(staged, summary.options.stages)},
-                   {"form", where(staged, name_of(summary.options.form))},
-                   {"solver", or_null(summary.description.solver)},
-                   {"iteration", or_null(summary.description.iteration)},
-                   {"kernel", or_null(summary.description.kernel)},
-                   {"step", where(!adaptive, summary.options.step)},
-                   {"tolerance", where(adaptive, summary.options.tolerance)},
-                   {"accuracy", where(summary.aimed.has_value(), summary.accuracy)},
-                   {"expected_error", where(summary.aimed && std::isfinite(summary.aimed->error),
-                                            summary.aimed ? summary.aimed->error : 0)},
-                   {"duration", summary.duration},
-                   {"every", where(!summary.at.any(), summary.every)},
-                   {"interval", where(summary.at.interval > 0, summary.at.interval)},
-                   {"steps", summary.statistics.steps},
-                   {"smallest_step", where(adaptive, summary.statistics.smallest_step)},
-                   {"largest_step", where(adaptive, summary.statistics.largest_step)},
-                   {"rejected_steps", summary.statistics.rejected_steps},
-                   {"newton_iterations", summary.statistics.newton_iterations},
-                   {"rows", summary.trajectory ? summary.rows_written : summary.rows},
-                   {"trajectory", or_null(summary.trajectory.value_or(""))},
-                   {"view", or_null(summary.view.value_or(""))},
-                   {"energy_initial", summary.energy_error.initial},
-                   {"energy_final", summary.energy_final},
-                   {"energy_error_max", summary.energy_error.largest},
-                   {"wall_seconds", summary.stepping_seconds},
-                   {"outcome", to_json(summary.ending)},
-                   {"events", events_json(summary)},
-                   {"warnings", summary.warnings},
-                   {"final", summary.model.space.empty() ? to_json(summary.system) : to_json(summary.final)}});
-  constexpr int one_line = -1;
-  return json.dump(one_line, ' ', false, Json::error_handler_t::replace) + "\n";
+  Json json = json_of(summary);
+  json["final"] = summary.model.space.empty() ? to_json(summary.system) : to_json(summary.final);
+  return one_line(json) + "\n";
+}
+
+std::string to_json_of_file(const Summary& summary) {
+  std::string text = one_line(json_of(summary));
+  for (const std::optional<std::string>& file :
+       {std::optional(summary.model.scenario), summary.trajectory, summary.view, summary.event_file}) {
+    if (file) text = with_public_name(std::move(text), *file);
+  }
+  return text;
 }
 
 std::string to_text(const Summary& summary) {
   return "pendula " + std::string(version) + ": " + summary.model.scenario + "\n\n" + settings(summary) + "\n" +
-         table(summary) + "\n" + statistics(summary) + "\n" + energies(summary) + "\n" + ending(summary);
+         table(summary) + "\n" + statistics(summary) + "\n" + energies(summary) + trust(summary) + "\n" +
+         ending(summary);
 }
 
 }  // namespace pendula::io

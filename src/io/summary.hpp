@@ -119,6 +119,9 @@ SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion);
 /// is null (the stages of "rk4", say), as is a number that is not finite.
 std::string to_json(const Summary& summary);
 
+/// The same for the run file, on one line: without the last state, which it has, and with public names of files.
+std::string to_json_of_file(const Summary& summary);
+
 /// The summary for people.
 std::string to_text(const Summary& summary);
 

@@ -79,11 +79,10 @@ SystemNumbers read_numbers(const Section& system, const SystemInfo& info) {
   return numbers;
 }
 
-/// theta of theta_1, where it has such an ending.
+/// theta of theta_1; empty where a name has no index.
 std::string_view family(std::string_view name) {
-  const std::size_t end = name.find_last_not_of("0123456789");
-  const bool numbered = end != std::string_view::npos && end > 0 && end + 1 < name.size() && name[end] == '_';
-  return numbered ? name.substr(0, end) : std::string_view();
+  const std::size_t index = index_of(name).size();
+  return index == 0 ? std::string_view() : name.substr(0, name.size() - index);
 }
 
 /// The keys of [start]: coordinates, rates and momenta, by name, and theta for theta_1, theta_2, … together.
@@ -94,7 +93,7 @@ class StartTable {
     for (const std::string_view coordinate : info.coordinates) {
       for (const std::string& stem : {std::string(coordinate), std::string(family(coordinate))}) {
         if (stem.empty()) continue;
-        known.insert({stem, rate_of(stem), momentum_of(stem)});
+        known.insert({stem, rate_name(stem), momentum_of(stem)});
       }
     }
     names_.assign(known.begin(), known.end());
@@ -104,13 +103,13 @@ class StartTable {
 
   /// The coordinates; what is not there is 0.
   Eigen::VectorXd positions() const {
-    return read([](const std::string& stem) { return stem; }, "");
+    return read([](std::string_view stem) { return std::string(stem); }, "");
   }
-  Eigen::VectorXd rates() const { return read(rate_of, "/s"); }
+  Eigen::VectorXd rates() const { return read(rate_name, "/s"); }
   Eigen::VectorXd momenta() const { return read(momentum_of, ""); }
 
   std::optional<Entry> first_momentum() const { return first(momentum_of); }
-  std::optional<Entry> first_rate() const { return first(rate_of); }
+  std::optional<Entry> first_rate() const { return first(rate_name); }
   const std::string& where() const { return table_->where(); }
 
   /// The entry of coordinate k, its own or one for all like it.
@@ -121,15 +120,25 @@ class StartTable {
   }
 
  private:
-  static std::string rate_of(const std::string& stem) { return stem + "_dot"; }
-  static std::string momentum_of(const std::string& stem) { return "p_" + stem; }
+  static std::string momentum_of(std::string_view stem) { return std::string("p_").append(stem); }
+
+  /// Rates have their names of old, too.
+  template <class Name>
+  std::optional<Entry> find(Name name, const std::string& stem) const {
+    const std::string key = name(stem), old = stem + "_dot";
+    std::optional<Entry> entry = table_->find(key);
+    if (key == old || key != present_name(old)) return entry;
+    const std::optional<Entry> before = table_->find(old);
+    if (entry && before) before->fail("nothing beside " + entry->key() + ", which is the same");
+    return entry ? entry : before;
+  }
 
   template <class Name>
   std::optional<Entry> first(Name name) const {
     for (const std::string_view coordinate : info_.coordinates) {
       for (const std::string& stem : {std::string(coordinate), std::string(family(coordinate))}) {
         if (stem.empty()) continue;
-        if (const auto entry = table_->find(name(stem))) return entry;
+        if (const auto entry = find(name, stem)) return entry;
       }
     }
     return std::nullopt;
@@ -143,9 +152,9 @@ class StartTable {
       const std::array<Unit, 2> angles = {{{rad, 1}, {deg, degree}}};
       const Units units = info_.is_angle[k] ? Units(angles) : Units();
       const std::string own(info_.coordinates[k]), stem(family(own));
-      if (const auto entry = table_->find(name(own))) {
+      if (const auto entry = find(name, own)) {
         values[static_cast<Eigen::Index>(k)] = entry->number(Sign::any, units);
-      } else if (const auto all = stem.empty() ? std::nullopt : table_->find(name(stem))) {
+      } else if (const auto all = stem.empty() ? std::nullopt : find(name, stem)) {
         const int count = members(stem);
         const Eigen::VectorXd each = all->per_link({count, "the model", all->where()}, Sign::any, units);
         values[static_cast<Eigen::Index>(k)] = each[number_of(k, stem)];
@@ -192,20 +201,35 @@ Motion read_start(const Section& root, const SystemSubject& system) {
   return start;
 }
 
-/// Angles that are given without a unit and beyond two turns: degrees, most likely.
-void warn_of_degrees(const Section& root, const SystemInfo& info, std::vector<std::string>& warnings) {
+/// Of each key once.
+std::vector<std::string> degree_warnings(const Section& root, const SystemInfo& info) {
   const StartTable table(root, info);
+  std::vector<std::string> warnings;
   for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
     const std::optional<Entry> entry = table.entry_of(k);
-    if (!info.is_angle[k] || !entry || !entry->is_number()) continue;
-    const double angle = entry->number();
-    if (std::abs(angle) <= 4 * std::numbers::pi) continue;
-    warnings.push_back(entry->place() + ": " + shortest(angle) + " rad is more than two turns; did you mean \"" +
-                       shortest(angle) + " deg\"?");
+    if (!info.is_angle[k] || !entry) continue;
+    const std::optional<std::string> warning = warning_of_degrees(*entry);
+    if (warning && std::ranges::find(warnings, *warning) == warnings.end()) warnings.push_back(*warning);
   }
+  return warnings;
 }
 
 }  // namespace
+
+std::optional<std::string> warning_of_degrees(const Entry& entry) {
+  if (entry.is_array()) {
+    for (std::size_t i = 0; i < entry.size(); ++i) {
+      if (auto warning = warning_of_degrees(entry.element(i))) return warning;
+    }
+    return std::nullopt;
+  }
+  if (!entry.is_number()) return std::nullopt;
+  const double angle = entry.number();
+  const std::string text = shortest(angle);
+  constexpr std::size_t most_typed = 6;  // characters; longer ones are multiples of pi, or where another run ended
+  if (std::abs(angle) <= 2 * std::numbers::pi || text.size() > most_typed) return std::nullopt;
+  return entry.place() + ": " + text + " rad is more than a turn; did you mean \"" + text + " deg\"?";
+}
 
 SystemScenario read_system(const Section& root, const std::filesystem::path& folder, const FindSystem& find) {
   if (const auto chain = root.find("chain")) chain->fail("no [chain] beside [system]");
@@ -221,7 +245,7 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
     throw InputError(model.place() + ": " + error.what());
   }
   scenario.start = read_start(root, *scenario.system);
-  warn_of_degrees(root, scenario.system->info(), scenario.warnings);
+  scenario.warnings = degree_warnings(root, scenario.system->info());
   return scenario;
 }
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/quantity.hpp>
 #include <system_error>
 
 #include "io/nearest_name.hpp"
@@ -151,26 +152,30 @@ bool is_bare_word(std::string_view text) {
 }
 
 /// A number and whatever stands behind it, as in "90 deg".
-struct Quantity {
+struct TextWithUnit {
   double value = 0;
   std::string_view unit;
 };
 
-std::optional<Quantity> read_quantity(std::string_view text) {
+std::optional<TextWithUnit> read_quantity(std::string_view text) {
   text = trimmed(text);
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  Quantity quantity;
+  TextWithUnit quantity;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), quantity.value);
   if (error != std::errc()) return std::nullopt;
   quantity.unit = trimmed(text.substr(static_cast<std::size_t>(end - text.data())));
   return quantity;
 }
 
+constexpr std::string_view degree_sign = "\u00b0";
+
 /// What a shell user types for a string: a word, or a number with a unit, whose quotes the shell takes.
 bool is_bare_string(std::string_view text) {
   if (is_bare_word(text)) return true;
-  const auto in_a_unit = [](char c) { return (c >= 'a' && c <= 'z') || c == '/'; };
-  const std::optional<Quantity> quantity = read_quantity(text);
+  const auto in_a_unit = [](char c) {
+    return (c >= 'a' && c <= 'z') || c == '/' || degree_sign.find(c) != std::string_view::npos;
+  };
+  const std::optional<TextWithUnit> quantity = read_quantity(text);
   return quantity && !quantity->unit.empty() && std::ranges::all_of(quantity->unit, in_a_unit);
 }
 
@@ -219,23 +224,53 @@ toml::table& table_of(toml::table& table, const KeyPart& part, const Place& plac
   return *next->as_table();
 }
 
+/// The table that the last part of a key is in.
+toml::table& last_table(toml::table& root, std::span<const KeyPart> path, const Place& place) {
+  toml::table* table = &root;
+  for (const KeyPart& part : path.first(path.size() - 1)) table = &table_of(*table, part, place);
+  return *table;
+}
+
+/// The array that a part's last element is in.
+toml::array& last_array(toml::table& table, const KeyPart& part, const Place& place) {
+  toml::node* node = table.get(part.name);
+  for (std::size_t k = 0; k + 1 < part.elements.size(); ++k) {
+    node = array_with(node, part.elements[k], place).get(part.elements[k] - 1);
+  }
+  return array_with(node, part.elements.back(), place);
+}
+
 /// Puts a value in the place of what `key` names.
 void put(toml::table& root, std::string_view key, toml::node& value, const std::string& where) {
   const std::vector<KeyPart> path = key_path(key);
   const Place place{where, key};
-  toml::table* table = &root;
-  for (std::size_t i = 0; i + 1 < path.size(); ++i) table = &table_of(*table, path[i], place);
+  toml::table& table = last_table(root, path, place);
   const auto& [name, elements] = path.back();
   if (elements.empty()) {
-    table->insert_or_assign(name, std::move(value));
+    table.insert_or_assign(name, std::move(value));
     return;
   }
-  toml::node* node = table->get(name);
-  for (std::size_t k = 0; k + 1 < elements.size(); ++k) {
-    node = array_with(node, elements[k], place).get(elements[k] - 1);
-  }
-  toml::array& array = array_with(node, elements.back(), place);
+  toml::array& array = last_array(table, path.back(), place);
   array.replace(array.cbegin() + static_cast<std::ptrdiff_t>(elements.back() - 1), std::move(value));
+}
+
+/// Takes out what `key` names.
+void take_out(toml::table& root, std::string_view key, const std::string& where) {
+  const std::vector<KeyPart> path = key_path(key);
+  const Place place{where, key};
+  toml::table& table = last_table(root, path, place);
+  const auto& [name, elements] = path.back();
+  if (!elements.empty()) {
+    toml::array& array = last_array(table, path.back(), place);
+    array.erase(array.cbegin() + static_cast<std::ptrdiff_t>(elements.back() - 1));
+  } else if (table.erase(name) == 0) {
+    throw InputError(where, printable(key), "a key of the scenario, to take it out", "none");
+  }
+}
+
+/// What a key may look like, for those who count from 0.
+std::string counting_hint(std::string_view key) {
+  return key.find("[0]") == std::string_view::npos ? "" : " (elements of arrays count from 1)";
 }
 
 void apply_override(toml::table& root, const std::string& text) {
@@ -244,9 +279,11 @@ void apply_override(toml::table& root, const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
   if (equals == std::string::npos || key_path(key).empty()) {
-    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text));
+    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text) + counting_hint(key));
   }
-  toml::table value = parse_value(trimmed(std::string_view(text).substr(equals + 1)), where);
+  const std::string_view given = trimmed(std::string_view(text).substr(equals + 1));
+  if (given.empty()) return take_out(root, key, where);
+  toml::table value = parse_value(given, where);
   put(root, key, *value.get("value"), where);
 }
 
@@ -260,11 +297,13 @@ std::string expected_number(Sign sign, Units units) {
   return expected;
 }
 
-/// The number in a text such as "90 deg".
+/// The number in a text such as "90 deg" or "90°".
 std::optional<double> with_unit(std::string_view text, Units units) {
-  const std::optional<Quantity> quantity = read_quantity(text);
+  const std::optional<TextWithUnit> quantity = read_quantity(text);
   if (!quantity) return std::nullopt;
-  const auto unit = std::ranges::find(units, quantity->unit, &Unit::name);
+  std::string name(quantity->unit);
+  if (name.starts_with(degree_sign)) name.replace(0, degree_sign.size(), "deg");
+  const auto unit = std::ranges::find(units, name, &Unit::name);
   return unit == units.end() ? std::nullopt : std::optional(quantity->value * unit->size);
 }
 
@@ -313,7 +352,7 @@ toml::table parse_toml(std::string_view text, std::string_view name, std::span<c
 
 void set_number(toml::table& root, std::string_view key, double number) {
   const std::string where = std::string(override_prefix) + std::string(key);
-  if (key_path(key).empty()) throw InputError(where + ": expected a key such as run.step");
+  if (key_path(key).empty()) throw InputError(where + ": expected a key such as run.step" + counting_hint(key));
   const bool is_integer = std::abs(number) < 0x1p53 && number == std::floor(number);
   toml::value<std::int64_t> integer(is_integer ? static_cast<std::int64_t>(number) : 0);
   toml::value<double> real(number);
@@ -421,6 +460,7 @@ void Section::read(const Entry& entry, std::span<const std::string_view> known,
   if (table_ == nullptr) entry.fail("a table");
   for (const auto& [key, node] : *table_) {
     if (std::ranges::find(known, key.str()) != known.end()) continue;
+    if (std::ranges::find(known, present_name(key.str())) != known.end()) continue;
     throw InputError(location(node.source()), dotted(printable(key.str())), "one of " + joined(known, ", "),
                      "the unknown key " + quoted(key.str()) + hint_at_key(key.str(), known, elsewhere));
   }

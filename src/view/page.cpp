@@ -18,10 +18,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t enough_rows = 2048;  // of exact ones
-constexpr std::size_t fewest_rows = 512;   // before a page may grow
-constexpr std::size_t most_marks = 1000;   // of an event in a run
-constexpr double alike = 1e-6;             // steps that differ by less are of one size
+constexpr std::size_t enough_rows = 2048;                 // of exact ones
+constexpr std::size_t fewest_rows = 512;                  // before a page may grow
+constexpr std::size_t most_marks = 1000;                  // of an event in a run
+constexpr double alike = 1e-6;                            // steps that differ by less are of one size
+constexpr double least_wanted = 600, most_wanted = 2500;  // rows of runs that are not very long
 
 /// Bytes of a row in base64: the time, the numbers, and floats that tell its energy error, its distance and its step.
 std::size_t row_bytes(std::size_t numbers, std::size_t size) {
@@ -71,6 +72,16 @@ Page::Page(const std::string& file, Scene scene, std::size_t runs, const PageLim
       all_columns_(all_columns(scene_)),
       drawn_columns_(drawn_columns(scene_)),
       file_(file) {}
+
+// Times of later runs are among those of the first, to the bit: the interval is twice, four times, … as long.
+RowTimes Page::times(double duration, std::size_t run) const {
+  if (duration == 0) return {1, {}};
+  const auto most = [&](std::size_t k) { return static_cast<double>(most_rows(k) - 2); };  // the ends, without thinning
+  const double wanted = std::max({least_wanted, std::min(most_wanted, 250 * duration), 50 * duration});
+  double interval = duration / std::min(std::ceil(wanted), most(0));
+  while (run > 0 && duration / interval > most(run)) interval *= 2;
+  return {interval, {}};
+}
 
 void Page::begin_run(const std::string& label) {
   if (!runs_.empty() && runs_.back().rows.size() == 0) runs_.pop_back();

@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <pendula/run/observer.hpp>
+#include <pendula/run/row_times.hpp>
 #include <pendula/run/run_record.hpp>
 #include <span>
 #include <string>
@@ -26,13 +27,17 @@ struct PageLimits {
 /// A page to look at one run, or at several together: one HTML file that needs nothing else.
 ///
 /// Rows are thinned, evenly and in bounded memory, and the page says so. As long as 2048 of them can be kept with all
-/// their columns as doubles, they are, and the CSV that the page gives is the trajectory's own text; longer rows, and
-/// those of the second run and later ones, are floats of what is drawn. Events are marks on the line of time, thinned
-/// in the same way; the sizes of steps are shown where the method chooses them.
+/// their columns as doubles, they are, and the CSV that the page gives has all of their digits; longer rows, and those
+/// of the second run and later ones, are floats of what is drawn. Events are marks on the line of time, thinned in the
+/// same way; the sizes of steps are shown where the method chooses them.
 class Page : public Observer {
  public:
   /// Opens the file. `runs` is how many will follow: they share the page. Throws io::InputError.
   Page(const std::string& file, Scene scene, std::size_t runs = 1, const PageLimits& limits = {});
+
+  /// The times at which the page wants rows of a run of this duration, so that it moves evenly: as many as it can keep,
+  /// but no more than serve to be looked at  [s]. `run` is its number, from 0 on.
+  RowTimes times(double duration, std::size_t run = 0) const;
 
   /// Rows that follow are those of a run that the page calls `label`.
   void begin_run(const std::string& label);

@@ -4,47 +4,23 @@
 //   fehlberg       Fehlberg 7(8) (odeint), dense equations with multipliers
 //   implicit       extrapolated linearly implicit Euler, bobs and tensions, for heavy damping
 //
-// usage: chain_reference METHOD TOLERANCE LIMIT DISTURBANCE < numbers > numbers
+// usage: chain_reference METHOD TOLERANCE LIMIT DISTURBANCE [states|dense] < numbers > numbers
 //
 // LIMIT bounds the evaluations of the equations (exit status 3 beyond), DISTURBANCE moves the start. Numbers in, as
 // reference.py writes them: dimension, links, gravity; per link mass, length, damping, torque (3); number of drives,
 // for each link, amplitude (3), frequency, phase; per link u (3) as theta, phi and their rates; number of times, times.
-// Numbers out, a line a time: the fastest bob so far, bobs, velocities.
-#include <array>
-#include <boost/numeric/odeint.hpp>
-#include <chain_equations.hpp>
-#include <cstdlib>
-#include <implicit_extrapolation.hpp>
-#include <iostream>
-#include <limits>
-#include <string>
+// Numbers out, a line a time: the fastest bob so far, bobs, velocities. With `states` and `dense` rows of long doubles
+// instead, at each time or at 20 places of each step: u, du/dt, t, and how far each rod has turned, in the plane.
+#include <journey.hpp>
 
 namespace reference {
 namespace {
-
-static_assert(std::numeric_limits<Real>::digits >= 64, "references need the 80-bit long double of x86");
 
 struct Run {
   Problem problem;
   State start;
   std::vector<Real> times;
 };
-
-Real next() {
-  std::string word;  // strtold reads what Python writes, hexadecimal floats too
-  std::cin >> word;
-  char* end = nullptr;
-  const Real value = std::strtold(word.c_str(), &end);
-  if (!std::cin || word.empty() || *end != '\0') {
-    std::cerr << "chain_reference: expected a number, got '" << word << "'\n";
-    std::exit(2);
-  }
-  return value;
-}
-
-std::size_t count() {
-  return static_cast<std::size_t>(next());
-}
 
 Vector next_vector() {
   Vector vector;
@@ -116,105 +92,88 @@ std::vector<Vector> sums(const Problem& problem, const State& y, std::size_t fir
   return points;
 }
 
-class Journey {
+class Chain {
  public:
-  Journey(Run run, Real limit) : run_(std::move(run)), limit_(limit) { look(); }
-
-  /// Goes from time to time by `try_step(y, step)`, which moves y or shortens the step.
-  template <class TryStep>
-  int travel(TryStep try_step) {
-    State& y = run_.start;
-    Real step = 1e-6L;
-    for (const Real until : run_.times) {
-      while (y.back() < until) {
-        const Real wanted = step;
-        const bool last = y.back() + step >= until;
-        if (last) step = until - y.back();
-        const bool moved = try_step(y, step);
-        if (evaluations > limit_ || (!moved && step < 1e-15L)) return 3;
-        if (!moved) continue;
-        project(run_.problem, y);
-        look();
-        if (last) {
-          y.back() = until;
-          step = std::max(step, wanted);
-        }
-      }
-      tell(y);
-    }
-    return 0;
+  explicit Chain(Problem problem, const State& start) : problem_(std::move(problem)), turned_(problem_.links) {
+    pass(start, start);
   }
 
-  const Problem& problem() const { return run_.problem; }
+  const Problem& problem() const { return problem_; }
 
-  Real evaluations = 0;
+  /// No rod turns by more than two radians in a step, so that turns can be counted.
+  Real longest(const State& y) const {
+    Real rate = 1e-3L;
+    for (std::size_t i = 0; i < problem_.links; ++i) {
+      const Vector turning = rod(y, problem_.links + i);
+      rate = std::max(rate, std::sqrt(dot(turning, turning)));
+    }
+    return 2 / rate;
+  }
 
- private:
-  void look() {
-    for (const Vector& velocity : sums(run_.problem, run_.start, run_.problem.links)) {
+  void project(State& y) const { reference::project(problem_, y); }
+
+  void pass(const State& before, const State& now) {
+    for (std::size_t i = 0; i < problem_.links; ++i) turned_[i] += angle(rod(before, i), rod(now, i));
+    for (const Vector& velocity : sums(problem_, now, problem_.links)) {
       fastest_ = std::max(fastest_, std::sqrt(dot(velocity, velocity)));
     }
   }
 
-  void tell(const State& y) const {
+  /// How far rods had turned is known of `from`.
+  std::vector<Real> row(const State& now, const State& from) const {
+    std::vector<Real> row = now;
+    for (std::size_t i = 0; i < problem_.links; ++i) row.push_back(turned_[i] + angle(rod(from, i), rod(now, i)));
+    return row;
+  }
+
+  void print(const State& y) const {
     std::printf("%.21Lg", fastest_);
-    for (const std::size_t first : {std::size_t{0}, run_.problem.links}) {
-      for (const Vector& point : sums(run_.problem, y, first)) {
+    for (const std::size_t first : {std::size_t{0}, problem_.links}) {
+      for (const Vector& point : sums(problem_, y, first)) {
         for (const Real component : point) std::printf(" %.21Lg", component);
       }
     }
     std::printf("\n");
   }
 
-  Run run_;
-  Real limit_, fastest_ = 0;
+ private:
+  static Real angle(const Vector& from, const Vector& to) {
+    return std::atan2(from[0] * to[1] - from[1] * to[0], from[0] * to[0] + from[1] * to[1]);
+  }
+
+  Problem problem_;
+  std::vector<Real> turned_;
+  Real fastest_ = 0;
 };
 
-/// odeint's steppers take time beside the state, and hand back a longer step for the next time.
-template <class Stepper, class Equations>
-int by_odeint(Journey& journey, Stepper stepper, Equations equations) {
-  return journey.travel([&](State& y, Real& step) {
-    const auto system = [&](const State& x, State& dx, Real) { equations(x, dx); };
-    Real time = y.back();
-    return stepper.try_step(system, y, time, step) == boost::numeric::odeint::success;
-  });
+Telling telling_of(const std::string& word) {
+  if (word == "states") return Telling::states;
+  if (word == "dense") return Telling::dense;
+  std::cerr << "chain_reference: expected states or dense, got '" << word << "'\n";
+  std::exit(2);
 }
 
-int travel(Journey& journey, const std::string& method, Real tolerance) {
-  namespace odeint = boost::numeric::odeint;
-  const auto tensions = [&](const State& y, State& dy) {
-    journey.evaluations += 1;
-    tension_form(journey.problem(), y, dy);
-  };
-  const auto dense = [&](const State& y, State& dy) {
-    journey.evaluations += 1;
-    dense_form(journey.problem(), y, dy);
-  };
-  if (method == "extrapolation") {
-    return by_odeint(journey, odeint::bulirsch_stoer<State, Real>(tolerance, tolerance, 1, 0), tensions);
-  }
-  if (method == "fehlberg") {
-    using Fehlberg = odeint::runge_kutta_fehlberg78<State, Real>;
-    return by_odeint(journey, odeint::make_controlled(tolerance, tolerance, Fehlberg()), dense);
-  }
-  if (method == "implicit") {
-    ImplicitExtrapolation implicit(tensions, tolerance);
-    return journey.travel([&](State& y, Real& step) { return implicit.try_step(y, step); });
-  }
-  std::cerr << "chain_reference: expected extrapolation, fehlberg or implicit, got '" << method << "'\n";
-  return 2;
+int answer(Run run, const std::string& method, Real tolerance, Real limit, Telling telling) {
+  const Problem problem = run.problem;
+  Journey<Chain> journey(Chain(run.problem, run.start), run.start, run.times, limit);
+  const auto tensions = [&](const State& y, State& dy) { tension_form(problem, y, dy); };
+  const auto dense = [&](const State& y, State& dy) { dense_form(problem, y, dy); };
+  const auto differentiate = [&](const State& y, Matrix& jacobian) { by_differences(tensions, y, jacobian); };
+  if (method == "fehlberg") return reference::travel(journey, method, tolerance, telling, dense, differentiate);
+  return reference::travel(journey, method, tolerance, telling, tensions, differentiate);
 }
 
 }  // namespace
 }  // namespace reference
 
 int main(int count, char** words) {
-  if (count != 5) {
-    std::cerr << "usage: chain_reference METHOD TOLERANCE LIMIT DISTURBANCE < numbers > numbers\n";
+  if (count != 5 && count != 6) {
+    std::cerr << "usage: chain_reference METHOD TOLERANCE LIMIT DISTURBANCE [states|dense] < numbers > numbers\n";
     return 2;
   }
   reference::Run run = reference::read_run();
   reference::disturb(run, std::strtold(words[4], nullptr));
-  reference::Journey journey(std::move(run), std::strtold(words[3], nullptr));
-  return reference::travel(journey, words[1], std::strtold(words[2], nullptr));
+  const auto telling = count == 6 ? reference::telling_of(words[5]) : reference::Telling::lines;
+  return reference::answer(std::move(run), words[1], std::strtold(words[2], nullptr), std::strtold(words[3], nullptr),
+                           telling);
 }

@@ -7,16 +7,41 @@
 
 namespace reference {
 
+using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+
+/// The Jacobian of equations by central differences.
+template <class Equations>
+void by_differences(Equations& equations, const State& y, Matrix& jacobian) {
+  const auto size = static_cast<Eigen::Index>(y.size());
+  jacobian.resize(size, size);
+  State moved = y, ahead, behind;
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const Real nudge = Real(3e-7) * (1 + std::abs(y[at]));
+    moved[at] = y[at] + nudge;
+    equations(moved, ahead);
+    moved[at] = y[at] - nudge;
+    equations(moved, behind);
+    moved[at] = y[at];
+    for (Eigen::Index r = 0; r < size; ++r) {
+      const auto row = static_cast<std::size_t>(r);
+      jacobian(r, k) = (ahead[row] - behind[row]) / (2 * nudge);
+    }
+  }
+}
+
 /// The linearly implicit Euler method, extrapolated (SEULEX; Hairer, Wanner, Solving Ordinary Differential Equations
 /// II, IV.9): for heavy damping, where an explicit method would take steps as short as what has long died away.
-template <class Equations>
+template <class Equations, class Differentiate>
 class ImplicitExtrapolation {
  public:
-  ImplicitExtrapolation(Equations& equations, Real tolerance) : equations_(equations), tolerance_(tolerance) {}
+  /// `differentiate(y, matrix)` is the Jacobian of the equations.
+  ImplicitExtrapolation(Equations& equations, Differentiate& differentiate, Real tolerance)
+      : equations_(equations), differentiate_(differentiate), tolerance_(tolerance) {}
 
   /// Tries a step of `step`; where it is accurate enough moves y. Either way leaves the step to try next.
   bool try_step(State& y, Real& step) {
-    differentiate(y);
+    differentiate_(y, jacobian_);
     for (std::size_t row = 0; row < columns; ++row) {
       euler(y, step, static_cast<int>(row) + 1, table_[row]);
       for (std::size_t column = row; column-- > 0;) {  // Aitken and Neville; the best of the row ends up in table_[0]
@@ -40,26 +65,6 @@ class ImplicitExtrapolation {
  private:
   static constexpr std::size_t columns = 9;
   using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
-
-  void differentiate(const State& y) {
-    const auto size = static_cast<Eigen::Index>(y.size());
-    jacobian_.resize(size, size);
-    State moved = y, ahead, behind;
-    for (Eigen::Index k = 0; k < size; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      const Real nudge = Real(3e-7) * (1 + std::abs(y[at]));
-      moved[at] = y[at] + nudge;
-      equations_(moved, ahead);
-      moved[at] = y[at] - nudge;
-      equations_(moved, behind);
-      moved[at] = y[at];
-      for (Eigen::Index r = 0; r < size; ++r) {
-        const auto row = static_cast<std::size_t>(r);
-        jacobian_(r, k) = (ahead[row] - behind[row]) / (2 * nudge);
-      }
-    }
-  }
 
   void euler(const State& y, Real step, int count, Column& end) {
     const auto size = static_cast<Eigen::Index>(y.size());
@@ -75,6 +80,7 @@ class ImplicitExtrapolation {
   }
 
   Equations& equations_;
+  Differentiate& differentiate_;
   Real tolerance_;
   Matrix jacobian_;
   std::array<Column, columns> table_;

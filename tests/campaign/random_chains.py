@@ -264,16 +264,18 @@ def finite(points: list[list[float | None]]) -> list[list[float]]:
 
 
 def toml(tables: dict) -> str:
-    """Scenarios hold numbers, words, arrays, and tables of one level; a drive stands in its line."""
+    """Scenarios hold numbers, words, arrays, and tables of one level; drives and events stand in their lines."""
 
     def value(v: object) -> str:
         if isinstance(v, dict):
             return "{" + ", ".join(f"{key} = {value(item)}" for key, item in v.items()) + "}"
         return "[" + ", ".join(map(value, v)) + "]" if isinstance(v, list) else json.dumps(v)
 
-    return "\n".join(
+    lists = "".join(f"{name} = {value(v)}\n" for name, v in tables.items() if isinstance(v, list))
+    return lists + "\n".join(
         f"[{name}]\n" + "".join(f"{key} = {value(item)}\n" for key, item in table.items())
         for name, table in tables.items()
+        if not isinstance(table, list)
     )
 
 

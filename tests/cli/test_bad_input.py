@@ -79,7 +79,8 @@ def test_text_that_is_no_toml_is_told_with_its_line(pendula, double):
         ("run.step=-1", "run.step: expected a finite number > 0", "-1"),
         (
             "run.stpe=1",
-            "run.stpe: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, duration",
+            "run.stpe: expected one of method, stages, form, solver, iteration, step, tolerance, accuracy, "
+            "duration, estimate",
             'the unknown key "stpe" (did you mean step?)',
         ),
         (
@@ -130,8 +131,8 @@ def test_an_output_that_cannot_be_opened(pendula, double):
     assert (run.status, run.out) == (2, "")
     reason = "expected a file that can be written, got: no/such/folder/ does not exist"
     assert run.err == f"pendula: no/such/folder/out.csv: {reason}\n"
-    run = pendula("simulate", double, "-o", "out/")
-    assert run.err == "pendula: out/: expected a file that can be written, got: out/ does not exist\n"
+    run = pendula("simulate", double, "-o", "out/run.csv")
+    assert run.err == "pendula: out/run.csv: expected a file that can be written, got: out/ does not exist\n"
     run = pendula("simulate", double, "-o", ".")
     assert run.err == "pendula: .: expected a file that can be written, got: Is a directory\n"
 
@@ -166,7 +167,8 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
         (
             [],
             "",
-            "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, check, kernels, build or new-model",
+            "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, models, describe, check, "
+            "kernels, build, new-model or help",
         ),
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),

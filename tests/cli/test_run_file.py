@@ -1,5 +1,6 @@
 """Run files: what is in them for others to read, and runs that go on from them as if they had never stopped."""
 
+import json
 import random
 import re
 import resource
@@ -40,6 +41,17 @@ THROUGH_THE_POLE = SPHERICAL.replace("phi_dot   = 0.9", "phi_dot   = 0.0").repla
 
 ADAPTIVE = DOUBLE.replace("step     = 5e-3", 'method = "dopri5"')
 
+EVENTS = """
+[[event]]
+name = "flip-over"
+when = "abs(theta_2) - 3"
+
+[[event]]
+name = "low"
+when = "y_2 + 1.5"
+direction = "down"
+"""
+
 SCENARIOS = {
     "double": DOUBLE,
     "whip": WHIP,
@@ -55,10 +67,16 @@ def bits(data: np.ndarray) -> np.ndarray:
     return data.view(np.int64) if data.dtype == np.float64 else data
 
 
+def arrays_of(run: h5py.File) -> set[str]:
+    """Rows, events, and what stays: all but what is told of the run."""
+    events = {f"events/{name}" for name in run.get("events", [])}
+    return set(run) - {"run", "events"} | events
+
+
 def assert_same_rows(first: Path, second: Path) -> None:
     with h5py.File(first) as one, h5py.File(second) as other:
-        assert set(one) == set(other)
-        for name in set(one) - {"run"}:
+        assert arrays_of(one) == arrays_of(other)
+        for name in arrays_of(one):
             assert np.array_equal(bits(one[name][...]), bits(other[name][...])), name
 
 
@@ -111,7 +129,7 @@ def test_quantities_have_names_units_and_axes(pendula, scenario, tmp_path):
         )
     with h5py.File(tmp_path / "run.h5") as run:
         assert run["run/scenario"].asstr()[()] == WHIP
-        assert run["run"].attrs["scenario_file"] == str(file)
+        assert run["run"].attrs["scenario_file"] == "run.toml"
         assert run["run/set"].asstr()[()] == '["run.duration=0.1"]'
 
 
@@ -119,12 +137,16 @@ def test_units_of_a_nondimensional_run(pendula, scenario, tmp_path):
     file = scenario(DOUBLE.replace("gravity = 9.81", 'gravity = 9.81\nunits = "natural"'))
     assert pendula("simulate", file, "-o", "run.h5").status == 0
     with h5py.File(tmp_path / "run.h5") as run:
-        assert [run[name].attrs["units"] for name in ["t", "x", "theta_dot", "energy"]] == [
-            "sqrt(l_1/g)",
-            "l_1",
-            "rad / sqrt(l_1/g)",
-            "M_1 g l_1",
-        ]
+        own = {
+            "t": "sqrt(l_1/g)",
+            "x": "l_1",
+            "theta_dot": "rad / sqrt(l_1/g)",
+            "energy": "M_1 g l_1",
+            "masses": "M_1",
+        }
+        assert {name: run[name].attrs["natural_unit"] for name in own} == own
+        assert {run[name].attrs["units"] for name in own} == {"1"}  # others, udunits does not know
+        assert run["theta"].attrs["units"] == "rad" and "natural_unit" not in run["theta"].attrs
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -140,14 +162,16 @@ def test_a_run_goes_on_as_if_it_had_never_stopped(name, pendula, scenario, tmp_p
         resumed = pendula("simulate", "--resume", "part.h5", "--set", f"run.duration={end}", "--json")
         assert (resumed.status, resumed.err) == (0, ""), resumed.err
     assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
-    different = {"scenario", "trajectory", "wall_seconds"}
+    # How far rows can be trusted is estimated anew, of those that are new.
+    assert 0 < resumed.json["expected_error"] < 1e-3
+    different = {"scenario", "trajectory", "wall_seconds", "expected_error"}
     assert {**resumed.json, **dict.fromkeys(different)} == {**whole.json, **dict.fromkeys(different)}
 
 
 def test_a_run_that_is_killed_leaves_a_file_that_opens_and_goes_on(scenario, tmp_path):
     """By SIGKILL and by signals that it hears, at random times."""
     draw = random.Random(11)
-    file = scenario(DOUBLE)
+    file = scenario(DOUBLE + EVENTS)
     long = settings("run.step=1e-3", "run.duration=1500", "output.every=3", "output.checkpoint=0.1")
     run = partial(subprocess.run, cwd=tmp_path, check=True, capture_output=True)
     run([program(), "simulate", file, *long, "-o", "whole.h5"])
@@ -301,7 +325,7 @@ def test_what_cannot_go_on_is_refused(pendula, scenario, tmp_path):
         (["none.h5"], "none.h5: expected a run file to go on from, got a file that is not there"),
         (["text.h5"], "text.h5: expected a run file to go on from, got one that HDF5 cannot read: "),
         (["other.h5"], 'other.h5: expected a run file to go on from, got a file without the group "run"'),
-        (["kernel.h5"], f"{file}: the run began by "),
+        (["kernel.h5"], "run.toml: the run began by "),
         (["old.h5"], "old.h5: expected a run of pendula 0.1.0, got one of 0.0.9"),
         (
             ["run.h5", *settings("run.duration=0.5")],
@@ -371,3 +395,124 @@ def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monke
     monkeypatch.setenv("MPLBACKEND", "agg")
     for block in blocks:
         exec(compile(block, page, "exec"), {})
+
+
+def test_a_run_file_is_what_climate_conventions_say(pendula, scenario, tmp_path):
+    """CF: what each array is, in which unit; flags of the type of their variable; and where the file comes from."""
+    file = scenario(DOUBLE.replace("gravity = 9.81", "damping = [0.1, 0.2]\ntorque = 0.3") + EVENTS)
+    assert pendula("simulate", file, "-o", tmp_path / "run.nc", "--set", "run.duration=5").status == 0
+    with xarray.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as run:
+        assert run.attrs["Conventions"] == "CF-1.11"
+        assert run.attrs["title"] == "run: 2 links in the plane"
+        command = "pendula simulate run.toml -o run.nc --set run.duration=5"
+        assert re.fullmatch(rf"\d{{4}}-\d\d-\d\dT\d\d:\d\d:\d\dZ: {command}", run.attrs["history"])
+        assert all(data.attrs["long_name"] and data.attrs["units"] for data in run.variables.values())
+        for name, unit in {"masses": "kg", "lengths": "m", "damping": "N m s/rad", "torque": "N m"}.items():
+            assert (run[name].dims, run[name].attrs["units"]) == (("link",), unit)
+        assert run["damping"].values.tolist() == [0.1, 0.2] and run["torque"].values.tolist() == [0.3, 0.3]
+        assert (float(run["gravity"]), run["gravity"].attrs["units"]) == (9.81, "m/s^2")
+    with xarray.open_dataset(tmp_path / "run.nc", engine="h5netcdf", group="events") as events:
+        assert events["event_name"].attrs["flag_meanings"] == "flip-over low"
+        assert events["event_direction"].attrs["flag_meanings"] == "down up"
+        for name in ("event_name", "event_direction"):
+            assert events[name].attrs["flag_values"].dtype == events[name].dtype
+            assert set(events[name].values) <= set(events[name].attrs["flag_values"])
+        assert events["x"].dims == ("event_number", "link") and events["x"].attrs["units"] == "m"
+
+
+def test_the_events_of_a_run_file_are_those_of_the_csv_file(pendula, scenario, tmp_path):
+    file = scenario(DOUBLE + EVENTS)
+    run = pendula(
+        "simulate", file, "--set", "run.duration=20", "-o", "run.h5", "--events", "events.csv", "--json"
+    )
+    header, *lines = (tmp_path / "events.csv").read_text().splitlines()
+    lines = [dict(zip(header.split(","), line.split(","), strict=True)) for line in lines]
+    assert len(lines) > 10 and {line["name"] for line in lines} == {"flip-over", "low"}
+    with h5py.File(tmp_path / "run.h5") as saved:
+        events = saved["events"]
+        names = events["event_name"].attrs["flag_meanings"].split()
+        assert [names[k - 1] for k in events["event_name"]] == [line["name"] for line in lines]
+        ways = [("down", "up")[k] for k in events["event_direction"]]
+        assert ways == [line["direction"] for line in lines]
+        assert list(events["event_number"]) == list(range(1, len(lines) + 1))
+        for column in ("t", "energy"):
+            assert list(events[column]) == [float(line[column]) for line in lines]
+        assert list(events["theta_dot"][:, 1]) == [float(line["theta_dot_2"]) for line in lines]
+        summary = json.loads(saved["run/summary"].asstr()[0])
+    assert summary["events"] == run.json["events"]
+    assert {**summary, "final": run.json["final"]} == {**run.json, "scenario": "run.toml"}
+
+
+def test_events_go_on_as_if_the_run_had_never_stopped(pendula, scenario, tmp_path):
+    file = scenario(DOUBLE + EVENTS)
+    long = settings("run.duration=20")
+    pendula("simulate", file, *long, "-o", "whole.h5")
+    assert pendula("simulate", file, "--set", "run.duration=0.73", "-o", "part.h5").status == 0
+    for end in ("3.3", "9.87654", "20"):
+        assert pendula("simulate", "--resume", "part.h5", "--set", f"run.duration={end}").status == 0
+    assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
+    with h5py.File(tmp_path / "part.h5") as part:
+        assert len(part["events/t"]) > 10
+        lines = part.attrs["history"].split("\n")
+        assert [line.split(": ", 1)[1] for line in lines[1:]] == [
+            f"pendula simulate --resume part.h5 --set run.duration={end}" for end in ("3.3", "9.87654", "20")
+        ]
+        assert json.loads(part["run/summary"].asstr()[0])["duration"] == 20
+
+
+def test_a_run_file_tells_no_folder_of_its_user(pendula, scenario, tmp_path):
+    """Warnings name the scenario, too: here one of an angle that looks like degrees."""
+    file = scenario(DOUBLE.replace("1.5707963267948966", "90") + EVENTS)
+    assert file.is_absolute()
+    run = pendula("simulate", file, "-o", tmp_path / "run.h5", "--view", tmp_path / "run.html")
+    assert f"{file}:8: start.theta: 90 rad" in run.err
+    assert pendula("simulate", "--resume", tmp_path / "run.h5", "--set", "run.duration=2").status == 0
+    assert str(tmp_path).encode() not in (tmp_path / "run.h5").read_bytes()
+    with h5py.File(tmp_path / "run.h5") as saved:
+        summary = json.loads(saved["run/summary"].asstr()[0])
+    assert (summary["scenario"], summary["trajectory"]) == ("run.toml", "run.h5")
+    assert summary["warnings"][0].startswith("run.toml:8: start.theta: 90 rad")
+
+
+def test_a_summary_stands_in_the_file_of_a_run_that_failed(pendula, scenario, tmp_path):
+    spherical = SPHERICAL.replace("theta     = 1.2", "theta = 0.0").replace(
+        "[run]", '[run]\nsolver = "dense"'
+    )
+    assert pendula("simulate", scenario(spherical), "-o", "run.h5").status == 1
+    with h5py.File(tmp_path / "run.h5") as saved:
+        assert json.loads(saved["run/summary"].asstr()[0])["outcome"]["status"] != "ok"
+
+
+def checksum(row: np.ndarray) -> float:
+    """Of a place to go on from, but for its first number."""
+    value = 0xCBF29CE484222325
+    for number in row[1:].view(np.uint64).tolist():
+        value = (value ^ number) * 0x100000001B3 % 2**64
+        value ^= value >> 32
+    return float(value >> 12)
+
+
+def make_old(file: Path) -> None:
+    """As run files were before they had constants, events, summaries, and counts of events at places to go on from."""
+    with h5py.File(file, "a") as run:
+        for name in ["masses", "lengths", "gravity", "damping", "torque", "events", "run/summary"]:
+            del run[name]
+        for name in ("Conventions", "title", "history", "source"):
+            del run.attrs[name]
+        run["run"].attrs["scenario_file"] = str(file.with_name("run.toml"))
+        places = run["run/checkpoint"][:, :-1].copy()
+        places[:, 0] = [checksum(place) for place in places]
+        del run["run/checkpoint"]
+        run["run/checkpoint"] = places
+
+
+def test_files_of_old_go_on(pendula, scenario, tmp_path):
+    file = scenario(DOUBLE + EVENTS)
+    pendula("simulate", file, "--set", "run.duration=8", "-o", "whole.h5")
+    pendula("simulate", file, "--set", "run.duration=3.3", "-o", "part.h5")
+    for name in ("whole.h5", "part.h5"):
+        make_old(tmp_path / name)
+    for end in ("5.5", "8"):
+        resumed = pendula("simulate", "--resume", "part.h5", "--set", f"run.duration={end}", "--json")
+        assert resumed.status == 0, resumed.err
+    assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")

@@ -19,11 +19,22 @@ def about(page: Path) -> dict:
 
 
 def test_a_page_shows_every_run(pendula, double, tmp_path):
-    result = pendula("simulate", double, "--view", "out.html", "--copies", 3, "--apart", "1e-6", "--json")
+    result = pendula("simulate", double, "--view", "out.html", "--copies", 3, "--apart", "5e-9", "--json")
     assert result.status == 0, result.err
     assert result.json["view"] == "out.html"
     labels = [run["label"] for run in about(tmp_path / "out.html")["runs"]]
-    assert labels == ["start", "start + 1e-06", "start + 2e-06", "start + 3e-06"]
+    assert labels == ["start", "start + 5e-09", "start + 1e-08", "start + 1.5e-08"]
+
+
+def test_a_page_has_rows_of_its_own_and_changes_nothing(pendula, double, tmp_path):
+    """Whatever steps and rows a run has, its page moves evenly."""
+    plain = settings("run.step=0.1", "output.every=7", "run.duration=3")
+    for asked in plain, [*plain, *settings("output.interval=0.5")]:
+        assert pendula("simulate", double, "-o", "alone.csv", *asked).status == 0
+        assert pendula("simulate", double, "-o", "beside.csv", "--view", "out.html", *asked).status == 0
+        assert (tmp_path / "alone.csv").read_bytes() == (tmp_path / "beside.csv").read_bytes()
+        [run] = about(tmp_path / "out.html")["runs"]
+        assert run["rows"] == 751 and run["seen"] == 751  # 250 a second
 
 
 def test_a_page_tells_how_it_was_made(pendula, double, tmp_path):
@@ -62,8 +73,8 @@ def test_copies_that_are_interrupted_are_missed(double, tmp_path):
     ("arguments", "message"),
     [
         (["--view", "-"], "pendula: -: expected a file of its own for the page"),
-        (["--view", "a.html", "-o", "a.html"], "pendula: a.html: expected a file of its own for the page"),
-        (["--view", "a.html", "-o", "./a.html"], "pendula: a.html: expected a file of its own for the page"),
+        (["--view", "a.csv", "-o", "a.csv"], "pendula: a.csv: expected a file of its own for the page"),
+        (["--view", "a.csv", "-o", "./a.csv"], "pendula: a.csv: expected a file of its own for the page"),
         (
             ["--view", "a.html", "--copies", "2", "--apart", "nan"],
             "--apart: expected a number that is finite, got nan",

@@ -111,7 +111,7 @@ def test_exponents_in_lanes_are_those_of_gauss_steps(name, moved):
     for key in lanes:
         assert (lanes[key] == divided[key]).all(), key
     assert not (alone["lyapunov"] == lanes["lyapunov"]).any()  # so they went another way
-    error = np.hypot(alone["lyapunov:error"], lanes["lyapunov:error"])
+    error = np.hypot(alone["lyapunov_error"], lanes["lyapunov_error"])
     assert (np.abs(alone["lyapunov"] - lanes["lyapunov"]) < 2 * error).all()
 
 

@@ -138,7 +138,7 @@ def test_cart_chain_keeps_the_momentum_of_the_whole(rows):
     momentum = [
         2.75 * v + 0.75 * 0.5 * cos(a) * p + 0.25 * 0.4 * cos(b) * q
         for v, a, b, p, q in zip(
-            *(run[k] for k in ("x_dot", "theta_1", "theta_2", "theta_1_dot", "theta_2_dot")), strict=True
+            *(run[k] for k in ("x_dot", "theta_1", "theta_2", "theta_dot_1", "theta_dot_2")), strict=True
         )
     ]
     assert max(abs(p - momentum[0]) for p in momentum) < 1e-13  # measured 6.7e-16
@@ -165,8 +165,8 @@ def test_a_push_on_the_cart_is_its_impulse(rows):
     free = "{ masses = [0.5, 0.25], lengths = [0.5, 0.4], cart_mass = 2.0 }"
     run = rows("cart_chain.toml", system__parameters=free, run__stages=8)
     last = {name: column[-1] for name, column in run.items()}
-    momentum = 2.75 * last["x_dot"] + 0.75 * 0.5 * cos(last["theta_1"]) * last["theta_1_dot"]
-    momentum += 0.25 * 0.4 * cos(last["theta_2"]) * last["theta_2_dot"]
+    momentum = 2.75 * last["x_dot"] + 0.75 * 0.5 * cos(last["theta_1"]) * last["theta_dot_1"]
+    momentum += 0.25 * 0.4 * cos(last["theta_2"]) * last["theta_dot_2"]
     assert momentum == pytest.approx(3.0 / 4.0 * (1 - cos(4.0 * last["t"])), abs=1e-13)  # measured 1.8e-15
 
 

@@ -48,12 +48,28 @@ def test_members_are_the_middles_of_cells(ensemble):
 
 
 def test_those_that_failed_and_those_it_never_happened_to_are_told_apart(ensemble):
-    axes, _ = figure(read(ensemble, "event:up"), MapChoice()).axes
+    axes, _ = figure(read(ensemble, "event_up"), MapChoice()).axes
     marks, _ = axes.images
     colours = marks.get_array()
     assert len(np.unique(colours[0].reshape(-1, 4), axis=0)) == 1  # a mass below zero: all failed
     assert not np.array_equal(colours[0, 0], colours[1, 0])
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["never", "failed"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["not within 3 s", "failed"]
+
+
+def test_how_long_members_were_moved_is_told(pendula, tmp_path):
+    (tmp_path / "double.toml").write_text(DOUBLE.replace("duration", "# duration") + AXES)
+    for changes, expected in [
+        ((), "not within 10 s"),
+        (("--set", "run.duration=2.5"), "not within 2.5 s"),
+        (
+            ("--set", "ensemble.axis[2].key=run.duration", "--set", "ensemble.axis[2].from=1"),
+            "not within its duration",
+        ),
+    ]:
+        done = pendula("ensemble", "double.toml", "-o", "out.h5", *changes)
+        assert done.returncode == 0, done.stderr
+        axes, _ = figure(read(tmp_path / "out.h5", "event:up"), MapChoice()).axes
+        assert axes.get_legend().get_texts()[0].get_text() == expected
 
 
 def test_angles_go_round(ensemble):
@@ -62,6 +78,27 @@ def test_angles_go_round(ensemble):
     assert image.get_cmap().name == "twilight_shifted"
     assert (image.norm.vmin, image.norm.vmax) == pytest.approx((-np.pi, np.pi))
     assert np.abs(image.get_array().compressed()).max() <= np.pi
+
+
+def test_a_key_may_be_as_the_scenario_has_it(ensemble):
+    assert read(ensemble, "event:up").key == read(ensemble, "event_up").key == "event_up"
+    assert read(ensemble, "event:up:count").key == "event_up_count"
+
+
+def test_files_of_old_are_read(ensemble):
+    """Data sets were called as the scenario calls what they keep."""
+    now = figure(read(ensemble, "event_up"), MapChoice()).axes
+    with h5py.File(ensemble, "a") as file:
+        for name in ("event_up", "event_up_count", "start_theta_1", "chain_masses_2"):
+            file.move(name, file[name].attrs["long_name"])
+        for data in file.values():
+            data.attrs.pop("long_name", None)
+    old = figure(read(ensemble, "event:up"), MapChoice()).axes
+    shown = [np.ma.filled(axes[0].images[1].get_array(), np.nan) for axes in (now, old)]
+    assert np.array_equal(*shown, equal_nan=True)
+    for axes in range(2):
+        assert old[axes].get_xlabel() == now[axes].get_xlabel()
+        assert old[axes].get_ylabel() == now[axes].get_ylabel()
 
 
 def test_a_line_where_another_number_has_a_value(ensemble):

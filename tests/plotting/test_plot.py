@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import DOUBLE
+from conftest import DOUBLE, ROOT
 from pendula_plot.__main__ import main
 from pendula_plot.figure import Choice, figure, symbol
 from pendula_plot.run import PlotError, Run, read_run
@@ -37,6 +37,22 @@ def test_panels_show_the_columns_of_the_run(runs):
     assert rounding[-1] == pytest.approx(rounding[0] * np.sqrt(len(rounding)))
     assert energy.get_yscale() == "log" and energy.get_ylabel() == "$|E - E_0|$ [J]"
     assert np.array_equal(trace.lines[0].get_ydata(), run.columns["y_2"])
+
+
+def test_inputs_are_drawn_like_coordinates(tmp_path):
+    """They have no rate: a phase portrait is that of the coordinate."""
+    (tmp_path / "cart.csv").write_text("t,x,x_dot,push,energy\n0,1,2,3,0\n1,4,5,6,0\n2,7,8,9,0\n")
+    run = read_run(tmp_path / "cart.csv")
+    series, phase = figure([run], Choice(("series", "phase"), ("push",))).axes
+    assert list(series.lines[0].get_ydata()) == [3, 6, 9]
+    assert list(phase.lines[0].get_xdata()) == [1, 4, 7] and list(phase.lines[0].get_ydata()) == [2, 5, 8]
+
+
+def test_natural_units_are_named(pendula, runs):
+    natural = ["--set", 'chain.units="natural"', "--set", "run.duration=1"]
+    assert pendula("simulate", "double.toml", *natural, "-o", "natural.h5").returncode == 0
+    run = read_run(runs / "natural.h5")
+    assert [run.unit(name) for name in ("t", "x_2", "theta_1")] == ["sqrt(l_1/g)", "l_1", "rad"]
 
 
 def test_space_is_traced_in_space(runs):
@@ -137,7 +153,7 @@ def test_what_is_wrong_is_told(runs, pendula, monkeypatch, capsys):
         ),
         (
             ["double.h5", "--coordinates", "theta_3"],
-            "double.h5: expected a coordinate, one of theta_1, theta_2, got theta_3",
+            "double.h5: expected a coordinate, one of theta_1, theta_2, or another column, got theta_3",
         ),
         (["double.h5", "--output", "a.bmp"], "a.bmp: expected a name that ends in .svg, .png or .pdf"),
         (
@@ -168,7 +184,6 @@ def test_a_row_that_is_just_being_written_is_left_out(runs):
 def test_a_missing_python_is_told(runs, pendula):
     plot = pendula("plot", "double.h5", "-o", "a.svg", PENDULA_PYTHON="/none/python")
     assert plot.returncode == 2
-    expected = (
-        "pictures take a Python, and /none/python could not be started (PENDULA_PYTHON names another one)"
-    )
+    setup = f"which {ROOT}/scripts/setup installs"
+    expected = f"pictures take a Python, {setup}; /none/python could not be started (PENDULA_PYTHON names another one)"
     assert plot.stderr == f"pendula: {expected}\n"

@@ -53,19 +53,6 @@ def test_a_run_of_one_row_is_a_still(open_page):
     assert page.get_attribute("#play", "aria-label") == "Play"
 
 
-@pytest.mark.parametrize("size", [WIDE, NARROW])
-@pytest.mark.parametrize("name", ["demo", "chaos", "cart", "no_points", "events"])
-def test_nothing_is_wider_than_the_screen(open_page, name, size):
-    page = open_page(name, size)
-    wide = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
-    assert page.evaluate(wide) <= 0
-    stage = page.locator("#stage").bounding_box()
-    assert stage["width"] > 0.6 * min(size[0], 1440)
-    assert stage["height"] >= 260
-    bar = page.locator(".bar").bounding_box()
-    assert bar["y"] + bar["height"] <= size[1]  # the player is seen without scrolling
-
-
 def test_plays_by_itself_unless_motion_is_unwanted(open_page):
     moving = open_page("cart", motion="no-preference")
     until(moving, "Number(document.getElementById('scrub').value) > 0.2")

@@ -4,28 +4,31 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <pendula/system/motion.hpp>
+#include <pendula/run/track.hpp>
 #include <pendula/system/options.hpp>
 #include <utility>
 
 namespace pendula {
 
-/// What is wanted of the last state of a run.
+/// What is wanted of a run, of every row and event.
 struct Accuracy {
   double error = 0;            ///< relative to the size and the speed of the motion; 0: what the tolerance makes of it
   bool chooses_stages = true;  ///< as many as the tolerance wants; else those of the options
 };
 
-/// By which tolerance a run ends as accurately as is wanted.
+/// By which tolerance a run is as accurate as is wanted.
 struct AccuracyAim {
   double tolerance = 0;
-  /// Error at the end by that tolerance; infinite where trials by the smallest ones do not end together.
+  /// Error by that tolerance, the largest along the motion; infinite where trials by the smallest ones part.
   double error = std::numeric_limits<double>::infinity();
-  Motion near;  ///< where the last trial ended, which went by that tolerance too, from all but the same start
+  /// The finest trial, which the run is compared with; nothing where that has no states.
+  std::optional<Track> finest = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
+  /// Up to where that is as accurate as is wanted  [s].
+  double trusted_until = std::numeric_limits<double>::infinity();
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(tolerance, error, near.time, near.q, near.v);
+    numbers(tolerance, error);
   }
 };
 
@@ -57,31 +60,44 @@ inline double finest_tolerance(const RunOptions& options, const Accuracy& accura
 
 /// What is known of the errors by two tolerances of which the finer one is good enough.
 struct AccuracyLadder {
-  AccuracyAim finest;  ///< `near` of which all others are compared with
+  AccuracyAim finest;  ///< which all others are compared with
   double factor = 0;   ///< what the motion makes of a tolerance
 };
 
-/// What a motion makes of the errors of its steps is a factor that grows with chaos. Trials tell it: `end(tolerance)`
-/// is the last state by that, nothing where a run does not come there. Two of them end apart by the error of the
-/// coarser one; `distance` is that of two states. Where the finer one is not expected to be good enough, or they end
-/// too far apart for a factor, the next is finer, and is compared with it. Errors scatter about what tolerances ask for
-/// by factors of ten and more, so that aims lie below what is wanted.
-template <class End, class Distance>
-AccuracyLadder climb_down(double wanted, double finest, End end, Distance distance) {
-  constexpr double apart = 100, coarsest = 1e-3, together = 0.01, enough = 0.3, aimed = 0.1;
+/// How far rows may be off what was wanted and not be told: errors scatter about what was seen in trials.
+inline constexpr double close_to_wanted = 2;
+
+/// What runs are off each other by, at most, that still tell errors.
+inline constexpr double together = 0.01;
+
+/// What a motion makes of the errors of its steps is a factor that grows with chaos. Trials tell it: `run(tolerance)`
+/// is the track of one, nothing where a run does not come to its end. Two of them part by the error of the coarser one;
+/// `apart(a, b)` is a Separation. Where the finer one is not expected to be good enough, or they part too far for a
+/// factor, the next is finer, and is compared with it. Errors scatter about what tolerances ask for by factors of ten
+/// and more, so that aims lie below what is wanted.
+template <class RunTrial, class Apart>
+AccuracyLadder climb_down(double wanted, double finest, double start, RunTrial run, Apart apart) {
+  constexpr double step = 100, coarsest = 1e-3, enough = 0.3, aimed = 0.1;
   constexpr double rounding = 2e-16;  // errs as a tolerance of that size would
-  double coarse = std::max(std::min(apart * wanted, coarsest), apart * finest), fine = coarse / apart;
-  std::optional<Motion> far = end(coarse);
+  double coarse = std::max(std::min(step * wanted, coarsest), step * finest), fine = coarse / step;
+  std::optional<Track> far = run(coarse);
   for (;;) {
-    std::optional<Motion> near = end(fine);
-    const double off = far && near ? distance(*far, *near) : std::numeric_limits<double>::infinity();
-    double next = fine / (10 * apart);
+    std::optional<Track> near = run(fine);
+    const double finer = std::max(fine, rounding) / coarse;  // by which the finer one errs less
+    std::optional<Separation> parted;
+    if (far && near) parted.emplace(apart(*far, *near));
+    const double off = parted ? parted->largest() : std::numeric_limits<double>::infinity();
+    double next = fine / (10 * step);
     if (off <= together) {
-      const double factor = off / coarse, error = factor * std::max(fine, rounding);
-      if (error <= enough * wanted || fine <= finest) return {{fine, error, *std::move(near)}, factor};
+      const double factor = off / coarse, error = finer * off;
+      if (error <= enough * wanted) return {{fine, error, std::move(near)}, factor};
+      if (fine <= finest) {
+        return {{fine, error, std::move(near), parted->within(close_to_wanted * wanted / finer, start)}, factor};
+      }
       next = std::min(aimed * wanted / factor, fine / 10);
     } else if (fine <= finest) {
-      return {{wanted, std::numeric_limits<double>::infinity(), {}}};
+      const double until = parted ? parted->within(close_to_wanted * wanted, start) : start;
+      return {{fine, std::numeric_limits<double>::infinity(), std::move(near), until}};
     }
     coarse = fine;
     fine = std::max(next, finest);
@@ -89,21 +105,21 @@ AccuracyLadder climb_down(double wanted, double finest, End end, Distance distan
   }
 }
 
-/// The finest tolerance may be good enough by far. So a coarser one is looked for by which the run itself ends off the
-/// finest trial by a part of what is wanted, as was seen: `end(tolerance)` is the last state of that run.
-template <class End, class Distance>
-AccuracyAim climb_up(double wanted, const AccuracyLadder& ladder, End end, Distance distance) {
-  constexpr double least = 0.05, most = 1, aimed = 0.2, coarsest = 1, apart = 5, most_change = 100;
+/// The finest tolerance may be good enough by far. So a coarser one, `coarsest` at most, is looked for by which a trial
+/// is off the finest one by a part of what is wanted, as was seen. `run` and `apart` as above.
+template <class RunTrial, class Apart>
+AccuracyAim climb_up(double wanted, double coarsest, const AccuracyLadder& ladder, RunTrial run, Apart apart) {
+  constexpr double least = 0.03, most = 0.5, aimed = 0.15, step = 5, most_change = 100;
   constexpr int most_trials = 6;
   AccuracyAim best = ladder.finest;
   double tolerance = ladder.factor > 0 ? aimed * wanted / ladder.factor : coarsest;
-  double low = apart * best.tolerance, high = coarsest, before = 0;
+  double low = step * best.tolerance, high = coarsest, before = 0;
   if (!(best.error <= wanted)) return best;
   for (int trial = 0; trial < most_trials && 2 * low < high; ++trial) {
     tolerance = std::clamp(tolerance, low, high);
-    const std::optional<Motion> there = end(tolerance);
-    const double error = there ? distance(*there, best.near) : std::numeric_limits<double>::infinity();
-    if (error <= most * wanted) best = {tolerance, error, std::move(best.near)};
+    const std::optional<Track> there = run(tolerance);
+    const double error = there ? apart(*there, *best.finest).largest() : std::numeric_limits<double>::infinity();
+    if (error <= most * wanted) best.tolerance = tolerance, best.error = error;
     if (error >= least * wanted && error <= most * wanted) break;
     (error > most * wanted ? high : low) = tolerance;
     const bool is_finest_trials = error < least * wanted && error < 1.5 * std::exchange(before, error);

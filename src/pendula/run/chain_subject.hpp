@@ -50,23 +50,43 @@ class ChainSubject : public Subject {
 
   /// `t`, per link `theta_i` (`phi_i`) `theta_dot_i` (`phi_dot_i`), bobs `x_i` `y_i` (`z_i`), `energy`.
   std::vector<Quantity> quantities() const override {
-    constexpr std::array<std::string_view, 2> angles = {"theta", "phi"};
-    constexpr std::array<std::string_view, 3> axes = {"x", "y", "z"};
+    constexpr std::array<std::array<std::string_view, 2>, 2> angles = {
+        {{"theta", "angle of the rod from the downward vertical"}, {"phi", "angle of the rod around the vertical"}}};
     const auto links = static_cast<std::size_t>(chain_.links());
-    std::vector<Quantity> quantities{{"t", "s"}};
+    std::vector<Quantity> quantities{{"t", "s", Role::time, "time"}};
     std::size_t first = 1;
     for (std::size_t a = 0; a < Space::dof; ++a) {
-      quantities.push_back({std::string(angles[a]), "rad", first++, links, 2 * Space::dof});
+      quantities.push_back({std::string(angles[a][0]), "rad", Role::coordinate, std::string(angles[a][1]), first++,
+                            links, 2 * Space::dof});
     }
     for (std::size_t a = 0; a < Space::dof; ++a) {
-      quantities.push_back({std::string(angles[a]) + "_dot", "rad/s", first++, links, 2 * Space::dof});
+      const std::string angle(angles[a][0]);
+      quantities.push_back({rate_name(angle), "rad/s", Role::rate, "rate of " + angle, first++, links, 2 * Space::dof});
     }
     first = 1 + 2 * Space::dof * links;
-    for (std::size_t axis = 0; axis < Space::dimension; ++axis) {
-      quantities.push_back({std::string(axes[axis]), "m", first++, links, Space::dimension});
+    for (const std::string_view axis : axes()) {
+      quantities.push_back({std::string(axis), "m", Role::point, std::string(axis).append(" of the bob"), first++,
+                            links, Space::dimension});
     }
-    quantities.push_back({"energy", "J", 1 + (2 * Space::dof + Space::dimension) * links});
+    const std::size_t last = 1 + (2 * Space::dof + Space::dimension) * links;
+    quantities.push_back({"energy", "J", Role::energy, "energy T + U", last});
     return quantities;
+  }
+
+  /// Masses, lengths, gravity, damping and the constant part of torques; drives are not among them.
+  std::vector<Constant> constants() const override {
+    const auto numbers = [](const auto& vector) { return std::vector<double>(vector.begin(), vector.end()); };
+    std::vector<Constant> constants{{"masses", "kg", "mass of the bob", numbers(chain_.masses()), true},
+                                    {"lengths", "m", "length of the rod", numbers(chain_.lengths()), true},
+                                    {"gravity", "m/s^2", "acceleration of gravity", {chain_.gravity()}},
+                                    {"damping", "N m s/rad", "what the angular velocity of the link is damped by",
+                                     numbers(chain_.damping()), true}};
+    for (std::size_t k = 0; k < Space::torque_components; ++k) {
+      const std::string of = Space::torque_components == 1 ? "" : std::string("_").append(axes()[k]);
+      constants.push_back({"torque" + of, "N m", "constant torque on the link, without drives",
+                           numbers(chain_.constant_torque().row(static_cast<Eigen::Index>(k))), true});
+    }
+    return constants;
   }
 
   void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
@@ -89,18 +109,51 @@ class ChainSubject : public Subject {
     return {1 + 2 * Space::dof * links + dimension * (links - 1), dimension};
   }
 
-  /// Of bobs relative to the length of the chain, and of their velocities to the fastest.
-  double distance(const Motion& a, const Motion& b) const override {
+  using Subject::distance;
+  /// Of bobs relative to the length of the chain, and of angles  [rad], those around the vertical by as far as they
+  /// move a rod: the larger one. And of their rates relative to the fastest bob and rod there; to a tenth of what the
+  /// chain swings with, and a hundredth of the fastest theta in the motion, at least.
+  double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     const auto furthest = [](const auto& x) { return x.colwise().norm().maxCoeff(); };
-    const auto v = bob_velocities(chain_, a);
-    const double position = furthest(bob_positions(chain_, a) - bob_positions(chain_, b)) / chain_.lengths().sum();
-    const double natural = std::sqrt(std::abs(chain_.gravity()) * chain_.lengths().sum());
-    const double speed = std::max(furthest(v), 0.1 * natural);
-    const double velocity = furthest(v - bob_velocities(chain_, b));
-    return position + (velocity == 0 ? 0 : velocity / speed);
+    const auto of = [](double off, double whole) { return off == 0 ? 0 : off / whole; };
+    const double length = chain_.lengths().sum();
+    const double slowest =
+        std::max(0.1 * std::sqrt(std::abs(chain_.gravity()) / length), 0.01 * size.v.head(chain_.links()).maxCoeff());
+    const auto velocities = bob_velocities(chain_, a);
+    const double bobs = furthest(bob_positions(chain_, a) - bob_positions(chain_, b)) / length;
+    const double rates = furthest(velocities - bob_velocities(chain_, b));
+    const Turned turned = turned_between(a, b);
+    return std::max(bobs, turned.angle) + std::max(of(rates, std::max(furthest(velocities), slowest * length)),
+                                                   of(turned.rate, std::max(turned.fastest, slowest)));
   }
 
  private:
+  static std::span<const std::string_view> axes() {
+    static constexpr std::array<std::string_view, 3> all = {"x", "y", "z"};
+    return std::span(all).first(Space::dimension);
+  }
+
+  /// What rods differ by, and the fastest of the first state.
+  struct Turned {
+    double angle = 0, rate = 0, fastest = 0;
+  };
+
+  Turned turned_between(const Motion& a, const Motion& b) const {
+    const int links = chain_.links();
+    Turned turned;
+    const auto keep = [](double& largest, double value) { largest = std::max(largest, std::abs(value)); };
+    for (int i = 0; i < links; ++i) {
+      const detail::LinkMotion<Space, double> one(a, links, i), other(b, links, i);
+      keep(turned.rate, (one.rate - other.rate).norm());
+      keep(turned.fastest, one.rate.norm());
+      keep(turned.angle, a.q[i] - b.q[i]);
+      if constexpr (Space::dof == 2) {
+        keep(turned.angle, std::hypot(one.direction[0], one.direction[1]) * (a.q[links + i] - b.q[links + i]));
+      }
+    }
+    return turned;
+  }
+
   Chain<Space> chain_;
 };
 

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
-#include <limits>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/accuracy.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
-#include <pendula/run/simulation.hpp>
+#include <pendula/run/track.hpp>
 #include <string>
-#include <utility>
-#include <vector>
 
 namespace pendula {
 
@@ -29,7 +26,7 @@ inline std::string smaller_step_advice(const RunOptions& run) {
 /// The energy of an undamped motion is known, that of a damped one at least never grows.
 inline Doubt of_energy(const Subject& subject, const RunOptions& run, const EnergyBalance& balance) {
   static constexpr double trusted = 1e-3;
-  if (is_explicit(run.method) && subject.loaded()) return {};  // nobody adds up the work
+  if (!subject.balances(run.method)) return {};
   const bool sinks = run.method == Method::radau && subject.damped();
   const double off = sinks ? balance.most : std::max(balance.most, -balance.least);
   if (off <= trusted) return {};
@@ -54,72 +51,84 @@ inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunRep
          " steps in parts; run.solver = \"chain\" knows no pole";
 }
 
-/// Of trials before the run.
-inline Doubt of_aim(double wanted, const AccuracyAim& aim) {
-  static constexpr double close = 10;  // what trials are off by
-  if (aim.error <= close * wanted) return {};
-  if (std::isfinite(aim.error)) {
-    return "an accuracy of " + pendula::rounded(wanted, 2) + " is not reached: by a tolerance of " +
-           pendula::rounded(aim.tolerance, 2) + " the motion ends elsewhere by about " +
-           pendula::rounded(aim.error, 1) + " of its size";
-  }
-  return "runs by the smallest tolerances that are of use end elsewhere, by more than 0.01 of the size: the last state "
-         "cannot be trusted";
+/// An error that everybody sees, relative to the size of the motion.
+inline constexpr double visible = 1e-3;
+
+/// Which rows are meant, by up to when others are not.
+inline std::string rows_after(double until, double start) {
+  return until > start ? "rows after t = " + pendula::rounded(until, 4) + " s" : "all rows";
+}
+inline std::string untrusted_after(double until, double start) {
+  return until > start ? rows_after(until, start) + " cannot be trusted" : "no row can be trusted";
 }
 
-/// Whether a second run is worth its time: none that was wrong had followed the motion so closely.
-inline bool is_doubtful(const RunOptions& run, const Statistics& statistics) {
-  return run.method != Method::gauss || is_adaptive(run) || statistics.largest_defect > 2e-5;
+/// Of trials before the run; `parted` tells how far it went from the finest of them, where it was compared.
+inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& parted, const AccuracyAim& aim,
+                    Trust& trust) {
+  const double wanted = setup.accuracy.error, trusted = close_to_wanted * wanted, start = setup.start.time;
+  const double error = std::max(aim.error, parted ? parted->largest() : 0);
+  if (std::isfinite(aim.error) && error <= together) trust.expected_error = error;
+  if (error <= trusted) return {};
+  trust.until = std::min(aim.trusted_until, parted ? parted->within(trusted, start) : aim.trusted_until);
+  const std::string of_wanted = "an accuracy of " + pendula::rounded(wanted, 2) + " is not reached: ";
+  if (std::isfinite(trust.expected_error)) {
+    return of_wanted + rows_after(trust.until, start) + " are off by up to about " + pendula::rounded(error, 1) +
+           " of the size of the motion";
+  }
+  const double seen = parted ? parted->within(visible, start) : aim.trusted_until;
+  return of_wanted + "runs by the smallest tolerances that are of use part; " + rows_after(trust.until, start) +
+         " are less accurate, " + untrusted_after(std::max(seen, trust.until), start);
 }
 
-/// Runs again with longer steps, or a tolerance a hundred times as large: where that ends elsewhere, the steps or the
-/// chaos of the motion decide where. Steps of twice the length, where some were taken in parts, would be taken in the
-/// same parts again.
-inline Doubt of_step(const RunSetup& setup, const RunReport& report, const std::function<bool()>& stop) {
-  static constexpr double trusted = 0.01;
-  const bool in_parts = report.statistics.rejected_steps > 0;
-  RunOptions coarser = setup.options;
-  coarser.step *= in_parts ? 3 : 2;
-  coarser.tolerance *= 100;
-  const auto integrator = setup.subject->make_integrator(coarser);
-  const double step = is_adaptive(coarser) ? std::numeric_limits<double>::infinity() : coarser.step;
-  Motion other = setup.start;
-  const RunResult result = simulate(
-      *integrator, setup.start, {step, setup.duration, std::numeric_limits<std::int64_t>::max()},
-      [&](const Motion& motion) { other = motion; }, stop);
-  if (result.stopped) {
-    return "it was interrupted while it ran again to see how far the last state can be trusted: that is not known";
-  }
-  const double off =
-      result.outcome ? setup.subject->distance(report.last, other) : std::numeric_limits<double>::infinity();
-  if (off <= trusted) return {};
+/// How a run is made again: with a tolerance a hundred times as large, or longer steps. Steps of twice the length,
+/// where some were taken in parts, would be taken in the same parts again; steps that are as long as a method can take
+/// by both tolerances, the same ones, are not where there is a stage less.
+inline RunOptions coarser(RunOptions options, const Statistics& statistics) {
+  if (options.method == Method::gauss && is_adaptive(options) && options.stages > 2) --options.stages;
+  options.step *= statistics.rejected_steps > 0 ? 3 : 2;
+  options.tolerance *= 100;
+  return options;
+}
+
+/// How much less a run errs than what a coarser one is off it by, where that errs by its order: not more than a few
+/// times, since errors scatter.
+inline double gain(const RunOptions& run, const RunOptions& coarser) {
+  constexpr double most = 5;
+  if (is_adaptive(run)) return most;
+  const int order = run.method == Method::rk4 ? 4 : order_of(run);
+  return std::min(most, std::pow(coarser.step / run.step, order) - 1);
+}
+
+/// The error that is not told: about what was asked for; where that is a tolerance of the motion, what that makes of it
+/// where it is no chaos.
+inline double trusted_error(const RunSetup& setup) {
+  if (setup.accuracy.error > 0) return close_to_wanted * setup.accuracy.error;
+  const bool is_of_motion = is_adaptive(setup.options) && !is_explicit(setup.options.method);
+  return is_of_motion ? std::min(visible, 1000 * setup.options.tolerance) : visible;
+}
+
+/// Of a second run: where that goes elsewhere, the steps or the chaos of the motion decide where.
+inline Doubt of_second_look(const RunSetup& setup, const RunOptions& coarser, const Separation& parted, Trust& trust) {
+  const double less = gain(setup.options, coarser), start = setup.start.time;
+  const double trusted = trusted_error(setup), error = parted.largest() / less;
+  if (error <= visible) trust.expected_error = error;
+  trust.until = parted.within(trusted * less, start);
+  if (std::isinf(trust.until)) return {};
+  const bool in_parts = coarser.step == 3 * setup.options.step;
   const std::string what = is_adaptive(coarser) ? "with a hundred times the tolerance"
                            : in_parts           ? "with three times the step"
                                                 : "with twice the step";
-  return what + " the motion ends " +
-         (std::isfinite(off) ? "elsewhere, by " + pendula::rounded(off, 2) + " of its size" : "before its time") +
-         ": the last state cannot be trusted; " + smaller_step_advice(setup.options);
+  const std::string rows = rows_after(trust.until, start);
+  if (error <= visible) {
+    return rows + " may be off by more than " + pendula::rounded(trusted, 2) + ", up to about " +
+           pendula::rounded(error, 1) + " of the size of the motion, which makes so much of the errors of its steps";
+  }
+  const std::string elsewhere = std::isinf(error) ? "ends before its time" : "goes elsewhere";
+  const double seen = parted.within(visible * less, start);
+  return what + " the motion " + elsewhere + ": " +
+         (seen > trust.until ? rows + " may be off by more than " + pendula::rounded(trusted, 2) + ", " : "") +
+         untrusted_after(seen, start) + "; " + smaller_step_advice(setup.options);
 }
 
 }  // namespace detail
-
-/// What makes a run that ended well doubtful all the same, one sentence each. `stop` ends the search. Measured on
-/// random chains: docs/method.md.
-inline std::vector<std::string> doubts(const RunSetup& setup, const RunReport& report, const EnergyBalance& balance,
-                                       const std::function<bool()>& stop) {
-  std::vector<std::string> doubts;
-  const auto add = [&](detail::Doubt doubt) {
-    if (doubt) doubts.push_back(*std::move(doubt));
-  };
-  add(detail::of_energy(*setup.subject, setup.options, balance));
-  add(detail::of_defect(setup.options, report.statistics.largest_defect));
-  add(detail::of_pole(*setup.subject, setup.options, report));
-  if (report.aimed && setup.accuracy.error > 0) {
-    add(detail::of_aim(setup.accuracy.error, *report.aimed));
-  } else if (detail::is_doubtful(setup.options, report.statistics)) {
-    add(detail::of_step(setup, report, stop));
-  }
-  return doubts;
-}
-
 }  // namespace pendula

@@ -22,4 +22,9 @@ struct RowTimes {
   }
 };
 
+/// Whether a run that has come so far has reached a time, but for rounding, whatever the end of the run is.
+inline bool is_reached(double time, double elapsed) {
+  return time <= elapsed + 8 * std::numeric_limits<double>::epsilon() * elapsed;
+}
+
 }  // namespace pendula

@@ -19,6 +19,8 @@
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/simulation.hpp>
+#include <pendula/run/track.hpp>
+#include <pendula/run/viewer.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -32,6 +34,12 @@ namespace detail {
 inline int glance_degree(const RunOptions& options) {
   if (options.method == Method::taylor) return 8;
   return is_explicit(options.method) ? 3 : options.stages;
+}
+
+/// How far rows are apart; 0 where steps tell it.
+inline double row_spacing(const RunSetup& setup) {
+  if (setup.rows.any()) return setup.rows.interval;
+  return is_adaptive(setup.options) ? 0 : static_cast<double>(setup.every) * setup.options.step;
 }
 
 }  // namespace detail
@@ -49,7 +57,16 @@ class Run {
   Description description() const { return integrator_->describe(); }
 
   /// Hands every row to `observer`, which must outlive the run.
-  void add(Observer& observer) { observers_.push_back(&observer); }
+  void add(Observer& observer) {
+    observers_.push_back(&observer);
+    takers_.push_back(&observer);
+  }
+
+  /// The same, with rows at times of its own in place of those of the run.
+  void add(Observer& observer, const RowTimes& times) {
+    observers_.push_back(&observer);
+    viewers_.emplace_back(*setup_.subject, observer, times);
+  }
 
   /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons to doubt what came out,
   /// which may take a second run with longer steps. A run that fails throws nothing: the report says so.
@@ -65,22 +82,25 @@ class Run {
   struct NotFinite {};
 
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
-  std::optional<Motion> try_out(double tolerance, double share, const std::function<bool()>& stop) const;
+  std::optional<Track> try_out(const RunOptions& options, double share, Track track,
+                               const std::function<bool()>& stop) const;
+  Track own_track() const { return Track(is_adaptive(setup_.options) ? Track::apart / 2 : Track::apart); }
   void choose_stages(RunOptions& options) const;
   bool aim(const std::function<bool()>& stop);
   void follow_aim();
-  AccuracyAim reached_aim(const RunReport& report) const;
   bool is_aimed() const { return setup_.accuracy.error > 0 && is_adaptive(setup_.options); }
   void integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report);
   void take(const Motion& motion, double work);
   std::optional<Motion> take_events(RunReport& report);
   void tell(const Occurrence& happened);
+  void view(const std::optional<Motion>& end);
   Observation look_at(const Motion& motion, double work);
   void look_at_end(const RunResult& result);
   void come_by(const RowPlace& place, bool last);
   void conclude(RunReport& report);
   void finish(RunReport& report);
-  void doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) const;
+  void doubt(RunReport& report, bool went_on, const std::function<bool()>& stop);
+  bool is_estimated() const { return setup_.doubted && setup_.estimate; }
 
   /// What is kept of a run besides its observers, for checkpoints.
   struct Kept {
@@ -96,7 +116,10 @@ class Run {
 
   RunSetup setup_;
   std::unique_ptr<Integrator> integrator_;
-  std::vector<Observer*> observers_;
+  std::vector<Observer*> observers_, takers_;  // all; those that take the rows of the run
+  std::vector<Viewer> viewers_;                // of the others
+  double viewing_seconds_ = 0;
+  std::optional<Track> track_;  // of this run, where another is compared with it
   Kept kept_;
   std::int64_t rows_ = 0;           // that there were
   double step_ = 0, step_end_ = 0;  // the last step's size and end
@@ -107,9 +130,9 @@ class Run {
 inline Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
       integrator_(setup_.subject->make_integrator(setup_.options)),
-      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration),
+      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, detail::row_spacing(setup_)),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
-            {.near = setup_.start}} {}
+            {}} {}
 
 inline RunReport Run::go(const std::function<bool()>& stop) {
   if (!is_aimed() || aim(stop)) return go(nullptr, stop);
@@ -127,22 +150,24 @@ inline RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bo
   return go(&checkpoint, stop);
 }
 
-// Where it ends, by an event perhaps; nothing where it does not. Its start is off by `share` of itself: what a motion
-// makes of that, errors of steps do not show where they vanish with it, as beside an equilibrium.
-inline std::optional<Motion> Run::try_out(double tolerance, double share, const std::function<bool()>& stop) const {
+// Nothing where it does not come to its end. Its start is off by `share` of itself: what a motion makes of that, errors
+// of steps do not show where they vanish with it, as beside an equilibrium.
+inline std::optional<Track> Run::try_out(const RunOptions& options, double share, Track track,
+                                         const std::function<bool()>& stop) const {
   RunSetup trial = setup_;
   trial.accuracy.error = 0;
-  trial.options.tolerance = tolerance;
-  choose_stages(trial.options);
+  trial.options = options;
   trial.start.q *= 1 + share;
   trial.start.v *= 1 + share;
   trial.every = std::numeric_limits<std::int64_t>::max();
   trial.rows = {};
   trial.doubted = false;
   std::erase_if(trial.events, [](const Event& event) { return !event.stop; });
-  const RunReport report = Run(std::move(trial)).go(stop);
-  if (report.end != RunEnd::complete && report.end != RunEnd::event) return {};
-  return report.last;
+  Run run(std::move(trial));
+  run.track_ = std::move(track);
+  const RunReport report = run.go(stop);
+  if (report.end == RunEnd::stopped) return {};
+  return std::move(run.track_);
 }
 
 // Whether the trials came to their ends.
@@ -150,15 +175,26 @@ inline bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
   const auto stops = [&] { return stopped = stopped || stop(); };
   double share = -1;
-  const auto end = [&](double tolerance) {
-    share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
-    return try_out(tolerance, share, stops);  // no two begin alike
+  std::optional<Track> first;  // whose times are those of all
+  const auto run_alike = [&](double tolerance) -> std::optional<Track> {
+    RunOptions options = setup_.options;
+    options.tolerance = tolerance;
+    choose_stages(options);
+    std::optional<Track> track = try_out(options, share, first ? Track::at_times_of(*first) : own_track(), stops);
+    if (!track || !track->is_complete()) return {};
+    if (!first) first = track;
+    return track;
   };
-  const auto end_alike = [&](double tolerance) { return try_out(tolerance, share, stops); };
-  const auto distance = [&](const Motion& a, const Motion& b) { return setup_.subject->distance(a, b); };
+  const auto run = [&](double tolerance) {
+    share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
+    return run_alike(tolerance);  // no two begin alike
+  };
+  const auto apart = [&](const Track& a, const Track& b) { return Separation(*setup_.subject, a, b); };
   const double wanted = setup_.accuracy.error, finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
-  kept_.aim = detail::climb_up(wanted, detail::climb_down(wanted, finest, end, distance), end_alike, distance);
-  if (kept_.aim.near.q.size() == 0) kept_.aim.near = setup_.start;  // as large as any, for checkpoints
+  const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides what was before
+  const double start = setup_.start.time;
+  kept_.aim =
+      detail::climb_up(wanted, coarsest, detail::climb_down(wanted, finest, start, run, apart), run_alike, apart);
   follow_aim();
   return !stopped;
 }
@@ -180,19 +216,12 @@ inline void Run::follow_aim() {
 inline RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
   RunReport report;
   report.stepping_seconds = std::nan("");
+  const bool has_trials = from == nullptr && is_aimed() && kept_.aim.finest;
+  if (is_estimated()) track_ = has_trials ? Track::at_times_of(*kept_.aim.finest) : own_track();
   integrate(from, stop, report);
   conclude(report);
   doubt(report, from != nullptr, stop);
   return report;
-}
-
-// How far from the last trial it ended tells how errors scatter.
-inline AccuracyAim Run::reached_aim(const RunReport& report) const {
-  AccuracyAim aim = kept_.aim;
-  if (report.end == RunEnd::complete && std::isfinite(aim.error) && report.last.time == aim.near.time) {
-    aim.error = std::max(aim.error, setup_.subject->distance(report.last, aim.near));
-  }
-  return aim;
 }
 
 inline void Run::conclude(RunReport& report) {
@@ -200,7 +229,7 @@ inline void Run::conclude(RunReport& report) {
   report.last = kept_.record.last();
   report.rows = rows_;
   report.options = setup_.options;
-  if (is_aimed()) report.aimed = reached_aim(report);
+  if (is_aimed()) report.aimed = kept_.aim;
   report.description = integrator_->describe();
   report.statistics = integrator_->statistics();
   report.energy_error = kept_.record.energy_error();
@@ -208,6 +237,7 @@ inline void Run::conclude(RunReport& report) {
   report.table = kept_.record.table();
   report.events = kept_.watch.tallies();
   report.event_cost = kept_.watch.cost();
+  if (track_) track_->finish(report.last, report.end == RunEnd::complete || report.end == RunEnd::event);
 }
 
 inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
@@ -218,20 +248,29 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
   const auto on_way = [&](const RowPlace& place, bool last) { come_by(place, last); };
   const auto on_step = [&] {
     step_ = integrator_->time() - std::exchange(step_end_, integrator_->time());
-    return take_events(report);
+    std::optional<Motion> end = take_events(report);
+    if (track_) track_->follow(*integrator_, end);
+    if (!viewers_.empty()) view(end);
+    return end;
   };
-  integrator_->remember_steps(!setup_.events.empty());
+  integrator_->remember_steps(!setup_.events.empty() || (track_ && track_->looks()) || !viewers_.empty());
   rows_ = from == nullptr ? 0 : from->rows;
   step_end_ = from == nullptr ? setup_.start.time : from->time;
   try {
     if (from == nullptr && setup_.rows.any() && setup_.rows.at(0) != 0) look_at(setup_.start, 0);
     from == nullptr ? kept_.watch.start(setup_.start) : kept_.watch.resume(integrator_->state());
+    const Motion begin = from == nullptr ? setup_.start : integrator_->state();
+    if (track_) track_->begin(begin);
+    for (Viewer& viewer : viewers_) viewer.begin(begin, setup_.start.time);
     const RunResult result = from == nullptr
                                  ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way, on_step)
                                  : pendula::go_on(*integrator_, setup_.start.time, schedule,
                                                   {from->rows, from->since_row}, on_row, stop, on_way, on_step);
     if (setup_.rows.any()) look_at_end(result);
-    report.stepping_seconds = result.stepping_seconds;
+    if (step_end_ > begin.time) {
+      for (Viewer& viewer : viewers_) viewer.finish(result.end ? *result.end : integrator_->state());
+    }
+    report.stepping_seconds = result.stepping_seconds - viewing_seconds_;
     report.step = result.outcome;
     report.end = !result.outcome  ? RunEnd::step_failed
                  : result.end     ? RunEnd::event
@@ -249,7 +288,7 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
 inline void Run::take(const Motion& motion, double work) {
   const Observation seen = look_at(motion, work);
   ++rows_;
-  for (Observer* observer : observers_) observer->take({motion, seen, row_, step_});
+  for (Observer* observer : takers_) observer->take({motion, seen, row_, step_});
 }
 
 // The first event that ends the run does so, and is the last one that is told.
@@ -270,6 +309,14 @@ inline void Run::tell(const Occurrence& happened) {
   setup_.subject->append_row(happened.motion, seen, event_row_);
   const EventRow row{setup_.events[happened.event], happened.up, {happened.motion, seen, event_row_, step_}};
   for (Observer* observer : observers_) observer->happen(row);
+}
+
+// Between steps, but no part of stepping.
+inline void Run::view(const std::optional<Motion>& end) {
+  using Clock = std::chrono::steady_clock;
+  const auto before = Clock::now();
+  for (Viewer& viewer : viewers_) viewer.follow(*integrator_, end, step_);
+  viewing_seconds_ += std::chrono::duration<double>(Clock::now() - before).count();
 }
 
 // The energy is not finite wherever anything else is not.
@@ -305,16 +352,29 @@ inline void Run::come_by(const RowPlace& place, bool last) {
   for (Observer* observer : observers_) observer->keep(checkpoint);
 }
 
-// Of a run that an event ended, up to there. What trials told is not known of an end that came later.
-inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) const {
+// What trials told is not known of an end that came later.
+inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) {
   report.warnings = event_warnings(setup_.events, report.events);
   if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
-  RunSetup whole = setup_;
-  if (report.end == RunEnd::event) whole.duration = report.last.time - setup_.start.time;
-  if (went_on) whole.accuracy.error = 0;
-  for (std::string& sentence : doubts(whole, report, kept_.record.balance(), stop)) {
-    report.warnings.push_back(std::move(sentence));
+  const auto add = [&](detail::Doubt doubt) {
+    if (doubt) report.warnings.push_back(*std::move(doubt));
+  };
+  add(detail::of_energy(*setup_.subject, setup_.options, kept_.record.balance()));
+  add(detail::of_defect(setup_.options, report.statistics.largest_defect));
+  add(detail::of_pole(*setup_.subject, setup_.options, report));
+  if (is_aimed() && !went_on) {
+    std::optional<Separation> parted;
+    if (track_ && kept_.aim.finest) parted.emplace(*setup_.subject, *track_, *kept_.aim.finest);
+    return add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
   }
+  if (!track_) return;
+  const RunOptions coarser = detail::coarser(setup_.options, report.statistics);
+  const double share = is_adaptive(coarser) ? 0.01 * coarser.tolerance : std::numeric_limits<double>::epsilon();
+  bool stopped = false;
+  const std::optional<Track> other =
+      try_out(coarser, share, Track::at_times_of(*track_), [&] { return stopped = stopped || stop(); });
+  if (!other) return add("it was interrupted while it ran again to see how far it can be trusted: that is not known");
+  add(detail::of_second_look(setup_, coarser, Separation(*setup_.subject, *track_, *other), report.trust));
 }
 
 // The first failure is the one that is told.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <pendula/run/subject.hpp>
+#include <pendula/run/table_times.hpp>
 #include <pendula/system/motion.hpp>
 #include <utility>
 #include <vector>
@@ -57,11 +58,11 @@ struct TableRow {
 /// What energies are compared with may be known when the run ends only: errors are kept in joules.
 class RunRecord {
  public:
-  /// The table has about `table_rows` rows, evenly over `duration`.
-  RunRecord(const Subject& subject, Motion start, double duration, int table_rows = 11)
+  /// The table has a few rows, evenly over `duration`; `spacing` is how far rows are apart, 0 where that is not known.
+  RunRecord(const Subject& subject, Motion start, double duration, double spacing = 0)
       : scale_(subject.energy_scale()),
         shown_(subject.shown_columns()),
-        interval_(duration / (table_rows - 1)),
+        interval_(table_interval(duration, spacing)),
         last_(std::move(start)),
         last_row_(empty_row()) {}
 

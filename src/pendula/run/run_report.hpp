@@ -28,10 +28,20 @@ struct RunSetup {
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
   RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
   Accuracy accuracy = {};   ///< of runs by tolerance, which follows from it by trials where it has an error
-  bool doubted = true;      ///< whether to look for reasons to doubt the end, which may take a second run
+  bool doubted = true;      ///< whether to look for reasons to doubt it
+  bool estimate = true;     ///< whether to run a second time to see how far it can be trusted, where it is doubted
   double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
   /// To look for.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
+};
+
+/// How far a run can be trusted, as another one tells.
+struct Trust {
+  /// The largest error of its rows and events, relative to the size and the speed of the motion; NaN where that is not
+  /// known.
+  double expected_error = std::numeric_limits<double>::quiet_NaN();
+  /// Up to where they are as accurate as was asked for, or to a thousandth where nothing was  [s].
+  double until = std::numeric_limits<double>::infinity();
 };
 
 /// Why a run was over.
@@ -53,6 +63,7 @@ struct RunReport {
   std::int64_t rows = 0;
   RunOptions options;                ///< that it was run by
   std::optional<AccuracyAim> aimed;  ///< of RunSetup::accuracy
+  Trust trust;                       ///< where it was doubted
   Description description;
   Statistics statistics;
   double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN where a row ended the run

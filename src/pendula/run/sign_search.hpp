@@ -31,8 +31,10 @@ struct SignChange {
 /// was seen to vary by is less than what it is from zero, and a sixth is none, so that what turns often in a step is
 /// not taken for what it is at the others. Else nine samples are interpolated, or halves where they do not tell the
 /// function. Bernstein coefficients, halved as long as needed, show pieces that are clear of zero or rise or fall all
-/// through, by more than interpolation and the polynomial may be off; what is neither, a zero that is nearly touched,
-/// is decided by states of full order, sampled and interpolated in the same way.
+/// through, by more than interpolation and the polynomial may be off: by the last two coefficients that it can have, or
+/// where that does not decide, by as much as it is off at one place. What is neither, a zero that is nearly touched, is
+/// decided by states of full order, sampled and interpolated in the same way; and what that does not decide by the
+/// place where the function turns.
 ///
 /// `Sight` has value(u), by the polynomial, and exact_value(u), at full order; u runs from 0 to 1.
 template <class Sight>
@@ -53,6 +55,7 @@ class SignSearch {
     first_value_ = first;
     last_value_ = last;
     missed_ = 0;
+    is_measured_ = false;
     last_ = {0, sign, first == 0};
     if (first != 0) node(0, sign_of(first));
     search({0, 1, first, last, sign_of(last)}, 0, by);
@@ -71,7 +74,7 @@ class SignSearch {
   static constexpr std::size_t points = BernsteinPolynomial::size;
   /// The sixth place: what turns by less than 125 radians in a step is not the same there as at Chebyshev points.
   static constexpr double unlike = 0.315;
-  static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30;
+  static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30, most_turns = 48;
   static constexpr double epsilon = std::numeric_limits<double>::epsilon();
   using Samples = BernsteinPolynomial::Numbers;
 
@@ -139,13 +142,36 @@ class SignSearch {
     const double noise = 4 * epsilon * largest;
     if (tail > 1e-3 * variation + noise) return unresolved(interval, values, halvings, by);
     const double width = interval.to - interval.from;
-    const double miss =
-        by == By::polynomial ? missed + sizes[degree_] / std::pow(width, static_cast<double>(degree_)) : 0;
+    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from coefficients here to the step's
     // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
     const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
-    resolved(interval, polynomial, by,
-             {tail + noise + miss,
-              steepest(tail + noise, points - 1) + width * steepest(miss, static_cast<double>(degree_ + 1))});
+    const auto band = [&](double miss) {
+      return Band{tail + noise + miss,
+                  steepest(tail + noise, points - 1) + width * steepest(miss, static_cast<double>(degree_ + 1))};
+    };
+    if (by == By::full_order) return resolved(interval, polynomial, by, band(0));
+    if (!is_measured_) {
+      const std::size_t found = changes_.size();
+      const Node before = last_;
+      is_unsure_ = false;
+      const double last_two = degree_ == 1 ? variation : std::max(sizes[degree_], sizes[degree_ - 1]);
+      resolved(interval, polynomial, by, band(missed_ + last_two * whole));
+      if (!is_unsure_) return;
+      changes_.resize(found);
+      last_ = before;
+      measure();
+    }
+    resolved(interval, polynomial, by, band(missed_ + sizes[degree_] * whole));
+  }
+
+  /// How far the polynomial misses where it does most: at the node next to the middle, since its error has a derivative
+  /// that is zero at all nodes.
+  void measure() {
+    constexpr std::array<double, 9> next_to_middle{0.5, 0.5, 0.2113, 0.5, 0.33, 0.5, 0.3807, 0.5, 0.4083};
+    const double place = next_to_middle[degree_];
+    const double off = std::abs(sample(place, By::polynomial) - sample(place, By::full_order));
+    if (std::isfinite(off)) missed_ = std::max(missed_, 2 * off);
+    is_measured_ = true;
   }
 
   /// The polynomial's values at the ends of the step in place of the true ones, and how far it misses them: rates by it
@@ -233,16 +259,42 @@ class SignSearch {
     }
   }
 
-  /// What rises or falls all through has a zero or none, as its ends tell; anything else takes a closer look. What full
-  /// order cannot tell either is a zero that is touched.
+  /// What rises or falls all through has a zero or none, as its ends tell; anything else takes a closer look.
   void close(Doubtful& doubtful, double to, By by) {
-    const bool is_known = !doubtful.open || doubtful.slope != 0 || by == By::full_order;
+    const bool is_known = !doubtful.open || doubtful.slope != 0;
     const double from = doubtful.from;
     doubtful = {};
     if (is_known) return;
+    if (by == By::full_order) return turn(from, to);
+    if (!is_measured_) {
+      is_unsure_ = true;
+      return;
+    }
     const double first = from == 0 ? first_value_ : sample(from, By::full_order);
     const double last = to == 1 ? last_value_ : sample(to, By::full_order);
     search({from, to, first, last, sign_of(last)}, most_halvings / 2, By::full_order);
+  }
+
+  /// Between two places of one sign the function comes close to zero and turns, by full order: golden sections lead to
+  /// where, or to a place of the other sign. What they do not tell from zero is a zero that is touched.
+  void turn(double from, double to) {
+    const int sign = last_.sign;
+    if (sign == 0 || sign_of(sample(to, By::full_order)) != sign) return;
+    constexpr double golden = 0.38196601125010515;
+    double low = from, high = to, u = low + golden * (high - low), height = sign * sample(u, By::full_order);
+    for (int tries = 0; tries < most_turns && height > 0 && is_told() && high - low > 4 * epsilon; ++tries) {
+      const bool is_left = u - low > high - u;  // of the longer part
+      const double other = is_left ? u - golden * (u - low) : u + golden * (high - u);
+      const double there = sign * sample(other, By::full_order);
+      if (there < height) {
+        (is_left ? high : low) = u;
+        u = other;
+        height = there;
+      } else {
+        (is_left ? low : high) = other;
+      }
+    }
+    if (height < 0) node(u, -sign);
   }
 
   /// Goes on to a place where the function has a sign, 0 where that says nothing; a value that is not finite forgets
@@ -278,7 +330,8 @@ class SignSearch {
   int samples_left_ = 0;
   bool is_finite_ = true;
   double first_value_ = 0, last_value_ = 0;  // at the ends of the step
-  double missed_ = 0;                        // by the polynomial there
+  double missed_ = 0;                        // by the polynomial there, and where it was measured
+  bool is_measured_ = false, is_unsure_ = false;
 };
 
 /// The instant of a change: the zero to within `tolerance`, or of a jump the first place that was seen behind it.

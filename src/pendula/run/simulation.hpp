@@ -139,12 +139,12 @@ struct Course {
   void to_next_times() {
     while (goes_on() && !is_over()) {
       step();
-      if (result.outcome && is_reached(schedule.rows.at(place.rows))) return;
+      if (result.outcome && is_reached(schedule.rows.at(place.rows), elapsed())) return;
     }
   }
   void take_times() {
     if (!result.outcome) return come_by();
-    for (double time = 0; is_reached(time = schedule.rows.at(place.rows));) {
+    for (double time = 0; is_reached(time = schedule.rows.at(place.rows), elapsed());) {
       if (result.end && begin + time > result.end->time) break;
       if (!row_at(begin + time)) return;
     }
@@ -163,10 +163,6 @@ struct Course {
     }
     return bool(looked);
   }
-
-  // But for rounding, whatever the end of the run is.
-  double slack() const { return 8 * std::numeric_limits<double>::epsilon() * elapsed(); }
-  bool is_reached(double time) const { return time <= elapsed() + slack(); }
 
   double last_row = std::numeric_limits<double>::quiet_NaN();
 };

@@ -41,15 +41,20 @@ class Subject {
   /// Whether energy may come from outside or go there, and whether it may go by damping.
   virtual bool loaded() const = 0;
   virtual bool damped() const = 0;
+  /// Whether the energy at every time is known: it is kept, or all that comes and goes is added up.
+  virtual bool balances(Method method) const { return !loaded() || !is_explicit(method); }
 
   /// Why a run with these options would be wrong, known beforehand: one sentence each.
   virtual std::vector<std::string> expected_trouble(const RunOptions& options) const = 0;
   /// Whether the dense solver's coordinates fail somewhere.
   virtual bool has_poles() const = 0;
 
-  /// What a trajectory has: time, coordinates, rates, points, energy; and the numbers of one row.
+  /// What a trajectory has: time, coordinates, rates, inputs, points, energy; and the numbers of one row.
   virtual std::vector<Quantity> quantities() const = 0;
   virtual void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
+
+  /// Masses, lengths and the like, in SI as quantities are.
+  virtual std::vector<Constant> constants() const = 0;
 
   /// Names of the numbers of a row.
   std::vector<std::string> columns() const { return columns_of(quantities()); }
@@ -60,8 +65,14 @@ class Subject {
   /// Of all columns, those that a short table shows: index of the first, and how many.
   virtual std::pair<std::size_t, std::size_t> shown_columns() const = 0;
 
-  /// Distance of two states relative to the size and the speed of the motion.
-  virtual double distance(const Motion& a, const Motion& b) const = 0;
+  /// Distance of two states relative to the size and the speed of the motion, whole turns of angles included; `size`
+  /// has the largest of each coordinate and rate, where the motion is known.
+  virtual double distance(const Motion& a, const Motion& b, const Motion& size) const = 0;
+
+  /// The same where nothing is known but the two.
+  double distance(const Motion& a, const Motion& b) const {
+    return distance(a, b, {b.time, a.q.cwiseAbs().cwiseMax(b.q.cwiseAbs()), a.v.cwiseAbs().cwiseMax(b.v.cwiseAbs())});
+  }
 };
 
 }  // namespace pendula

@@ -65,29 +65,40 @@ class SystemSubject : public Subject {
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return entry_->loaded(numbers_.plain()); }
   bool damped() const override { return loaded(); }
+  /// What depends on time may bring and take energy many times in a step that the motion does not need to be shorter.
+  bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
   std::vector<std::string> expected_trouble(const RunOptions& /*options*/) const override { return {}; }
   bool has_poles() const override { return false; }
 
-  /// `t`, coordinates, their rates, components of the points, `energy`.
+  /// `t`, coordinates, their rates, inputs, components of the points, `energy`.
   std::vector<Quantity> quantities() const override {
     constexpr std::string_view axes = "xyz";
-    std::vector<Quantity> quantities{{"t", "s"}};
-    const auto add = [&](std::string name, std::string unit) {
-      quantities.push_back({std::move(name), std::move(unit), quantities.size()});
+    std::vector<Quantity> quantities{{"t", "s", Role::time, "time"}};
+    const auto add = [&](std::string name, std::string unit, Role role, std::string meaning) {
+      quantities.push_back({std::move(name), std::move(unit), role, std::move(meaning), quantities.size()});
     };
     const std::size_t count = info().coordinates.size();
     for (std::size_t k = 0; k < count; ++k) {
-      add(std::string(info().coordinates[k]), std::string(info().coordinate_units[k]));
+      const std::string name(info().coordinates[k]);
+      add(name, std::string(info().coordinate_units[k]), Role::coordinate, "coordinate " + name);
     }
     for (std::size_t k = 0; k < count; ++k) {
-      add(std::string(info().coordinates[k]) + "_dot", std::string(info().coordinate_units[k]) + "/s");
+      const std::string name(info().coordinates[k]);
+      add(rate_name(name), rate_unit(info().coordinate_units[k]), Role::rate, "rate of " + name);
+    }
+    for (std::size_t k = 0; k < info().inputs.size(); ++k) {
+      const std::string name(info().inputs[k]);
+      add(name, std::string(info().input_units[k]), Role::input, "input " + name);
     }
     for (std::size_t k = 0; k < info().points.size(); ++k) {
+      const std::string point(info().points[k]);
       for (int axis = 0; axis < info().point_sizes[k]; ++axis) {
-        add(std::string(info().points[k]) + "_" + axes[static_cast<std::size_t>(axis)], "m");
+        const std::string name(1, axes[static_cast<std::size_t>(axis)]);
+        add(std::string(point).append("_").append(name), "m", Role::point,
+            std::string(name).append(" of the point ").append(point));
       }
     }
-    add("energy", "J");
+    add("energy", "J", Role::energy, "energy v dL/dv - L");
     return quantities;
   }
 
@@ -95,8 +106,23 @@ class SystemSubject : public Subject {
     row.push_back(motion.time);
     row.insert(row.end(), motion.q.begin(), motion.q.end());
     row.insert(row.end(), motion.v.begin(), motion.v.end());
+    append_inputs(motion.time, row);
     row.insert(row.end(), seen.points.begin(), seen.points.end());
     row.push_back(seen.energy);
+  }
+
+  /// The parameters of the model.
+  std::vector<Constant> constants() const override {
+    std::vector<Constant> constants;
+    auto next = numbers_.parameters.begin();
+    for (std::size_t k = 0; k < info().parameters.size(); ++k) {
+      const std::string name(info().parameters[k]);
+      const auto end = next + info().parameter_sizes[k];
+      constants.push_back(
+          {name, std::string(info().parameter_units[k]), "parameter " + name, {next, end}, info().is_per_link[k]});
+      next = end;
+    }
+    return constants;
   }
 
   std::span<const std::string_view> coordinates() const override { return info().coordinates; }
@@ -106,34 +132,46 @@ class SystemSubject : public Subject {
     const std::size_t count = info().coordinates.size();
     if (info().points.empty()) return {1, std::min<std::size_t>(count, 3)};
     const auto last = static_cast<std::size_t>(info().point_sizes.back());
-    return {1 + 2 * count + static_cast<std::size_t>(point_components()) - last, last};
+    const std::size_t before = 1 + 2 * count + info().inputs.size();
+    return {before + static_cast<std::size_t>(point_components()) - last, last};
   }
 
-  /// Of coordinates relative to the largest, angles at least to one radian, and of rates to the fastest, each in its
-  /// own unit.
-  double distance(const Motion& a, const Motion& b) const override {
+  using Subject::distance;
+  /// The largest of coordinates, relative to the largest of their unit, angles at least to one radian, and of rates,
+  /// relative to the fastest of their unit.
+  double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     double furthest = 0;
-    const auto compare = [&](double x, double y, double size) {
-      if (x != y) furthest = std::max(furthest, std::abs(x - y) / size);
+    const auto compare = [&](double x, double y, double scale) {
+      if (x != y) furthest = std::max(furthest, std::abs(x - y) / scale);
     };
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
-      compare(a.q[i], b.q[i], std::max(info().is_angle[k] ? 1.0 : 0.0, largest(a.q, b.q, info().coordinate_units[k])));
-      compare(a.v[i], b.v[i], largest(a.v, b.v, info().coordinate_units[k]));
+      const std::string_view unit = info().coordinate_units[k];
+      compare(a.q[i], b.q[i], std::max(info().is_angle[k] ? 1.0 : 0.0, largest(size.q, unit)));
+      compare(a.v[i], b.v[i], largest(size.v, unit));
     }
     return furthest;
   }
 
  private:
+  static std::string rate_unit(std::string_view unit) { return (unit.empty() ? "1" : std::string(unit)) + "/s"; }
+
+  void append_inputs(double time, std::vector<double>& row) const {
+    const std::size_t first = row.size();
+    row.insert(row.end(), numbers_.inputs.begin(), numbers_.inputs.end());
+    for (const InputSine& sine : numbers_.sines) {
+      row[first + static_cast<std::size_t>(sine.input)] +=
+          sine.amplitude * std::sin(sine.frequency * time + sine.phase);
+    }
+  }
+
   int point_components() const { return std::accumulate(info().point_sizes.begin(), info().point_sizes.end(), 0); }
 
-  // Among the coordinates of one unit.
-  double largest(const Eigen::VectorXd& a, const Eigen::VectorXd& b, std::string_view unit) const {
+  // Among those of one unit.
+  double largest(const Eigen::VectorXd& sizes, std::string_view unit) const {
     double largest = 0;
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) {
-      if (info().coordinate_units[k] != unit) continue;
-      const auto i = static_cast<Eigen::Index>(k);
-      largest = std::max({largest, std::abs(a[i]), std::abs(b[i])});
+      if (info().coordinate_units[k] == unit) largest = std::max(largest, sizes[static_cast<Eigen::Index>(k)]);
     }
     return largest;
   }

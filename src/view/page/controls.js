@@ -109,9 +109,10 @@ class Controls {
   #showHonesty() {
     const run = this.#run();
     const kind = run.exact
-      ? "All columns with 17 digits, as in the trajectory file."
-      : "Coordinates and rates as 32-bit numbers, about 7 digits: for pictures. The trajectory file has them all.";
-    at("honesty").textContent = `${run.rows} rows. ${kind} ${run.thinning}`;
+      ? "All columns with 17 digits, at times that suit pictures."
+      : "Coordinates and rates as 32-bit numbers, about 7 digits, at times that suit pictures.";
+    const rest = "The trajectory file has the rows that the scenario asks for.";
+    at("honesty").textContent = `${run.rows} rows. ${kind} ${run.thinning} ${rest}`;
   }
 
   #key(event) {

@@ -1,6 +1,7 @@
 // What the page holds: the scene, and the rows of its runs.
 
 const scene = JSON.parse(document.getElementById("scene").textContent);
+for (const unit of ["timeUnit", "lengthUnit"]) scene[unit] = unitText(scene[unit]);
 
 function bytesOfBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);

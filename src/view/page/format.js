@@ -41,14 +41,23 @@ function ordinal(number) {
   return `${number}${(!teens && { 1: "st", 2: "nd", 3: "rd" }[number % 10]) || "th"}`;
 }
 
+/// Digits as indices.
+function lowered(digits) {
+  return [...digits].map((c) => "₀₁₂₃₄₅₆₇₈₉"[c]).join("");
+}
+
 /// theta_12_dot as θ₁₂: what a plot calls a coordinate.
 function symbol(name) {
   const greek = { theta: "θ", phi: "φ", psi: "ψ", alpha: "α", beta: "β", gamma: "γ" };
-  const lowered = "₀₁₂₃₄₅₆₇₈₉";
   const [stem, ...rest] = name.split("_");
   const index = rest.join("_");
-  const below = /^\d+$/.test(index) ? [...index].map((c) => lowered[c]).join("") : index && `_${index}`;
+  const below = /^\d+$/.test(index) ? lowered(index) : index && `_${index}`;
   return (greek[stem] ?? stem) + below;
+}
+
+/// sqrt(l_1/g) as √(l₁/g).
+function unitText(unit) {
+  return unit.replaceAll("sqrt", "√").replace(/_(\d+)/g, (_, digits) => lowered(digits));
 }
 
 /// Steps of 1, 2 or 5 powers of ten that divide a range in about `count`.

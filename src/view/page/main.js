@@ -56,6 +56,7 @@ function start() {
   document.documentElement.dataset.stage = Stage.kind;
   if (Stage.kind === "lanes") document.querySelector(".corner").hidden = true;
   const panels = makePanels(player);
+  document.documentElement.dataset.panels = panels.length;
   let isDue = true;
   const due = () => (isDue = true);
   const marks = new Marks(player);

@@ -111,8 +111,10 @@ class PhasePanel {
 
   refresh() {
     const { group, member } = this.picker;
-    this.plot.show(member, group, group.isAngle && this.isWrapped());
+    this.plot.show(member, group.isAngle && this.isWrapped());
     this.plot.axes.describe(`Phase portrait: rate of ${member.name} against ${member.name}`);
+    const [name, { unit }] = [symbol(member.name), group];
+    this.box.keys.textContent = `Rate of ${name} in ${[unit, scene.timeUnit].join("/")} over ${name} in ${unit}`;
   }
   redraw() {
     this.plot.redraw();
@@ -136,7 +138,7 @@ function makePanels(player) {
   if (runs.some((run) => run.stepSizes)) {
     const least = Math.min(...runs.map((run) => run.stepSizes?.reduce((m, x) => (x < m ? x : m), Infinity) ?? Infinity));
     made.push(new LogPanel("Step size", player, (run) => run.stepSizes,
-      (largest) => `From ${readable(least, 3)} to ${largest} ${scene.timeUnit}, of the step that each row lies in`));
+      (largest) => `From ${readable(least, 3)} to ${largest} ${scene.timeUnit}`));
   }
   if (groups.length > 0) {
     const angles = new CoordinatesPanel(player);

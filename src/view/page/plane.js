@@ -1,5 +1,8 @@
 // The stage of motions in the plane.
 
+/// Pixels that the motion leaves free: for the clock and the buttons, and for the rule.
+const inset = { top: 42, bottom: 32 };
+
 class Stage {
   constructor(host, motion) {
     this.motion = motion;
@@ -25,7 +28,7 @@ class Stage {
 
   reset() {
     const { low, high, reach } = this.motion;
-    const room = 0.12 * reach;
+    const room = 0.08 * reach;
     this.home = {
       x: (low[0] + high[0]) / 2,
       y: (low[1] + high[1]) / 2,
@@ -43,15 +46,21 @@ class Stage {
 
   /// Pixels of CSS to a metre.
   get scale() {
-    return Math.min(this.width / this.home.width, this.height / this.home.height) * this.view.zoom;
+    const height = Math.max(this.height - inset.top - inset.bottom, 1);
+    return Math.min(this.width / this.home.width, height / this.home.height) * this.view.zoom;
   }
 
-  zoom(factor, x = this.width / 2, y = this.height / 2) {
+  /// Where the middle of the view is, from the top.
+  get middle() {
+    return (this.height + inset.top - inset.bottom) / 2;
+  }
+
+  zoom(factor, x = this.width / 2, y = this.middle) {
     const before = this.scale;
     this.view.zoom = Math.min(Math.max(this.view.zoom * factor, 0.2), 200);
     const change = 1 / before - 1 / this.scale;
     this.view.x += (x - this.width / 2) * change;
-    this.view.y -= (y - this.height / 2) * change;
+    this.view.y -= (y - this.middle) * change;
     this.onChange();
   }
 
@@ -77,7 +86,8 @@ class Stage {
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
     pen.setTransform(this.fine, 0, 0, this.fine, 0, 0);
-    pen.lineJoin = pen.lineCap = "round";
+    pen.lineJoin = "round";
+    pen.lineCap = "butt"; // pieces of traces let through what is behind them: round ends would be seen twice
     this.#drawGrid();
     runs.forEach((run, k) => this.motion.at(run, time, this.places[k]));
     runs.forEach((_, k) => this.#drawTraces(k, time, trace));
@@ -89,13 +99,13 @@ class Stage {
     return this.width / 2 + (x - this.view.x) * this.scale;
   }
   #y(y) {
-    return this.height / 2 - (y - this.view.y) * this.scale;
+    return this.middle - (y - this.view.y) * this.scale;
   }
 
   #drawGrid() {
     const { pen, width, height, scale } = this;
     const [left, right] = [this.view.x - width / 2 / scale, this.view.x + width / 2 / scale];
-    const [bottom, top] = [this.view.y - height / 2 / scale, this.view.y + height / 2 / scale];
+    const [bottom, top] = [this.view.y - (height - this.middle) / scale, this.view.y + this.middle / scale];
     const ticks = niceTicks(0, right - left, width / 110);
     const step = ticks.length > 1 ? ticks[1] - ticks[0] : right - left;
     pen.strokeStyle = palette.css("line");
@@ -162,6 +172,7 @@ class Stage {
     const many = runs.length > 1;
     const places = this.places[k];
     const alpha = runs.length > 8 ? 0.55 : 1;
+    pen.lineCap = "round";
     pen.strokeStyle = many ? rgba(palette.run(k), alpha * 0.8) : palette.css("rod");
     pen.lineWidth = many ? 1.5 : Math.max(1.2, Math.min(4, (0.012 * motion.reach * this.scale) / Math.sqrt(motion.count / 4 + 1)));
     pen.beginPath();

@@ -82,7 +82,7 @@ class Axes {
     for (const { at, text } of xTicks) {
       const x = Math.round(this.atX(at)) + 0.5;
       line(pen, x, top, x, this.height - bottom);
-      if (x < this.width - right - 34) pen.fillText(text, x, this.height - 7);
+      if (!xName || x < this.width - right - 34) pen.fillText(text, x, this.height - 7);
     }
     pen.textAlign = "right";
     pen.fillText(xName, this.width - right, this.height - 7);
@@ -187,7 +187,7 @@ class TimePlot {
     const { axes } = this;
     const wrapped = this.kind === "wrapped";
     axes.y = wrapped ? { low: -Math.PI, high: Math.PI } : rangeOf(this.curves.map((curve) => curve.numbers));
-    return linearTicks(axes.y, axes.height / 40, wrapped);
+    return linearTicks(axes.y, axes.height / 28, wrapped);
   }
 
   // Zeros, where there are any, are drawn at the bottom, a tick below the least.
@@ -269,14 +269,12 @@ class PhasePlot {
     host.classList.add("still");
   }
 
-  /// member  of a group; wrapped: as an angle within a half turn
-  show(member, group, wrapped) {
+  /// wrapped: as an angle within a half turn
+  show(member, wrapped) {
     this.wrapped = wrapped;
-    this.unit = group.unit;
     this.curves = runs.map((run, k) => ({
       run, colour: () => palette.run(k), q: run.column(member.column), rate: run.column(member.rate),
     }));
-    this.xName = `${symbol(member.name)} / ${group.unit}`;
     this.redraw();
   }
 
@@ -287,8 +285,7 @@ class PhasePlot {
     axes.x = turned;
     axes.y = rangeOf(this.curves.map((curve) => curve.rate));
     const xTicks = linearTicks(axes.x, axes.width / 70, this.wrapped);
-    axes.drawGrid(pen, xTicks, linearTicks(axes.y, axes.height / 40, false), "");
-    this.#name(pen);
+    axes.drawGrid(pen, xTicks, linearTicks(axes.y, axes.height / 28, false), "");
     pen.lineWidth = 1.1;
     const alpha = runs.length > 1 ? Math.max(0.12, 0.6 / Math.sqrt(runs.length)) : 0.4;
     for (const curve of this.curves) {
@@ -312,13 +309,6 @@ class PhasePlot {
       }
       dot(pen, axes.atX(this.#place(curve.q[row])), axes.atY(curve.rate[row]), curve.colour(), runs.length > 6 ? 2.5 : 4);
     }
-  }
-
-  #name(pen) {
-    pen.textAlign = "right";
-    pen.fillText(this.xName, this.axes.width - plotMargin.right - 4, this.axes.height - plotMargin.bottom - 6);
-    pen.textAlign = "left";
-    pen.fillText(`its rate / ${this.unit}/${scene.timeUnit}`, plotMargin.left + 4, plotMargin.top + 10);
   }
 
   #place(q) {

@@ -1,0 +1,84 @@
+"""What a model has, for people and programs who are to set it in motion: names, units, defaults."""
+
+from __future__ import annotations
+
+import ast
+import re
+from math import isfinite
+from pathlib import Path
+
+from pendula_codegen.model import Model, rate_name, read_model
+from pendula_codegen.models import FOLDER, model_names
+
+_REMARK = re.compile(r'model\.\w+\(\s*f?"([A-Za-z]\w*?)(?:_\{.*?\})?".*#\s*(.+)$')
+
+
+def describe(file: Path, links: int | None = None) -> dict[str, object]:
+    """The model as JSON has it; `default` is null where the scenario has to give the number. Raises GenerationError."""
+    model = read_model(file, links)
+    text = file.read_text(encoding="utf-8")
+    remarks = _remarks(text)
+
+    def remark(name: str) -> str:
+        return remarks.get(name) or remarks.get(re.sub(r"_\d+$", "", name), "")
+
+    return {
+        "model": file.stem,
+        "about": _first_line(text),
+        "file": str(file.resolve()),
+        "links": model.links,
+        "has_links": _has_links(model),
+        "coordinates": [
+            {
+                "name": c.symbol.name,
+                "unit": c.unit,
+                "rate": rate_name(c.symbol.name),
+                "momentum": f"p_{c.symbol.name}",
+                "remark": remark(c.symbol.name),
+            }
+            for c in model.coordinates
+        ],
+        "parameters": [
+            {
+                "name": p.name,
+                "unit": p.unit,
+                "default": p.default if p.default is not None and isfinite(p.default) else None,
+                "positive": p.positive,
+                "per_link": p.per_link,
+                "remark": remark(p.name),
+            }
+            for p in model.parameters
+        ],
+        "inputs": [
+            {"name": i.symbol.name, "unit": i.unit, "remark": remark(i.symbol.name)} for i in model.inputs
+        ],
+        "points": [
+            {
+                "name": point.name,
+                "columns": [f"{point.name}_{axis}" for axis in "xyz"[: len(point.components)]],
+                "remark": remark(point.name),
+            }
+            for point in model.points
+        ],
+    }
+
+
+def describe_all() -> list[dict[str, object]]:
+    """All built-in models, of one link where they have some."""
+    return [describe(FOLDER / f"{name}.py") for name in model_names()]
+
+
+def _has_links(model: Model) -> bool:
+    return any(p.per_link for p in model.parameters)
+
+
+def _first_line(text: str) -> str:
+    """Of what the file says of itself."""
+    about = ast.get_docstring(ast.parse(text)) or ""
+    return about.partition("\n")[0]
+
+
+def _remarks(text: str) -> dict[str, str]:
+    """Comments on the lines that declare names; a name with the number of a link is that without it."""
+    found = filter(None, map(_REMARK.search, text.splitlines()))
+    return {match[1]: match[2] for match in found}

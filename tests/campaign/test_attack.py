@@ -1,0 +1,258 @@
+"""The attack itself: its references against what is known without them, and whether it finds a program that lies."""
+
+import math
+import os
+import stat
+import sys
+from pathlib import Path
+
+import crossings
+import drawing
+import judging
+import model_equations
+import numpy as np
+import pytest
+import truth
+
+PULSE = """
+from sympy import exp
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    w = model.parameter("w", "s", default=1e-4)
+    u = model.input("u", "N")
+    model.lagrangian = model.rate(x) ** 2 / 2 + x * exp(-(((model.time - 0.5) / w) ** 2)) / w
+    model.force(x, u)
+"""
+
+
+@pytest.fixture
+def room(tmp_path) -> truth.Room:
+    references = []
+    for name in ("CHAIN_REFERENCE", "MODEL_REFERENCE"):
+        assert os.environ.get(name), f"{name} must name the compiled reference"
+        references.append(Path(os.environ[name]))
+    return truth.Room(*references, tmp_path / "truths")
+
+
+@pytest.fixture(autouse=True)
+def kept(room) -> None:
+    room.kept.mkdir()
+
+
+def test_the_same_numbers_draw_the_same_cases():
+    for kind in drawing.KINDS:
+        for number in (0, 7, drawing.FIRST[kind] + 5):
+            assert drawing.draw(kind, 3, number) == drawing.draw(kind, 3, number)
+        assert drawing.draw(kind, 3, 1).tables != drawing.draw(kind, 4, 1).tables
+
+
+# --- references
+
+
+@pytest.mark.parametrize("width", [1e-1, 1e-3, 1e-6])
+def test_a_pulse_gives_its_impulse(room, width):
+    """√π in all, whatever its width; a drive sin(3 t) adds (3 t − sin 3 t)/9 to x."""
+    system = {"model": "model.py", "parameters": {"w": width}}
+    system["drive"] = [{"input": "u", "amplitude": 1.0, "frequency": 3.0}]
+    tables = {"system": system, "start": {"x": 0.3}, "run": {"duration": 2.0}}
+    subject = truth.ModelSubject(room, tables, PULSE, [("t - 0.5", width)])
+    rows = truth.rows_at(subject, [0.1, 2.0], 2.0)
+    driven = 1 / 3 - math.cos(6) / 3
+    assert rows.columns["x_dot"][1] - driven == pytest.approx(math.sqrt(math.pi), rel=1e-10)  # measured 5e-12
+    whole = 0.3 + math.sqrt(math.pi) * 1.5 + (6 - math.sin(6)) / 9
+    assert rows.columns["x"][1] == pytest.approx(whole, rel=1e-10)  # measured 4e-12
+    assert rows.uncertainty.max() < 1e-10  # measured 5e-12: the time is rounded, too
+
+
+def test_friction_that_sticks_is_for_the_implicit_reference(room):
+    """v/√(v² + ε) with ε = 1e-12, held by 0.3 against a push of 0.1: it creeps at √ε/√8."""
+    text = """
+from sympy import sqrt
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    v = model.rate(x)
+    model.lagrangian = v**2 / 2
+    model.force(x, 0.1 - 0.3 * v / sqrt(v**2 + 1e-12))
+"""
+    tables = {"system": {"model": "model.py"}, "start": {"x_dot": 1.0}, "run": {"duration": 20.0}}
+    subject = truth.ModelSubject(room, tables, text, [("x_dot", 1e-6)])
+    subject.methods = subject.methods[1:]  # the explicit one would be tried first, for seconds
+    rows = truth.rows_at(subject, [20.0], 20.0)
+    assert float(rows.columns["x_dot"][0]) == pytest.approx(1e-6 / math.sqrt(8), rel=1e-6)  # measured 1e-9
+    assert float(rows.columns["x"][0]) == pytest.approx(2.5, abs=1e-4)  # v²/2/0.2, and what it creeps
+
+
+def test_the_equations_are_those_of_the_chain(room):
+    """Rigid rods of the model `rods`, their masses at their ends, against a chain: Lagrange against tensions."""
+    start = {"theta_1": 1.0, "theta_2": -2.0}
+    ends = {"masses": 1.5, "lengths": 0.7, "centers": 0.7, "inertias": 1e-300, "damping": 0.1}
+    run = {"duration": 2.0}
+    text = (drawing.BROUGHT / "rods.py").read_text()
+    model = truth.ModelSubject(
+        room,
+        {"system": {"model": "rods", "links": 2, "parameters": ends}, "start": start, "run": run},
+        text,
+        [],
+    )
+    chain = truth.ChainSubject(
+        room,
+        {
+            "chain": {"space": "planar", "links": 2, "masses": 1.5, "lengths": 0.7, "damping": 0.1},
+            "start": {"theta": [1.0, -2.0]},
+            "run": run,
+        },
+    )
+    ours, theirs = (truth.rows_at(subject, [1.0, 2.0], 2.0).columns for subject in (model, chain))
+    for name in ("theta_1", "theta_2"):
+        assert np.abs(ours[name] - theirs[name]).max() < 1e-12  # measured 3e-16
+
+
+def test_a_dense_motion_is_the_motion(room):
+    tables = {
+        "chain": {"space": "planar", "masses": [1.0, 1.0], "lengths": 1.0},
+        "start": {"theta": [2.0, 3.0]},
+        "run": {"duration": 3.0},
+    }
+    subject = truth.ChainSubject(room, tables)
+    motion, ends = truth.dense(subject, 3.0)
+    times = [0.123, 1.7, 2.999]
+    rows = truth.rows_at(subject, times, 3.0)
+    between = subject.compared(subject.columns(motion.at(np.array(times))), rows.sizes)
+    assert np.abs(between - rows.numbers).max() < 1e-14  # measured 2e-17
+    assert motion.unresolved < 1e-13
+    assert ends.uncertainty.max() < 1e-12
+
+
+# --- crossings
+
+
+def found(g, direction="both", events=(), doubt=1e-9, until=10.0):
+    grid = np.linspace(0, 10, 1000, dtype=truth.Real)
+    gaps = crossings.gaps(g, lambda t: np.full(len(t), doubt), grid)
+    return [fault.text for fault in crossings.compare(gaps, list(events), direction, until)]
+
+
+def near_pair(t):
+    """Crosses 0.5 twice, 2e-4 apart and 1e-8 deep."""
+    return (t - 0.5) ** 2 - 1e-8
+
+
+def test_a_pair_deeper_than_the_doubt_must_be_found():
+    pair = [(0.4999, "down"), (0.5001, "up")]
+    assert found(near_pair, events=pair) == []
+    assert any("missed: down" in w for w in found(near_pair))
+    assert any("missed: up" in w for w in found(near_pair, events=pair[:1]))
+    assert found(near_pair, "up", [pair[1]]) == []
+    assert any("another direction" in w for w in found(near_pair, "up", pair))
+
+
+def test_a_pair_less_deep_may_be_missed_but_not_halved():
+    assert found(near_pair, doubt=1e-7) == []
+    assert found(near_pair, events=[(0.4999, "down"), (0.5001, "up")], doubt=1e-7) == []
+    assert any("half a pair" in w for w in found(near_pair, events=[(0.4999, "down")], doubt=1e-7))
+
+
+def test_crossings_that_are_none_late_or_twice_are_told():
+    def g(t):
+        return np.sin(t)
+
+    there = [(math.pi, "down"), (2 * math.pi, "up"), (3 * math.pi, "down")]
+    assert found(g, events=there) == []
+    assert found(g, events=there[:2], until=8.0) == []
+    assert any("false" in w for w in found(g, events=[*there, (5.0, "up")]))
+    assert any("false" in w for w in found(g, events=[(math.pi + 1e-6, "down"), *there[1:]]))
+    assert any("0 up and 2 down" in w for w in found(g, events=[there[0], *there]))
+
+
+def test_a_jump_is_a_crossing():
+    def g(t):
+        return np.fmod(t, truth.Real(4)) - 1
+
+    jumps = [(1.0, "up"), (4.0, "down"), (5.0, "up"), (8.0, "down"), (9.0, "up")]
+    assert found(g, events=jumps) == []
+    assert any("missed: down" in w for w in found(g, events=jumps[:1] + jumps[2:]))
+
+
+# --- verdicts
+
+
+CASE = drawing.Case(
+    "events",
+    0,
+    0,
+    "here",
+    {
+        "chain": {"space": "planar", "masses": [1.0], "lengths": 1.0},
+        "start": {"theta": [1.0]},
+        "run": {"duration": 3.0},
+        "output": {"times": [0.5, 1.5, 2.5]},
+        "event": [{"name": "e1", "when": "theta_1 - {0}"}],
+    },
+    levels=[[drawing.Level("theta_1", "turn", 0.0, -1e-6)]],
+)
+
+
+def wrapped(program: Path, folder: Path, change: str) -> Path:
+    """A program that does what pendula does, and then changes what it told: Python over `rows`, `events`, both lists of
+    lines, and `summary`."""
+    file = folder / "liar"
+    file.write_text(
+        f"""#!{sys.executable}
+import json, subprocess, sys
+done = subprocess.run([{str(program)!r}, *sys.argv[1:]], capture_output=True, text=True)
+summary = json.loads(done.stdout)
+rows, events = (open(name).read().splitlines() for name in ("rows.csv", "events.csv"))
+{change}
+for name, lines in (("rows.csv", rows), ("events.csv", events)):
+    open(name, "w").write("\\n".join(lines) + "\\n")
+print(json.dumps(summary))
+"""
+    )
+    file.chmod(file.stat().st_mode | stat.S_IXUSR)
+    return file
+
+
+LIES = {
+    "nothing": ("", "right"),
+    "a row": ('rows[2] = rows[2].replace("-0.", "-0.0", 1)', "SILENT"),
+    "an event": ("events.pop(); summary['events'][0]['count'] -= 1", "SILENT"),
+    "a count": ("summary['events'][0]['count'] -= 1", "SILENT"),
+    "the end": ("summary['final']['theta'][0] += 6.283185307179586", "SILENT"),
+    "an energy": ("rows[1] = rows[1].rsplit(',', 1)[0] + ',1.0'", "SILENT"),
+    "no number": ('rows[1] = rows[1].split(",")[0] + ",nan" * rows[1].count(",")', "SILENT"),
+    "a row, and says so": (
+        'rows[2] = rows[2].replace("-0.", "-0.0", 1); summary["warnings"] = ["no"]',
+        "said",
+    ),
+    "a row, and says so of later ones": (
+        'rows[2] = rows[2].replace("-0.", "-0.0", 1); summary |= {"warnings": ["no"], "trusted_until": 2.0}',
+        "SILENT",
+    ),
+    "a doubt": ('summary["warnings"] = ["no"]', "false doubt"),
+    "what no doubt is": ('summary["warnings"] = ["run.stages: has no effect"]', "right"),
+}
+
+
+@pytest.mark.parametrize("lie", LIES)
+def test_lies_are_found(room, program, tmp_path, lie):
+    change, kind = LIES[lie]
+    liar = wrapped(program, tmp_path, change)
+    verdict = judging.judge(CASE, room, judging.Program(liar, tmp_path / "run"))
+    assert verdict.kind == kind, verdict
+
+
+def test_a_program_that_ends_in_a_traceback_is_told(room, tmp_path):
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\nexit 3\n")
+    broken.chmod(0o755)
+    assert judging.judge(CASE, room, judging.Program(broken, tmp_path / "run")).kind == "crash"
+
+
+def test_a_model_says_its_columns():
+    model = model_equations.Model(PULSE)
+    assert model.names == ["x", "x_dot"]
+    rows = np.array([[2.0, 3.0, 0.5]], dtype=truth.Real)
+    columns = model.columns(rows, [0.1])
+    assert columns["energy"][0] == pytest.approx(4.5 - 2 / 0.1)
