@@ -80,9 +80,9 @@ def test_floating_point_exponents_are_those_of_fractions():
     [
         # No number where x < 0, as SymPy has none that is real there.
         (lambda x: x ** Rational(1, 3), "cbrt(sqrt_1)"),
-        (lambda x: x ** Rational(-1, 5), "pow(x, Real(1.0 / 5.0))"),
-        (lambda x: x**0.3, "pow(x, Real(0.3))"),
-        (lambda x: (1 + x**2) ** Rational(1, 3), "cbrt(Real(1.0) + x * x)"),
+        (lambda x: x ** Rational(-1, 5), "pow(x_, Real(1.0 / 5.0))"),
+        (lambda x: x**0.3, "pow(x_, Real(0.3))"),
+        (lambda x: (1 + x**2) ** Rational(1, 3), "cbrt(Real(1.0) + x_ * x_)"),
     ],
 )
 def test_roots_of_negative_numbers_are_none(said, printed, tmp_path):

@@ -38,6 +38,7 @@ MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, const 
   for (int k = 1; k <= most_spans && time_ > 0; ++k) {
     if (std::optional<Span> found = span(std::ldexp(time_, -k))) spans_.push_back(std::move(*found));
   }
+  if (spans_.empty()) time_ = 0;
 }
 
 std::vector<CheckLine> MotionCheck::lines() const {
@@ -339,8 +340,10 @@ CheckLine MotionCheck::tangents(const Span& span) const {
   form.topRightCorner(half, half).setIdentity();
   form.bottomLeftCorner(half, half) = -form.topRightCorner(half, half);
   const Eigen::MatrixXd D = derivative;
-  const Eigen::MatrixXd size = D.cwiseAbs().transpose() * form.cwiseAbs() * D.cwiseAbs();
-  return at_most(what, ((D.transpose() * form * D - form).cwiseAbs().array() / size.array()).maxCoeff() / epsilon);
+  if (!D.allFinite()) return at_most(what, none);
+  const Eigen::ArrayXXd size = (D.cwiseAbs().transpose() * form.cwiseAbs() * D.cwiseAbs()).array();
+  const Eigen::ArrayXXd defect = (D.transpose() * form * D - form).cwiseAbs().array();
+  return at_most(what, (defect / (epsilon * size + std::numeric_limits<double>::min())).maxCoeff());
 }
 
 }  // namespace pendula::cli
