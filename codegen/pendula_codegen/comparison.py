@@ -17,7 +17,7 @@ from pendula_codegen.model import Model
 from pendula_codegen.written import Evaluator, NotInRangeError, Written, written
 
 DRAWN = 8
-AIMED = 16
+AIMED = 32
 
 Numbers = dict[Symbol, float]
 
@@ -90,8 +90,10 @@ def points(model: Model, start: Start, seed: int) -> list[Numbers]:
         # Nearer to the start where there is nothing further away.
         any(keep(_drawn(model, symbols, start, draw, k, 0.5**attempt)) for attempt in range(20))
     aims = list(_aims(said, symbols))
-    for target in draw.sample(aims, min(AIMED, len(aims))):
-        numbers = _drawn(model, symbols, start, draw, 0, 1.0)
+    draw.shuffle(aims)
+    for k in range(AIMED if aims else 0):
+        target, turn = aims[k % len(aims)], k // len(aims)
+        numbers = _drawn(model, symbols, start, draw, k + turn, 1.0)
         place = _hit(target, numbers, draw)
         if place is not None:
             keep({**numbers, target.symbol: place})
@@ -101,7 +103,7 @@ def points(model: Model, start: Start, seed: int) -> list[Numbers]:
 def _drawn(
     model: Model, symbols: _Symbols, start: Start, draw: random.Random, number: int, spread: float
 ) -> Numbers:
-    """Every other point has the parameters of the start."""
+    """Every other point has the parameters of the start; two of four have its time."""
 
     def some(size: float) -> float:
         return draw.choice((-1, 1)) * size * 10 ** draw.uniform(-1.5, 0.5)
@@ -109,7 +111,7 @@ def _drawn(
     def near(value: float) -> float:
         return value * 2 ** (spread * draw.uniform(-1, 1)) if value else spread * 10 ** draw.uniform(-2, 0)
 
-    numbers = {symbols.time: start.time + (spread * 10 ** draw.uniform(-2, 4) if number % 4 else 0.0)}
+    numbers = {symbols.time: start.time + (spread * 10 ** draw.uniform(-2, 4) if number % 4 > 1 else 0.0)}
     for coordinate, value in zip(model.coordinates, start.q, strict=True):
         size = 1.0 if coordinate.is_angle or not value else abs(value)
         numbers[coordinate.symbol] = value + spread * some(size / 2)
@@ -132,16 +134,17 @@ class _Aim:
 
 def _aims(said: Iterable[Expr], symbols: _Symbols) -> Iterator[_Aim]:
     """Where functions change most, and sums in them or in denominators and roots vanish."""
-    seen: set[tuple[Expr, Symbol]] = set()
+    seen: set[_Aim] = set()
     for part in sorted({part for expression in said for part in expression.atoms(Function, Pow)}, key=str):
         inside = part.args[0]
         if isinstance(part, (sin, cos)) or (part.is_Pow and part.exp.is_Integer and part.exp > 0):
             continue
         for expression, exactly in ((inside, part.is_Pow), *((total, True) for total in inside.atoms(Add))):
             for symbol in (symbols.time, *symbols.q):
-                if symbol in expression.free_symbols and (expression, symbol) not in seen:
-                    seen.add((expression, symbol))
-                    yield _Aim(expression, symbol, exactly)
+                aim = _Aim(expression, symbol, exactly)
+                if symbol in expression.free_symbols and aim not in seen:
+                    seen.add(aim)
+                    yield aim
 
 
 def _hit(aim: _Aim, numbers: Mapping[Symbol, float], draw: random.Random) -> float | None:

@@ -2,10 +2,9 @@
 
 import json
 import random
-import re
 
 import pytest
-from conftest import EXAMPLES, ROOT
+from conftest import EXAMPLES
 from test_documentation import blocks
 from test_forcing import MODEL as FORCED
 from test_forcing import SHARP

@@ -124,7 +124,13 @@ def test_pulses_in_lanes_are_their_impulses(moved, tmp_path):
 
 @pytest.mark.parametrize(
     ("force", "impulse"),
-    [("pulse", 0.05 * sqrt(pi)), ("narrower", 0.074 * sqrt(pi)), ("switched", 2), ("turning", 0.02), ("dying", 1e-3)],
+    [
+        ("pulse", 0.05 * sqrt(pi)),
+        ("narrower", 0.074 * sqrt(pi)),
+        ("switched", 2),
+        ("turning", 0.02),
+        ("dying", 1e-3),
+    ],
 )
 def test_forces_with_numbers_in_their_exponents_are_there(force, impulse, moved):
     others = dict.fromkeys(("pulse", "narrower", "switched", "turning", "dying", "wall", "step"), 0.0)
@@ -136,6 +142,8 @@ def test_forces_with_numbers_in_their_exponents_are_there(force, impulse, moved)
 def test_a_step_of_the_potential_is_smooth_far_away(moved):
     """Where it begins, (x − 5)/0.03 is 833, and exp of that is no double."""
     others = dict.fromkeys(("pulse", "narrower", "switched", "turning", "dying", "wall"), 0.0)
-    text = scenario({**others, "step": 8.0}, "step = 0.002", "x = 30.0\nx_dot = -10.0", 6.0).replace("forced", "sharp")
+    text = scenario({**others, "step": 8.0}, "step = 0.002", "x = 30.0\nx_dot = -10.0", 6.0).replace(
+        "forced", "sharp"
+    )
     got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
     assert got["v"]["x"] == pytest.approx(-sqrt(100 + 2 * 8), rel=1e-10)  # measured 7e-13
