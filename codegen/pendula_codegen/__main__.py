@@ -7,6 +7,7 @@ import json
 import sys
 from pathlib import Path
 
+from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
@@ -63,7 +64,23 @@ def _parser() -> argparse.ArgumentParser:
         "--model", required=True, help="a file that defines define(model, links), or a built-in model's name"
     )
     model.add_argument("--links", type=int, help="number of links, from 1, where the model has links")
+    model.add_argument("--alias", default="", help="a further name of its structure, for programs")
     model.set_defaults(run=_run_model)
+
+    written = commands.add_parser(
+        "written", help="what a model says at points about a start, for pendula check: numbers in a line"
+    )
+    written.add_argument("--model", required=True, help="as of the command model")
+    written.add_argument("--links", type=int, help="as of the command model")
+    for name, words in (
+        ("parameters", "numbers of all parameters, those of links first"),
+        ("q", "coordinates of the start"),
+        ("v", "rates of the start"),
+    ):
+        written.add_argument(f"--{name}", required=True, type=_numbers, help=f"{words}, with commas")
+    written.add_argument("--time", required=True, type=float, help="of the start")
+    written.add_argument("--seed", required=True, type=int, help="of the points")
+    written.set_defaults(run=_run_written)
 
     what = commands.add_parser("describe", help="what a model has, as JSON")
     what.add_argument("--model", required=True, help="as of model")
@@ -107,7 +124,17 @@ def _run_link(options: argparse.Namespace) -> None:
 
 def _run_model(options: argparse.Namespace) -> None:
     model = read_model(find_model(options.model), options.links)
-    _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name))
+    _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name, options.alias))
+
+
+def _run_written(options: argparse.Namespace) -> None:
+    model = read_model(find_model(options.model), options.links)
+    start = Start(options.parameters, options.time, options.q, options.v)
+    print(comparison(model, start, options.seed))
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(number) for number in text.split(",") if number]
 
 
 def _run_tableaux(options: argparse.Namespace) -> None:

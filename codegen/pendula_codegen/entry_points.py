@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from sympy import Expr, Integer, Matrix, Rational, Symbol
+from sympy import Add, Expr, Integer, Matrix, Rational, Symbol, expand
 
 from pendula_codegen.mechanics import (
     LagrangianSystem,
@@ -126,6 +126,7 @@ class SystemKernel(ABC):
     parameters = Argument("parameters", "parameters")
     inputs = Argument("inputs", "inputs")
     equation = "E = d/dt ∂L/∂v − ∂L/∂q − Q"
+    suffix = ""  # of variables that are called after something of the model
     force_unit = ""
     momentum_unit = ""
     mass_unit = ""
@@ -152,7 +153,7 @@ class SystemKernel(ABC):
         """One per form; shared by all functions, so that what two of them hold is expanded once."""
         forms = [Form(pair_angles, frozenset()) for pair_angles in (True, False)]
         leaves = [*self.leaves(), *self.motion()]
-        return [Vocabulary(leaves, self.angles(), {}, form) for form in forms]
+        return [Vocabulary(leaves, self.angles(), {}, form, keep_sums=True) for form in forms]
 
     def functions(self) -> list[Function]:
         """All entry points, in the order of the header."""
@@ -168,9 +169,9 @@ class SystemKernel(ABC):
 
     # --- values
 
-    @cached_property
+    @property
     def accelerations(self) -> tuple[Symbol, ...]:
-        return tuple(Symbol(f"{q.name}_ddot") for q in self.system.coordinates)
+        return self.system.accelerations
 
     @cached_property
     def momentum_symbols(self) -> tuple[Symbol, ...]:
@@ -213,13 +214,31 @@ class SystemKernel(ABC):
 
     @cached_property
     def kinetic_energy(self) -> Expr:
+        """½ vᵀ M v; of terms of L that are it, as they are: squares of sums have digits that their products lose."""
+        quadratic, others = self._by_degree
         v = Matrix(self.system.velocities)
-        return Rational(1, 2) * (v.T * self.mass * v)[0]
+        slopes = gradient(Add(*others), self.system.velocities)
+        mass = self.jacobian(slopes, self.system.velocities)
+        return Add(*quadratic, Rational(1, 2) * (v.T * mass * v)[0])
 
     @cached_property
     def energy(self) -> Expr:
-        slopes = zip(self.system.velocities, self.L_v, strict=True)
-        return sum((v * p for v, p in slopes), Integer(0)) - self.system.lagrangian
+        """v·∂L/∂v − L, in the same way."""
+        quadratic, others = self._by_degree
+        slopes = gradient(Add(*others), self.system.velocities)
+        gained = (v * p for v, p in zip(self.system.velocities, slopes, strict=True))
+        return Add(*quadratic, *gained, *(-term for term in others))
+
+    @cached_property
+    def _by_degree(self) -> tuple[list[Expr], list[Expr]]:
+        """Terms of L that are squares in the rates, and the others."""
+        quadratic, others = [], []
+        for term in Add.make_args(self.system.lagrangian):
+            pairs = zip(self.system.velocities, gradient(term, self.system.velocities), strict=True)
+            twice = Add(*(v * slope for v, slope in pairs))
+            is_square = twice != 0 and expand(twice - 2 * term) == 0
+            (quadratic if is_square else others).append(term)
+        return quadratic, others
 
     @cached_property
     def _momentum_at_rest(self) -> list[Expr]:

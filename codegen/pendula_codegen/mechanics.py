@@ -37,6 +37,10 @@ class LagrangianSystem:
     forces: tuple[Expr, ...]
     time: Symbol | None = None
 
+    @property
+    def accelerations(self) -> tuple[Symbol, ...]:
+        return tuple(Symbol(f"{q.name}_ddot") for q in self.coordinates)
+
     def __post_init__(self) -> None:
         clock = () if self.time is None else (self.time,)
         declared = (*self.coordinates, *self.velocities, *self.parameters, *clock)

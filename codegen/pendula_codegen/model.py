@@ -25,7 +25,9 @@ import mpmath
 from sympy import Add, Expr, Integer, Symbol, expand, lambdify, sympify
 
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.mechanics import LagrangianSystem, gradient, jacobian, momenta
+from pendula_codegen.exact import exact
+from pendula_codegen.language import refusal
+from pendula_codegen.mechanics import LagrangianSystem, jacobian, momenta
 from pendula_codegen.simplify import shortest
 
 MAX_LINKS = 64  # a slip of the keyboard should not be derived for ever
@@ -124,8 +126,12 @@ class Model:
         return symbol
 
     def rate(self, of: Expr) -> Expr:
-        """dq/dt of a coordinate, a symbol; of an expression in coordinates and time, its derivative."""
+        """dq/dt of a coordinate, a symbol; of an expression in coordinates and time, its derivative.
+
+        Of rates and inputs there is none: accelerations are what the equations are solved for.
+        """
         value = self._expression(of, "rate")
+        self._check(value, "rate", (*self._positions(), self.time))
         for coordinate in self.coordinates:
             if value == coordinate.symbol:
                 return _rate_symbol(coordinate.symbol)
@@ -206,6 +212,11 @@ class Model:
 
     # --- what the generator asks
 
+    @property
+    def ordered_parameters(self) -> list[Parameter]:
+        """Parameters in the order of the kernel: those of links first."""
+        return sorted(self.parameters, key=lambda parameter: not parameter.per_link)
+
     @cached_property
     def system(self) -> LagrangianSystem:
         """The model as mechanics.py takes it, checked. Raises GenerationError."""
@@ -214,6 +225,7 @@ class Model:
         if self._lagrangian is None:
             raise GenerationError(f"{self.file}: expected model.lagrangian to be set")
         self._check_lagrangian(self._lagrangian)
+        self._check_forces()
         angles = [c.symbol for c in self.coordinates if c.is_angle]
         system = LagrangianSystem(
             name=self.name,
@@ -221,24 +233,27 @@ class Model:
             velocities=self._rates(),
             parameters=tuple(symbol for p in self.parameters for symbol in p.symbols),
             inputs=tuple(i.symbol for i in self.inputs),
-            lagrangian=shortest(self._lagrangian.value, angles),
-            forces=tuple(self._force_along(c.symbol, angles) for c in self.coordinates),
+            lagrangian=shortest(self._lagrangian.value, angles, self._rates()),
+            forces=tuple(self._shortest_force(c.symbol, angles) for c in self.coordinates),
             time=self.time,
         )
         self._check_kinetic(system, self._lagrangian.where)
         return system
 
-    def _force_along(self, q: Symbol, angles: Sequence[Symbol]) -> Expr:
+    def force_along(self, q: Symbol) -> Expr:
+        """Generalised force along a coordinate that L does not give, as the file says it."""
+        given = [said.value for along, said in self._forces if along == q]
+        return Add(*given, -self.dissipation.diff(_rate_symbol(q)))
+
+    def _check_forces(self) -> None:
         known = (*self._positions(), *self._rates(), self.time)
-        inputs = tuple(i.symbol for i in self.inputs)
-        given = [said for along, said in self._forces if along == q]
-        for said in given:
-            self._check(said.value, "force", (*known, *inputs), said.where)
-        total = Add(*(said.value for said in given))
+        for _, said in self._forces:
+            self._check(said.value, "force", (*known, *(i.symbol for i in self.inputs)), said.where)
         if self._dissipation is not None:
             self._check(self._dissipation.value, "dissipation", known, self._dissipation.where)
-            total -= gradient(expand(self._dissipation.value), [_rate_symbol(q)])[0]
-        return shortest(total, angles)
+
+    def _shortest_force(self, q: Symbol, angles: Sequence[Symbol]) -> Expr:
+        return shortest(self.force_along(q), angles, self._rates())
 
     def _check_lagrangian(self, said: _Said) -> None:
         inputs = {i.symbol for i in self.inputs} & said.value.free_symbols
@@ -277,9 +292,13 @@ class Model:
         return _Said(self._expression(value, what), self._line())
 
     def _expression(self, value: object, what: str) -> Expr:
-        if isinstance(value, (Real, Expr)) and not isinstance(value, bool):
-            return sympify(value)
-        self._fail(f"{what}: expected a SymPy expression, got {type(value).__name__} {value!r}")
+        if not isinstance(value, (Real, Expr)) or isinstance(value, bool):
+            self._fail(f"{what}: expected a SymPy expression, got {type(value).__name__} {value!r}")
+        expression = exact(sympify(value))
+        refused = refusal(expression)
+        if refused is not None:
+            self._fail(f"{what}: {refused}")
+        return expression
 
     def _check(self, value: Expr, what: str, known: Sequence[Symbol], where: str | None = None) -> None:
         strangers = sorted(value.free_symbols - set(known), key=lambda symbol: symbol.name)
@@ -306,7 +325,7 @@ class Model:
         return Symbol(name, real=True)
 
     def _name(self, name: object) -> None:
-        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9_]*[A-Za-z0-9])?", name) or "__" in name:
             self._fail(f"expected a name of letters, digits and underscores, got {name!r}")
         if name in CPP_KEYWORDS or (keyword.iskeyword(name) and name != "lambda"):
             self._fail(f"expected a name that no programming language uses, got '{name}'")

@@ -16,6 +16,8 @@ from pendula_codegen.vocabulary import Angle, Leaf
 class ModelKernel(SystemKernel):
     """Everything that is emitted for one model file."""
 
+    suffix = "_"  # nothing else has: not a type, a function, or a macro
+
     def __init__(self, model: Model):
         super().__init__(model.system)
         self.model = model

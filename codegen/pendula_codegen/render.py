@@ -60,11 +60,14 @@ KINDS = {
     "mechanics.py": {"kernel", "model"},
     "simplify.py": {"kernel", "model"},
     "templates/kernel.hpp.j2": {"kernel", "model"},
+    "comparison.py": set(),
+    "exact.py": {"model"},
     "model.py": {"model"},
     "model_kernel.py": {"model"},
     "link.py": {"link"},
     "templates/link.hpp.j2": {"link"},
     "tableau.py": {"tableaux"},
+    "written.py": set(),
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
     "__main__.py": set(),
     "counts.py": set(),
@@ -107,14 +110,19 @@ def kernel_name(space: str, links: int) -> str:
 class Words:
     """What a kernel says of itself, and what people are told of it.
 
+    struct    what its structure is called
     about     lines of its documentation
     sizes     names and values of integer constants
     types     names of further types, and what they are, in C++
     fields    of the structure Parameters
+    number    what that calls the type of a number
+    alias     a further name of the structure
+    own       names that somebody else has chosen, and that stand in the header as they are
     """
 
     name: str
     model: str
+    struct: str
     banner: str
     about: list[str]
     sizes: dict[str, int]
@@ -126,6 +134,9 @@ class Words:
     fields: list[str]
     holds_time: bool = False
     has_hamiltonian: bool = False
+    number: str = "Real"
+    alias: str = ""
+    own: list[str] = field(default_factory=list)
 
 
 def render_kernel(space: str, links: int, paper_blocks: bool = False) -> Header:
@@ -147,6 +158,7 @@ def render_chain(kernel: ChainKernel) -> Header:
     words = Words(
         name=name,
         model=model.name,
+        struct=cpp.struct_name(name),
         banner=banner(
             f"Kernel of the {model.name} chain with {n} link{plural}.",
             "kernel",
@@ -194,10 +206,10 @@ def render_chain(kernel: ChainKernel) -> Header:
     return _render(kernel, words)
 
 
-def render_model(model: Model, source: str) -> Header:
-    """The header of a model; `source` is how the banner names its file."""
+def render_model(model: Model, source: str, alias: str = "") -> Header:
+    """The header of a model; `source` is how the banner names its file, `alias` a further name of its structure."""
     kernel = ModelKernel(model)
-    ordered = sorted(model.parameters, key=lambda parameter: not parameter.per_link)
+    ordered = model.ordered_parameters
     inputs, points = len(model.inputs), sum(len(p.components) for p in model.points)
     names = [c.symbol.name for c in model.coordinates]
     holds_time = _holds_time(model)
@@ -205,11 +217,12 @@ def render_model(model: Model, source: str) -> Header:
     words = Words(
         name=model.name,
         model=Path(model.file).stem,
+        struct=f"{model.name}_kernel",
         banner=banner(
             f"Kernel of the system {model.name}.",
             "model",
             None,
-            f"--model {source}{links} --output {model.name}.hpp",
+            f"--model {source}{links}{f' --alias {alias}' if alias else ''} --output {model.name}.hpp",
             Path(model.file),
         ),
         about=[
@@ -229,6 +242,9 @@ def render_model(model: Model, source: str) -> Header:
         types={"Points": cpp.matrix("point_components", 1), "Inputs": cpp.matrix(inputs, 1)},
         fields=[cpp.parameter_field(parameter) for parameter in ordered],
         holds_time=holds_time,
+        number="_real",
+        alias=alias,
+        own=[parameter.name for parameter in ordered] + [alias] * bool(alias),
     )
     return _render(kernel, words)
 
@@ -257,7 +273,7 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
     functions = [cpp.render_function(kernel, function) for function in kernel.functions()]
     text = ENVIRONMENT.get_template("kernel.hpp.j2").render(
         words=words,
-        struct=cpp.struct_name(words.name),
+        struct=words.struct,
         constants=cpp.constants(
             words.coordinates,
             words.parameters,

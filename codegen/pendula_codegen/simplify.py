@@ -5,25 +5,74 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 
-from sympy import Add, Dummy, Expr, Integer, Mul, Symbol, cos, expand, sin
+from sympy import Add, Expr, Integer, Mul, Symbol, cos, expand, sin
 
 Powers = frozenset[tuple[Expr, Expr]]  # of a product without its number: base, exponent
 
 
-def shortest(expression: Expr, angles: Sequence[Symbol]) -> Expr:
-    """The expanded form, with every pair of terms that these identities make one made one."""
+def shortest(expression: Expr, angles: Sequence[Symbol], rates: Sequence[Symbol]) -> Expr:
+    """The same expression, with every pair of terms that these identities make one made one.
+
+    For that, products of sums that hold sines and cosines of angles are multiplied out where there are rates: that is
+    how the velocity of a point is squared. What loses digits there, the mass matrix loses, too, and it is needed.
+    Nothing else is multiplied out: (x − 1000)² has digits near x = 1000 that x² − 2000 x + 10⁶ has not.
+    """
+    held = {angle for angle in angles if expression.has(angle)}
     terms: dict[Powers, Expr] = {}
-    for term in Add.make_args(_expanded(expression)):
+    for term in _multiplied_out(expression, held, set(rates)):
         number, rest = term.as_coeff_Mul()
         powers = frozenset(rest.as_powers_dict().items()) - {(Integer(1), Integer(1))}
         terms[powers] = terms.get(powers, Integer(0)) + number
-    held = [angle for angle in angles if expression.has(angle)]
     found = True
     while found:
         found = False
-        for identity in _identities(held):
+        for identity in _identities([angle for angle in angles if angle in held]):
             found = _join(terms, *identity) or found
     return Add(*(number * Mul(*(base**power for base, power in powers)) for powers, number in terms.items()))
+
+
+def _multiplied_out(expression: Expr, angles: set[Symbol], rates: set[Symbol]) -> list[Expr]:
+    """Terms whose sum `expression` is."""
+    parts: list[Expr] = []
+    for term in Add.make_args(expression):
+        parts += _parts_of_product(term, angles, rates) if term.free_symbols & rates else [term]
+    return parts
+
+
+def _parts_of_product(product: Expr, angles: set[Symbol], rates: set[Symbol]) -> list[Expr]:
+    parts: list[Expr] = [Integer(1)]
+    for factor in Mul.make_args(product):
+        base, power = factor.as_base_exp()
+        twice = base.is_Add and power == 2
+        for _ in range(2 if twice else 1):
+            others = _parts_of_sum(base if twice else factor, angles, rates)
+            parts = [part * other for part in parts for other in others]
+    return parts
+
+
+def _parts_of_sum(factor: Expr, angles: set[Symbol], rates: set[Symbol]) -> list[Expr]:
+    """The terms that turn with an angle, one by one, and the rest as one; a factor that does not turn as it is."""
+    if not factor.is_Add or not _turns(factor, angles, rates):
+        return [factor]
+    turning = [term for term in factor.args if _turns(term, angles, rates)]
+    resting = [term for term in factor.args if not _turns(term, angles, rates)]
+    return [
+        *(part for term in turning for part in _parts_of_product(term, angles, rates)),
+        *([Add(*resting)] if resting else []),
+    ]
+
+
+def _turns(term: Expr, angles: set[Symbol], rates: set[Symbol]) -> bool:
+    """Whether a term has a sine or cosine of an angle as a factor; of sums all terms, one where there are rates."""
+    for factor in Mul.make_args(term):
+        base, power = factor.as_base_exp()
+        if isinstance(base, (sin, cos)) and base.free_symbols & angles:
+            return True
+        if base.is_Add and power in (1, 2):
+            enough = any if base.free_symbols & rates else all
+            if enough(_turns(part, angles, rates) for part in base.args):
+                return True
+    return False
 
 
 def _identities(angles: Sequence[Symbol]) -> Iterable[tuple[list[Expr], list[Expr], int, list[Expr]]]:
@@ -85,20 +134,6 @@ def shortest_by_pythagoras(expression: Expr, angles: Sequence[Symbol]) -> Expr:
 
 def _terms(expression: Expr) -> int:
     return len(Add.make_args(expression))
-
-
-def _expanded(expression: Expr) -> Expr:
-    """Multiplied out, but for roots and denominators, which stay as they are."""
-    held: dict[Symbol, Expr] = {}
-
-    def hold(power: Expr) -> Symbol:
-        held[symbol := Dummy()] = power
-        return symbol
-
-    whole = expression.replace(lambda e: e.is_Pow and not e.exp.is_positive, hold)
-    return (
-        expand(whole.replace(lambda e: e.is_Pow and not e.exp.is_Integer, hold)).xreplace(held).xreplace(held)
-    )
 
 
 def _by_pythagoras(expression: Expr, angles: Sequence[Symbol]) -> Iterable[Expr]:

@@ -15,9 +15,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import chain
-from math import gcd, lcm
 
-from pendula_codegen.polynomial import Monomial, Number, Polynomial, quotient
+from pendula_codegen.polynomial import Monomial, Number, Polynomial, content, in_range, is_exact, quotient
 
 Term = tuple[Number, int]  # coefficient, node
 ZERO: Term = (0, -1)
@@ -71,14 +70,12 @@ class Graph:
         parts = sorted((node, value) for node, value in collected.items() if value)
         if not parts:
             return ZERO
-        content = _content([value for _, value in parts])
+        shared = content([value for _, value in parts])
         if parts[0][1] < 0:
-            content = -content
+            shared = -shared
         if len(parts) == 1:
             return parts[0][1], parts[0][0]
-        return content, self._node(
-            self.sums, tuple((quotient(value, content), node) for node, value in parts)
-        )
+        return shared, self._node(self.sums, tuple((quotient(value, shared), node) for node, value in parts))
 
     def children(self, node: int) -> list[int]:
         """The nodes that `node` reads, with multiplicity."""
@@ -122,17 +119,6 @@ class Graph:
 
 def _scaling(coefficient: Number) -> int:
     return 0 if abs(coefficient) in (0, 1) else 1
-
-
-def _content(values: list[Number]) -> Number:
-    """A positive factor worth pulling out of a sum: 1 where a coefficient is ±1, which is free already."""
-    if 1 in values or -1 in values:
-        return 1
-    numerator, denominator = 0, 1
-    for value in values:
-        numerator = gcd(numerator, value.numerator)
-        denominator = lcm(denominator, value.denominator)
-    return quotient(numerator, denominator)
 
 
 def factor(graph: Graph, polynomial: Polynomial, counts: dict[int, int] | None = None) -> Term:
@@ -288,12 +274,15 @@ class _ProductPairs(_PairExtraction):
 class _SumPairs(_PairExtraction):
     def pairs(self, row: int) -> set[tuple]:
         terms = self.graph.sums[row]
-        return {(a, b, _ratio(y, x)) for i, (x, a) in enumerate(terms) for y, b in terms[i + 1 :]}
+        found = {(a, b, _ratio(y, x)) for i, (x, a) in enumerate(terms) for y, b in terms[i + 1 :]}
+        return {pair for pair in found if in_range(pair[2])}
 
     def make(self, pair: tuple) -> int:
         a, b, ratio = pair
-        content = _content([1, ratio])
-        return self.graph._node(self.graph.sums, ((quotient(1, content), a), (quotient(ratio, content), b)))
+        # x − 0.1 has digits near x = 0.1 that 1 − x/0.1 has not.
+        turned = not is_exact(ratio) and (a == UNIT or is_exact(quotient(1, ratio)))
+        terms = ((quotient(1, ratio), a), (1, b)) if turned else ((1, a), (ratio, b))
+        return self.graph._node(self.graph.sums, terms)
 
     def replace(self, row: int, pair: tuple, new: int) -> None:
         a, b, _ = pair

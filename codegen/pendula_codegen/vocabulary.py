@@ -99,7 +99,12 @@ class Vocabulary:
     """All atoms that one program may be written in."""
 
     def __init__(
-        self, leaves: Sequence[Leaf], angles: Sequence[Angle], definitions: dict[Symbol, Expr], form: Form
+        self,
+        leaves: Sequence[Leaf],
+        angles: Sequence[Angle],
+        definitions: dict[Symbol, Expr],
+        form: Form,
+        keep_sums: bool = False,
     ):
         self.atoms: list[Atom] = []
         self._form = form
@@ -108,7 +113,7 @@ class Vocabulary:
         self._numbers: dict[Expr, int] = {}
         self._pairs: dict[tuple[type, Symbol, Symbol], int] = {}
         self._calls: dict[tuple, int] = {}
-        self._expander = Expander(self._atom, self._call)
+        self._expander = Expander(self._atom, self._call, keep_sums)
         for symbol, definition in definitions.items():
             if symbol not in form.expanded:
                 self._add(symbol, Atom(symbol.name, "definition", definition=definition))
@@ -200,7 +205,7 @@ class Vocabulary:
             return {(): quotient(1, number)}
         key = (function, tuple(ordered(argument).items()))
         if key not in self._calls:
-            word = function if isinstance(function, str) else function[0]
+            word = (function if isinstance(function, str) else function[0]) or "sum"
             name = f"{word}_{sum(1 for known, _ in self._calls if known == function) + 1}"
             self._calls[key] = len(self.atoms)
             self.atoms.append(

@@ -15,8 +15,10 @@
 #include <cstring>
 #include <fstream>
 #include <iomanip>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
+#include <span>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -101,17 +103,6 @@ fs::path find_model(const std::string& model, const fs::path& folder, const Tool
   throw ModelError("expected a model file ending in .py, or a built-in model" +
                    (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model +
                    did_you_mean(nearest_name(model, std::vector<std::string_view>(names.begin(), names.end()))));
-}
-
-/// planar_2 as Planar2: the generator's name of the structure.
-std::string struct_name(const std::string& name) {
-  std::string text;
-  bool first = true;
-  for (const char letter : name) {
-    if (letter != '_') text += first ? static_cast<char>(std::toupper(static_cast<unsigned char>(letter))) : letter;
-    first = letter == '_';
-  }
-  return text;
 }
 
 /// Flags for the instruction set that the library runs with, as in cmake/PendulaLibrary.cmake.
@@ -202,7 +193,7 @@ void compile(const std::string& name, const fs::path& folder, const fs::path& ob
                         << "#define EXPORTED extern \"C\" __attribute__((visibility(\"default\")))\n"
                         << "EXPORTED constinit const int pendula_interface = pendula::system_interface;\n"
                         << "EXPORTED constinit const pendula::SystemEntry pendula_system =\n"
-                        << "    pendula::system_entry<pendula::kernels::" << struct_name(name) << ">();\n";
+                        << "    pendula::system_entry<pendula::kernels::" << name << "_kernel>();\n";
   std::vector<std::string> command{toolchain.compiler,
                                    "-std=c++20",
                                    "-O3",
@@ -300,6 +291,17 @@ void remove_unused_kernels(const fs::path& cache) {
     const fs::file_time_type used = entry.last_write_time(none);
     if (!none && entry.path().extension() == ".so" && used < oldest) fs::remove(entry.path(), none);
   }
+}
+
+/// Numbers with commas between them.
+template <class Numbers>
+std::string listed(const Numbers& numbers) {
+  std::string text;
+  for (const double number : numbers) {
+    if (!text.empty()) text += ',';
+    text += shortest(number);
+  }
+  return text;
 }
 
 std::string kernel_name(const std::string& model, std::optional<int> links) {
@@ -417,6 +419,22 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   }
   remove_unused_kernels(cache);
   return {object, entry, was_there};
+}
+
+std::vector<double> written_values(const std::string& model, std::optional<int> links, const fs::path& folder,
+                                   const Toolchain& toolchain, std::span<const double> parameters, const Motion& start,
+                                   unsigned seed) {
+  std::vector<std::string> arguments = about("written", find_model(model, folder, toolchain), links);
+  const auto add = [&](const char* name, const std::string& value) { arguments.push_back(name + ('=' + value)); };
+  add("--parameters", listed(parameters));
+  add("--time", shortest(start.time));
+  add("--q", listed(start.q));
+  add("--v", listed(start.v));
+  add("--seed", std::to_string(seed));
+  std::istringstream words(last_line(run_generator(arguments, toolchain)));
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) numbers.push_back(std::strtod(word.c_str(), nullptr));
+  return numbers;
 }
 
 }  // namespace pendula::io

@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <pendula/system/kernel_registry.hpp>
+#include <pendula/system/motion.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,6 +52,12 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
 /// The text of a model's file; empty where its kernel is part of this program. Throws as find_kernel.
 std::string model_source(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
                          const Toolchain& toolchain);
+
+/// What a model says about a start, for KernelComparison: by the generator, which derives it from the text of the
+/// model. `parameters` are those of the kernel. Throws as find_kernel.
+std::vector<double> written_values(const std::string& model, std::optional<int> links,
+                                   const std::filesystem::path& folder, const Toolchain& toolchain,
+                                   std::span<const double> parameters, const Motion& start, unsigned seed);
 
 /// What a model has, as JSON: coordinates, parameters, inputs, points, with units. Throws ModelError.
 std::string describe_model(const std::string& model, std::optional<int> links, const Toolchain& toolchain);

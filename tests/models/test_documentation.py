@@ -41,10 +41,13 @@ def test_the_program_compiles_and_ends_where_the_scenario_does(folder, pendula, 
     if kept is None:
         pytest.fail("PENDULA_CONSUMER_FLAGS: expected the flags that compile and link a program with pendula")
     generator = environment["PENDULA_PYTHON"]
-    made = [generator, "-m", "pendula_codegen", "model", "--model", "sprung.py", "--links", "2", "--output"]
+    made = [generator, "-m", "pendula_codegen", "model", "--model", "sprung.py", "--links", "2"]
     header = folder / "pendula" / "kernels" / "sprung_2.hpp"
     subprocess.run(
-        [*made, header], cwd=folder, check=True, env={**environment, "PYTHONPATH": str(ROOT / "codegen")}
+        [*made, "--alias", "Sprung2", "--output", header],
+        cwd=folder,
+        check=True,
+        env={**environment, "PYTHONPATH": str(ROOT / "codegen")},
     )
     compiler, *flags = kept.split()
     subprocess.run(

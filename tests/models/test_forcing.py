@@ -26,6 +26,28 @@ def define(model, links):
     model.force(theta, push * pulse + shaking * sin(frequency * model.time) + swell * growing)
 """
 
+# Numbers as literals: these stand in exponents and in what is taken out of them.
+SHARP = """
+from sympy import exp
+
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    t = model.time
+    amount = {
+        name: model.parameter(name, "N", default=0.1)
+        for name in ("pulse", "narrower", "switched", "turning", "dying", "wall", "step")
+    }
+    model.lagrangian = model.rate(x) ** 2 / 2
+    model.lagrangian += amount["switched"] * x / (1 + exp(1000.0 * (t - 2)))
+    model.lagrangian += amount["step"] / (1 + exp((x - 5) / 0.03))
+    model.lagrangian -= amount["wall"] * exp(-((x / 0.02) ** 2))
+    model.force(x, amount["pulse"] * exp(-(((t - 2) / 0.05) ** 2)))
+    model.force(x, amount["narrower"] * exp(-(((t - 2) / 0.074) ** 2)))
+    model.force(x, amount["turning"] * exp(50.0 * (t - 2.25)) / (1 + exp(50.0 * (t - 2.25))) ** 2)
+    model.force(x, amount["dying"] * exp(-1000.0 * t))
+"""
+
 METHODS = {
     "default": "",
     "2 stages": "stages = 2\ntolerance = 1e-6",
@@ -50,6 +72,7 @@ def scenario(parameters: dict[str, float], method: str, start="theta = 0.0", end
 def moved(pendula, tmp_path):
     """moved(text, command) -> the finished process, in a folder with the model."""
     (tmp_path / "forced.py").write_text(MODEL)
+    (tmp_path / "sharp.py").write_text(SHARP)
 
     def move(text: str, *command):
         (tmp_path / "forced.toml").write_text(text)
@@ -97,3 +120,30 @@ def test_pulses_in_lanes_are_their_impulses(moved, tmp_path):
     with h5py.File(tmp_path / "out.h5") as file:
         rates = file["theta_dot"][()].ravel()
     assert np.abs(rates / (10 * 0.004 * sqrt(2 * pi)) - 1).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("force", "impulse"),
+    [
+        ("pulse", 0.05 * sqrt(pi)),
+        ("narrower", 0.074 * sqrt(pi)),
+        ("switched", 2),
+        ("turning", 0.02),
+        ("dying", 1e-3),
+    ],
+)
+def test_forces_with_numbers_in_their_exponents_are_there(force, impulse, moved):
+    others = dict.fromkeys(("pulse", "narrower", "switched", "turning", "dying", "wall", "step"), 0.0)
+    text = scenario({**others, force: 3.0}, "", "x = 0.3", 6.0).replace("forced", "sharp")
+    got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
+    assert got["v"]["x"] == pytest.approx(3 * impulse, rel=1e-8)  # measured 1.6e-10
+
+
+def test_a_step_of_the_potential_is_smooth_far_away(moved):
+    """Where it begins, (x − 5)/0.03 is 833, and exp of that is no double."""
+    others = dict.fromkeys(("pulse", "narrower", "switched", "turning", "dying", "wall"), 0.0)
+    text = scenario({**others, "step": 8.0}, "step = 0.002", "x = 30.0\nx_dot = -10.0", 6.0).replace(
+        "forced", "sharp"
+    )
+    got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
+    assert got["v"]["x"] == pytest.approx(-sqrt(100 + 2 * 8), rel=1e-10)  # measured 7e-13

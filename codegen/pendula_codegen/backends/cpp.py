@@ -9,18 +9,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from pendula_codegen.entry_points import Function, SystemKernel
+from pendula_codegen.errors import GenerationError
 from pendula_codegen.model import Coordinate, Input, Parameter
 from pendula_codegen.places import Place
-from pendula_codegen.polynomial import Number
+from pendula_codegen.polynomial import Number, in_range, size_of
 from pendula_codegen.program import Program
 from pendula_codegen.straight_line import UNIT, ZERO, Term
 
-# Names that mean something else inside a member function, and those of functions that it calls.
-_MEANT = (
-    "Real Vector Matrix Points Inputs Parameters sine_and_cosine solve_symmetric sin cos tan asin acos atan sinh cosh "
-    "tanh exp log sqrt cbrt pow time"
-)
-RESERVED = frozenset(_MEANT.split())
 COLUMNS = 120  # of the project's style
 WIDTH = 112  # of a statement inside a member function
 
@@ -74,25 +69,30 @@ def print_body(
     solve: Sequence[str] = (),
     solved: int = 0,
     entry: Callable[[tuple[int, ...]], str] = eigen_entry,
+    suffix: str = "",
 ) -> Body:
     """The statements of `program`; none of its variables is called as one of `reserved`.
 
     solve    statements that come after the first `solved` outputs, and make what others read
     entry    how an entry of an array is written
+    suffix   of variables that are called after something of the model
     """
-    return _Printer(program, reserved, entry).body(solve, solved)
+    return _Printer(program, reserved, entry, suffix).body(solve, solved)
 
 
 class _Printer:
-    def __init__(self, program: Program, reserved: Iterable[str], entry: Callable[[tuple[int, ...]], str]):
+    def __init__(
+        self, program: Program, reserved: Iterable[str], entry: Callable[[tuple[int, ...]], str], suffix: str
+    ):
         self._program = program
+        self._suffix = suffix
         self._graph = program.graph
         self._atoms = program.atoms
         self._entry = entry
-        self._taken = {*reserved, *RESERVED}
+        self._taken = {*reserved}
         self._names: dict[int, str] = {}
         for node, atom in enumerate(program.atoms):
-            self._names[node] = self._free(atom.name)
+            self._names[node] = self._free(atom.name + (suffix if atom.kind != "call" else ""))
         self._numbered = 0
         self._printed: set[int] = set()
 
@@ -204,6 +204,7 @@ class _Printer:
         if len(factors) == 2 and all(f < len(self._atoms) for f in factors):
             first, second = sorted((self._atoms[f] for f in factors), key=lambda atom: atom.position)
             name = f"{first.name}_squared" if first == second else f"{first.name}_{second.name}"
+            name += self._suffix
             if name not in self._taken:
                 return self._free(name)
         self._numbered += 1
@@ -253,6 +254,10 @@ class _Printer:
 
 
 def _number(value: Number) -> str:
+    if not in_range(value):
+        raise GenerationError(
+            f"a kernel holds a number of the size 2**{size_of(value)}, which no double can hold: expected other units"
+        )
     if (
         value.denominator & (value.denominator - 1) == 0
         or max(abs(value.numerator), value.denominator) > 2**53
@@ -304,11 +309,12 @@ def render_function(kernel: SystemKernel, function: Function) -> RenderedFunctio
     names = [argument.name for argument in function.inputs] + [output.name for output in function.written]
     solve = function.solve
     if solve is None:
-        body = print_body(program, names)
+        body = print_body(program, names, suffix=kernel.suffix)
     else:
         local, solution = solve.matrix, solve.solution
         steps = [f"solve_symmetric({local.name}, {solution.name});"]
-        body = print_body(program, [*names, local.name], steps, len(solve.assignments))
+        taken = [*names, local.name]
+        body = print_body(program, taken, steps, len(solve.assignments), suffix=kernel.suffix)
     declared = [] if solve is None else [f"{TYPES[solve.matrix.type]} {solve.matrix.name};"]
     # An input that the mathematics does not need stays, unnamed.
     read = [
@@ -355,17 +361,17 @@ def literal(value: object) -> str:
 
 
 def struct_name(name: str) -> str:
-    """planar_2 as Planar2."""
+    """What programs call the kernel planar_2: Planar2."""
     return "".join(part[:1].upper() + part[1:] for part in name.split("_"))
 
 
 def matrix(rows: int | str, columns: int | str) -> str:
-    return f"Eigen::Matrix<Real, {rows}, {columns}>"
+    return f"::Eigen::Matrix<Real, {rows}, {columns}>"
 
 
 def parameter_field(parameter: Parameter) -> str:
-    """The field of a parameter in the structure Parameters."""
-    kind = matrix("links", 1) if parameter.per_link else "Real"
+    """The field of a parameter in the structure Parameters, whose number type has a name that no parameter has."""
+    kind = "::Eigen::Matrix<_real, links, 1>" if parameter.per_link else "_real"
     return f"{kind} {parameter.name};  ///< {parameter.unit}"
 
 

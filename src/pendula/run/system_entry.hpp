@@ -6,8 +6,8 @@
 #include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/lanes/lane_kernel.hpp>
 #include <pendula/run/system_integrator.hpp>
-#include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_registry.hpp>
+#include <pendula/system/kernel_values.hpp>
 
 namespace pendula {
 
@@ -61,7 +61,7 @@ constexpr SystemEntry system_entry() {
   return {info_of<S>(),
           &detail::make_system<S>,
           &detail::system_dynamics<S>,
-          &check_kernel<S>,
+          &evaluate_kernel<S>,
           &detail::observe_system<S>,
           &detail::system_rates<S>,
           &detail::system_is_loaded<S>,

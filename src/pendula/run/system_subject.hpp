@@ -62,9 +62,6 @@ class SystemSubject : public Subject {
     return v;
   }
 
-  /// As KernelEntry::check.
-  KernelCheck check(unsigned seed) const { return entry_->check(seed); }
-
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return entry_->loaded(numbers_.plain()); }
   bool damped() const override { return loaded(); }

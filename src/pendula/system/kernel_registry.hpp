@@ -16,9 +16,13 @@ class LaneDynamics;
 /// Makes a kernel's accelerations of several members at once (lane_dynamics.hpp).
 using MakeLaneDynamics = std::unique_ptr<LaneDynamics>();
 
-/// What a generated kernel's self-test measured.
+/// Every function of a system's kernel at one point (kernel_values.hpp).
+using EvaluateKernel = void(const PlainSystem&, double time, const double* q, const double* v, const double* a,
+                            double* values);
+
+/// What a check of a generated kernel measured.
 struct KernelCheck {
-  /// One statement about the kernel, the largest relative error found in it, and what that may be.
+  /// One statement about the kernel, the largest error found in it, and what that may be.
   struct Line {
     std::string_view what;
     double error = 0;
@@ -55,7 +59,7 @@ struct SystemEntry {
   SystemInfo info;
   std::unique_ptr<PlainIntegrator> (*make)(const PlainSystem&, const RunOptions&);  ///< of implicit methods
   std::unique_ptr<ForwardDynamics> (*dynamics)(const PlainSystem&);
-  KernelCheck (*check)(unsigned seed);
+  EvaluateKernel* evaluate;
   /// Energies in one state, and the components of its points, one after the other.
   SystemEnergies (*observe)(const PlainSystem&, double time, const double* q, const double* v, double* points);
   /// Rates that go with momenta p; not finite where the mass matrix is singular.

@@ -1,0 +1,110 @@
+"""What a model may say: what means something else than it seems, or cannot be computed, is refused with its line."""
+
+from pathlib import Path
+
+import pytest
+from sympy import Rational, sqrt
+
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.model import Model, read_model
+from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.render import render_model
+
+HEAD = """from sympy import *
+
+
+def define(model, links):
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    t, push = model.time, model.input("push", "N")
+    m = model.parameter("mass", "kg", default=1.0, positive=True)
+    kinetic = m * (model.rate(x)**2 + model.rate(y)**2) / 2
+    model.lagrangian = kinetic - x**2 / 2
+"""
+
+
+def read(folder: Path, line: str) -> Model:
+    file = folder / "said.py"
+    file.write_text(f"{HEAD}    {line}\n")
+    return read_model(file)
+
+
+REFUSED = {
+    "model.force(x, -model.rate(model.rate(x)))": "rate holds 'x_dot', the rate of x, which may not stand in it",
+    "model.force(x, model.rate(x * model.rate(y)))": "rate holds 'y_dot', the rate of y, which may not stand in it",
+    "model.force(x, model.rate(push))": "rate holds 'push', an input, which may not stand in it",
+    "model.force(x, model.rate(sin(x) + push**2))": "rate holds 'push', an input, which may not stand in it",
+    "model.force(x, sqrt(x**2))": "force: a kernel cannot evaluate Abs(x): it has + − * /",
+    "model.force(x, sign(x))": "force: a kernel cannot evaluate sign(x): it has",
+    "model.force(x, Max(x, 0))": "force: a kernel cannot evaluate Max(0, x): it has",
+    "model.force(x, Piecewise((x, x > 0), (0, True)))": "force: a kernel cannot evaluate Piecewise(",
+    "model.force(x, x // 2)": "force: a kernel cannot evaluate floor(x/2): it has",
+    "model.force(x, Heaviside(t))": "force: a kernel cannot evaluate Heaviside(t): it has",
+    "model.force(x, x**65)": "force: a kernel cannot evaluate x**65: it has powers up to 64",
+    "model.force(x, x**1000.0)": "force: a kernel cannot evaluate x**1000: it has powers up to 64",
+    "model.force(x, x * sqrt(Integer(-2)))": "is no real number",
+    "model.force(x, (-2)**x)": "(-2)**x is no real number",
+    "model.force(x, x * oo)": "is no finite real number",
+    "model.force(x, (1e-200 * x)**2)": "force: the number 1.00E-400 is out of the range",
+    "model.force(x, 1e200 * x * 1e200)": "force: the number 1.00E+400 is out of the range",
+    "model.point('bob', (Abs(x), 0))": "point bob: a kernel cannot evaluate Abs(x): it has",
+    "model.dissipation = Abs(model.rate(x))": "dissipation: a kernel cannot evaluate Abs(x_dot): it has",
+    "model.force(x, Symbol('x', positive=True))": "force holds a symbol 'x' that is not the model's own, a coordinate",
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_it_is_refused_with_its_line(line, tmp_path):
+    with pytest.raises(GenerationError) as refused:
+        read(tmp_path, line)
+    assert str(refused.value).startswith(f"{tmp_path / 'said.py'}:10: ")
+    assert REFUSED[line] in str(refused.value)
+
+
+def test_a_constant_has_no_rate_and_time_has_one():
+    model = Model("said", 1, "said.py")
+    x, m = model.coordinate("x", "m"), model.parameter("m", "kg")
+    assert model.rate(m) == 0 and model.rate(2) == 0 and model.rate(model.time) == 1
+    assert model.rate(x * model.time) == model.rate(x) * model.time + x
+
+
+def test_floating_point_exponents_are_those_of_fractions():
+    """x to the power of 2.0 was exp(2.0 log x): no number where x < 0."""
+    model = Model("said", 1, "said.py")
+    x = model.coordinate("x", "m")
+    model.lagrangian = model.rate(x) ** 2.0 / 2 - x**2.0 * (1 + x**2) ** 0.5
+    assert model.lagrangian == model.rate(x) ** 2 / 2 - x**2 * sqrt(1 + x**2)
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        # No number where x < 0, as SymPy has none that is real there.
+        (lambda x: x ** Rational(1, 3), "cbrt(sqrt_1)"),
+        (lambda x: x ** Rational(-1, 5), "pow(x_, Real(1.0 / 5.0))"),
+        (lambda x: x**0.3, "pow(x_, Real(0.3))"),
+        (lambda x: (1 + x**2) ** Rational(1, 3), "cbrt(Real(1.0) + x_ * x_)"),
+    ],
+)
+def test_roots_of_negative_numbers_are_none(said, printed, tmp_path):
+    file = tmp_path / "said.py"
+    file.touch()
+    model = Model("said", 1, str(file))
+    x = model.coordinate("x", "m")
+    model.lagrangian = model.rate(x) ** 2 / 2
+    model.force(x, said(x))
+    assert printed in render_model(model, "said.py").text
+
+
+def test_coefficients_of_very_different_sizes_are_kept():
+    """Their ratio, that shared sums are made by, is no double."""
+    model = Model("said", 1, "said.py")
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    model.lagrangian = model.rate(x) ** 2 / 2 + model.rate(y) ** 2 / 2
+    model.force(x, 1e-290 * x + 1e290 * y)
+    model.force(y, 2e-290 * x + 2e290 * y)
+    kernel = ModelKernel(model)
+    for function in kernel.functions():
+        for coefficient, _ in (
+            term for terms in kernel.program(function).graph.sums.values() for term in terms
+        ):
+            assert 1e-300 < abs(float(coefficient)) < 1e300
