@@ -34,15 +34,6 @@ inline Doubt of_energy(const Subject& subject, const RunOptions& run, const Ener
   return "energy is off by " + pendula::rounded(off, 2) + " " + whole + smaller_step_advice(run);
 }
 
-inline Doubt of_defect(const RunOptions& run, double defect) {
-  // Steps of the program's choice follow what they resolve as closely as the tolerance wants.
-  const double trusted = is_adaptive(run) ? std::max(1e-3, 30 * std::sqrt(run.tolerance)) : 0.02;
-  if (defect <= trusted || run.stages == 1) return {};
-  const std::string advice =
-      is_adaptive(run) ? "run.method = \"radau\" is made for damping that fast" : smaller_step_advice(run);
-  return "a step missed the velocity by " + pendula::rounded(defect, 2) + " of the fastest; " + advice;
-}
-
 /// Near a pole φ moves faster than steps of one size follow, even in parts.
 inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunReport& report) {
   const std::int64_t rejected = report.statistics.rejected_steps;
@@ -60,6 +51,22 @@ inline std::string rows_after(double until, double start) {
 }
 inline std::string untrusted_after(double until, double start) {
   return until > start ? rows_after(until, start) + " cannot be trusted" : "no row can be trusted";
+}
+
+/// Whether a step is off by more than steps of the program's choice are, that resolve motion as the tolerance wants.
+inline bool misses(const RunOptions& run, double defect) {
+  return run.stages != 1 && defect > (is_adaptive(run) ? std::max(1e-3, 30 * std::sqrt(run.tolerance)) : 0.02);
+}
+
+/// `missed`: when the first such step began.
+inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<double> missed, Trust& trust) {
+  const RunOptions& run = setup.options;
+  if (!missed) return {};
+  trust.until = std::min(trust.until, *missed);
+  const std::string advice =
+      is_adaptive(run) ? "run.method = \"radau\" is made for damping that fast" : smaller_step_advice(run);
+  return "a step missed the velocity by " + pendula::rounded(defect, 2) + " of the fastest: " +
+         rows_after(*missed, setup.start.time) + " may be wrong; " + advice;
 }
 
 /// Of trials before the run; `parted` tells how far it went from the finest of them, where it was compared.

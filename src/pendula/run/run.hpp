@@ -124,6 +124,7 @@ class Run {
   Kept kept_;
   std::int64_t rows_ = 0;           // that there were
   double step_ = 0, step_end_ = 0;  // the last step's size and end
+  std::optional<double> missed_;    // when the first step began that is off by more than it may be
   std::vector<double> row_, event_row_;
   std::chrono::steady_clock::time_point kept_at_ = std::chrono::steady_clock::now();
 };
@@ -247,7 +248,9 @@ inline void Run::integrate(const Checkpoint* from, const std::function<bool()>& 
   const auto on_row = [&](const Motion& motion, double work = 0) { take(motion, work); };
   const auto on_way = [&](const RowPlace& place, bool last) { come_by(place, last); };
   const auto on_step = [&] {
-    step_ = integrator_->time() - std::exchange(step_end_, integrator_->time());
+    const double begin = std::exchange(step_end_, integrator_->time());
+    step_ = step_end_ - begin;
+    if (!missed_ && detail::misses(options, integrator_->statistics().largest_defect)) missed_ = begin;
     std::optional<Motion> end = take_events(report);
     if (track_) track_->follow(*integrator_, end);
     if (!viewers_.empty()) view(end);
@@ -362,14 +365,15 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
     if (doubt) report.warnings.push_back(*std::move(doubt));
   };
   add(detail::of_energy(*setup_.subject, setup_.options, kept_.record.balance()));
-  add(detail::of_defect(setup_.options, report.statistics.largest_defect));
   add(detail::of_pole(*setup_.subject, setup_.options, report));
   if (is_aimed() && !went_on) {
     std::optional<Separation> parted;
     if (track_ && kept_.aim.finest) parted.emplace(*setup_.subject, *track_, *kept_.aim.finest);
-    return add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
+    add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
+  } else if (track_) {
+    add(look_again(report, stop));
   }
-  if (track_) add(look_again(report, stop));
+  add(detail::of_defect(setup_, report.statistics.largest_defect, missed_, report.trust));
 }
 
 // By a run that takes less time; where that says that this one cannot be trusted, by one that takes more, if there is
@@ -377,8 +381,9 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
 inline detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
   const double tolerance = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
-  const double share = std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon());
   const auto compare = [&](const detail::SecondLook& look) {
+    const double share =
+        std::max(0.01 * std::min(tolerance, look.options.tolerance), std::numeric_limits<double>::epsilon());
     Divergence divergence(*setup_.subject, *track_);
     const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {
       stopped = stopped || stop();
