@@ -54,7 +54,7 @@ class Run {
   std::vector<std::string> expected_trouble() const { return setup_.subject->expected_trouble(setup_.options); }
 
   /// What really runs.
-  Description description() const { return integrator_->describe(); }
+  const Description& description() const { return description_; }
 
   /// Hands every row to `observer`, which must outlive the run.
   void add(Observer& observer) {
@@ -116,12 +116,13 @@ class Run {
   };
 
   RunSetup setup_;
-  std::unique_ptr<Integrator> integrator_;
+  std::unique_ptr<Integrator> integrator_;  // one at a time: of a million links it takes a gigabyte
   std::vector<Observer*> observers_, takers_;  // all; those that take the rows of the run
   std::vector<Viewer> viewers_;                // of the others
   double viewing_seconds_ = 0;
   std::optional<Track> track_;  // of this run, where another is compared with it
   Kept kept_;
+  Description description_;
   std::int64_t rows_ = 0;           // that there were
   double step_ = 0, step_end_ = 0;  // the last step's size and end
   std::optional<double> missed_;    // when the first step began that is off by more than it may be
@@ -134,7 +135,8 @@ inline Run::Run(RunSetup setup)
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, detail::row_spacing(setup_)),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
-            {}} {}
+            {}},
+      description_(integrator_->describe()) {}
 
 inline RunReport Run::go(const std::function<bool()>& stop) {
   if (!is_aimed() || aim(stop)) return go(nullptr, stop);
@@ -176,14 +178,16 @@ inline bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
-  std::optional<Track> first;  // whose times are those of all
+  std::optional<Track> alike;  // by times of the first one, which are those of all
+  integrator_.reset();
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
+    if (stopped) return {};
     RunOptions options = setup_.options;
     options.tolerance = tolerance;
     choose_stages(options);
-    Track track = try_out(options, share, first ? Track::at_times_of(*first) : own_track(), stops);
+    Track track = try_out(options, share, alike.value_or(own_track()), stops);
     if (!track.is_complete()) return {};
-    if (!first) first = track;
+    if (!alike) alike = Track::at_times_of(track);
     return track;
   };
   const auto run = [&](double tolerance) {
@@ -196,7 +200,7 @@ inline bool Run::aim(const std::function<bool()>& stop) {
   const double start = setup_.start.time;
   kept_.aim =
       detail::climb_up(wanted, coarsest, detail::climb_down(wanted, finest, start, run, apart), run_alike, apart);
-  follow_aim();
+  if (!stopped) follow_aim();
   return !stopped;
 }
 
@@ -211,6 +215,7 @@ inline void Run::follow_aim() {
   options.tolerance = kept_.aim.tolerance;
   choose_stages(options);
   integrator_ = setup_.subject->make_integrator(options);
+  description_ = integrator_->describe();
   kept_.watch.set_degree(detail::glance_degree(options));
 }
 
@@ -231,8 +236,11 @@ inline void Run::conclude(RunReport& report) {
   report.rows = rows_;
   report.options = setup_.options;
   if (is_aimed()) report.aimed = kept_.aim;
-  report.description = integrator_->describe();
-  report.statistics = integrator_->statistics();
+  if (integrator_) {
+    report.statistics = integrator_->statistics();
+    description_ = integrator_->describe();
+  }
+  report.description = description_;
   report.energy_error = kept_.record.energy_error();
   report.energy_final = kept_.record.energy();
   report.table = kept_.record.table();
@@ -345,6 +353,7 @@ inline void Run::look_at_end(const RunResult& result) {
 
 inline void Run::come_by(const RowPlace& place, bool last) {
   using Clock = std::chrono::steady_clock;
+  if (observers_.empty()) return;
   const auto wants = [](const Observer* observer) { return observer->wants_checkpoint(); };
   if (!last && std::ranges::none_of(observers_, wants)) {
     if (std::isinf(setup_.checkpoint)) return;
@@ -380,6 +389,7 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
 // time for it: of constant steps not where the other came far.
 inline detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
+  integrator_.reset();
   const double tolerance = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
   const auto compare = [&](const detail::SecondLook& look) {
     const double share =

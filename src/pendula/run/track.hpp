@@ -39,7 +39,11 @@ class Track {
 
   /// Where it begins.
   void begin(const Motion& start) {
-    if (!looks()) states_.push_back(start);
+    if (looks()) return;
+    most_ = std::max(least, most_numbers / (2 * static_cast<std::size_t>(start.q.size()) + numbers_besides));
+    first_ = std::min(first_, static_cast<std::int64_t>(most_ / 2));
+    states_.push_back(start);
+    numbers_.push_back(0);
   }
 
   /// After every step, which the run ends at `end` within, if it does.
@@ -57,8 +61,8 @@ class Track {
   void add_row(const Motion& row) {
     if (looks() || ++all_rows_ % every_row_ != 0) return;
     rows_.push_back(row);
-    if (rows_.size() < most_rows) return;
-    std::size_t kept = first;
+    if (rows_.size() < std::min(most_rows, most_)) return;
+    auto kept = static_cast<std::size_t>(first_);
     for (std::size_t k = kept + 1; k < rows_.size(); k += 2) std::swap(rows_[kept++], rows_[k]);
     rows_.resize(kept);
     every_row_ *= 2;
@@ -81,26 +85,34 @@ class Track {
   const Motion& last() const { return last_; }
 
  private:
-  // The first steps; states of a run of few steps, as dense as that; what is kept of any run, about 64 MB.
-  static constexpr std::size_t first = 12, few = 64, most_numbers = std::size_t{1} << 23, numbers_besides = 16;
-  static constexpr std::size_t most_rows = 256;
+  // States of a run of few steps, as dense as that; what is kept of any run, about 64 MB, but a dozen states at least.
+  static constexpr std::size_t most_rows = 256, few = 64, least = 12, most_numbers = std::size_t{1} << 23,
+                               numbers_besides = 24;
 
   void count_step(const Integrator& integrator) {
     ++steps_;
-    if (steps_ > static_cast<std::int64_t>(first) && steps_ % every_ != 0) return;
+    if (!is_kept(steps_)) return;
     states_.push_back(integrator.state());
-    const std::size_t numbers = 2 * static_cast<std::size_t>(states_.back().q.size()) + numbers_besides;
-    if (states_.size() < (every_ < apart ? few : std::max(few, most_numbers / numbers))) return;
-    std::size_t kept = first + 1;                                           // and the start
-    const std::size_t next = first / static_cast<std::size_t>(every_) + 1;  // that many times `every` steps
-    for (std::size_t k = kept + next % 2; k < states_.size(); k += 2) std::swap(states_[kept++], states_[k]);
-    states_.resize(kept);
+    numbers_.push_back(steps_);
+    if (states_.size() < (every_ < apart ? std::min(few, most_) : most_)) return;
     every_ *= 2;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < states_.size(); ++k) {
+      if (!is_kept(numbers_[k])) continue;
+      std::swap(states_[kept], states_[k]);
+      numbers_[kept++] = numbers_[k];
+    }
+    states_.resize(kept);
+    numbers_.resize(kept);
   }
 
-  std::int64_t every_, steps_ = 0;
+  bool is_kept(std::int64_t step) const { return step <= first_ || step % every_ == 0; }
+
+  std::int64_t every_, steps_ = 0, first_ = 12;
+  std::size_t most_ = few;
   std::vector<double> times_;
   std::vector<Motion> states_;
+  std::vector<std::int64_t> numbers_;  // of the steps that they are the ends of
   std::int64_t all_rows_ = 0, every_row_ = 1;
   std::vector<Motion> rows_;
   Motion last_;
