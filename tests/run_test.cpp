@@ -466,6 +466,21 @@ TEST(Run, TriesNoToleranceThatItsOrderIsTooLowFor) {
   }
 }
 
+// Where chaos leaves no tolerance that is small enough, they would only take time.
+TEST(Run, TriesTinyTolerancesByRadauWhereTheyLeadToTheAccuracy) {
+  RunSetup setup = double_pendulum(7);
+  setup.options = {.method = Method::radau, .stages = 3, .step = 0};
+  setup.start.q = Eigen::Vector2d(2.5, 2.5);
+  setup.accuracy.error = 1e-9;
+  const RunReport reached = pendula::Run(setup).go();
+  EXPECT_TRUE(reached.warnings.empty()) << reached.warnings[0];
+  EXPECT_LT(reached.options.tolerance, 1e-13);  // measured 7e-15
+  setup.duration = 30;
+  const RunReport lost = pendula::Run(setup).go();
+  EXPECT_EQ(lost.warnings.size(), 1U);
+  EXPECT_EQ(lost.options.tolerance, 1e-9 / 1024);  // of order 5, four steps for one
+}
+
 // By the tolerance that its first part was run by, whatever its new end is.
 TEST(Run, GoesOnByTheAccuracyItBeganWith) {
   RunSetup setup = double_pendulum(5);

@@ -3,7 +3,7 @@
 import pytest
 
 # Ends near rest, where rates are nothing that errors could be compared with; whole periods; a pivot that is shaken
-# while nothing else moves.
+# while nothing else moves, or nothing but the last digit of an angle.
 RIGHT = {
     "a damped rod at rest": {"model": "rods", "parameters": "{damping=0.3}", "theta_1": 1, "duration": 200},
     "a rod after ten swings": {"model": "rods", "theta_1": 1e-4, "duration": 16.379848, "accuracy": 1e-12},
@@ -12,6 +12,18 @@ RIGHT = {
         "parameters": "{y_amplitude=0.03, frequency=120}",
         "theta_1": 0,
         "duration": 1,
+    },
+    "a rod that all but rests": {
+        "model": "rods",
+        "parameters": "{damping=0.3}",
+        "theta_1": 1e-14,
+        "duration": 200,
+    },
+    "upright to the last digit": {
+        "model": "driven_chain",
+        "parameters": "{y_amplitude=0.1, frequency=50}",
+        "theta_1": 3.141592653589793,
+        "duration": 10,
     },
     "upright on a shaken pivot": {
         "model": "driven_chain",

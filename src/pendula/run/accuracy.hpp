@@ -48,14 +48,22 @@ inline int order_of(const RunOptions& options) {
   }
 }
 
-/// The smallest tolerance that steps are chosen by: one that rounding allows, and where the order is given, one that
-/// takes no more than some steps for each of a run by the accuracy itself.
-inline double finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
+/// The smallest tolerances that steps are chosen by.
+struct FinestTolerance {
+  double good;      ///< where it may be good enough
+  double hopeless;  ///< where none is, so that it only tells up to when the motion is known
+};
+
+/// Rounding allows so much; and an order that is given no more than some steps for each of a run by the accuracy
+/// itself, unless more of them lead to the accuracy.
+inline FinestTolerance finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
   constexpr double most_steps = 4;
   const double rounding = is_explicit(options.method) ? 1e-14 : 1e-16;
+  const double few_steps = std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
   const bool chooses_order = options.method == Method::bulirsch_stoer || options.method == Method::taylor;
-  if (accuracy.chooses_stages || chooses_order) return rounding;
-  return std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
+  if (chooses_order) return {rounding, rounding};
+  if (!accuracy.chooses_stages) return {few_steps, few_steps};
+  return {rounding, options.method == Method::gauss ? rounding : few_steps};
 }
 
 /// What is known of the errors by two tolerances of which the finer one is good enough.
@@ -76,10 +84,10 @@ inline constexpr double together = 0.01;
 /// factor, the next is finer, and is compared with it. Errors scatter about what tolerances ask for by factors of ten
 /// and more, so that aims lie below what is wanted.
 template <class RunTrial, class Apart>
-AccuracyLadder climb_down(double wanted, double finest, double start, RunTrial run, Apart apart) {
+AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start, RunTrial run, Apart apart) {
   constexpr double step = 100, coarsest = 1e-3, enough = 0.3, aimed = 0.1;
   constexpr double rounding = 2e-16;  // errs as a tolerance of that size would
-  double coarse = std::max(std::min(step * wanted, coarsest), step * finest), fine = coarse / step;
+  double coarse = std::max(std::min(step * wanted, coarsest), step * smallest.good), fine = coarse / step;
   std::optional<Track> far = run(coarse);
   for (;;) {
     std::optional<Track> near = run(fine);
@@ -87,6 +95,7 @@ AccuracyLadder climb_down(double wanted, double finest, double start, RunTrial r
     std::optional<Separation> parted;
     if (far && near) parted.emplace(apart(*far, *near));
     const double off = parted ? parted->largest() : std::numeric_limits<double>::infinity();
+    const double finest = smallest.good / coarse * off <= wanted ? smallest.good : smallest.hopeless;
     double next = fine / (10 * step);
     if (off <= together) {
       const double factor = off / coarse, error = finer * off;

@@ -195,7 +195,8 @@ inline bool Run::aim(const std::function<bool()>& stop) {
     return run_alike(tolerance);  // no two begin alike
   };
   const auto apart = [&](const Track& a, const Track& b) { return Separation(*setup_.subject, a, b); };
-  const double wanted = setup_.accuracy.error, finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
+  const double wanted = setup_.accuracy.error;
+  const detail::FinestTolerance finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
   const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides what was before
   const double start = setup_.start.time;
   kept_.aim =

@@ -87,8 +87,9 @@ class RunRecord {
 
   EnergyBalance balance() const {
     if (scale_) return balance_;
-    if (!(whole_ > 0)) return {};
-    return {balance_.most / whole_, balance_.least / whole_};
+    const double whole = std::max(whole_, rounding * largest_sum_);
+    if (!(whole > 0)) return {};
+    return {balance_.most / whole, balance_.least / whole};
   }
 
   /// The thinned table; it ends in the last row.
@@ -116,6 +117,8 @@ class RunRecord {
 
  private:
   static constexpr std::size_t most_table_rows = 16;
+  // Of |T| + |U|, what moves less is lost in the rounding of these, a thousandth of it and more.
+  static constexpr double rounding = 1e-10;
 
   TableRow empty_row() const { return {0, std::vector<double>(shown_.second), 0}; }
 

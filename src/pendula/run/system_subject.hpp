@@ -138,7 +138,8 @@ class SystemSubject : public Subject {
 
   using Subject::distance;
   /// The largest of coordinates, relative to the largest of their unit, angles at least to one radian, and of rates,
-  /// relative to the fastest of their unit.
+  /// relative to the fastest of their unit, at least to what moves a coordinate by a hundredth of that until the end:
+  /// rates of what rests are nothing but rounding.
   double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     double furthest = 0;
     const auto compare = [&](double x, double y, double scale) {
@@ -147,8 +148,9 @@ class SystemSubject : public Subject {
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       const std::string_view unit = info().coordinate_units[k];
-      compare(a.q[i], b.q[i], std::max(info().is_angle[k] ? 1.0 : 0.0, largest(size.q, unit)));
-      compare(a.v[i], b.v[i], largest(size.v, unit));
+      const double whole = std::max(info().is_angle[k] ? 1.0 : 0.0, largest(size.q, unit));
+      compare(a.q[i], b.q[i], whole);
+      compare(a.v[i], b.v[i], std::max(size.time > 0 ? 0.01 * whole / size.time : 0, largest(size.v, unit)));
     }
     return furthest;
   }
