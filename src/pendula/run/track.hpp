@@ -7,7 +7,6 @@
 #include <iterator>
 #include <limits>
 #include <optional>
-#include <pendula/run/integrator.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <utility>
@@ -24,8 +23,10 @@ class Track {
   static constexpr std::int64_t apart = 6;
 
   /// At the end of each of the first steps, in which what is stiff dies away, and of every so many later ones, `apart`
-  /// of constant ones; of a run of many steps at fewer of them.
-  explicit Track(std::int64_t every) : every_(every) {}
+  /// of constant ones; of a run of many steps at fewer of them: at most so many numbers are kept, by default about
+  /// 64 MB.
+  explicit Track(std::int64_t every, std::size_t most_numbers = std::size_t{1} << 23)
+      : most_numbers_(most_numbers), every_(every) {}
 
   /// At the times of `other`.
   static Track at_times_of(const Track& other) {
@@ -42,14 +43,16 @@ class Track {
     if (!looks()) states_.push_back(start);
   }
 
-  /// After every step, which the run ends at `end` within, if it does.
-  void follow(Integrator& integrator, const std::optional<Motion>& end) {
-    if (!looks()) return count_step(integrator);
-    const double last = end ? end->time : integrator.time();
+  /// After every step of `mover`, an Integrator or what has its time, state, look and glance; the run ends at `end`
+  /// within, if it does.
+  template <class Mover>
+  void follow(Mover& mover, const std::optional<Motion>& end) {
+    if (!looks()) return count_step(mover);
+    const double last = end ? end->time : mover.time();
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {
       const double time = times_[states_.size()];
       Motion there;
-      states_.push_back(integrator.look(time, there) ? std::move(there) : integrator.glance(time));
+      states_.push_back(mover.look(time, there) ? std::move(there) : mover.glance(time));
     }
   }
 
@@ -81,16 +84,17 @@ class Track {
   const Motion& last() const { return last_; }
 
  private:
-  // The first steps; states of a run of few steps, as dense as that; what is kept of any run, about 64 MB.
-  static constexpr std::size_t first = 12, few = 64, most_numbers = std::size_t{1} << 23, numbers_besides = 16;
+  // The first steps; states of a run of few steps, as dense as that; what a state takes besides its numbers.
+  static constexpr std::size_t first = 12, few = 64, numbers_besides = 16;
   static constexpr std::size_t most_rows = 256;
 
-  void count_step(const Integrator& integrator) {
+  template <class Mover>
+  void count_step(const Mover& mover) {
     ++steps_;
     if (steps_ > static_cast<std::int64_t>(first) && steps_ % every_ != 0) return;
-    states_.push_back(integrator.state());
+    states_.push_back(mover.state());
     const std::size_t numbers = 2 * static_cast<std::size_t>(states_.back().q.size()) + numbers_besides;
-    if (states_.size() < (every_ < apart ? few : std::max(few, most_numbers / numbers))) return;
+    if (states_.size() < (every_ < apart ? few : std::max(few, most_numbers_ / numbers))) return;
     std::size_t kept = first + 1;                                           // and the start
     const std::size_t next = first / static_cast<std::size_t>(every_) + 1;  // that many times `every` steps
     for (std::size_t k = kept + next % 2; k < states_.size(); k += 2) std::swap(states_[kept++], states_[k]);
@@ -98,6 +102,7 @@ class Track {
     every_ *= 2;
   }
 
+  std::size_t most_numbers_;
   std::int64_t every_, steps_ = 0;
   std::vector<double> times_;
   std::vector<Motion> states_;
@@ -149,6 +154,9 @@ class Separation {
     return largest;
   }
 
+  /// That of the ends alone.
+  Separation of_ends() const { return Separation({places_.back()}); }
+
   /// The last time up to which all distances are at most so large; infinite where all are. `start` where none is.
   double within(double limit, double start) const {
     double last = start;
@@ -165,6 +173,8 @@ class Separation {
   struct Place {
     double time, off;
   };
+
+  explicit Separation(std::vector<Place> places) : places_(std::move(places)) {}
 
   std::vector<Place> places_;
 };
