@@ -238,24 +238,17 @@ class Session {
     return ranks_.size() > 1 ? 1 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   }
 
-  /// Some members are looked at again, evenly among all: what can be said of the others, without moving each of them
-  /// twice.
+  /// What a second look at some members has told.
   void doubt() {
-    constexpr std::int64_t most = 8, one_of = 32;
-    const std::int64_t count = std::clamp<std::int64_t>(plan_.count / one_of, 1, most);
-    const MemberRuns members(scenarios_, plan_, kept_, guard_);
-    std::int64_t doubted = 0;
-    std::string first;
-    for (std::int64_t k = 0; k < count; ++k) {
-      const std::int64_t member = (2 * k + 1) * plan_.count / (2 * count);
-      const std::vector<std::string> sentences = members.doubts(member);
-      if (sentences.empty() || doubted++ > 0) continue;
-      first = "member " + std::to_string(member) + ": " + sentences.front();
-    }
-    if (doubted == 0) return;
-    const std::string all = std::to_string(count) + (count == 1 ? " member that was" : " members that were");
-    warnings_.push_back("of " + all + " moved again to see how far the ensemble can be trusted " +
-                        std::to_string(doubted) + " cannot be, or not to the last digits; the first, " + first);
+    if (tally_.untrusted == 0) return;
+    const std::int64_t first = tally_.first_untrusted;
+    std::string numbers;
+    for (const std::string& each : plan_.overrides(first)) numbers += (numbers.empty() ? "" : ", ") + each;
+    const auto advice = [](const auto& scenario) { return detail::smaller_step_advice(scenario.run); };
+    warnings_.push_back("of " + std::to_string(tally_.looked_at) + " members that were looked at again " +
+                        std::to_string(tally_.untrusted) +
+                        " cannot be trusted, or not to the last digits (trusted = 0 in the file); the first, member " +
+                        std::to_string(first) + ": " + numbers + "; " + std::visit(advice, scenarios_.base()));
   }
 
   /// Of shards that end at once, one after the other.
@@ -301,6 +294,8 @@ class Session {
                                         {"members_done", tally_.done},
                                         {"complete", tally_.done == plan_.count},
                                         {"statuses", statuses},
+                                        {"looked_at", tally_.looked_at},
+                                        {"untrusted", tally_.untrusted},
                                         {"threads", threads()},
                                         {"ranks", ranks_.size()},
                                         {"wall_seconds", seconds_},
@@ -312,6 +307,7 @@ class Session {
     std::cout << "members            " << tally_.done
               << (tally_.done < plan_.count ? " of " + std::to_string(plan_.count) : "") << '\n';
     for (const auto& [name, count] : statuses.items()) std::cout << "  " << name << "  " << count << '\n';
+    std::cout << "looked at again    " << tally_.looked_at << ", " << tally_.untrusted << " of them not trusted\n";
     std::cout << "time               " << rounded(seconds_, 3) << " s, "
               << rounded(static_cast<double>(moved) / seconds_, 3) << " members a second, " << threads()
               << (threads() == 1 ? " thread" : " threads")

@@ -63,7 +63,11 @@ std::shared_ptr<const SystemEntry> MemberScenarios::find_system(const std::strin
 
 MemberRuns::MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan, const Kept& kept,
                        const InterruptGuard& guard)
-    : scenarios_(scenarios), plan_(plan), kept_(kept), guard_(guard), width_(kept.columns().size() + 1) {}
+    : scenarios_(scenarios),
+      plan_(plan),
+      kept_(kept),
+      guard_(guard),
+      width_(kept.columns().size() + io::EnsembleHead::flags) {}
 
 /// One member, from its scenario to its report.
 struct MemberRuns::Member {
@@ -71,6 +75,7 @@ struct MemberRuns::Member {
   std::string problem;
   std::optional<RunSetup> setup;  // of one that waits for others
   RunReport report;
+  bool is_looked_at = false;
   std::optional<LyapunovSpectrum> exponent;  // where it is kept, and was found together with those of others
 };
 
@@ -94,29 +99,27 @@ io::DoneChunk MemberRuns::run(const Chunk& members) const {
     const std::string message = append(all[k], done.rows);
     if (!message.empty()) done.messages.push_back({members.first + static_cast<std::int64_t>(k), message});
   }
+  if (guard_.interrupted()) throw Interrupted();  // a second look, perhaps, which would tell of a doubt
   return done;
 }
 
-std::vector<std::string> MemberRuns::doubts(std::int64_t member) const {
-  try {
-    io::SharedExpressions shared;
-    RunSetup setup = setup_of(scenarios_.of_member(plan_, member), shared);
-    setup.doubted = true;
-    return Run(std::move(setup)).go([&] { return guard_.interrupted(); }).warnings;
-  } catch (const io::InputError&) {
-    return {};
-  }
+// All of few; of many some, who fill lanes together, evenly by multiples of the golden ratio, whatever rows a grid has.
+bool MemberRuns::is_looked_at(std::int64_t number) const {
+  constexpr std::uint64_t few = 256, one_of = 32, together = 8, golden = 0x9E3779B97F4A7C15;
+  const auto count = static_cast<std::uint64_t>(plan_.count), wanted = std::max(few, count / one_of);
+  const std::uint64_t share = std::numeric_limits<std::uint64_t>::max() / count;
+  return count <= few || static_cast<std::uint64_t>(number) / together * golden < share * wanted;
 }
 
 // Reads a member, and runs it unless it can go with others. One that something is wrong with is read once more, with
 // its places in the file.
 MemberRuns::Member MemberRuns::member(std::int64_t number, io::SharedExpressions& shared) const {
   try {
-    return member_of(scenarios_.quickly_of_member(plan_, number), shared);
+    return member_of(scenarios_.quickly_of_member(plan_, number), number, shared);
   } catch (const io::InputError&) {
   }
   try {
-    return member_of(scenarios_.of_member(plan_, number), shared);
+    return member_of(scenarios_.of_member(plan_, number), number, shared);
   } catch (const io::InputError& error) {
     Member unreadable;
     unreadable.problem = error.what();
@@ -124,10 +127,14 @@ MemberRuns::Member MemberRuns::member(std::int64_t number, io::SharedExpressions
   }
 }
 
-MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const {
+MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, std::int64_t number,
+                                         io::SharedExpressions& shared) const {
   Member member;
   member.scenario = std::move(scenario);
   RunSetup setup = setup_of(*member.scenario, shared);
+  // Trials for an accuracy tell of each how far it can be trusted.
+  setup.doubted = setup.estimate && (setup.accuracy.error > 0 || is_looked_at(number));
+  member.is_looked_at = setup.doubted;
   if (lane_kind(setup, lane_options(setup, method()))) {
     member.setup = std::move(setup);
   } else {
@@ -184,7 +191,11 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
     const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
     LyapunovSpectrum spectrum;
     if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
-    rows.push_back(io::member_status(ending.status));
+    const int status = io::member_status(ending.status);
+    const auto trusted = static_cast<double>(report.warnings.empty() ? io::Trusted::yes : io::Trusted::no);
+    if (std::getenv("DBG")) for (auto& w : report.warnings) std::cerr << w << "\n";
+    rows.push_back(status);
+    rows.push_back(member.is_looked_at && io::is_ok(status) ? trusted : std::nan(""));
     kept_.append(*subject, report, spectrum, rows);
     return ending.message;
   };

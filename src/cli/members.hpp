@@ -84,18 +84,17 @@ class MemberRuns {
  public:
   MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan, const Kept& kept, const InterruptGuard& guard);
 
-  /// What came of them; one that cannot be moved says so. Throws Interrupted.
+  /// What came of them, and whether a second look at some of them agrees; one that cannot be moved says so. Throws
+  /// Interrupted.
   io::DoneChunk run(const Chunk& members) const;
-
-  /// Reasons not to trust the end of a member, by a second look at it; none where it failed anyway.
-  std::vector<std::string> doubts(std::int64_t member) const;
 
  private:
   struct Member;
 
   MemberMethod method() const { return plan_.chooses_method ? MemberMethod::quickest : MemberMethod::asked; }
+  bool is_looked_at(std::int64_t number) const;
   Member member(std::int64_t number, io::SharedExpressions& shared) const;
-  Member member_of(io::AnyScenario scenario, io::SharedExpressions& shared) const;
+  Member member_of(io::AnyScenario scenario, std::int64_t number, io::SharedExpressions& shared) const;
   RunSetup setup_of(const io::AnyScenario& scenario, io::SharedExpressions& shared) const;
   void find_exponents(std::vector<Member>& all) const;
   template <class Scenario>

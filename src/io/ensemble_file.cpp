@@ -71,7 +71,7 @@ class Bytes {
 /// One column of a chunk into its place.
 class Columns {
  public:
-  Columns(const Bytes& bytes, const EnsembleHead& head) : bytes_(bytes), width_(head.columns.size() + 1) {}
+  Columns(const Bytes& bytes, const EnsembleHead& head) : bytes_(bytes), width_(head.width()) {}
 
   void write(const DoneChunk& chunk, std::size_t column, const Place& place) {
     switch (place.type) {
@@ -126,11 +126,17 @@ void for_each_done(const std::string& folder, const EnsembleHead& head, Take tak
 
 Found look_through(const std::string& folder, const EnsembleHead& head) {
   Found found;
-  const std::size_t width = head.columns.size() + 1;
+  EnsembleTally& tally = found.tally;
   for_each_done(folder, head, [&](const DoneChunk& chunk) {
-    found.tally.done += chunk.members.size();
-    for (std::size_t k = 0; k < chunk.rows.size(); k += width) {
-      ++found.tally.statuses.at(static_cast<std::size_t>(chunk.rows[k]));
+    tally.done += chunk.members.size();
+    for (std::int64_t k = 0; k < chunk.members.size(); ++k) {
+      const double* const row = &chunk.rows[static_cast<std::size_t>(k) * head.width()];
+      ++tally.statuses.at(static_cast<std::size_t>(row[0]));
+      if (std::isnan(row[1])) continue;
+      ++tally.looked_at;
+      if (row[1] != static_cast<double>(Trusted::no)) continue;
+      const std::int64_t member = chunk.members.first + k;
+      if (tally.untrusted++ == 0 || member < tally.first_untrusted) tally.first_untrusted = member;
     }
     found.messages.insert(found.messages.end(), chunk.messages.begin(), chunk.messages.end());
   });
@@ -155,7 +161,7 @@ class Words {
   }
 
  private:
-  std::set<std::string> taken_ = {"status", "member", "failed_member", "message"};
+  std::set<std::string> taken_ = {"status", "trusted", "member", "failed_member", "message"};
 };
 
 void write_origin(const hdf5::Handle& file, const EnsembleHead& head, const EnsembleTally& tally) {
@@ -203,7 +209,7 @@ std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleH
   return scales;
 }
 
-/// The data sets, empty, and where each lies: of the status, the columns; of members at random their numbers and keys.
+/// The data sets, empty, and where each lies: of the flags, the columns; of members at random their numbers and keys.
 std::vector<Place> create_columns(const hdf5::Handle& file, const EnsembleHead& head) {
   Words words;
   const std::vector<hdf5::Handle> scales = write_scales(file, head, words);
@@ -220,6 +226,8 @@ std::vector<Place> create_columns(const hdf5::Handle& file, const EnsembleHead& 
   std::vector<std::string> meanings{"not_run"};
   meanings.insert(meanings.end(), member_statuses.begin(), member_statuses.end());
   hdf5::write_flags(status, Type::byte, not_run, meanings);
+  const hdf5::Handle trusted = create("trusted", "whether a second look at the member agrees", "", Type::byte);
+  hdf5::write_flags(trusted, Type::byte, -1, std::array<std::string, 3>{"not_looked_at", "no", "yes"});
   std::vector<Place> drawn;
   for (const EnsembleDraw& draw : head.plan.draws) {
     create(words.of(draw.key), draw.key, unit_of_key(draw.key), Type::real);
@@ -285,8 +293,8 @@ Chunk EnsembleHead::members_of(std::int64_t k) const {
 JournalKind EnsembleHead::kind() const {
   std::string text = origin.version + '\n' + origin.instruction_set + '\n' + origin.scenario + '\n' + origin.model;
   for (const std::string& change : origin.overrides) text += '\n' + change;
-  text += '\n' + std::to_string(chunk);
-  return {fingerprint(text), columns.size() + 1};
+  text += '\n' + std::to_string(chunk) + " trusted";  // which files of old have not
+  return {fingerprint(text), width()};
 }
 
 std::vector<bool> done_chunks(const std::string& folder, const EnsembleHead& head) {
@@ -323,7 +331,7 @@ EnsembleTally write_ensemble(const std::string& file, const EnsembleHead& head, 
     if (!opened.close()) throw hdf5::Error();
     Bytes bytes(part, file);
     Columns columns(bytes, head);
-    const std::size_t kept = head.columns.size() + 1;
+    const std::size_t kept = head.width();
     for_each_done(folder, head, [&](const DoneChunk& chunk) {
       for (std::size_t k = 0; k < kept; ++k) columns.write(chunk, k, places[k]);
     });

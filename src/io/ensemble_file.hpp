@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -28,6 +29,9 @@ constexpr bool is_ok(int status) {
   return status == 0 || status == 1;
 }
 
+/// Whether a member that was looked at again can be trusted, as the data set `trusted` numbers it; −1 of others.
+enum class Trusted { no, yes };
+
 /// A number that is kept of every member.
 struct EnsembleColumn {
   std::string name;    ///< as it is asked for, `event:flip`: a data set is called so in letters, digits and underscores
@@ -47,7 +51,9 @@ struct EnsembleHead {
 
   std::int64_t chunks() const { return (plan.count + chunk - 1) / chunk; }
   Chunk members_of(std::int64_t k) const;
-  /// A row of a journal: the status, then the columns.
+  /// A row of a journal: the status, Trusted or NaN, then the columns.
+  std::size_t width() const { return flags + columns.size(); }
+  static constexpr std::size_t flags = 2;
   JournalKind kind() const;
 };
 
@@ -61,7 +67,9 @@ std::vector<bool> done_chunks(const std::string& folder, const EnsembleHead& hea
 struct EnsembleTally {
   std::int64_t done = 0;
   std::array<std::int64_t, member_statuses.size()> statuses{};
-  DoneChunk::Message first_failure{-1, {}};  ///< of the first member that has one
+  std::int64_t looked_at = 0, untrusted = 0;  ///< of those that came to their ends
+  std::int64_t first_untrusted = -1;          ///< number of a member
+  DoneChunk::Message first_failure{-1, {}};   ///< of the first member that has one
 
   std::int64_t failed() const { return done - statuses[0] - statuses[1]; }
 };

@@ -613,9 +613,8 @@ def judge_ensemble(case: Case, room: truth.Room, program: Program) -> Verdict:
     if ended.returncode not in (0, 1) or not summary:
         verdict.kind, verdict.words = "crash", [f"exit status {ended.returncode}", ended.stderr[-300:]]
         return verdict
-    done = Run(0, summary, "", {}, [], {}, verdict.seconds)
-    verdict.words = done.doubts
-    wrong: list[tuple[float, str]] = []
+    verdict.words = Run(0, summary, "", {}, [], {}, verdict.seconds).doubts
+    wrong, silent, falsely_doubted = [], [], []
     decided = True
     with h5py.File(folder / "out.h5") as file:
         kept = Kept(file)
@@ -628,14 +627,28 @@ def judge_ensemble(case: Case, room: truth.Room, program: Program) -> Verdict:
                 decided = False
                 continue
             decided = decided and sure
-            wrong += found
+            wrong += [text for _, text in found]
+            is_doubted = kept.is_doubted(member)
+            if found and not is_doubted:
+                silent += [text for _, text in found]
+            is_right = sure and not found and errors.error.max(initial=0) < DOUBTFUL[by] * asked
+            if is_doubted and is_right and asked * errors.growth.max(initial=1) < NOTHING_ASKED:  # no luck
+                falsely_doubted.append(f"member {member} is right")
             verdict.error = max(verdict.error, float(errors.error.max(initial=0)))
             verdict.ratio = max(verdict.ratio, float(errors.ratio.max(initial=0)))
             verdict.growth = max(verdict.growth, float(errors.growth.max(initial=1)))
         if kept.failed_all():
             verdict.kind = "refused"
             return verdict
-    return conclude(verdict, done, wrong, decided)
+    verdict.wrong = [*silent, *wrong][:6]
+    verdict.words = falsely_doubted + verdict.words
+    if silent or wrong:
+        verdict.kind = "SILENT" if silent else "said"
+    elif falsely_doubted:
+        verdict.kind = "false doubt"
+    elif not decided:
+        verdict.kind = "said" if verdict.words else "undecided"
+    return verdict
 
 
 class Kept:
@@ -670,6 +683,9 @@ class Kept:
 
     def failed(self, member: int) -> bool:
         return self.status(member) not in ("ok", "stopped_by_event")
+
+    def is_doubted(self, member: int) -> bool:
+        return int(self.find("trusted")[member]) == 0
 
     def failed_all(self) -> bool:
         return all(self.failed(k) for k in range(len(self.find("status"))))

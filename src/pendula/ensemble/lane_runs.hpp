@@ -8,6 +8,7 @@
 #include <deque>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <pendula/chain/chain_links.hpp>
@@ -20,9 +21,11 @@
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/run/track.hpp>
 #include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 namespace pendula {
@@ -89,7 +92,7 @@ inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions
   const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;
   const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
                     setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
-                    !setup.doubted && setup.accuracy.error == 0;
+                    setup.accuracy.error == 0;
   LaneKind kind;
   if (!fits || !(detail::name_chain<Planar>(setup, options, kind) ||
                  detail::name_chain<Spatial>(setup, options, kind) || detail::name_kernel(setup, options, kind))) {
@@ -209,14 +212,18 @@ class PlainSystems : public PlainEnds {
 template <class Members>
 class LaneRuns : private LaneWatch {
  public:
-  /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they are run alone.
-  LaneRuns(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop)
-      : setups_(setups), options_(options), stop_(stop), members_(setups) {
+  /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they are run alone. So
+  /// must `tracks`, one for each or null, that go along with them.
+  LaneRuns(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop,
+           std::span<Track* const> tracks)
+      : setups_(setups), options_(options), stop_(stop), tracks_(tracks), members_(setups) {
     watches_.reserve(setups.size());
-    for (const RunSetup* setup : setups) {
-      watches_.emplace_back(setup->events, detail::glance_degree(options));
-      if (!setup->events.empty()) watches_.back().start(setup->start);
-      wants_steps_ |= !setup->events.empty() || is_tried(*setup);
+    for (std::size_t k = 0; k < setups.size(); ++k) {
+      const RunSetup& setup = *setups[k];
+      watches_.emplace_back(setup.events, detail::glance_degree(options));
+      if (!setup.events.empty()) watches_.back().start(setup.start);
+      if (tracks[k] != nullptr) tracks[k]->begin(setup.start);
+      wants_steps_ |= !setup.events.empty() || is_tried(setup) || tracks[k] != nullptr;
     }
     steps_.resize(setups.size());
     takes_too_long_.resize(setups.size());
@@ -232,6 +239,8 @@ class LaneRuns : private LaneWatch {
         reports_[k].end = RunEnd::stopped;
       } else if (!finish(k)) {
         continue;
+      } else if (tracks_[k] != nullptr) {
+        tracks_[k]->finish(reports_[k].last, true);
       }
       found[k] = std::move(reports_[k]);
     }
@@ -259,6 +268,7 @@ class LaneRuns : private LaneWatch {
     report.energy_error.largest = report.energy_error.of(before.energy + std::max(last, end.energy_error));
     if (is_tried(setup) && !is_good(k, report)) return false;
     report.energy_final = after.energy;
+    report.options = options_;
     report.rows = 1 + (end.steps + setup.every - 1) / setup.every;
     report.statistics.steps = end.steps;
     report.statistics.rejected_steps = end.rejected_steps;
@@ -345,6 +355,31 @@ class LaneRuns : private LaneWatch {
     Alone& alone_;
   };
 
+  /// The same as a Track follows it: by the polynomial alone.
+  class TrackedStep {
+   public:
+    TrackedStep(LaneSteps& steps, int lane, const Step& step) : steps_(steps), lane_(lane), step_(step) {}
+
+    double time() const { return steps_.end(lane_); }
+    Motion state() const {
+      Motion motion;
+      step_.state(motion);
+      return motion;
+    }
+    bool look(double /*time*/, Motion& /*motion*/) const { return false; }
+    Motion glance(double time) const {
+      Motion motion;
+      const double begin = steps_.begin(lane_);
+      step_.glance((time - begin) / (steps_.end(lane_) - begin), time, motion);
+      return motion;
+    }
+
+   private:
+    LaneSteps& steps_;
+    int lane_;
+    const Step& step_;
+  };
+
   bool wants_steps() const override { return wants_steps_; }
   bool stops() override { return stop_(); }
 
@@ -365,20 +400,27 @@ class LaneRuns : private LaneWatch {
   void look_into(LaneSteps& steps, int lane) {
     const std::size_t k = steps.member(lane);
     const RunSetup& setup = *setups_[k];
-    if (setup.events.empty()) return;
-    for (const Occurrence& happened :
-         watches_[k].after_step(Step(steps, lane, setup, options_, alone_[static_cast<std::size_t>(lane)]))) {
-      if (!setup.events[happened.event].stop) continue;
-      reports_[k].end = RunEnd::event;
-      reports_[k].ended_by = happened.event;
-      reports_[k].last = happened.motion;
-      steps.finish(lane);
+    Step step(steps, lane, setup, options_, alone_[static_cast<std::size_t>(lane)]);
+    std::optional<Motion> end;
+    if (!setup.events.empty()) {
+      for (const Occurrence& happened : watches_[k].after_step(step)) {
+        if (!setup.events[happened.event].stop) continue;
+        reports_[k].end = RunEnd::event;
+        reports_[k].ended_by = happened.event;
+        reports_[k].last = happened.motion;
+        end = happened.motion;
+        steps.finish(lane);
+      }
     }
+    if (tracks_[k] == nullptr) return;
+    TrackedStep tracked(steps, lane, step);
+    tracks_[k]->follow(tracked, end);
   }
 
   std::span<const RunSetup* const> setups_;
   RunOptions options_;
   const std::function<bool()>& stop_;
+  std::span<Track* const> tracks_;
   std::vector<EventWatch> watches_;
   Members members_;
   std::vector<RunReport> reports_;
@@ -391,5 +433,28 @@ class LaneRuns : private LaneWatch {
   std::vector<std::int64_t> steps_;  // that each member has taken
   std::vector<bool> takes_too_long_;
 };
+
+namespace detail {
+
+/// Which of some runs can take lanes together.
+using RunsByKind = std::map<LaneKind, std::vector<std::size_t>>;
+
+inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, const std::vector<std::size_t>& numbers) {
+  std::vector<const RunSetup*> some;
+  some.reserve(numbers.size());
+  for (const std::size_t k : numbers) some.push_back(&setups[k]);
+  return some;
+}
+
+/// As LaneRuns does it.
+inline std::vector<std::optional<RunReport>> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
+                                                          const RunOptions& options, const std::function<bool()>& stop,
+                                                          std::span<Track* const> tracks) {
+  if (kind.kernel != nullptr) return LaneRuns<PlainSystems>(alike, options, stop, tracks).go();
+  if (kind.dimension == Planar::dimension) return LaneRuns<PlainChains<Planar>>(alike, options, stop, tracks).go();
+  return LaneRuns<PlainChains<Spatial>>(alike, options, stop, tracks).go();
+}
+
+}  // namespace detail
 
 }  // namespace pendula

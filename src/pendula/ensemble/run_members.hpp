@@ -5,14 +5,15 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
-#include <map>
 #include <optional>
 #include <pendula/ensemble/lane_exponents.hpp>
 #include <pendula/ensemble/lane_runs.hpp>
+#include <pendula/ensemble/second_looks.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/run_report.hpp>
+#include <pendula/run/track.hpp>
 #include <span>
 #include <utility>
 #include <vector>
@@ -41,16 +42,6 @@ std::optional<double> natural_pace_in(const Subject& subject) {
 inline double natural_pace(const Subject& subject) {
   const std::optional<double> planar = natural_pace_in<Planar>(subject);
   return planar ? *planar : natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
-}
-
-// Which of some runs can take lanes together.
-using RunsByKind = std::map<LaneKind, std::vector<std::size_t>>;
-
-inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, const std::vector<std::size_t>& numbers) {
-  std::vector<const RunSetup*> some;
-  some.reserve(numbers.size());
-  for (const std::size_t k : numbers) some.push_back(&setups[k]);
-  return some;
 }
 
 // Whether an explicit method loses no more energy in a run, step by step, than the motion's errors are, and how much
@@ -121,18 +112,11 @@ inline RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
 
 namespace detail {
 
-inline std::vector<std::optional<RunReport>> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
-                                                          const RunOptions& options,
-                                                          const std::function<bool()>& stop) {
-  if (kind.kernel != nullptr) return LaneRuns<PlainSystems>(alike, options, stop).go();
-  if (kind.dimension == Planar::dimension) return LaneRuns<PlainChains<Planar>>(alike, options, stop).go();
-  return LaneRuns<PlainChains<Spatial>>(alike, options, stop).go();
-}
-
 // The lanes in which a run was tried last, and what came of it, if they moved it.
 struct Tried {
   std::optional<LaneKind> kind;
   std::optional<RunReport> report;
+  std::optional<Track> track;  // of one that is to be looked at again
 };
 
 // Those of which nothing came yet, if lanes are others than before.
@@ -148,21 +132,40 @@ inline void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, 
   }
   for (const auto& [kind, numbers] : kinds) {
     const std::vector<const RunSetup*> alike = chosen(setups, numbers);
-    auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop);
+    std::vector<Track*> tracks;
+    for (const std::size_t k : numbers) {
+      tracks.push_back(is_estimated(setups[k]) ? &tried[k].track.emplace(lane_track()) : nullptr);
+    }
+    auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop, tracks);
     for (std::size_t k = 0; k < numbers.size(); ++k) tried[numbers[k]].report = std::move(reports[k]);
   }
 }
 
+// Those that lanes have moved to their ends.
+inline void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<bool()>& stop,
+                                std::vector<Tried>& tried) {
+  std::vector<Doubted> doubted;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    Tried& one = tried[k];
+    if (one.report && one.track && one.report->end != RunEnd::stopped) {
+      doubted.push_back({setups[k], *one.report, *one.track});
+    }
+  }
+  look_again(doubted, stop);
+}
+
 }  // namespace detail
 
-/// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. A report
-/// depends on its setup alone, to the last bit; of a run that was stopped it says that and nothing else. Throws as Run.
+/// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. Those
+/// that are to be estimated are looked at again, those in lanes by others in lanes. A report depends on its setup
+/// alone, to the last bit; of a run that was stopped it says that and nothing else. Throws as Run.
 inline std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
     MemberMethod method = MemberMethod::asked) {
   std::vector<detail::Tried> tried(setups.size());
   if (method == MemberMethod::quickest) detail::try_in_lanes(setups, method, stop, tried);
   detail::try_in_lanes(setups, MemberMethod::asked, stop, tried);
+  detail::look_again_in_lanes(setups, stop, tried);
   std::vector<RunReport> reports;
   reports.reserve(setups.size());
   for (std::size_t k = 0; k < setups.size(); ++k) {

@@ -110,9 +110,9 @@ class ChainSubject : public Subject {
   }
 
   using Subject::distance;
-  /// Of bobs relative to the length of the chain, and of angles  [rad], those around the vertical by as far as they
-  /// move a rod: the larger one. And of their rates relative to the fastest bob and rod there; to a tenth of what the
-  /// chain swings with, and a hundredth of the fastest theta in the motion, at least.
+  /// Of bobs relative to the length of the chain, and of angles  [rad]: the larger one; in space of directions, which
+  /// two pairs of angles and more tell after a pole. And of their rates relative to the fastest bob and rod there; to a
+  /// tenth of what the chain swings with, and a hundredth of the fastest theta in the motion, at least.
   double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     const auto furthest = [](const auto& x) { return x.colwise().norm().maxCoeff(); };
     const auto of = [](double off, double whole) { return off == 0 ? 0 : off / whole; };
@@ -146,10 +146,7 @@ class ChainSubject : public Subject {
       const detail::LinkMotion<Space, double> one(a, links, i), other(b, links, i);
       keep(turned.rate, (one.rate - other.rate).norm());
       keep(turned.fastest, one.rate.norm());
-      keep(turned.angle, a.q[i] - b.q[i]);
-      if constexpr (Space::dof == 2) {
-        keep(turned.angle, std::hypot(one.direction[0], one.direction[1]) * (a.q[links + i] - b.q[links + i]));
-      }
+      keep(turned.angle, Space::dof == 2 ? (one.direction - other.direction).norm() : a.q[i] - b.q[i]);
     }
     return turned;
   }

@@ -7,7 +7,6 @@
 #include <iterator>
 #include <limits>
 #include <optional>
-#include <pendula/run/integrator.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <utility>
@@ -24,8 +23,10 @@ class Track {
   static constexpr std::int64_t apart = 6;
 
   /// At the end of each of the first steps, in which what is stiff dies away, and of every so many later ones, `apart`
-  /// of constant ones; of a run of many steps at fewer of them.
-  explicit Track(std::int64_t every) : every_(every) {}
+  /// of constant ones; of a run of many steps at fewer of them: at most so many numbers are kept, by default about
+  /// 64 MB.
+  explicit Track(std::int64_t every, std::size_t most_numbers = std::size_t{1} << 23)
+      : most_numbers_(most_numbers), every_(every) {}
 
   /// At the times of `other`.
   static Track at_times_of(const Track& other) {
@@ -40,20 +41,22 @@ class Track {
   /// Where it begins.
   void begin(const Motion& start) {
     if (looks()) return;
-    most_ = std::max(least, most_numbers / (2 * static_cast<std::size_t>(start.q.size()) + numbers_besides));
+    most_ = std::max(least, most_numbers_ / (2 * static_cast<std::size_t>(start.q.size()) + numbers_besides));
     first_ = std::min(first_, static_cast<std::int64_t>(most_ / 2));
     states_.push_back(start);
     numbers_.push_back(0);
   }
 
-  /// After every step, which the run ends at `end` within, if it does.
-  void follow(Integrator& integrator, const std::optional<Motion>& end) {
-    if (!looks()) return count_step(integrator);
-    const double last = end ? end->time : integrator.time();
+  /// After every step of `mover`, an Integrator or what has its time, state, look and glance; the run ends at `end`
+  /// within, if it does.
+  template <class Mover>
+  void follow(Mover& mover, const std::optional<Motion>& end) {
+    if (!looks()) return count_step(mover);
+    const double last = end ? end->time : mover.time();
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {
       const double time = times_[states_.size()];
       Motion there;
-      states_.push_back(integrator.look(time, there) ? std::move(there) : integrator.glance(time));
+      states_.push_back(mover.look(time, there) ? std::move(there) : mover.glance(time));
     }
   }
 
@@ -85,14 +88,14 @@ class Track {
   const Motion& last() const { return last_; }
 
  private:
-  // States of a run of few steps, as dense as that; what is kept of any run, about 64 MB, but a dozen states at least.
-  static constexpr std::size_t most_rows = 256, few = 64, least = 12, most_numbers = std::size_t{1} << 23,
-                               numbers_besides = 24;
+  // States of a run of few steps, as dense as that, and of any run at least; what a state takes besides its numbers.
+  static constexpr std::size_t most_rows = 256, few = 64, least = 12, numbers_besides = 24;
 
-  void count_step(const Integrator& integrator) {
+  template <class Mover>
+  void count_step(const Mover& mover) {
     ++steps_;
     if (!is_kept(steps_)) return;
-    states_.push_back(integrator.state());
+    states_.push_back(mover.state());
     numbers_.push_back(steps_);
     if (states_.size() < (every_ < apart ? std::min(few, most_) : most_)) return;
     every_ *= 2;
@@ -108,6 +111,7 @@ class Track {
 
   bool is_kept(std::int64_t step) const { return step <= first_ || step % every_ == 0; }
 
+  std::size_t most_numbers_;
   std::int64_t every_, steps_ = 0, first_ = 12;
   std::size_t most_ = few;
   std::vector<double> times_;
@@ -161,6 +165,9 @@ class Separation {
     return largest;
   }
 
+  /// That of the ends alone.
+  Separation of_ends() const { return Separation({places_.back()}); }
+
   /// The last time up to which all distances are at most so large; infinite where all are. `start` where none is.
   double within(double limit, double start) const {
     double last = start;
@@ -177,6 +184,8 @@ class Separation {
   struct Place {
     double time, off;
   };
+
+  explicit Separation(std::vector<Place> places) : places_(std::move(places)) {}
 
   std::vector<Place> places_;
 };

@@ -1,0 +1,154 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <pendula/ensemble/lane_runs.hpp>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/doubts.hpp>
+#include <pendula/run/event.hpp>
+#include <pendula/run/run.hpp>
+#include <pendula/run/run_report.hpp>
+#include <pendula/run/track.hpp>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pendula::detail {
+
+/// Whether a run is compared with another one.
+inline bool is_estimated(const RunSetup& setup) {
+  return setup.doubted && setup.estimate;
+}
+
+/// States of a run in lanes, of which there may be many at once: 256 kB of them at most.
+inline Track lane_track() {
+  return Track(Track::apart / 2, std::size_t{1} << 15);
+}
+
+/// A run in lanes that is to be looked at again.
+struct Doubted {
+  const RunSetup& setup;
+  RunReport& report;
+  const Track& track;
+  Doubt doubt = {};  // NOLINT(readability-redundant-member-init): left out in initializers
+};
+
+/// Lanes were compiled for even numbers of stages only. Of the two that are near it is the one that is further away
+/// from the number that the run has.
+inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
+  if (options.method == Method::gauss && options.stages % 2 != 0)
+    options.stages += options.stages < run.stages ? -1 : 1;
+  return options;
+}
+
+/// Another run may find other events, or at other times.
+inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunReport& report, const RunReport& other) {
+  for (std::size_t k = 0; k < setup.events.size(); ++k) {
+    const EventTally &one = report.events[k], &another = other.events[k];
+    const double off = std::abs(one.first - another.first) * look.trusted;
+    const bool is_early = !(off > visible * (one.first - setup.start.time));  // or never
+    if (one.count == another.count && is_early) continue;
+    const std::string what = "event " + setup.events[k].name + " happens ";
+    if (one.count != another.count) {
+      return look.how + ' ' + what + std::to_string(another.count) + " times in place of " + std::to_string(one.count);
+    }
+    return look.how + ' ' + what + "at " + pendula::rounded(another.first, 4) + " s for the first time, not at " +
+           pendula::rounded(one.first, 4) + " s";
+  }
+  return {};
+}
+
+/// Between their ends runs in lanes are seen by the polynomials of steps, which err by more than the steps: they tell
+/// whether the motion has gone elsewhere on the way, as chaos does before it comes to rest.
+inline Doubt of_other(const Doubted& member, const SecondLook& look, const RunReport& other, const Track& track) {
+  static constexpr double elsewhere = 0.5;
+  const Separation parted(*member.setup.subject, member.track, track);
+  const bool is_elsewhere = parted.largest() > elsewhere;
+  Doubt doubt = of_second_look(member.setup, look, is_elsewhere ? parted : parted.of_ends(), member.report.trust);
+  return doubt ? doubt : of_events(member.setup, look, member.report, other);
+}
+
+/// Where no other run goes in lanes: the run itself alone, which looks at itself again, and is compared.
+inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& stop) {
+  const RunSetup& setup = member.setup;
+  const RunReport alone = Run(setup).go(stop);
+  member.report.trust = alone.trust;
+  const std::size_t beside = event_warnings(setup.events, alone.events).size();
+  if (alone.warnings.size() > beside) return alone.warnings[beside];
+  const bool is_over = alone.end == RunEnd::complete || alone.end == RunEnd::event;
+  const double off = is_over ? setup.subject->distance(member.report.last, alone.last, size_of(member.track))
+                             : std::numeric_limits<double>::infinity();
+  if (!(off <= trusted_error(setup))) return "alone, not in lanes, it ends elsewhere";
+  return of_events(setup, {setup.options, "alone, not in lanes,", 1, 1}, member.report, alone);
+}
+
+/// Looks at members again, each by the run that `choose(report)` tells; of whom it tells none, what was said stands.
+template <class Choose>
+void look_by(std::span<Doubted* const> members, Choose choose, const std::function<bool()>& stop) {
+  std::vector<Doubted*> looked;
+  std::vector<SecondLook> looks;
+  std::vector<RunSetup> setups;
+  std::vector<Track> tracks;
+  RunsByKind kinds;
+  std::vector<std::size_t> others;  // who do not go in lanes so
+  for (Doubted* const member : members) {
+    const RunOptions& run = member->report.options;
+    std::optional<SecondLook> look = choose(member->report);
+    if (!look) continue;
+    const double share = is_adaptive(run) ? 0.01 * run.tolerance : 0;
+    RunSetup setup = member->setup;
+    setup.options = in_lanes(look->options, run);
+    setup.start.q *= 1 + std::max(share, std::numeric_limits<double>::epsilon());
+    setup.start.v *= 1 + std::max(share, std::numeric_limits<double>::epsilon());
+    setup.doubted = false;
+    const std::optional<LaneKind> kind = lane_kind(setup);
+    (kind ? kinds[*kind] : others).push_back(looked.size());
+    looked.push_back(member);
+    looks.push_back(*std::move(look));
+    setups.push_back(std::move(setup));
+    tracks.push_back(Track::at_times_of(member->track));
+  }
+  for (const auto& [kind, numbers] : kinds) {
+    const std::vector<const RunSetup*> alike = chosen(setups, numbers);
+    std::vector<Track*> followed;
+    for (const std::size_t k : numbers) followed.push_back(&tracks[k]);
+    const auto reports = run_in_lanes(kind, alike, alike[0]->options, stop, followed);
+    for (std::size_t j = 0; j < numbers.size(); ++j) {
+      const std::size_t k = numbers[j];
+      if (!reports[j]) {
+        others.push_back(k);
+      } else if (reports[j]->end == RunEnd::stopped) {
+        looked[k]->report.end = RunEnd::stopped;
+      } else {
+        looked[k]->doubt = of_other(*looked[k], looks[k], *reports[j], tracks[k]);
+      }
+    }
+  }
+  for (const std::size_t k : others) {
+    looked[k]->doubt = of_run_alone(*looked[k], stop);
+    if (stop()) looked[k]->report.end = RunEnd::stopped;
+  }
+}
+
+/// As Run does it: by a run that errs more, and takes less time; where that says that a member cannot be trusted, by
+/// one that errs less.
+inline void look_again(std::vector<Doubted>& members, const std::function<bool()>& stop) {
+  std::vector<Doubted*> left;
+  for (Doubted& member : members) left.push_back(&member);
+  look_by(
+      left, [](const RunReport& run) { return std::optional(coarser(run.options, run.statistics)); }, stop);
+  std::erase_if(left, [](const Doubted* member) { return !member->doubt || member->report.end == RunEnd::stopped; });
+  look_by(
+      left, [](const RunReport& run) { return finer(run.options); }, stop);
+  for (Doubted& member : members) {
+    if (member.doubt) member.report.warnings.push_back(*std::move(member.doubt));
+  }
+}
+
+}  // namespace pendula::detail
