@@ -367,9 +367,11 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
   if (is_aimed() && !went_on) {
     std::optional<Separation> parted;
     if (track_ && kept_.aim.finest) parted.emplace(*setup_.subject, *track_, *kept_.aim.finest);
-    return add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
+    add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
+  } else if (track_) {
+    add(look_again(report, stop));
   }
-  if (track_) add(look_again(report, stop));
+  add(detail::of_unseen(setup_, report.statistics, report.trust));
 }
 
 // By a run that takes less time; where that says that this one cannot be trusted, by one that takes more, if there is
