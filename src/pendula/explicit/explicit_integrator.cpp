@@ -197,12 +197,14 @@ class FixedStepIntegrator : public ExplicitIntegrator {
 
   Outcome start(double time, const double* q, const double* v) override {
     std::fill(fastest_.begin(), fastest_.end(), 0.0);
+    field_.forget();
     return ExplicitIntegrator::start(time, q, v);
   }
 
   void member(MemberNumbers& numbers) override {
     ExplicitIntegrator::member(numbers);
     numbers.range(fastest_.data(), fastest_.size());
+    field_.forget();
   }
 
   // A step that ends nowhere is taken in ever smaller parts.
@@ -246,10 +248,11 @@ class FixedStepIntegrator : public ExplicitIntegrator {
       fastest_[k] = std::max(fastest_[k], std::abs(x_[fastest_.size() + k]));
     }
     const double least = std::max(beside * *std::max_element(fastest_.begin(), fastest_.end()), nothing);
-    const auto size = [&](std::size_t k) { return std::max(fastest_[k], least); };
-    right_hand_side()(next_, rate_, time());
-    right_hand_side()(x_, end_rate_, time() + h);
-    statistics_.step_over(time(), field_.unseen(dynamics(), time(), h, next_, rate_, x_, end_rate_, size).effect, 0);
+    const auto size_of = [&](const Vector&) {
+      return [this, least](std::size_t k) { return std::max(fastest_[k], least); };
+    };
+    statistics_.step_over(time(), field_.unseen(dynamics(), time(), h, next_, x_, size_of).effect, 0);
+    field_.move_on();
   }
 
   static constexpr double nothing = 1e-280;
@@ -257,7 +260,7 @@ class FixedStepIntegrator : public ExplicitIntegrator {
   odeint::runge_kutta4<Vector> stepper_;
   int parts_of_last_ = 1;
   FieldSteps field_;
-  Vector next_, fastest_, end_rate_ = x_;
+  Vector next_, fastest_;
 };
 
 /// What the errors of a step are compared with: coordinates and rates themselves, and beside them a radian and one a
@@ -303,18 +306,18 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
         next_rate_(x_.size()),
         tolerance_(tolerance),
         forcing_(gauss, static_cast<std::size_t>(coordinates), tolerance, is_blind),
-        field_(Gauss::stages, this->dynamics(), static_cast<std::size_t>(coordinates)),
-        begin_rate_(x_.size()),
-        end_rate_(x_.size()) {}
+        field_(Gauss::stages, this->dynamics(), static_cast<std::size_t>(coordinates), is_blind) {}
 
   Outcome start(double time, const double* q, const double* v) override {
     const Outcome outcome = ExplicitIntegrator::start(time, q, v);
     if (outcome) forcing_.start(dynamics(), time, q, v);
+    field_.forget();
     return outcome;
   }
 
   void member(MemberNumbers& numbers) override {
     ExplicitIntegrator::member(numbers);
+    field_.forget();
     numbers(forcing_);
   }
 
@@ -339,6 +342,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
     hand_on(tells);
     if (!is_cut) statistics_.count_chosen(trial.size);
     statistics_.step_over(time(), trial.unseen, tolerance_);
+    field_.move_on();
     return accept(trial.size, next_);
   }
 
@@ -385,16 +389,15 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
 
   // Of the step to next_.
   double unseen(double h) {
-    right_hand_side()(x_, begin_rate_, time());
-    right_hand_side()(next_, end_rate_, time() + h);
-    const ErrorSize sizes(x_, begin_rate_, next_, h, tolerance_);
-    const auto size = [&](std::size_t k) { return sizes[x_.size() / 2 + k]; };
-    return field_.unseen(dynamics(), time(), h, x_, begin_rate_, next_, end_rate_, size).impulse;
+    const auto size_of = [&](const Vector& rate) {
+      return
+          [this, sizes = ErrorSize(x_, rate, next_, h, tolerance_)](std::size_t k) { return sizes[x_.size() / 2 + k]; };
+    };
+    return field_.unseen(dynamics(), time(), h, x_, next_, size_of).impulse;
   }
 
   ForcedSteps forcing_;
   FieldSteps field_;
-  Vector begin_rate_, end_rate_;
 
   double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
 
