@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 
-from sympy import Matrix
+from sympy import Expr, Function, Matrix, Pow, acos, asin, cos, log, sin, tan
 
-from pendula_codegen.entry_points import SystemKernel
+from pendula_codegen.entry_points import Function as EntryPoint
+from pendula_codegen.entry_points import Output, Q, SystemKernel, V
 from pendula_codegen.mechanics import jacobian, time_slope
 from pendula_codegen.model import Model
 from pendula_codegen.places import Place
@@ -36,6 +38,28 @@ class ModelKernel(SystemKernel):
         ]
         return Matrix(components), Matrix(rates)
 
+    def functions(self) -> list[EntryPoint]:
+        if not self.call_arguments:
+            return super().functions()
+        values = Matrix([value for value, _ in self.call_arguments])
+        found = Output("found", "arguments", values, f"arguments, ({values.rows})")
+        title = "What functions are taken of that change within a short time where it changes little"
+        read = (self.parameters, Q, V, self.inputs)
+        return [*super().functions(), EntryPoint("call_arguments", title, read, (found,))]
+
+    @cached_property
+    def call_arguments(self) -> list[tuple[Expr, bool]]:
+        """What functions of the Lagrangian and of forces are taken of, while it moves, and whether it is a base.
+
+        Those change where their argument comes by zero or by its largest or smallest value: exp, tanh, … by steps of
+        1, powers and logarithms by its own size. Sines of what moves slowly move slowly; so do whole powers.
+        """
+        system = self.system
+        moving = {*system.coordinates, *system.velocities, *system.inputs, self.model.time}
+        held = {call for said in (system.lagrangian, *system.forces) for call in said.atoms(Function, Pow)}
+        found = {pair: None for call in sorted(held, key=str) for pair in _arguments(call)}
+        return [(value, is_base) for value, is_base in found if value.free_symbols & moving]
+
     def angles(self) -> list[Angle]:
         held = [(k, c) for k, c in enumerate(self.model.coordinates) if c.is_angle]
         return [Angle(c.symbol, Place("q", index=(k,))) for k, c in held]
@@ -52,3 +76,18 @@ class ModelKernel(SystemKernel):
             for k, given in enumerate(self.model.inputs)
         ]
         return [*parameters, time, *inputs]
+
+
+def _arguments(call: Expr) -> Iterator[tuple[Expr, bool]]:
+    inside = call.args[0]
+    if call.is_Pow:
+        if not (call.exp.is_Integer and call.exp > 0):
+            yield inside, True
+        if call.exp.free_symbols:
+            yield call.exp * log(inside), False
+    elif isinstance(call, (asin, acos)):
+        yield 1 - inside**2, True
+    elif isinstance(call, tan):
+        yield cos(inside), True
+    elif not isinstance(call, (sin, cos)):
+        yield inside, isinstance(call, log)

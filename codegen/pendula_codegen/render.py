@@ -116,6 +116,7 @@ class Words:
     types     names of further types, and what they are, in C++
     fields    of the structure Parameters
     number    what that calls the type of a number
+    bases     of what functions are taken of, whether it is a base
     alias     a further name of the structure
     own       names that somebody else has chosen, and that stand in the header as they are
     """
@@ -135,6 +136,7 @@ class Words:
     holds_time: bool = False
     has_hamiltonian: bool = False
     number: str = "Real"
+    bases: list[bool] = field(default_factory=list)
     alias: str = ""
     own: list[str] = field(default_factory=list)
 
@@ -213,6 +215,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
     inputs, points = len(model.inputs), sum(len(p.components) for p in model.points)
     names = [c.symbol.name for c in model.coordinates]
     holds_time = _holds_time(model)
+    bases = [is_base for _, is_base in kernel.call_arguments]
     links = f" --links {model.links}" if model.name != Path(model.file).stem else ""
     words = Words(
         name=model.name,
@@ -239,10 +242,15 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
         parameters=ordered,
         inputs=model.inputs,
         points=[(p.name, len(p.components)) for p in model.points],
-        types={"Points": cpp.matrix("point_components", 1), "Inputs": cpp.matrix(inputs, 1)},
+        types={
+            "Points": cpp.matrix("point_components", 1),
+            "Inputs": cpp.matrix(inputs, 1),
+            **({"Arguments": cpp.matrix(len(bases), 1)} if bases else {}),
+        },
         fields=[cpp.parameter_field(parameter) for parameter in ordered],
         holds_time=holds_time,
         number="_real",
+        bases=bases,
         alias=alias,
         own=[parameter.name for parameter in ordered] + [alias] * bool(alias),
     )
@@ -281,6 +289,7 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
             words.points,
             _constant_masses(kernel),
             periodic,
+            words.bases,
         ),
         assignments=cpp.read_statements(words.parameters),
         places=cpp.place_statements(words.parameters),

@@ -4,7 +4,7 @@ import math
 import random
 
 import pytest
-from sympy import Rational, Symbol, atan, cos, diff, exp, lambdify, log, simplify, sin, sqrt, symbols
+from sympy import Rational, Symbol, atan, cos, diff, exp, lambdify, log, simplify, sin, sqrt, symbols, tan
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 
 from pendula_codegen.model import Model, read_model
@@ -202,3 +202,31 @@ def test_names_that_mean_something_in_the_code_are_no_obstacle(tmp_path):
     model.lagrangian = Rational(1, 2) * (model.rate(p) ** 2 + model.rate(v) ** 2) - f * p**2 * v
     text = render_model(model, "letters.py").text
     assert "const Real& p_ = q[0];" in text and "const Real& f_ = parameters.f;" in text
+
+
+def test_a_kernel_tells_what_narrow_functions_are_taken_of():
+    model = Model("narrow", 1, "narrow.py")
+    x, a = model.coordinate("x", "m"), model.coordinate("a", "rad")
+    w, push = model.parameter("w", "m", default=0.1), model.input("push", "N")
+    v, t = model.rate(x), model.time
+    model.lagrangian = v**2 / 2 + model.rate(a) ** 2 / 2 - exp(-((x / w) ** 2)) - 1 / (1 + (x - w) ** 2)
+    model.lagrangian += x**4 * cos(3 * a) + exp(w) - log(1 + x**2) + sqrt(x**2 + w)
+    model.force(x, push * exp(-t) - v / sqrt(v**2 + w) + tan(a) + atan(push) + 2**x)
+    assert dict(ModelKernel(model).call_arguments) == {
+        -(x**2) / w**2: False,
+        1 + (x - w) ** 2: True,
+        1 + x**2: True,
+        x**2 + w: True,
+        v**2 + w: True,
+        cos(a): True,
+        -t: False,
+        push: False,
+        x * log(2): False,
+    }
+
+
+@pytest.mark.parametrize(("name", "links"), CASES)
+def test_models_of_sines_and_whole_powers_pay_nothing(name, links):
+    kernel = ModelKernel(read(name, links))
+    tells = "call_arguments" in [function.name for function in kernel.functions()]
+    assert tells == bool(kernel.call_arguments) == (name == "spring_pendulum")  # the root of a length

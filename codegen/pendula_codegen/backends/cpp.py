@@ -288,6 +288,7 @@ TYPES = {
     "vector": "Vector<Real>",
     "matrix": "Matrix<Real>",
     "points": "Points<Real>",
+    "arguments": "Arguments<Real>",
     "link_vector": "LinkVector<Real>",
     "link_matrix": "LinkMatrix<Real>",
 }
@@ -382,8 +383,9 @@ def constants(
     points: Sequence[tuple[str, int]],
     constant_masses: bool,
     periodic: Sequence[bool],
+    bases: Sequence[bool] = (),
 ) -> list[str]:
-    """Static members by which a kernel says what it is."""
+    """Static members by which a kernel says what it is; `bases` of arguments, where there are any."""
     members = [
         ("std::string_view", "coordinate_names", [c.symbol.name for c in coordinates]),
         ("std::string_view", "coordinate_units", [c.unit for c in coordinates]),
@@ -399,6 +401,7 @@ def constants(
         ("std::string_view", "input_units", [i.unit for i in inputs]),
         ("std::string_view", "point_names", [name for name, _ in points]),
         ("int", "point_sizes", [size for _, size in points]),
+        *([("bool", "argument_is_base", list(bases))] if bases else []),
     ]
     lines = []
     for element, name, values in members:

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <functional>
 #include <pendula/explicit/explicit_integrator.hpp>
+#include <pendula/explicit/field_steps.hpp>
 #include <pendula/explicit/forced_steps.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/stop_sign.hpp>
@@ -189,7 +190,22 @@ class ExplicitIntegrator : public PlainIntegrator {
 
 class FixedStepIntegrator : public ExplicitIntegrator {
  public:
-  using ExplicitIntegrator::ExplicitIntegrator;
+  FixedStepIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel)
+      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
+        field_(2, this->dynamics(), static_cast<std::size_t>(coordinates)),
+        fastest_(static_cast<std::size_t>(coordinates)) {}
+
+  Outcome start(double time, const double* q, const double* v) override {
+    std::fill(fastest_.begin(), fastest_.end(), 0.0);
+    field_.forget();
+    return ExplicitIntegrator::start(time, q, v);
+  }
+
+  void member(MemberNumbers& numbers) override {
+    ExplicitIntegrator::member(numbers);
+    numbers.range(fastest_.data(), fastest_.size());
+    field_.forget();
+  }
 
   // A step that ends nowhere is taken in ever smaller parts.
   Outcome step(double h) override {
@@ -199,6 +215,7 @@ class FixedStepIntegrator : public ExplicitIntegrator {
       if (is_good) {
         x_.swap(next_);
         parts_of_last_ = parts;
+        if (field_.has_to_look()) count_unseen(h);
         return accept(h, next_);
       }
       ++statistics_.rejected_steps;
@@ -224,93 +241,26 @@ class FixedStepIntegrator : public ExplicitIntegrator {
 
   void advance(Vector& x, double time, double h) override { take(parts_of_last_, x, time, h); }
 
+  // Of the step that began at next_, relative to the fastest that a coordinate was, or others were, nearly.
+  void count_unseen(double h) {
+    constexpr double beside = 1e-3;
+    for (std::size_t k = 0; k < fastest_.size(); ++k) {
+      fastest_[k] = std::max(fastest_[k], std::abs(x_[fastest_.size() + k]));
+    }
+    const double least = std::max(beside * *std::max_element(fastest_.begin(), fastest_.end()), nothing);
+    const auto size_of = [&](const Vector&) {
+      return [this, least](std::size_t k) { return std::max(fastest_[k], least); };
+    };
+    statistics_.step_over(time(), field_.unseen(dynamics(), time(), h, next_, x_, size_of).effect, 0);
+    field_.move_on();
+  }
+
+  static constexpr double nothing = 1e-280;
+
   odeint::runge_kutta4<Vector> stepper_;
   int parts_of_last_ = 1;
-  Vector next_;
-};
-
-/// Steps of its own size; h is only an upper bound.
-class AdaptiveIntegrator : public ExplicitIntegrator {
- public:
-  AdaptiveIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
-                     ForcedSteps forcing)
-      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
-        next_(x_.size()),
-        next_rate_(x_.size()),
-        forcing_(std::move(forcing)) {}
-
-  Outcome start(double time, const double* q, const double* v) override {
-    const Outcome outcome = ExplicitIntegrator::start(time, q, v);
-    if (outcome) forcing_.start(dynamics(), time, q, v);
-    return outcome;
-  }
-
-  void member(MemberNumbers& numbers) override {
-    ExplicitIntegrator::member(numbers);
-    numbers(forcing_);
-  }
-
-  // What depends on time is looked at as if nothing cut the step, and one that is cut and fails is found as if nothing
-  // cut it: so a run that goes on takes the steps of one that was not cut.
-  Outcome step(double h) override {
-    const double longest = forcing_.followed(dynamics(), time(), x_.data(), x_.data() + x_.size() / 2,
-                                             proposed_ == 0 ? first_step : proposed_);
-    bool is_cut = longest > h;
-    Trial trial = is_cut ? find_step(h, 1) : find_step(longest);
-    if (is_cut && !trial.is_accepted) {
-      trial = find_step(longest);
-      is_cut = !trial.is_accepted || trial.size >= h;
-      if (is_cut) trial = find_step(h);
-    }
-    if (is_stopped()) return interrupted(trial.size);
-    statistics_.rejected_steps += trial.rejected;
-    if (!trial.is_accepted) return failure(Status::tolerance_not_met, trial.proposed, next_);
-    x_.swap(next_);
-    const bool tells = !is_cut || trial.proposed < trial.size;  // else that of the next one is not known from this
-    if (tells) proposed_ = trial.proposed;
-    hand_on(tells);
-    if (!is_cut) statistics_.count_chosen(trial.size);
-    return accept(trial.size, next_);
-  }
-
- protected:
-  /// Tries a step of the size `tried` to `next_`, and makes it the size that the next one should have.
-  virtual bool try_step(double& tried) = 0;
-  /// After a step that was accepted; whether it says how to take the next one.
-  virtual void hand_on(bool tells) = 0;
-
-  Vector next_, next_rate_;
-
- private:
-  /// What steps that were tried have come to; the last one's end is in next_.
-  struct Trial {
-    double size = 0, proposed = 0;  // of the last one, and of what follows it
-    int rejected = 0;
-    bool is_accepted = false;
-  };
-
-  /// Tries steps, shorter and shorter from this one on.
-  Trial find_step(double longest, int tries = max_attempts) {
-    Trial trial{.proposed = longest};
-    for (int attempt = 0; attempt < tries && trial.proposed > smallest_step() && !is_stopped(); ++attempt) {
-      trial.size = trial.proposed;
-      trial.is_accepted = try_step(trial.proposed);
-      if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(trial.proposed)) {
-        trial.proposed = trial.size / 8;
-        trial.is_accepted = false;
-      }
-      if (trial.is_accepted) break;
-      ++trial.rejected;
-    }
-    return trial;
-  }
-
-  ForcedSteps forcing_;
-
-  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
-
-  static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
-  static constexpr int max_attempts = 100;
+  FieldSteps field_;
+  Vector next_, fastest_;
 };
 
 /// What the errors of a step are compared with: coordinates and rates themselves, and beside them a radian and one a
@@ -344,6 +294,117 @@ class ErrorSize {
   double place_, turn_;
 };
 
+/// Steps of its own size; h is only an upper bound.
+class AdaptiveIntegrator : public ExplicitIntegrator {
+ public:
+  /// Of a method that is as good as the quadrature `Gauss`.
+  template <class Gauss>
+  AdaptiveIntegrator(Gauss gauss, std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts,
+                     std::string_view kernel, double tolerance, bool is_blind = false)
+      : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
+        next_(x_.size()),
+        next_rate_(x_.size()),
+        tolerance_(tolerance),
+        forcing_(gauss, static_cast<std::size_t>(coordinates), tolerance, is_blind),
+        field_(Gauss::stages, this->dynamics(), static_cast<std::size_t>(coordinates), is_blind) {}
+
+  Outcome start(double time, const double* q, const double* v) override {
+    const Outcome outcome = ExplicitIntegrator::start(time, q, v);
+    if (outcome) forcing_.start(dynamics(), time, q, v);
+    field_.forget();
+    return outcome;
+  }
+
+  void member(MemberNumbers& numbers) override {
+    ExplicitIntegrator::member(numbers);
+    field_.forget();
+    numbers(forcing_);
+  }
+
+  // What depends on time is looked at as if nothing cut the step, and one that is cut and fails is found as if nothing
+  // cut it: so a run that goes on takes the steps of one that was not cut.
+  Outcome step(double h) override {
+    const double longest = forcing_.followed(dynamics(), time(), x_.data(), x_.data() + x_.size() / 2,
+                                             proposed_ == 0 ? first_step : proposed_);
+    bool is_cut = longest > h;
+    Trial trial = is_cut ? find_step(h, 1) : find_step(longest);
+    if (is_cut && !trial.is_accepted) {
+      trial = find_step(longest);
+      is_cut = !trial.is_accepted || trial.size >= h;
+      if (is_cut) trial = find_step(h);
+    }
+    if (is_stopped()) return interrupted(trial.size);
+    statistics_.rejected_steps += trial.rejected;
+    if (!trial.is_accepted) return failure(Status::tolerance_not_met, trial.proposed, next_);
+    x_.swap(next_);
+    const bool tells = !is_cut || trial.proposed < trial.size;  // else that of the next one is not known from this
+    if (tells) proposed_ = trial.proposed;
+    hand_on(tells);
+    if (!is_cut) statistics_.count_chosen(trial.size);
+    statistics_.step_over(time(), trial.unseen, tolerance_);
+    field_.move_on();
+    return accept(trial.size, next_);
+  }
+
+ protected:
+  /// Tries a step of the size `tried` to `next_`, and makes it the size that the next one should have.
+  virtual bool try_step(double& tried) = 0;
+  /// After a step that was accepted; whether it says how to take the next one.
+  virtual void hand_on(bool tells) = 0;
+
+  Vector next_, next_rate_;
+  double tolerance_;
+
+ private:
+  /// What steps that were tried have come to; the last one's end is in next_.
+  struct Trial {
+    double size = 0, proposed = 0;  // of the last one, and of what follows it
+    int rejected = 0;
+    bool is_accepted = false;
+    double unseen = 0;  // impulse between its stages
+  };
+
+  /// Tries steps, shorter and shorter from this one on.
+  Trial find_step(double longest, int tries = max_attempts) {
+    Trial trial{.proposed = longest};
+    for (int attempt = 0; attempt < tries && trial.proposed > smallest_step() && !is_stopped(); ++attempt) {
+      trial.size = trial.proposed;
+      trial.is_accepted = try_step(trial.proposed);
+      if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(trial.proposed)) {
+        trial.proposed = trial.size / 8;
+        trial.is_accepted = false;
+      }
+      if (trial.is_accepted && field_.has_to_look()) {
+        trial.unseen = unseen(trial.size);
+        if (statistics_.has_to_see(trial.unseen, trial.size, tolerance_)) {
+          trial.proposed = trial.size / 2;
+          trial.is_accepted = false;
+        }
+      }
+      if (trial.is_accepted) break;
+      ++trial.rejected;
+    }
+    return trial;
+  }
+
+  // Of the step to next_.
+  double unseen(double h) {
+    const auto size_of = [&](const Vector& rate) {
+      return
+          [this, sizes = ErrorSize(x_, rate, next_, h, tolerance_)](std::size_t k) { return sizes[x_.size() / 2 + k]; };
+    };
+    return field_.unseen(dynamics(), time(), h, x_, next_, size_of).impulse;
+  }
+
+  ForcedSteps forcing_;
+  FieldSteps field_;
+
+  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
+
+  static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
+  static constexpr int max_attempts = 100;
+};
+
 /// ErrorSize and what a step adds to a coordinate or rate, as odeint asks for it.
 class ErrorChecker {
  public:
@@ -375,8 +436,7 @@ class PairIntegrator : public AdaptiveIntegrator {
  public:
   PairIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                  double tolerance)
-      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
-                           ForcedSteps(Gauss(), static_cast<std::size_t>(coordinates), tolerance, is_blind)),
+      : AdaptiveIntegrator(Gauss(), std::move(dynamics), coordinates, parts, kernel, tolerance, is_blind),
         stepper_(ErrorChecker(tolerance, next_)) {}
 
  private:
@@ -411,9 +471,7 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
  public:
   ExtrapolationIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts,
                           std::string_view kernel, double tolerance)
-      : AdaptiveIntegrator(std::move(dynamics), coordinates, parts, kernel,
-                           ForcedSteps(kernels::GaussTableau<8>(), static_cast<std::size_t>(coordinates), tolerance)),
-        tolerance_(tolerance) {
+      : AdaptiveIntegrator(kernels::GaussTableau<8>(), std::move(dynamics), coordinates, parts, kernel, tolerance) {
     table_.fill(Vector(x_.size()));
   }
 
@@ -514,7 +572,6 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
     return next_row_ <= row ? best_[next_row_] : best_[row] * work(next_row_) / work(row);
   }
 
-  double tolerance_;
   odeint::modified_midpoint<Vector> midpoint_;
   std::array<Vector, rows> table_;
   std::array<double, rows> best_{};

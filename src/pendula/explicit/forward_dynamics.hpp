@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 namespace pendula {
 
@@ -23,6 +24,11 @@ class ForwardDynamics {
   /// Then, of one state at each of `count` times, (count, dof·n).
   virtual void accelerations(const double* /*times*/, std::size_t /*count*/, const double* /*q*/, const double* /*v*/,
                              double* /*found*/) {}
+
+  /// Of what its functions are taken of that may be narrow, whether it is the base of a power (field_look.hpp).
+  virtual std::span<const bool> arguments() const { return {}; }
+  /// And what that is in a state.
+  virtual void find_arguments(double /*time*/, const double* /*q*/, const double* /*v*/, double* /*found*/) {}
 };
 
 }  // namespace pendula

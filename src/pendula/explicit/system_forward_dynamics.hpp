@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <pendula/explicit/forward_dynamics.hpp>
 #include <pendula/system/accelerations_in_time.hpp>
+#include <pendula/system/field_look.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
 
@@ -31,6 +33,16 @@ class SystemForwardDynamics : public ForwardDynamics {
     if constexpr (holds_time<S>) {
       accelerations_in_time(model_, std::span(times, count), Eigen::Map<const Vector>(q), Eigen::Map<const Vector>(v),
                             found);
+    }
+  }
+
+  std::span<const bool> arguments() const override { return argument_bases<S>(); }
+  void find_arguments(double time, const double* q, const double* v, double* found) override {
+    if constexpr (tells_arguments<S>) {
+      typename S::template Arguments<double> arguments;
+      S::call_arguments(model_.parameters(time), Vector(Eigen::Map<const Vector>(q)),
+                        Vector(Eigen::Map<const Vector>(v)), model_.inputs(time), arguments);
+      std::copy_n(arguments.data(), arguments.size(), found);
     }
   }
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <pendula/gauss/iteration_choice.hpp>
+#include <pendula/gauss/lagrangian_field.hpp>
 #include <pendula/gauss/lagrangian_fixed_point.hpp>
 #include <pendula/gauss/lagrangian_newton.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
@@ -36,6 +37,7 @@ class LagrangianSolver {
         stages_(model, checked(stages), family),
         newton_(stages),
         forcing_(family, stages),
+        field_(stages),
         choice_(iteration, newton_cost(stages)) {}
 
   Status start(const State& state) { return stages_.start(state.time, state.q, state.v); }
@@ -95,6 +97,11 @@ class LagrangianSolver {
       shape.imbalance = stages_.imbalance();
     }
     return shape;
+  }
+  /// Of what forces do between the stages that were solved.
+  Unseen unseen() requires tells_arguments<S> {
+    find_forces();
+    return field_.unseen(stages_);
   }
   bool loaded() const { return stages_.model().loaded(); }
   bool damped() const { return stages_.model().damped(); }
@@ -166,6 +173,7 @@ class LagrangianSolver {
   LagrangianNewton<S, Width> newton_;
   LagrangianFixedPoint<S, Width> fixed_point_;
   SystemForcing<S> forcing_;
+  LagrangianField<S, Width> field_;
   IterationChoice choice_;
   Correction last_;
   int count_ = 0;

@@ -14,6 +14,7 @@
 #include <pendula/system/mass_scale.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/system_model.hpp>
+#include <span>
 #include <utility>
 
 namespace pendula {
@@ -48,6 +49,8 @@ class LagrangianStages {
   const Columns& columns() const { return columns_; }
   int stages() const { return columns_.stages(); }
   double time_of(int stage) const { return time_ + columns_.h() * columns_.c(static_cast<std::size_t>(stage)); }
+
+  double time_at(double share) const { return time_ + step_ * share; }
 
   // --- The state ---
 
@@ -172,6 +175,10 @@ class LagrangianStages {
   }
   const Compensated<double>& momentum_before(std::size_t k) const { return p_[k]; }
 
+  /// What the stages of number k, a coordinate or a momentum, add up to.
+  double change(std::size_t k) const { return sum(U_[k]); }
+  double h() const { return step_; }
+
   /// h b v of coordinate k, h b f of its momentum.
   Stored& moved(std::size_t k) { return U_[k]; }
   Stored& pushed(std::size_t k) { return U_[count + k]; }
@@ -249,6 +256,43 @@ class LagrangianStages {
       coefficients = fma(weight * a, a, coefficients);
     }
     return shape_of(eighth_powers, speed, coefficients);
+  }
+
+  /// Coordinates and momenta at shares of the step, by the polynomials through the stages' rates.
+  void along(const L& shares, Lanes& Q, Lanes& P) const {
+    const L y = fma(L(2.0), shares, L(-1.0));
+    std::array<L, static_cast<std::size_t>(Width)> integrals;  // of the Legendre polynomials
+    L before(1.0), here = y;
+    integrals[0] = shares;
+    for (int m = 1; m < stages(); ++m) {
+      const L next = L(1.0 / (m + 1)) * fma(L(2.0 * m + 1) * y, here, L(-m) * before);
+      integrals[static_cast<std::size_t>(m)] = L(0.5 / (2 * m + 1)) * (next - before);
+      before = here;
+      here = next;
+    }
+    alignas(pack_alignment) Stored coefficients;
+    const auto reach = [&](const Compensated<double>& start, const Stored& increments) {
+      columns_.legendre(increments).store(coefficients);
+      L moved(start.compensation);
+      for (int m = 0; m < stages(); ++m) moved = fma(L(coefficients[m]), integrals[static_cast<std::size_t>(m)], moved);
+      return L(start.value) + moved;
+    };
+    for (std::size_t k = 0; k < count; ++k) {
+      Q[at(k)] = reach(q_[k], U_[k]);
+      P[at(k)] = reach(p_[k], U_[count + k]);
+    }
+  }
+
+  /// The size of changes of coordinates and momenta, relative to the speed of the motion.
+  double size_of(std::span<const double> changes, double pace) const {
+    double places = 0, pushes = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double place = weight_[k] * changes[k], push = changes[count + k] / weight_[k];
+      places += place * place;
+      pushes += push * push;
+    }
+    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
+    return std::sqrt((pace * pace * places + pushes) / fastest);
   }
 
   /// Energy that forces, and what holds time, bring in the step.

@@ -62,11 +62,11 @@ class Pace {
   }
 
  private:
-  // Where nothing moves or pushes yet, 1 rad/s, or one unit of length a second, is as good as any.
+  // Where nothing turns or pushes yet, 1/s is as good as any; where nothing moves, one unit of length a second.
   void start_from_nothing(const Vector& v, const Matrix& mass) {
-    if (slowest_squared_ > 0 || (v.array() != 0).any()) return;
+    if (slowest_squared_ > 0 || at(v, v).pace > 0) return;
     slowest_squared_ = 1;
-    natural_speed_squared_ = mass.diagonal().sum();
+    if ((v.array() == 0).all()) natural_speed_squared_ = mass.diagonal().sum();
   }
 
   double slowest_squared_ = 0, natural_speed_squared_ = 0;

@@ -224,7 +224,11 @@ class GaussStepper {
       solver_.allow_newton(true);
       is_found = bool(outcome);
       if (is_found) {
-        if (controller_.accepts(solver_.shape(), h)) {
+        const StepController wide = controller_;  // of what is narrow the steps elsewhere do not know
+        const bool is_good = controller_.accepts(solver_.shape(), h);
+        const bool sees_all = sees(longest, h);
+        if (!sees_all) controller_ = wide;
+        if (is_good && sees_all) {
           outcome = accept(h, outcome);
           if (!outcome) return outcome;
           ++statistics_.steps;
@@ -243,6 +247,17 @@ class GaussStepper {
       const bool is_last = attempts == tries || outcome.status == Status::interrupted;
       if (h < smallest_chosen * std::abs(time()) || is_last) return outcome;
     }
+  }
+
+  /// Whether stages of a step see what forces do between them; if not, the next one is to be shorter.
+  bool sees(double& longest, double h) {
+    if constexpr (requires { solver_.unseen(); }) {
+      unseen_ = solver_.unseen();
+      if (!statistics_.has_to_see(unseen_.impulse, h, options_.tolerance)) return true;
+      longest = h / 2;
+      return false;
+    }
+    return true;
   }
 
   /// One step of exactly h; on failure the state is what it was.
@@ -359,6 +374,7 @@ class GaussStepper {
     const double work = statistics_.load_work;
     if (solver_.loaded()) statistics_.load_work += solver_.work();
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
+    count_unseen();
     if (remembers_) remember(h, false, work);
     if constexpr (LinearizingSolver<Solver>) {
       if (linearization_ && !looks_) solver_.linearize(linearization_->next());
@@ -367,6 +383,15 @@ class GaussStepper {
     time_.add(h);
     outcome.time = time();
     return outcome;
+  }
+
+  // A step of its own choice was looked at when it was found.
+  void count_unseen() {
+    if constexpr (requires { solver_.unseen(); }) {
+      if (looks_) return;
+      if (!controller_.chooses()) unseen_ = solver_.unseen();
+      statistics_.step_over(time(), controller_.chooses() ? unseen_.impulse : unseen_.effect, options_.tolerance);
+    }
   }
 
   // A failure where coordinates are singular is theirs, whatever shape it took.
@@ -410,6 +435,7 @@ class GaussStepper {
   StepController controller_;
   Compensated<double> time_{};
   double defect_ = 0;  // of the last solution
+  Unseen unseen_;
   Statistics statistics_;
   StopSign stop_;
   bool remembers_ = false, looks_ = false;

@@ -13,8 +13,10 @@
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/system/field_look.hpp>
 #include <pendula/system/mass_scale.hpp>
 #include <pendula/system/system_model.hpp>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -43,6 +45,7 @@ class VelocityNewton {
         polynomials_(tableau_of<Eigen::Dynamic>(family, stages)),
         system_(stages),
         forcing_(family, stages),
+        look_(stages, argument_bases<S>()),
         at_(static_cast<std::size_t>(stages)) {
     for (Stage& stage : at_) stage.last_a.setZero();
   }
@@ -176,6 +179,35 @@ class VelocityNewton {
     return shape;
   }
 
+  /// Of what forces do between the stages that were solved.
+  Unseen unseen() requires tells_arguments<S> {
+    shape();  // places the stages
+    const auto at_all = [&](std::span<const double> shares, auto&& tell) {
+      for (std::size_t i = 0; i < shares.size(); ++i) tell(i, along(shares[i]));
+    };
+    const auto find_arguments = [&](std::span<const double> shares, double* found) {
+      at_all(shares, [&](std::size_t i, const State& there) {
+        typename S::template Arguments<double> arguments;
+        S::call_arguments(model_.parameters(there.time), there.q, there.v, model_.inputs(there.time), arguments);
+        std::copy_n(arguments.data(), arguments.size(), found + i * S::argument_is_base.size());
+      });
+    };
+    if (!look_.finds(find_arguments)) return {};
+    Vector sums, missed;
+    const auto accelerations = [&](std::span<const double> shares, double* found) {
+      at_all(shares, [&](std::size_t i, const State& there) {
+        Vector a;
+        S::acceleration(model_.parameters(there.time), there.q, there.v, model_.inputs(there.time), a);
+        std::copy_n(a.data(), count, found + i * count);
+      });
+    };
+    look_.sum(accelerations, {sums.data(), count}, {missed.data(), count});
+    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
+    const auto size_of = [&](const Vector& v) { return std::sqrt(v.cwiseProduct(weight_).squaredNorm() / fastest); };
+    const double h = coefficients_.h(), impulse = size_of(h * missed);
+    return {impulse, size_of(h * sums - increments()[1]) + Unseen::of_impulse(impulse)};
+  }
+
   double work() const {
     double work = 0;
     for (int i = 0; i < stages(); ++i) {
@@ -278,6 +310,18 @@ class VelocityNewton {
     }
   }
 
+  // At a share of the step, by the polynomials through the rates and accelerations of its stages, which are placed.
+  State along(double share) const {
+    const double h = coefficients_.h();
+    const auto up_to = polynomials_.integrals(share);
+    State state{time_ + h * share, q_.value, v_.value};
+    for (int j = 0; j < stages(); ++j) {
+      state.q += h * up_to[static_cast<std::size_t>(j)] * at(j).v;
+      state.v += h * up_to[static_cast<std::size_t>(j)] * at(j).a;
+    }
+    return state;
+  }
+
   // By how much the polynomial through the stages' rates is off at the start of the step.
   Vector missed_at_start() const {
     Vector missed = -v_.value;
@@ -364,6 +408,7 @@ class VelocityNewton {
   detail::NodePolynomials<Eigen::Dynamic, double> polynomials_;
   detail::StageSystem<S::coordinates> system_;
   SystemForcing<S> forcing_;
+  FieldLook look_;
   std::vector<Stage> at_;
   Compensated<Vector> q_, v_;
   std::array<Compensated<Vector>, 2> saved_, remembered_;

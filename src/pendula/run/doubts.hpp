@@ -69,6 +69,16 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
          rows_after(*missed, setup.start.time) + " may be wrong; " + advice;
 }
 
+/// Steps went past something narrow in the forces, from a time on that shows in rows.
+inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trust& trust) {
+  if (std::isinf(statistics.unseen_from)) return {};
+  trust.until = std::min(trust.until, statistics.unseen_from);
+  trust.expected_error = std::numeric_limits<double>::quiet_NaN();
+  return "steps went past something narrow in the forces, " + rounded(statistics.unseen, 1) +
+         " of the speed of the motion in all: " + untrusted_after(statistics.unseen_from, setup.start.time) + "; " +
+         smaller_step_advice(setup.options);
+}
+
 /// Of trials before the run; `parted` tells how far it went from the finest of them, where it was compared.
 inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& parted, const AccuracyAim& aim,
                     Trust& trust) {

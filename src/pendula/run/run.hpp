@@ -384,6 +384,7 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
     add(look_again(report, stop));
   }
   add(detail::of_defect(setup_, report.statistics.largest_defect, missed_, report.trust));
+  add(detail::of_unseen(setup_, report.statistics, report.trust));
 }
 
 // By a run that takes less time; where that says that this one cannot be trusted, by one that takes more, if there is

@@ -70,6 +70,6 @@ struct SystemEntry {
 };
 
 /// Layout of what crosses to a kernel that was compiled by itself: SystemEntry and all that it leads to.
-inline constexpr int system_interface = 8;
+inline constexpr int system_interface = 9;
 
 }  // namespace pendula

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <ostream>
 #include <span>
 #include <sstream>
@@ -109,6 +111,14 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
   return out << message(outcome);
 }
 
+/// What a step does not see between its stages, relative to the speed of the motion.
+struct Unseen {
+  double impulse = 0;  ///< the largest, to anywhere in the step
+  double effect = 0;   ///< on the end of the step
+  /// That an impulse may have, where the motion passes it as if it were not there.
+  static constexpr double of_impulse(double impulse) { return impulse * impulse; }
+};
+
 /// Counts over a run.
 struct Statistics {
   std::int64_t steps = 0;                      ///< accepted steps
@@ -117,6 +127,9 @@ struct Statistics {
   double load_work = 0;                        ///< energy that torque and damping brought  [J]; NaN where nobody counts
   double largest_defect = 0;                   ///< of a step that was accepted: GaussStepper::step
   double smallest_step = 0, largest_step = 0;  ///< of the method's own choice  [s]; 0: there was none
+  /// What steps did not see of the field between their stages, of the speed of the motion, in all; the time from which
+  /// that shows in rows  [s].
+  double unseen = 0, unseen_from = std::numeric_limits<double>::infinity();
 
   /// A step of the method's own choice was taken.
   void count_chosen(double h) {
@@ -124,9 +137,28 @@ struct Statistics {
     largest_step = std::max(largest_step, h);
   }
 
+  /// The step from `time` does not see so much. It was chosen by a tolerance; 0: it was as asked for.
+  void step_over(double time, double effect, double tolerance) {
+    constexpr double visible = 5e-4;
+    if (effect <= std::max(tolerance, unseen_rounding)) return;
+    unseen += std::isnan(effect) ? std::numeric_limits<double>::infinity() : effect;
+    const double trusted = tolerance > 0 ? std::min(visible, 1000 * tolerance) : visible;
+    if (unseen > trusted) unseen_from = std::min(unseen_from, time);
+  }
+
+  /// Whether a step by a tolerance is to be taken shorter for what it does not see; the shortest are left to their
+  /// errors.
+  bool has_to_see(double impulse, double h, double tolerance) const {
+    constexpr double shortest = 1e-6;  // of the longest step
+    return !(impulse <= std::max(tolerance, unseen_rounding)) && h > shortest * largest_step;
+  }
+
+  static constexpr double unseen_rounding = 1e-13;
+
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(steps, rejected_steps, newton_iterations, load_work, largest_defect, smallest_step, largest_step);
+    numbers(steps, rejected_steps, newton_iterations, load_work, largest_defect, smallest_step, largest_step, unseen,
+            unseen_from);
   }
 };
 

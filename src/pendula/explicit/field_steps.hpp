@@ -1,0 +1,132 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/kernels/gauss_tableaux.hpp>
+#include <pendula/system/field_look.hpp>
+#include <pendula/system/outcome.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+/// What a step of an explicit method does not see of the field between its stages.
+class FieldSteps {
+ public:
+  /// For a method that is as good as a quadrature of so many nodes. `is_blind`: its estimate of errors does not see
+  /// what a stage alone meets.
+  FieldSteps(int nodes, const ForwardDynamics& dynamics, std::size_t coordinates, bool is_blind = false)
+      : look_(nodes, dynamics.arguments()),
+        arguments_(dynamics.arguments().size()),
+        is_blind_(is_blind),
+        path_(coordinates),
+        begin_(2 * coordinates),
+        end_(2 * coordinates),
+        place_(coordinates),
+        rate_(coordinates),
+        sums_(coordinates),
+        missed_(coordinates) {}
+
+  bool has_to_look() const { return look_.has_to_look(); }
+
+  /// The next step begins anywhere; where the last one that was looked at has ended.
+  void forget() { begin_is_known_ = false; }
+  void move_on() {
+    begin_.swap(end_);
+    begin_is_known_ = has_to_look();
+  }
+
+  /// Along each coordinate k, relative to size_of(rate at x)(k); the largest. The path from x = (q, q̇) to `end` is the
+  /// quintic through both, their rates and accelerations.
+  template <class SizeOf>
+  Unseen unseen(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
+                const std::vector<double>& end, SizeOf&& size_of) {
+    lay_path(dynamics, time, h, x, end);
+    const auto size = size_of(begin_);
+    const auto arguments = [&](std::span<const double> shares, double* found) {
+      for (std::size_t i = 0; i < shares.size(); ++i) {
+        go_to(shares[i], h);
+        dynamics.find_arguments(time + shares[i] * h, place_.data(), rate_.data(), found + i * arguments_);
+      }
+    };
+    const auto accelerations = [&](std::span<const double> shares, double* found) {
+      for (std::size_t i = 0; i < shares.size(); ++i) {
+        go_to(shares[i], h);
+        dynamics.acceleration(time + shares[i] * h, place_.data(), rate_.data(), found + i * path_.size());
+      }
+    };
+    const bool is_found = look_.finds(arguments);
+    if (is_found) {
+      look_.sum(accelerations, sums_, missed_);
+    } else if (is_blind_) {
+      sum_roughly(accelerations);
+    } else {
+      return {};
+    }
+    Unseen most;
+    const auto raise = [](double& largest, double number) {
+      if (!(number <= largest)) largest = number;
+    };
+    for (std::size_t k = 0; k < path_.size(); ++k) {
+      const double gained = end[path_.size() + k] - x[path_.size() + k];
+      const double lacks = std::abs(h * sums_[k] - gained) / size(k), impulse = h * missed_[k] / size(k);
+      raise(most.impulse, is_blind_ ? std::max(impulse, lacks / path_error) : impulse);
+      raise(most.effect, lacks + Unseen::of_impulse(impulse));
+    }
+    return most;
+  }
+
+ private:
+  void lay_path(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
+                const std::vector<double>& end) {
+    const std::size_t count = path_.size();
+    if (!begin_is_known_) dynamics.acceleration(time, x.data(), x.data() + count, begin_.data() + count);
+    begin_is_known_ = true;
+    dynamics.acceleration(time + h, end.data(), end.data() + count, end_.data() + count);
+    for (std::size_t k = 0; k < count; ++k) {
+      const double v = h * x[count + k], a = h * h * begin_[count + k];
+      const double moved = end[k] - x[k] - v - a / 2, gained = h * end[count + k] - v - a;
+      const double turned = h * h * end_[count + k] - a;
+      path_[k] = {x[k],
+                  v,
+                  a / 2,
+                  10 * moved - 4 * gained + turned / 2,
+                  -15 * moved + 7 * gained - turned,
+                  6 * moved - 3 * gained + turned / 2};
+    }
+  }
+
+  void go_to(double share, double h) {
+    for (std::size_t k = 0; k < path_.size(); ++k) {
+      const auto& c = path_[k];
+      place_[k] = c[0] + share * (c[1] + share * (c[2] + share * (c[3] + share * (c[4] + share * c[5]))));
+      rate_[k] = (c[1] + share * (2 * c[2] + share * (3 * c[3] + share * (4 * c[4] + share * 5 * c[5])))) / h;
+    }
+  }
+
+  template <class Accelerations>
+  void sum_roughly(Accelerations& accelerations) {
+    using Gauss = kernels::GaussTableau<3>;
+    found_.resize(Gauss::stages * path_.size());
+    accelerations(std::span<const double>(Gauss::c), found_.data());
+    std::fill(sums_.begin(), sums_.end(), 0.0);
+    std::fill(missed_.begin(), missed_.end(), 0.0);
+    for (std::size_t j = 0; j < Gauss::b.size(); ++j) {
+      for (std::size_t k = 0; k < path_.size(); ++k) sums_[k] += Gauss::b[j] * found_[j * path_.size() + k];
+    }
+  }
+
+  static constexpr double path_error = 100;  // of a quintic, in errors of the step, about
+
+  FieldLook look_;
+  std::size_t arguments_;
+  bool is_blind_, begin_is_known_ = false;
+  std::vector<std::array<double, 6>> path_;  // coefficients of powers of the share
+  std::vector<double> begin_, end_;          // rates; of the coordinates' nothing
+  std::vector<double> place_, rate_, sums_, missed_, found_;
+};
+
+}  // namespace pendula

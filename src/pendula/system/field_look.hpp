@@ -1,0 +1,265 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <pendula/kernels/gauss_tableaux.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+/// Whether a kernel tells what its functions are taken of: S::call_arguments, and of each whether that is the base of a
+/// power (pendula_codegen/model_kernel.py).
+template <class S>
+inline constexpr bool tells_arguments = requires {
+  S::argument_is_base;
+};
+
+/// Which they are; none where a kernel tells of none.
+template <class S>
+std::span<const bool> argument_bases() {
+  if constexpr (tells_arguments<S>) return S::argument_is_base;
+  return {};
+}
+
+namespace detail {
+
+/// Legendre's polynomials on (0, 1), P_0 to P_n.
+template <std::size_t n>
+constexpr std::array<double, n + 1> legendre_polynomials(double x) {
+  const double y = 2 * x - 1;
+  std::array<double, n + 1> values{1, y};
+  for (std::size_t m = 1; m < n; ++m) {
+    const auto degree = static_cast<double>(m);
+    values[m + 1] = ((2 * degree + 1) * y * values[m] - degree * values[m - 1]) / (degree + 1);
+  }
+  return values;
+}
+
+}  // namespace detail
+
+/// Looks for what forces do between the nodes of a step: a wall or a pulse that is narrower than they are apart shows
+/// in none of them.
+///
+/// Functions of a model change within a short time where what they are taken of does: exp, tanh and their like where
+/// that comes by zero, or by its largest or smallest value, powers and logarithms where it comes by the smallest. What
+/// they are taken of is smooth along the polynomial of a step, so that few places show where that is; there and close
+/// to it forces are summed over ever shorter intervals. Shares of the step are 0 to 1.
+class FieldLook {
+ public:
+  /// For a method of so many nodes.
+  FieldLook(int nodes, std::span<const bool> is_base)
+      : is_base_(is_base.begin(), is_base.end()), parts_(std::max(1, nodes / 2)) {
+    const int intervals = is_base.empty() ? 0 : std::max(least_intervals, 2 * nodes);
+    for (int i = 0; i <= intervals; ++i) samples_.push_back(static_cast<double>(i) / std::max(intervals, 1));
+    places_.reserve(most_places);
+  }
+
+  /// Whether a model has functions that may be narrow.
+  bool has_to_look() const { return !is_base_.empty(); }
+
+  /// Whether any of them changes faster than samples of the step show; arguments(shares, found) are what functions are
+  /// taken of, (shares, arguments).
+  template <class Arguments>
+  bool finds(Arguments&& arguments) {
+    places_.clear();
+    evaluate(samples_, arguments, found_);
+    for (std::size_t a = 0; a < is_base_.size(); ++a) {
+      for (std::size_t i = 0; i < samples_.size(); ++i) look_at(a, i, arguments);
+    }
+    return !places_.empty();
+  }
+
+  /// `count` numbers along the step, where something was found: their sums, and what nodes that lie about twice as
+  /// close as those of the method do not see of them; numbers(shares, found) are those, (shares, count). Found are, of
+  /// each,
+  ///   sums    ∫₀¹
+  ///   missed  the largest |∫ (number − polynomial through nodes)| from the start of a part of the step to anywhere in
+  ///           it, of all parts
+  template <class Numbers>
+  void sum(Numbers&& numbers, std::span<double> sums, std::span<double> missed) {
+    find_borders();
+    std::fill(sums.begin(), sums.end(), 0.0);
+    std::fill(missed.begin(), missed.end(), 0.0);
+    for (int part = 0; part < parts_; ++part) {
+      const double from = static_cast<double>(part) / parts_, to = static_cast<double>(part + 1) / parts_;
+      const auto first = std::upper_bound(borders_.begin(), borders_.end(), from);
+      const auto last = std::lower_bound(first, borders_.end(), to);
+      sum_part(from, to, {first, last}, numbers, sums, missed);
+    }
+  }
+
+ private:
+  using Gauss = kernels::GaussTableau<8>;
+  using Nodes = std::array<double, Gauss::stages>;
+
+  /// Where a function changes, and the distance within which it does not change much any more.
+  struct Place {
+    double share, distance;
+  };
+
+  static constexpr int least_intervals = 8, sections = 7, most_rounds = 9;
+  // Of an argument, from place to place; of a base, relative to itself. Functions that change by so little are smooth.
+  static constexpr double smooth = 0.5, flat = 0.25;
+  static constexpr double gone = 60;   // exp of minus that is nothing
+  static constexpr double growth = 3;  // of intervals, away from a place
+  static constexpr std::size_t most_places = 64;
+
+  template <class Arguments>
+  void evaluate(std::span<const double> shares, Arguments& arguments, std::vector<double>& found) {
+    found.resize(shares.size() * is_base_.size());
+    arguments(shares, found.data());
+  }
+
+  double at(std::size_t i, std::size_t a) const { return found_[i * is_base_.size() + a]; }
+
+  bool changes(std::size_t a, double one, double other, double limit) const {
+    const double size = is_base_[a] ? std::min(std::abs(one), std::abs(other)) : 1.0;
+    return std::abs(one - other) > limit * size;
+  }
+
+  // How near a function is to where it changes: the larger, the nearer.
+  double nearness(std::size_t a, double sign, double value) const {
+    return is_base_[a] ? -std::abs(value) : sign * value;
+  }
+
+  template <class Arguments>
+  void look_at(std::size_t a, std::size_t i, Arguments& arguments) {
+    const std::size_t last = samples_.size() - 1;
+    const double here = at(i, a), before = at(i - (i > 0), a), after = at(i + (i < last), a);
+    if (i < last && (here < 0) != (after < 0) && changes(a, here, after, smooth)) {
+      zoom(a, 0, samples_[i], samples_[i + 1], arguments);
+    }
+    if (!changes(a, here, before, smooth) && !changes(a, here, after, smooth)) return;
+    const double reach = std::max(std::abs(here - before), std::abs(here - after));
+    for (const double sign : {1.0, -1.0}) {
+      const double near = nearness(a, sign, here);
+      if (near < nearness(a, sign, before) || near < nearness(a, sign, after)) continue;
+      if (!is_base_[a] && near + reach < -gone) continue;
+      zoom(a, sign, samples_[i - (i > 0)], samples_[i + (i < last)], arguments);
+      if (is_base_[a]) return;
+    }
+  }
+
+  // Into an interval, where an argument crosses zero (sign 0), or comes to its largest or smallest value.
+  template <class Arguments>
+  void zoom(std::size_t a, double sign, double from, double to, Arguments& arguments) {
+    std::array<double, sections + 1> shares;
+    for (int round = 1;; ++round) {
+      const double distance = (to - from) / sections;
+      for (int j = 0; j <= sections; ++j) shares[static_cast<std::size_t>(j)] = from + j * distance;
+      evaluate(shares, arguments, near_);
+      const auto value = [&](std::size_t j) { return near_[j * is_base_.size() + a]; };
+      std::size_t best = 0, low, high;
+      if (sign == 0) {
+        while (best + 2 < shares.size() && (value(best) < 0) == (value(best + 1) < 0)) ++best;
+        low = best;
+        high = best + 1;
+      } else {
+        for (std::size_t j = 1; j < shares.size(); ++j) {
+          if (nearness(a, sign, value(j)) > nearness(a, sign, value(best))) best = j;
+        }
+        low = best - (best > 0);
+        high = best + (best + 1 < shares.size());
+      }
+      const bool is_flat = !changes(a, value(low), value(best), flat) && !changes(a, value(best), value(high), flat);
+      if (is_flat || round == most_rounds) {
+        const bool is_gone = sign != 0 && !is_base_[a] && nearness(a, sign, value(best)) < -gone;
+        if (!is_gone) add({sign == 0 ? (shares[low] + shares[high]) / 2 : shares[best], distance});
+        return;
+      }
+      from = shares[low];
+      to = shares[high];
+    }
+  }
+
+  void add(const Place& place) {
+    const auto is_known = [&](const Place& known) {
+      return std::abs(known.share - place.share) <= place.distance / 2 && known.distance <= 2 * place.distance;
+    };
+    if (places_.size() < most_places && std::none_of(places_.begin(), places_.end(), is_known)) {
+      places_.push_back(place);
+    }
+  }
+
+  // Around every place: what is far from it may be far apart.
+  void find_borders() {
+    borders_.clear();
+    for (const Place& place : places_) {
+      borders_.push_back(place.share);
+      for (double away = place.distance; away < 0.5 / parts_; away *= growth) {
+        borders_.push_back(place.share - away);
+        borders_.push_back(place.share + away);
+      }
+    }
+    std::sort(borders_.begin(), borders_.end());
+  }
+
+  template <class Numbers>
+  void evaluate_at_nodes(double from, double length, Numbers& numbers, std::vector<double>& found, std::size_t count) {
+    Nodes shares;
+    for (std::size_t j = 0; j < shares.size(); ++j) shares[j] = from + Gauss::c[j] * length;
+    found.resize(shares.size() * count);
+    numbers(std::span<const double>(shares), found.data());
+  }
+
+  template <class Numbers>
+  void sum_part(double from, double to, std::span<const double> borders, Numbers& numbers, std::span<double> sums,
+                std::span<double> missed) {
+    const std::size_t count = sums.size();
+    evaluate_at_nodes(from, to - from, numbers, found_, count);
+    here_.assign(count, 0.0);
+    most_.assign(count, 0.0);
+    double before = from;
+    for (std::size_t i = 0; i <= borders.size(); ++i) {
+      const double here = i < borders.size() ? borders[i] : to;
+      const bool is_whole = borders.empty();
+      if (!is_whole) evaluate_at_nodes(before, here - before, numbers, near_, count);
+      const std::vector<double>& found = is_whole ? found_ : near_;
+      const Nodes weights = sums_of_polynomials((here - from) / (to - from));
+      for (std::size_t k = 0; k < count; ++k) {
+        double by_nodes = 0;
+        for (std::size_t j = 0; j < weights.size(); ++j) {
+          here_[k] += Gauss::b[j] * (here - before) * found[j * count + k];
+          by_nodes += weights[j] * (to - from) * found_[j * count + k];
+        }
+        const double off = std::abs(here_[k] - by_nodes);
+        if (!(off <= most_[k]) && !is_whole) most_[k] = off;
+      }
+      before = here;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      sums[k] += here_[k];
+      missed[k] += most_[k];
+    }
+  }
+
+  // ∫₀ˣ of the polynomial that is 1 at one node of Gauss and 0 at the others, for each.
+  static Nodes sums_of_polynomials(double x) {
+    const auto values = detail::legendre_polynomials<Gauss::stages>(x);
+    Nodes sums{};
+    for (std::size_t j = 0; j < sums.size(); ++j) {
+      for (std::size_t m = 0; m < sums.size(); ++m) {
+        const double sum = m == 0 ? 2 * x : (values[m + 1] - values[m - 1]) / static_cast<double>(2 * m + 1);
+        sums[j] += Gauss::b[j] * at_nodes[j][m] * static_cast<double>(2 * m + 1) * sum / 2;
+      }
+    }
+    return sums;
+  }
+
+  static constexpr std::array<std::array<double, Gauss::stages + 1>, Gauss::stages> at_nodes = [] {
+    std::array<std::array<double, Gauss::stages + 1>, Gauss::stages> values{};
+    for (std::size_t j = 0; j < values.size(); ++j)
+      values[j] = detail::legendre_polynomials<Gauss::stages>(Gauss::c[j]);
+    return values;
+  }();
+
+  std::vector<bool> is_base_;
+  int parts_;
+  std::vector<double> samples_, found_, near_, borders_, here_, most_;
+  std::vector<Place> places_;
+};
+
+}  // namespace pendula
