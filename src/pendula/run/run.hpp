@@ -172,17 +172,19 @@ inline Track Run::try_out(const RunOptions& options, double share, Track track,
 
 // Whether the trials came to their ends.
 inline bool Run::aim(const std::function<bool()>& stop) {
+  integrator_.reset();  // of a long chain as large as that of a trial; follow_aim makes one anew
   bool stopped = false;
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
   std::optional<Track> first;  // whose times are those of all
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
+    if (stopped) return {};
     RunOptions options = setup_.options;
     options.tolerance = tolerance;
     choose_stages(options);
     Track track = try_out(options, share, first ? Track::at_times_of(*first) : own_track(), stops);
     if (!track.is_complete()) return {};
-    if (!first) first = track;
+    if (!first) first = Track::at_times_of(track);
     return track;
   };
   const auto run = [&](double tolerance) {
@@ -377,8 +379,9 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
 // time for it: of constant steps not where the other came far.
 inline detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
-  const double tolerance = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
-  const double share = std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon());
+  double asked = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
+  if (is_aimed()) asked = std::min(asked, setup_.accuracy.error);
+  const double share = std::max(0.01 * asked, std::numeric_limits<double>::epsilon());
   const auto compare = [&](const detail::SecondLook& look) {
     Divergence divergence(*setup_.subject, *track_);
     const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {

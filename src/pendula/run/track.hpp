@@ -30,7 +30,11 @@ class Track {
   /// At the times of `other`.
   static Track at_times_of(const Track& other) {
     Track track(0);
-    for (const Motion& state : other.states_) track.times_.push_back(state.time);
+    if (other.looks()) {
+      track.times_ = other.times_;
+    } else {
+      for (const Motion& state : other.states_) track.times_.push_back(state.time);
+    }
     return track;
   }
 
@@ -57,7 +61,7 @@ class Track {
   void add_row(const Motion& row) {
     if (looks() || ++all_rows_ % every_row_ != 0) return;
     rows_.push_back(row);
-    if (rows_.size() < most_rows) return;
+    if (rows_.size() < at_most(most_rows)) return;
     std::size_t kept = first;
     for (std::size_t k = kept + 1; k < rows_.size(); k += 2) std::swap(rows_[kept++], rows_[k]);
     rows_.resize(kept);
@@ -85,12 +89,17 @@ class Track {
   static constexpr std::size_t first = 12, few = 64, most_numbers = std::size_t{1} << 23, numbers_besides = 16;
   static constexpr std::size_t most_rows = 256;
 
+  /// Of what is kept, `count` or as many as there is memory for.
+  std::size_t at_most(std::size_t count) const {
+    const std::size_t numbers = 2 * static_cast<std::size_t>(states_.front().q.size()) + numbers_besides;
+    return std::max(2 * first, std::min(count, most_numbers / numbers));
+  }
+
   void count_step(const Integrator& integrator) {
     ++steps_;
     if (steps_ > static_cast<std::int64_t>(first) && steps_ % every_ != 0) return;
     states_.push_back(integrator.state());
-    const std::size_t numbers = 2 * static_cast<std::size_t>(states_.back().q.size()) + numbers_besides;
-    if (states_.size() < (every_ < apart ? few : std::max(few, most_numbers / numbers))) return;
+    if (states_.size() < at_most(every_ < apart ? few : most_numbers)) return;
     std::size_t kept = first + 1;                                           // and the start
     const std::size_t next = first / static_cast<std::size_t>(every_) + 1;  // that many times `every` steps
     for (std::size_t k = kept + next % 2; k < states_.size(); k += 2) std::swap(states_[kept++], states_[k]);
