@@ -121,6 +121,25 @@ RunReport run_on(RunSetup setup, double duration, int steps, Keeper& keeper) {
   return run.go_on(from, stop);
 }
 
+// Of a chain of a million links every trial takes seconds to begin.
+TEST(Run, BeginsNoOtherTrialWhereItIsTold) {
+  struct Counted : ChainSubject<Planar> {
+    using ChainSubject::ChainSubject;
+    std::unique_ptr<Integrator> make_integrator(const RunOptions& options) const override {
+      ++made;
+      return ChainSubject::make_integrator(options);
+    }
+    mutable int made = 0;
+  };
+  const auto counted = std::make_shared<Counted>(equal_chain<Planar>(2));
+  RunSetup setup = double_pendulum(10);
+  setup.subject = counted;
+  setup.options.step = 0;
+  setup.accuracy.error = 1e-9;
+  EXPECT_EQ(pendula::Run(setup).go([] { return true; }).end, RunEnd::stopped);
+  EXPECT_EQ(counted->made, 3);  // by the run, its first trial, and the run as the trials would have it
+}
+
 // To ends that are no multiple of the step, by signals between rows and at rows: what ends a run leaves no trace.
 TEST(Run, GoesOnAsIfItHadNeverStopped) {
   Random random(11);
@@ -446,7 +465,7 @@ TEST(Run, SaysWhichAccuracyCannotBeReached) {
   setup.duration = 100;
   const RunReport lost = pendula::Run(setup).go();
   ASSERT_EQ(lost.warnings.size(), 1U);
-  EXPECT_NE(lost.warnings[0].find("runs by the smallest tolerances that are of use part; rows after t = "),
+  EXPECT_NE(lost.warnings[0].find("even runs by the smallest useful tolerances part; rows after t = "),
             std::string::npos)
       << lost.warnings[0];
 }

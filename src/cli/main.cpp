@@ -113,15 +113,20 @@ bool are_panels(const std::string& text) {
   return good;
 }
 
+/// 0 for anything else.
+int whole_number(const std::string& text) {
+  int number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() ? number : 0;
+}
+
 CommandLine::CommandLine() {
   const CLI::Validator not_empty = expect("the name of a file", [](const std::string& text) { return !text.empty(); });
-  const auto number_from_one = [](const std::string& text) {
-    int number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    return error == std::errc() && end == text.data() + text.size() && number >= 1;
-  };
-  const CLI::Validator one_or_more = expect("a whole number of links, 1 or more", number_from_one);
-  const CLI::Validator some_threads = expect("a whole number of threads, 1 or more", number_from_one);
+  const CLI::Validator one_or_more =
+      expect("a whole number of links, 1 or more", [](const std::string& text) { return whole_number(text) >= 1; });
+  const CLI::Validator some_threads = expect("a whole number of threads, from 1 to 1024", [](const std::string& text) {
+    return whole_number(text) >= 1 && whole_number(text) <= 1024;
+  });
   app.set_version_flag(
       "--version", [] { return "pendula " + std::string(version) + " (" + instruction_set() + ")"; },
       "Print the version and the instruction set in use, and end");
@@ -291,7 +296,7 @@ CommandLine::CommandLine() {
 
   map = app.add_subcommand("map", "Draw what is kept of an ensemble over its axes");
   map->add_option("FILE", map_options.file, "The file of an ensemble")->required()->check(not_empty);
-  map->add_option("KEY", map_options.key, "A kept number, such as event:flip or energy_error")
+  map->add_option("KEY", map_options.key, "A kept number, such as event_flip or energy_error")
       ->required()
       ->check(not_empty);
   map->add_option("-o,--output", map_options.output, "The picture: .svg, .png or .pdf")
@@ -304,7 +309,7 @@ CommandLine::CommandLine() {
   map->add_option("--contour", map_options.contour, "A line where another kept number has a value")
       ->type_name("KEY=VALUE")
       ->check(expect("KEY=VALUE such as energy_start=-9.81", is_level));
-  map->footer("Example: pendula map flips.h5 event:flip -o flips.png");
+  map->footer("Example: pendula map flips.h5 event_flip -o flips.png");
 
   gallery = app.add_subcommand("gallery", "Make a page of striking motions, each with its scenario");
   gallery->add_option("DIR", gallery_folder, "The folder for it")->required()->check(not_empty);

@@ -91,7 +91,7 @@ double uniform(std::uint64_t bits) {
 double drawn(const EnsembleDraw& draw, std::uint64_t seed, std::uint64_t key, std::uint64_t member) {
   const r123::Philox4x64 generate;
   const r123::Philox4x64::ctr_type words = generate({{member, key, 0, 0}}, {{seed, 0}});
-  if (!draw.normal) return draw.first + (draw.second - draw.first) * uniform(words[0]);
+  if (!draw.normal) return std::lerp(draw.first, draw.second, uniform(words[0]));
   // Box and Muller.
   const double radius = std::sqrt(-2 * std::log(uniform(words[0])));
   return draw.first + draw.second * radius * std::cos(2 * std::numbers::pi * uniform(words[1]));
@@ -101,7 +101,7 @@ double drawn(const EnsembleDraw& draw, std::uint64_t seed, std::uint64_t key, st
 
 double EnsembleAxis::at(std::int64_t k) const {
   if (k + 1 == count) return count == 1 ? from : to;
-  return from + (to - from) * (static_cast<double>(k) / static_cast<double>(count - 1));
+  return std::lerp(from, to, static_cast<double>(k) / static_cast<double>(count - 1));
 }
 
 std::vector<std::int64_t> EnsemblePlan::shape() const {

@@ -473,7 +473,9 @@ def test_what_is_no_file_is_not_replaced(tmp_path):
 
 
 def test_threads_are_counted(tmp_path):
-    assert "expected a whole number of threads, 1 or more" in run(tmp_path, "--threads", "0").err
+    for count in ("0", "1025", "1000000"):
+        wrong = run(tmp_path, "--threads", count)
+        assert wrong.status == 2 and "expected a whole number of threads, from 1 to 1024" in wrong.err
 
 
 def test_an_axis_may_be_a_key_of_a_drive(tmp_path):

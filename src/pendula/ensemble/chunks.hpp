@@ -5,6 +5,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -18,8 +19,8 @@ struct Chunk {
 };
 
 /// Calls work(chunk) for every chunk that `claim` hands out, until it has none, on `threads` threads, of which this is
-/// one. `claim` and `work` are called by several at once. What either throws ends the others after their chunk, and is
-/// thrown here; the first one counts.
+/// one; on fewer, where the system gives no more. `claim` and `work` are called by several at once. What either throws
+/// ends the others after their chunk, and is thrown here; the first one counts.
 inline void for_each_chunk(int threads, const std::function<std::optional<Chunk>()>& claim,
                            const std::function<void(const Chunk&)>& work) {
   std::mutex guard;
@@ -42,7 +43,11 @@ inline void for_each_chunk(int threads, const std::function<std::optional<Chunk>
   };
   {
     std::vector<std::jthread> others;
-    for (int k = 1; k < threads; ++k) others.emplace_back(take_all);
+    try {
+      for (int k = 1; k < threads; ++k) others.emplace_back(take_all);
+    } catch (const std::system_error&) {
+      // those that there are do all
+    }
     take_all();
   }
   if (failure) std::rethrow_exception(failure);

@@ -93,7 +93,7 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
            " of the size of the motion";
   }
   const double seen = parted ? parted->within(visible, start) : aim.trusted_until;
-  return of_wanted + "runs by the smallest tolerances that are of use part; " + rows_after(trust.until, start) +
+  return of_wanted + "even runs by the smallest useful tolerances part; " + rows_after(trust.until, start) +
          " are less accurate, " + untrusted_after(std::max(seen, trust.until), start);
 }
 
@@ -160,7 +160,7 @@ inline Doubt of_second_look(const RunSetup& setup, const SecondLook& look, const
   const std::string rows = rows_after(trust.until, start);
   if (parted.largest() * look.trusted <= visible) {
     return rows + " may be off by more than " + pendula::rounded(trusted, 2) + ", up to about " +
-           pendula::rounded(error, 1) + " of the size of the motion, which makes so much of the errors of its steps";
+           pendula::rounded(error, 1) + " of the size of the motion, which amplifies the errors of its steps";
   }
   const double seen = parted.within(visible / look.trusted, start);
   return look.how + " the motion goes elsewhere: " +

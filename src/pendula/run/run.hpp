@@ -175,6 +175,7 @@ inline Track Run::try_out(const RunOptions& options, double share, Track track,
 
 // Whether the trials came to their ends.
 inline bool Run::aim(const std::function<bool()>& stop) {
+  integrator_.reset();  // of a long chain as large as that of a trial; follow_aim makes one anew
   bool stopped = false;
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
@@ -392,10 +393,11 @@ inline void Run::doubt(RunReport& report, bool went_on, const std::function<bool
 inline detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
   integrator_.reset();
-  const double tolerance = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
+  double asked = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
+  if (is_aimed()) asked = std::min(asked, setup_.accuracy.error);
   const auto compare = [&](const detail::SecondLook& look) {
     const double share =
-        std::max(0.01 * std::min(tolerance, look.options.tolerance), std::numeric_limits<double>::epsilon());
+        std::max(0.01 * std::min(asked, look.options.tolerance), std::numeric_limits<double>::epsilon());
     Divergence divergence(*setup_.subject, *track_);
     const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {
       stopped = stopped || stop();

@@ -31,7 +31,11 @@ class Track {
   /// At the times of `other`.
   static Track at_times_of(const Track& other) {
     Track track(0);
-    for (const Motion& state : other.states_) track.times_.push_back(state.time);
+    if (other.looks()) {
+      track.times_ = other.times_;
+    } else {
+      for (const Motion& state : other.states_) track.times_.push_back(state.time);
+    }
     return track;
   }
 
