@@ -594,5 +594,57 @@ TYPED_TEST(RunsInLanes, LeaveOffWhenAsked) {
   EXPECT_LT(asked, 60);
 }
 
+// Chaotic, then at rest, after other numbers of turns by other tolerances: those of which lanes say nothing are right.
+// The looks change nothing.
+TEST(RunsInLanes, AreDoubtedWhereOthersEndElsewhere) {
+  ChainParameters<Planar> parameters;
+  parameters.masses = parameters.lengths = Eigen::Vector2d(1, 1);
+  parameters.damping = Eigen::Vector2d(0.1, 0.1);
+  const auto subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters));
+  RunOptions options = chosen(1e-9);
+  options.method = Method::fehlberg78;
+  std::vector<RunSetup> setups;
+  for (int k = 0; k < 16; ++k) {
+    setups.push_back({.subject = subject,
+                      .start = Motion(0, Eigen::Vector2d(0.2 * k, 0.2 * k), Eigen::Vector2d(0, 0)),
+                      .options = options,
+                      .duration = 300,
+                      .every = 1,
+                      .doubted = false});
+  }
+  ASSERT_TRUE(lane_kind(setups[0]));
+  const std::vector<RunReport> plain = run_members(setups);
+  std::vector<RunSetup> finest = setups;
+  for (RunSetup& setup : finest) setup.options.tolerance = 1e-13;
+  const std::vector<RunReport> right = run_members(finest);
+  for (RunSetup& setup : setups) setup.doubted = true;
+  const std::vector<RunReport> found = run_members(setups);
+  int wrong = 0, trusted = 0;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    EXPECT_EQ(found[k].last.q, plain[k].last.q) << k;
+    EXPECT_EQ(found[k].statistics.steps, plain[k].statistics.steps) << k;
+    EXPECT_TRUE(plain[k].warnings.empty());
+    EXPECT_EQ(found[k].warnings.empty(), std::isinf(found[k].trust.until)) << k;
+    const bool is_right = (found[k].last.q - right[k].last.q).norm() < 1e-3;
+    wrong += is_right ? 0 : 1;
+    trusted += found[k].warnings.empty() ? 1 : 0;
+    EXPECT_TRUE(is_right || !found[k].warnings.empty()) << k;
+  }
+  EXPECT_GE(wrong, 1);
+  EXPECT_GE(trusted, 5);
+}
+
+// After a pole two pairs of angles tell one direction.
+TEST(ChainSubjects, CompareDirectionsInSpace) {
+  ChainParameters<Spatial> parameters;
+  parameters.masses = parameters.lengths = Eigen::VectorXd::Ones(1);
+  const ChainSubject<Spatial> subject{Chain<Spatial>(parameters)};
+  const Motion one(0, Eigen::Vector2d(0.3, 1), Eigen::Vector2d(0.5, 0.2));
+  const Motion same(0, Eigen::Vector2d(-0.3, 1 + std::acos(-1)), Eigen::Vector2d(-0.5, 0.2));
+  const Motion other(0, Eigen::Vector2d(0.3, 1.1), Eigen::Vector2d(0.5, 0.2));
+  EXPECT_LT(subject.distance(one, same), 1e-14);  // measured DISTANCE
+  EXPECT_GT(subject.distance(one, other), 0.02);
+}
+
 }  // namespace
 }  // namespace pendula::test

@@ -193,7 +193,6 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
     if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
     const int status = io::member_status(ending.status);
     const auto trusted = static_cast<double>(report.warnings.empty() ? io::Trusted::yes : io::Trusted::no);
-    if (std::getenv("DBG")) for (auto& w : report.warnings) std::cerr << w << "\n";
     rows.push_back(status);
     rows.push_back(member.is_looked_at && io::is_ok(status) ? trusted : std::nan(""));
     kept_.append(*subject, report, spectrum, rows);

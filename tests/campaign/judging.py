@@ -631,8 +631,7 @@ def judge_ensemble(case: Case, room: truth.Room, program: Program) -> Verdict:
             is_doubted = kept.is_doubted(member)
             if found and not is_doubted:
                 silent += [text for _, text in found]
-            is_right = sure and not found and errors.error.max(initial=0) < DOUBTFUL[by] * asked
-            if is_doubted and is_right and asked * errors.growth.max(initial=1) < NOTHING_ASKED:  # no luck
+            if is_doubted and sure and not found and errors.error.max(initial=0) < DOUBTFUL[by] * asked:
                 falsely_doubted.append(f"member {member} is right")
             verdict.error = max(verdict.error, float(errors.error.max(initial=0)))
             verdict.ratio = max(verdict.ratio, float(errors.ratio.max(initial=0)))

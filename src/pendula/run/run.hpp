@@ -180,7 +180,6 @@ inline bool Run::aim(const std::function<bool()>& stop) {
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
   std::optional<Track> alike;  // by times of the first one, which are those of all
-  integrator_.reset();
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
     if (stopped) return {};
     RunOptions options = setup_.options;
