@@ -1,13 +1,15 @@
 #include "io/expression.hpp"
 
-#include <muParser.h>
-
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 #include <pendula/run/quantity.hpp>
 #include <string_view>
+#include <system_error>
 
 #include "io/nearest_name.hpp"
 
@@ -16,6 +18,199 @@ namespace {
 
 constexpr std::size_t longest_text = 10'000;
 constexpr std::size_t most_listed = 24;
+constexpr int deepest = 200;
+
+enum class Operation : std::uint8_t {
+  constant,
+  column,
+  negative,
+  sum,
+  difference,
+  product,
+  ratio,
+  power,
+  less,
+  greater,
+  at_most,
+  at_least,
+  equal,
+  unequal,
+  both,
+  either,
+  choose,
+  sine,
+  cosine,
+  tangent,
+  arcsine,
+  arccosine,
+  arctangent,
+  arctangent2,
+  hyperbolic_sine,
+  hyperbolic_cosine,
+  hyperbolic_tangent,
+  exponential,
+  logarithm,
+  logarithm2,
+  logarithm10,
+  root,
+  size,
+  sign,
+  rint,
+  floor,
+  remainder,
+  least,
+  largest
+};
+
+struct Function {
+  std::string_view name;
+  Operation operation;
+  int operands;
+};
+constexpr std::array<Function, 23> functions = {{{"sin", Operation::sine, 1},
+                                                 {"cos", Operation::cosine, 1},
+                                                 {"tan", Operation::tangent, 1},
+                                                 {"asin", Operation::arcsine, 1},
+                                                 {"acos", Operation::arccosine, 1},
+                                                 {"atan", Operation::arctangent, 1},
+                                                 {"atan2", Operation::arctangent2, 2},
+                                                 {"sinh", Operation::hyperbolic_sine, 1},
+                                                 {"cosh", Operation::hyperbolic_cosine, 1},
+                                                 {"tanh", Operation::hyperbolic_tangent, 1},
+                                                 {"exp", Operation::exponential, 1},
+                                                 {"log", Operation::logarithm, 1},
+                                                 {"ln", Operation::logarithm, 1},
+                                                 {"log2", Operation::logarithm2, 1},
+                                                 {"log10", Operation::logarithm10, 1},
+                                                 {"sqrt", Operation::root, 1},
+                                                 {"abs", Operation::size, 1},
+                                                 {"sign", Operation::sign, 1},
+                                                 {"rint", Operation::rint, 1},
+                                                 {"floor", Operation::floor, 1},
+                                                 {"fmod", Operation::remainder, 2},
+                                                 {"min", Operation::least, 2},
+                                                 {"max", Operation::largest, 2}}};
+
+// What reaches have, of doubles.
+double sign(double x) {
+  return x > 0 ? 1 : x < 0 ? -1 : 0;
+}
+double rint(double x) {
+  return std::floor(x + 0.5);
+}
+double min(double a, double b) {
+  return std::min(a, b);
+}
+double max(double a, double b) {
+  return std::max(a, b);
+}
+double less(double a, double b) {
+  return a < b ? 1 : 0;
+}
+double at_most(double a, double b) {
+  return a <= b ? 1 : 0;
+}
+double equal(double a, double b) {
+  return a == b ? 1 : 0;
+}
+double unequal(double a, double b) {
+  return a != b ? 1 : 0;
+}
+double both(double a, double b) {
+  return a != 0 && b != 0 ? 1 : 0;
+}
+double either(double a, double b) {
+  return a != 0 || b != 0 ? 1 : 0;
+}
+double choose(double condition, double yes, double no) {
+  return condition != 0 ? yes : no;
+}
+
+template <class Number>
+Number applied(Operation operation, const Number& a, const Number& b, const Number& c) {
+  using std::sin, std::cos, std::tan, std::asin, std::acos, std::atan, std::atan2, std::sinh, std::cosh, std::tanh,
+      std::exp, std::log, std::log2, std::log10, std::sqrt, std::abs, std::floor, std::fmod, std::pow;
+  switch (operation) {
+    case Operation::negative:
+      return -a;
+    case Operation::sum:
+      return a + b;
+    case Operation::difference:
+      return a - b;
+    case Operation::product:
+      return a * b;
+    case Operation::ratio:
+      return a / b;
+    case Operation::power:
+      return pow(a, b);
+    case Operation::less:
+      return less(a, b);
+    case Operation::greater:
+      return less(b, a);
+    case Operation::at_most:
+      return at_most(a, b);
+    case Operation::at_least:
+      return at_most(b, a);
+    case Operation::equal:
+      return equal(a, b);
+    case Operation::unequal:
+      return unequal(a, b);
+    case Operation::both:
+      return both(a, b);
+    case Operation::either:
+      return either(a, b);
+    case Operation::choose:
+      return choose(a, b, c);
+    case Operation::sine:
+      return sin(a);
+    case Operation::cosine:
+      return cos(a);
+    case Operation::tangent:
+      return tan(a);
+    case Operation::arcsine:
+      return asin(a);
+    case Operation::arccosine:
+      return acos(a);
+    case Operation::arctangent:
+      return atan(a);
+    case Operation::arctangent2:
+      return atan2(a, b);
+    case Operation::hyperbolic_sine:
+      return sinh(a);
+    case Operation::hyperbolic_cosine:
+      return cosh(a);
+    case Operation::hyperbolic_tangent:
+      return tanh(a);
+    case Operation::exponential:
+      return exp(a);
+    case Operation::logarithm:
+      return log(a);
+    case Operation::logarithm2:
+      return log2(a);
+    case Operation::logarithm10:
+      return log10(a);
+    case Operation::root:
+      return sqrt(a);
+    case Operation::size:
+      return abs(a);
+    case Operation::sign:
+      return sign(a);
+    case Operation::rint:
+      return rint(a);
+    case Operation::floor:
+      return floor(a);
+    case Operation::remainder:
+      return fmod(a, b);
+    case Operation::least:
+      return min(a, b);
+    case Operation::largest:
+      return max(a, b);
+    case Operation::constant:
+    case Operation::column:
+      break;
+  }
+  return a;
+}
 
 std::string quoted(const std::string& text) {
   constexpr std::size_t longest_shown = 60;
@@ -38,71 +233,320 @@ std::string listed(std::span<const std::string> names) {
   return text + "pi";
 }
 
-[[noreturn]] void reject_name(const std::string& name, std::span<const std::string> names) {
-  const std::vector<std::string_view> views(names.begin(), names.end());
-  throw ExpressionError("an expression in " + listed(names),
-                        "the unknown name " + quoted(name) + did_you_mean(nearest_name(name, views)));
-}
-
-/// Whether a text sets a variable, which an expression in muParser may.
-bool assigns(std::string_view text) {
-  constexpr std::string_view before = "=<>!";
-  for (std::size_t at = text.find('='); at != std::string_view::npos; at = text.find('=', at + 1)) {
-    const bool ends_comparison = at > 0 && before.find(text[at - 1]) != std::string_view::npos;
-    const bool begins_comparison = at + 1 < text.size() && text[at + 1] == '=';
-    if (!ends_comparison && !begins_comparison) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
-struct Expression::Parser : mu::Parser {
-  Parser() {
-    DefineConst("pi", std::numbers::pi);
-    DefineFun(
-        "fmod", +[](double a, double b) { return std::fmod(a, b); });
-    DefineFun(
-        "floor", +[](double a) { return std::floor(a); });
+template <class Number>
+Number Expression::of(std::span<const Number> numbers, std::vector<Number>& values) const {
+  values.resize(nodes_.size());
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    const auto operation = static_cast<Operation>(node.operation);
+    values[k] = operation == Operation::constant ? Number(node.number)
+                : operation == Operation::column ? numbers[node.a]
+                                                 : applied(operation, values[node.a], values[node.b], values[node.c]);
   }
-};
-
-Expression::~Expression() = default;
-
-Expression::Expression(const std::string& text, std::span<const std::string> names)
-    : parser_(std::make_unique<Parser>()) {
-  const std::string expected =
-      "an expression such as cos(" + names[std::min<std::size_t>(1, names.size() - 1)] + ") - 0.5";
-  if (text.size() > longest_text) throw ExpressionError(expected, quoted(text) + ", which is too long");
-  if (assigns(text)) throw ExpressionError(expected + ", which sets nothing", quoted(text));
-  try {
-    parser_->SetExpr(text);
-    std::vector<std::string> used;
-    for (const auto& [name, unused] : parser_->GetUsedVar()) used.push_back(name);
-    values_.resize(used.size());
-    for (std::size_t k = 0; k < used.size(); ++k) {
-      auto found = std::ranges::find(names, used[k]);
-      if (found == names.end()) found = std::ranges::find(names, present_name(used[k]));
-      if (found == names.end()) reject_name(used[k], names);
-      columns_.push_back(static_cast<std::size_t>(found - names.begin()));
-      parser_->DefineVar(used[k], &values_[k]);
-    }
-    parser_->Eval();
-    if (parser_->GetNumResults() != 1) throw ExpressionError(expected, quoted(text) + ", which is several");
-  } catch (const mu::Parser::exception_type& error) {
-    std::string why = error.GetMsg();
-    if (why.ends_with('.')) why.pop_back();
-    throw ExpressionError(expected, quoted(text) + ": " + why);
-  }
+  return values.back();
 }
 
-double Expression::operator()(std::span<const double> row) {
-  for (std::size_t k = 0; k < columns_.size(); ++k) values_[k] = row[columns_[k]];
-  try {
-    return parser_->Eval();
-  } catch (const mu::Parser::exception_type&) {
-    return std::numeric_limits<double>::quiet_NaN();
+/// Reads a text into nodes, from left to right. What binds less calls what binds more; −x^2 is −(x^2), and 2^3^2 is
+/// 2^(3^2).
+class ExpressionReader {
+ public:
+  ExpressionReader(Expression& expression, const std::string& text, std::span<const std::string> names)
+      : nodes_(expression.nodes_), columns_(expression.columns_), text_(text), names_(names) {}
+
+  /// Gives whether it is plain.
+  bool read() {
+    if (text_.size() > longest_text) throw ExpressionError(expected(), quoted(text_) + ", which is too long");
+    choice();
+    if (here() == ',') throw ExpressionError(expected(), quoted(text_) + ", which is several");
+    if (here() == '=') throw ExpressionError(expected() + ", which sets nothing", quoted(text_));
+    if (here() != '\0') fail("an operator");
+    return kinds_.back().is_plain && !kinds_.back().is_of_time();
   }
+
+ private:
+  /// What is known of a node.
+  struct Kind {
+    bool is_constant = false, is_plain = false;
+    bool has_time = false, has_others = false;
+    /// By how much it changes at most where all columns change by one; infinite where it is not linear.
+    double turns = std::numeric_limits<double>::infinity();
+
+    bool is_of_time() const { return has_time && !has_others; }
+  };
+
+  // --- Grammar. Each gives the place of its node ---
+
+  std::size_t choice() {
+    const Deeper deeper(*this);
+    const std::size_t condition = any();
+    if (!take("?")) return condition;
+    const std::size_t yes = choice();
+    need(":");
+    return add(Operation::choose, {condition, yes, choice()});
+  }
+  std::size_t any() {
+    std::size_t value = all();
+    while (take("||")) value = add(Operation::either, {value, all()});
+    return value;
+  }
+  std::size_t all() {
+    std::size_t value = comparison();
+    while (take("&&")) value = add(Operation::both, {value, comparison()});
+    return value;
+  }
+  std::size_t comparison() {
+    std::size_t value = sum();
+    for (;;) {
+      if (take("<=")) {
+        value = add(Operation::at_most, {value, sum()});
+      } else if (take(">=")) {
+        value = add(Operation::at_least, {value, sum()});
+      } else if (take("<")) {
+        value = add(Operation::less, {value, sum()});
+      } else if (take(">")) {
+        value = add(Operation::greater, {value, sum()});
+      } else if (take("==")) {
+        value = add(Operation::equal, {value, sum()});
+      } else if (take("!=")) {
+        value = add(Operation::unequal, {value, sum()});
+      } else {
+        return value;
+      }
+    }
+  }
+  std::size_t sum() {
+    std::size_t value = product();
+    for (;;) {
+      if (take("+")) {
+        value = add(Operation::sum, {value, product()});
+      } else if (take("-")) {
+        value = add(Operation::difference, {value, product()});
+      } else {
+        return value;
+      }
+    }
+  }
+  std::size_t product() {
+    std::size_t value = factor();
+    for (;;) {
+      if (take("*")) {
+        value = add(Operation::product, {value, factor()});
+      } else if (take("/")) {
+        value = add(Operation::ratio, {value, factor()});
+      } else {
+        return value;
+      }
+    }
+  }
+  std::size_t factor() {
+    const Deeper deeper(*this);
+    if (take("-")) return add(Operation::negative, {factor()});
+    if (take("+")) return factor();
+    const std::size_t base = operand();
+    return take("^") ? add(Operation::power, {base, factor()}) : base;
+  }
+  std::size_t operand() {
+    if (take("(")) {
+      const std::size_t value = choice();
+      need(")");
+      return value;
+    }
+    if (is_digit(here()) || here() == '.') return number();
+    if (is_letter(here())) return name();
+    fail("a number, a name or a parenthesis");
+  }
+
+  std::size_t number() {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
+    if (error != std::errc()) fail("a number");
+    at_ = static_cast<std::size_t>(end - text_.data());
+    return constant(value);
+  }
+
+  std::size_t name() {
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && (is_letter(text_[at_]) || is_digit(text_[at_]))) ++at_;
+    const std::string word = text_.substr(begin, at_ - begin);
+    const auto function = std::ranges::find(functions, word, &Function::name);
+    if (function != functions.end()) return call(*function);
+    if (word == "pi") return constant(std::numbers::pi);
+    auto found = std::ranges::find(names_, word);
+    if (found == names_.end()) found = std::ranges::find(names_, present_name(word));
+    if (found == names_.end()) reject_name(word);
+    return column(static_cast<std::size_t>(found - names_.begin()));
+  }
+
+  /// Of any number of operands where the function is one of two that lets them be taken one after the other.
+  std::size_t call(const Function& function) {
+    need("(");
+    std::size_t value = choice();
+    const bool takes_any = function.operation == Operation::least || function.operation == Operation::largest;
+    if (function.operands == 1) value = add(function.operation, {value});
+    if (function.operands == 2 && !takes_any) {
+      need(",");
+      value = add(function.operation, {value, choice()});
+    }
+    while (takes_any && take(",")) value = add(function.operation, {value, choice()});
+    need(")");
+    return value;
+  }
+
+  // --- Nodes ---
+
+  std::size_t constant(double value) {
+    return append({.number = value}, {.is_constant = true, .is_plain = true, .turns = 0});
+  }
+
+  std::size_t column(std::size_t of_row) {
+    const auto found = std::ranges::find(columns_, of_row);
+    const auto place = static_cast<std::size_t>(found - columns_.begin());
+    if (found == columns_.end()) columns_.push_back(of_row);
+    const bool is_time = names_[of_row] == "t";
+    return append({static_cast<std::uint8_t>(Operation::column), place},
+                  {.is_plain = true, .has_time = is_time, .has_others = !is_time, .turns = 1});
+  }
+
+  /// What is made of constants alone is one.
+  std::size_t add(Operation operation, std::initializer_list<std::size_t> operands) {
+    std::array<std::size_t, 3> of{};
+    std::ranges::copy(operands, of.begin());
+    const bool is_constant = std::ranges::all_of(operands, [&](std::size_t k) { return kinds_[k].is_constant; });
+    if (is_constant) {
+      const double value = applied(operation, nodes_[of[0]].number, nodes_[of[1]].number, nodes_[of[2]].number);
+      nodes_.resize(nodes_.size() - operands.size());
+      kinds_.resize(nodes_.size());
+      return constant(value);
+    }
+    return append({static_cast<std::uint8_t>(operation), of[0], of[1], of[2]}, kind(operation, operands));
+  }
+
+  std::size_t append(const Expression::Node& node, const Kind& kind) {
+    nodes_.push_back(node);
+    kinds_.push_back(kind);
+    return nodes_.size() - 1;
+  }
+
+  Kind kind(Operation operation, std::initializer_list<std::size_t> operands) const {
+    constexpr double quickest_sine = 2.001;
+    Kind made;
+    bool are_plain = true;
+    for (const std::size_t k : operands) {
+      made.has_time |= kinds_[k].has_time;
+      made.has_others |= kinds_[k].has_others;
+      are_plain &= kinds_[k].is_plain;
+    }
+    const std::size_t first = *operands.begin(), last = *(operands.end() - 1);
+    const Kind &a = kinds_[first], &b = kinds_[last];
+    const double of_a = std::abs(nodes_[first].number), of_b = std::abs(nodes_[last].number);
+    switch (operation) {
+      case Operation::negative:
+        made.turns = a.turns;
+        made.is_plain = are_plain;
+        break;
+      case Operation::sum:
+      case Operation::difference:
+        made.turns = a.turns + b.turns;
+        made.is_plain = are_plain;
+        break;
+      case Operation::product:
+        if (a.is_constant) made.turns = of_a * b.turns;
+        if (b.is_constant) made.turns = a.turns * of_b;
+        made.is_plain = are_plain;
+        break;
+      case Operation::ratio:
+        if (b.is_constant) made.turns = a.turns / of_b;
+        made.is_plain = are_plain && b.is_constant;
+        break;
+      case Operation::power:
+        made.is_plain = are_plain && b.is_constant && (of_b == 2 || of_b == 3 || of_b == 4) && nodes_[last].number > 0;
+        break;
+      case Operation::sine:
+      case Operation::cosine:
+        made.is_plain = are_plain && a.turns <= quickest_sine && !a.has_time;
+        break;
+      default:
+        break;
+    }
+    return made;
+  }
+
+  // --- Letters ---
+
+  static bool is_digit(char c) { return c >= '0' && c <= '9'; }
+  static bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+
+  /// The next letter that is no space; 0 at the end.
+  char here() {
+    while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) <= ' ') ++at_;
+    return at_ < text_.size() ? text_[at_] : '\0';
+  }
+
+  bool take(std::string_view sign) {
+    here();
+    if (!std::string_view(text_).substr(at_).starts_with(sign)) return false;
+    at_ += sign.size();
+    return true;
+  }
+  void need(std::string_view sign) {
+    if (!take(sign)) fail(std::string("\"").append(sign).append("\""));
+  }
+
+  // --- Errors ---
+
+  std::string expected() const {
+    return "an expression such as cos(" + names_[std::min<std::size_t>(1, names_.size() - 1)] + ") - 0.5";
+  }
+  [[noreturn]] void fail(const std::string& wanted) {
+    const char found = here();
+    const std::string got = found == '\0' ? "its end" : quoted(text_.substr(at_, 12));
+    throw ExpressionError(expected(), quoted(text_) + ": expected " + wanted + " before " + got);
+  }
+  [[noreturn]] void reject_name(const std::string& word) const {
+    std::vector<std::string_view> known(names_.begin(), names_.end());
+    for (const Function& function : functions) known.push_back(function.name);
+    throw ExpressionError("an expression in " + listed(names_),
+                          "the unknown name " + quoted(word) + did_you_mean(nearest_name(word, known)));
+  }
+
+  /// Counts how deep choices and factors are nested: each takes some of the stack.
+  class Deeper {
+   public:
+    explicit Deeper(ExpressionReader& reader) : reader_(reader) {
+      if (++reader_.depth_ > deepest) {
+        throw ExpressionError(reader_.expected(), quoted(reader_.text_) + ", which is nested too deeply");
+      }
+    }
+    ~Deeper() { --reader_.depth_; }
+    Deeper(const Deeper&) = delete;
+    Deeper& operator=(const Deeper&) = delete;
+
+   private:
+    ExpressionReader& reader_;
+  };
+
+  std::vector<Expression::Node>& nodes_;
+  std::vector<Kind> kinds_;  // of nodes
+  std::vector<std::size_t>& columns_;
+  const std::string& text_;
+  std::span<const std::string> names_;
+  std::size_t at_ = 0;
+  int depth_ = 0;
+};
+
+Expression::Expression(const std::string& text, std::span<const std::string> names) {
+  ExpressionReader reader(*this, text, names);
+  is_plain_ = reader.read();
+}
+
+double Expression::operator()(std::span<const double> numbers) {
+  return of(numbers, values_);
+}
+
+Reach Expression::operator()(std::span<const Reach> numbers) {
+  return of(numbers, reaches_);
 }
 
 }  // namespace pendula::io

@@ -79,7 +79,8 @@ def turns(
     """Times where g turns, of those that are not further than `wide` from zero."""
     slope = np.diff(values)
     k = 1 + np.flatnonzero(slope[1:] * slope[:-1] <= 0)
-    change = np.maximum(np.abs(slope[k - 1]), np.abs(slope[k]))
+    beside = np.clip(k[:, None] + (-2, -1, 1, 2), 0, len(grid) - 1)  # of a grid that is uneven
+    change = np.abs(values[beside] - values[k, None]).max(axis=1, initial=0)
     k = k[np.abs(values[k]) < 4 * change + 2 * wide[k]]
     if len(k) > MOST_TURNS:
         raise OverflowError("it turns too often")

@@ -128,8 +128,10 @@ def test_a_dense_motion_is_the_motion(room):
 # --- crossings
 
 
-def found(g, direction="both", events=(), doubt=1e-9, until=10.0):
-    grid = np.linspace(0, 10, 1000, dtype=truth.Real)
+EVEN = np.linspace(0, 10, 1000, dtype=truth.Real)
+
+
+def found(g, direction="both", events=(), doubt=1e-9, until=10.0, grid=EVEN):
     gaps = crossings.gaps(g, lambda t: np.full(len(t), doubt), grid)
     return [fault.text for fault in crossings.compare(gaps, list(events), direction, until)]
 
@@ -146,6 +148,19 @@ def test_a_pair_deeper_than_the_doubt_must_be_found():
     assert any("missed: up" in w for w in found(near_pair, events=pair[:1]))
     assert found(near_pair, "up", [pair[1]]) == []
     assert any("another direction" in w for w in found(near_pair, "up", pair))
+
+
+def test_a_pair_is_seen_wherever_the_grid_lies():
+    """Half way between two times, each of which has another one close by."""
+    twice = np.sort(np.concatenate([EVEN, EVEN + 1e-7]))
+    middle = (twice[201] + twice[202]) / 2
+
+    def g(t):
+        return 1e-8 - (t - middle) ** 2
+
+    pair = [(float(middle) - 1e-4, "up"), (float(middle) + 1e-4, "down")]
+    assert found(g, events=pair, grid=twice) == []
+    assert any("missed: up" in w for w in found(g, grid=twice))
 
 
 def test_a_pair_less_deep_may_be_missed_but_not_halved():

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <numbers>
 #include <numeric>
+#include <pendula/numeric/interval.hpp>
 #include <utility>
 
 namespace pendula {
@@ -39,6 +40,21 @@ std::array<double, points> chebyshev_sizes(const std::array<double, points>& val
     sizes[k] = std::abs(std::inner_product(values.begin(), values.end(), weights[k].begin(), 0.0));
   }
   return sizes;
+}
+
+/// A place that is none of five samples: what turns by less than 125 radians on [0, 1] is not the same there as at
+/// them.
+inline constexpr double odd_place = 0.315;
+
+/// What the polynomial through five samples is at the odd place, by the barycentric formula.
+inline double expected_at_odd_place(const std::array<double, 5>& seen) {
+  double sum = 0, weights = 0;
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    const double weight = (k % 2 == 0 ? 1 : -1) * (k % 4 == 0 ? 0.5 : 1) / (odd_place - sample_place(2 * k));
+    sum += weight * seen[k];
+    weights += weight;
+  }
+  return sum / weights;
 }
 
 /// A polynomial of degree 8 on [0, 1] by its Bernstein coefficients, between the smallest and the largest of which it
@@ -92,6 +108,37 @@ class BernsteinPolynomial {
   /// Whether it surely stays from −band to band.
   bool is_within(double band) const {
     return std::ranges::all_of(b_, [&](double value) { return std::abs(value) <= band; });
+  }
+
+  /// Between which numbers it surely stays.
+  Interval range() const {
+    const auto [least, most] = std::ranges::minmax(b_);
+    return {least, most};
+  }
+
+  /// Its derivative, as one of the same degree.
+  BernsteinPolynomial slopes() const {
+    constexpr double degree = size - 1;
+    Numbers slopes{};
+    for (std::size_t k = 0; k + 1 < size; ++k) {
+      const double slope = degree * (b_[k + 1] - b_[k]), share = static_cast<double>(k + 1) / degree;
+      slopes[k] += (1 - static_cast<double>(k) / degree) * slope;
+      slopes[k + 1] += share * slope;
+    }
+    return BernsteinPolynomial(slopes);
+  }
+
+  /// The same polynomial from `low` to `high`, 0 < high, as one on [0, 1].
+  BernsteinPolynomial part(double low, double high) const {
+    Numbers b = b_;
+    for (std::size_t level = 1; level < size; ++level) {
+      for (std::size_t k = size - 1; k >= level; --k) b[k] = b[k - 1] + high * (b[k] - b[k - 1]);
+    }
+    const double x = low / high;
+    for (std::size_t level = size - 1; level > 0; --level) {
+      for (std::size_t k = 0; k < level; ++k) b[k] += x * (b[k + 1] - b[k]);
+    }
+    return BernsteinPolynomial(b);
   }
 
   /// The same polynomial on [0, 1/2] and on [1/2, 1], each as one on [0, 1].

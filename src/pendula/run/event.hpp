@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/numeric/reach.hpp>
 #include <pendula/system/motion.hpp>
 #include <span>
 #include <string>
@@ -16,6 +18,22 @@ namespace pendula {
 /// Which changes of sign are meant.
 enum class Direction { up, down, both };
 
+/// An event's function as one of a few numbers of the motion: what it may be over a time is known where they are.
+class Formula {
+ public:
+  Formula() = default;
+  Formula(const Formula&) = delete;
+  Formula& operator=(const Formula&) = delete;
+  virtual ~Formula() = default;
+
+  /// How many numbers besides the time it is made of.
+  virtual std::size_t size() const = 0;
+  /// These, of a motion.
+  virtual void read(const Motion& motion, std::span<double> numbers) = 0;
+  virtual double value(double time, std::span<const double> numbers) = 0;
+  virtual Reach reach(const Reach& time, std::span<const Reach> numbers) = 0;
+};
+
 /// Something that happens where a function of the motion changes its sign.
 ///
 /// A zero that is touched is none, nor is one that the motion starts or ends at; a jump over zero is one. Where the
@@ -25,6 +43,8 @@ struct Event {
   std::function<double(const Motion&)> value;
   Direction direction = Direction::both;
   bool stop = false;  ///< whether the run ends there
+  /// The same function, where it may turn faster than the motion: none for what turns as slowly as that.
+  std::shared_ptr<Formula> formula = nullptr;
 };
 
 /// That an event happened.

@@ -7,8 +7,10 @@
 #include <functional>
 #include <limits>
 #include <pendula/run/event.hpp>
+#include <pendula/run/formula_search.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/sign_search.hpp>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -54,7 +56,7 @@ class StepStates {
     views.forget();
   }
 
-  double time(double u) const { return begin_.time + u * (end_.time - begin_.time); }
+  double time(double u) const { return u == 1 ? end_.time : begin_.time + u * (end_.time - begin_.time); }
   double length() const { return end_.time - begin_.time; }
 
   /// Of which a place is to be told, at best: a few roundings of the time.
@@ -116,6 +118,41 @@ class StepValues {
  private:
   StepStates<Step>& states_;
   const std::function<double(const Motion&)>& function_;
+  const Motion* seen_ = nullptr;
+};
+
+/// A formula of them. One of the time alone takes no state but where something happens.
+template <class Step>
+class FormulaValues {
+ public:
+  FormulaValues(StepStates<Step>& states, Formula& formula)
+      : states_(states), formula_(formula), numbers_(formula.size()) {}
+
+  std::size_t size() const { return formula_.size(); }
+  double time(double u) const { return states_.time(u); }
+  double resolution() const { return states_.resolution(); }
+  void glance(double u, std::span<double> numbers) { formula_.read(states_.glance(u), numbers); }
+  void look(double u, std::span<double> numbers) { formula_.read(states_.look(u), numbers); }
+  double value(double time, std::span<const double> numbers) { return formula_.value(time, numbers); }
+  Reach reach(const Reach& time, std::span<const Reach> numbers) { return formula_.reach(time, numbers); }
+
+  double exact_value(double u) {
+    place_ = u;
+    if (size() > 0) {
+      seen_ = &states_.look(u);
+      formula_.read(*seen_, numbers_);
+    }
+    return value(time(u), numbers_);
+  }
+
+  /// The state of the last exact value.
+  const Motion& seen() { return size() > 0 ? *seen_ : states_.look(place_); }
+
+ private:
+  StepStates<Step>& states_;
+  Formula& formula_;
+  std::vector<double> numbers_;
+  double place_ = 0;
   const Motion* seen_ = nullptr;
 };
 
@@ -182,20 +219,28 @@ class EventWatch {
 
   template <class Step>
   void look_for(std::size_t k, detail::StepStates<Step>& states, std::vector<Occurrence>& found) {
-    const Event& event = events_[k];
+    if (events_[k].formula == nullptr) {
+      detail::StepValues<Step> values(states, events_[k].value);
+      look_for(k, SignSearch(values, degree_), values, states.resolution(), found);
+    } else {
+      detail::FormulaValues<Step> values(states, *events_[k].formula);
+      look_for(k, FormulaSearch(values, degree_), values, states.resolution(), found);
+    }
+  }
+
+  template <class Search, class Values>
+  void look_for(std::size_t k, Search search, Values& values, double resolution, std::vector<Occurrence>& found) {
     const Side before = sides_[k];
-    detail::StepValues<Step> values(states, event.value);
-    SignSearch search(values, degree_);
-    const double last = event.value(motion_);
-    const auto search_by = [&](auto by) {
-      return locate_all(k, search.find(before.value, last, before.sign, by), values, states.resolution(), found);
-    };
-    using By = typename decltype(search)::By;
-    if (!search_by(By::polynomial)) search_by(By::full_order);
+    const double last = events_[k].value(motion_);
     const int sign = std::isfinite(last) ? sign_of(last) : 0;
+    const auto search_by = [&](SeenBy by) {
+      return locate_all(k, search.find(before.value, last, before.sign, by), values, resolution, found);
+    };
+    const bool is_found = search_by(SeenBy::polynomial) || search_by(SeenBy::full_order);
+    if (!is_found) locate_all(k, changes_by_ends(before.sign, sign), values, resolution, found);
     sides_[k] = {last, sign != 0 || !std::isfinite(last) ? sign : before.sign};
     if (!search.is_finite() || !std::isfinite(last)) note(tallies_[k].not_finite);
-    if (!search.is_told()) note(tallies_[k].not_told);
+    if (!search.is_told() || !is_found) note(tallies_[k].not_told);
   }
 
   /// Adds what happened at changes; nothing, and false, where the motion does not have one of them.
@@ -203,10 +248,12 @@ class EventWatch {
   bool locate_all(std::size_t k, const std::vector<SignChange>& changes, Values& values, double resolution,
                   std::vector<Occurrence>& found) const {
     const std::size_t before = found.size();
-    for (const SignChange& change : changes) {
+    for (std::size_t n = 0; n < changes.size(); ++n) {
+      const SignChange& change = changes[n];
       const bool up = change.sign > 0;
       if (events_[k].direction != Direction::both && (events_[k].direction == Direction::up) != up) continue;
-      if (!locate(values, change, resolution)) {
+      const double low = n == 0 ? 0 : changes[n - 1].to, high = n + 1 == changes.size() ? 1 : changes[n + 1].from;
+      if (!locate(values, change, resolution) && !locate_beside(values, change, low, high, resolution)) {
         found.resize(before);
         return false;
       }

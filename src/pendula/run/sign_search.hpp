@@ -25,6 +25,83 @@ struct SignChange {
   double slope = 0;             ///< a step
 };
 
+/// What states of a step are taken from.
+enum class SeenBy { polynomial, full_order };
+
+/// Where the polynomial of a step, of a degree from 1 to 8, misses the motion most: at the node next to the middle,
+/// since its error has a derivative that is zero at all nodes.
+inline double place_of_miss(std::size_t degree) {
+  constexpr std::array<double, 9> next_to_middle{0.5, 0.5, 0.2113, 0.5, 0.33, 0.5, 0.3807, 0.5, 0.4083};
+  return next_to_middle[degree];
+}
+
+/// What the signs at both ends of a step tell, and no more.
+inline std::vector<SignChange> changes_by_ends(int first, int last) {
+  if (first * last >= 0) return {};
+  return {{0, 1, last, std::nullopt, 0}};
+}
+
+/// The signs of a function at places of a step, from left to right, and where they change.
+class SignLine {
+ public:
+  /// `first` is the value at the beginning, `sign` the last one before it that was not 0, or 0.
+  void begin(double first, int sign) {
+    changes_.clear();
+    last_ = {0, sign, first == 0};
+    go_on(0, sign_of(first));
+  }
+
+  /// To a place where the function has a sign, 0 where that says nothing: the change that this shows, if there is one.
+  SignChange* go_on(double u, int sign) {
+    if (sign == 0) return nullptr;
+    const Node before = std::exchange(last_, {u, sign, false});
+    if (before.sign == 0 || before.sign == sign) return nullptr;
+    return &changes_.emplace_back(SignChange{before.at, before.is_zero ? before.at : u, sign, std::nullopt, 0});
+  }
+
+  /// To a place where the function has no value, or none that says anything of what was before.
+  void forget(double u) { last_ = {u, 0, false}; }
+
+  /// The last sign, 0 where it is not known.
+  int sign() const { return last_.sign; }
+
+  std::vector<SignChange> take() { return std::exchange(changes_, {}); }
+
+ private:
+  struct Node {
+    double at = 0;
+    int sign = 0;
+    bool is_zero = false;  // and of that sign before
+  };
+
+  std::vector<SignChange> changes_;
+  Node last_;
+};
+
+/// Between two places of one sign a function comes close to zero and turns: golden sections lead to where, or to a
+/// place of the other sign, which is given, if there is one. What they do not tell from zero is a zero that is touched.
+/// `value` gives the value at a place, `goes_on` whether more of these may be asked for.
+template <class Value, class GoesOn>
+std::optional<double> other_sign(double from, double to, int sign, Value value, GoesOn goes_on) {
+  constexpr double golden = 0.38196601125010515, nearest = 4 * std::numeric_limits<double>::epsilon();
+  constexpr int most_turns = 48;
+  if (sign == 0 || sign_of(value(to)) != sign) return {};
+  double low = from, high = to, u = low + golden * (high - low), height = sign * value(u);
+  for (int tries = 0; tries < most_turns && height > 0 && goes_on() && high - low > nearest; ++tries) {
+    const bool is_left = u - low > high - u;  // of the longer part
+    const double other = is_left ? u - golden * (u - low) : u + golden * (high - u);
+    const double there = sign * value(other);
+    if (there < height) {
+      (is_left ? high : low) = u;
+      u = other;
+      height = there;
+    } else {
+      (is_left ? low : high) = other;
+    }
+  }
+  return height < 0 ? std::optional(u) : std::nullopt;
+}
+
 /// Finds every change of sign of a function within a step, from what the step's polynomial shows of it.
 ///
 /// Six samples decide where the function is far from zero: five are Chebyshev points, by which twice what the function
@@ -40,8 +117,7 @@ struct SignChange {
 template <class Sight>
 class SignSearch {
  public:
-  /// What values are taken from.
-  enum class By { polynomial, full_order };
+  using By = SeenBy;
 
   /// `degree` of the step's polynomial: how fast its error falls with the length of the step.
   SignSearch(Sight& sight, int degree) : sight_(sight), degree_(static_cast<std::size_t>(std::clamp(degree, 1, 8))) {}
@@ -49,18 +125,15 @@ class SignSearch {
   /// Changes in order; `first` and `last` are the values at both ends, `sign` is the last one before the step that was
   /// not 0, 0 where there was none. A zero at the beginning belongs to this step, one at its end to the next.
   std::vector<SignChange> find(double first, double last, int sign, By by = By::polynomial) {
-    changes_.clear();
     is_finite_ = true;
     samples_left_ = most_samples;
     first_value_ = first;
     last_value_ = last;
     missed_ = 0;
     is_measured_ = false;
-    last_ = {0, sign, first == 0};
-    if (first != 0) node(0, sign_of(first));
+    line_.begin(first, sign);
     search({0, 1, first, last, sign_of(last)}, 0, by);
-    if (!is_told()) by_ends(sign, sign_of(last));
-    return std::exchange(changes_, {});
+    return is_told() ? line_.take() : changes_by_ends(sign, sign_of(last));
   }
 
   /// Whether the function was finite wherever it was looked at.
@@ -72,9 +145,7 @@ class SignSearch {
 
  private:
   static constexpr std::size_t points = BernsteinPolynomial::size;
-  /// The sixth place: what turns by less than 125 radians in a step is not the same there as at Chebyshev points.
-  static constexpr double unlike = 0.315;
-  static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30, most_turns = 48;
+  static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30;
   static constexpr double epsilon = std::numeric_limits<double>::epsilon();
   using Samples = BernsteinPolynomial::Numbers;
 
@@ -97,12 +168,6 @@ class SignSearch {
     bool open = false;
     double from = 0;
     int slope = 0;  // of all of them, or 0
-  };
-
-  struct Node {
-    double at = 0;
-    int sign = 0;
-    bool is_zero = false;  // and of that sign before
   };
 
   /// What the values between the last node and the next are known by.
@@ -151,24 +216,20 @@ class SignSearch {
     };
     if (by == By::full_order) return resolved(interval, polynomial, by, band(0));
     if (!is_measured_) {
-      const std::size_t found = changes_.size();
-      const Node before = last_;
+      const SignLine before = line_;
       is_unsure_ = false;
       const double last_two = degree_ == 1 ? variation : std::max(sizes[degree_], sizes[degree_ - 1]);
       resolved(interval, polynomial, by, band(missed_ + last_two * whole));
       if (!is_unsure_) return;
-      changes_.resize(found);
-      last_ = before;
+      line_ = before;
       measure();
     }
     resolved(interval, polynomial, by, band(missed_ + sizes[degree_] * whole));
   }
 
-  /// How far the polynomial misses where it does most: at the node next to the middle, since its error has a derivative
-  /// that is zero at all nodes.
+  /// How far the polynomial misses where it does most.
   void measure() {
-    constexpr std::array<double, 9> next_to_middle{0.5, 0.5, 0.2113, 0.5, 0.33, 0.5, 0.3807, 0.5, 0.4083};
-    const double place = next_to_middle[degree_];
+    const double place = place_of_miss(degree_);
     const double off = std::abs(sample(place, By::polynomial) - sample(place, By::full_order));
     if (std::isfinite(off)) missed_ = std::max(missed_, 2 * off);
     is_measured_ = true;
@@ -188,25 +249,14 @@ class SignSearch {
     const std::array<double, 5> seen{values[0], values[2], values[4], values[6], values[8]};
     const std::array<double, 5> sizes = chebyshev_sizes<5>(seen);
     if (!(sizes[0] > 2 * (sizes[1] + sizes[2] + sizes[3] + sizes[4]))) return false;
-    return std::abs(sample(interval.at(unlike), by) - expected_there(seen)) < 0.1 * sizes[0];
+    return std::abs(sample(interval.at(odd_place), by) - expected_at_odd_place(seen)) < 0.1 * sizes[0];
   }
 
   /// How far the interpolant is off there. Full order is asked for short parts only, where looks would cost more than
   /// they tell.
   double off_at_sixth(const BernsteinPolynomial& interpolant, const Interval& interval, By by) {
     if (by == By::full_order) return 0;
-    return std::abs(sample(interval.at(unlike), by) - interpolant(unlike));
-  }
-
-  /// What the polynomial through five samples is at the sixth place, by the barycentric formula.
-  static double expected_there(const std::array<double, 5>& seen) {
-    double sum = 0, weights = 0;
-    for (std::size_t k = 0; k < seen.size(); ++k) {
-      const double weight = (k % 2 == 0 ? 1 : -1) * (k % 4 == 0 ? 0.5 : 1) / (unlike - sample_place(2 * k));
-      sum += weight * seen[k];
-      weights += weight;
-    }
-    return sum / weights;
+    return std::abs(sample(interval.at(odd_place), by) - interpolant(odd_place));
   }
 
   /// Halves; where those are too short for anything but a jump or a corner, or too many, the samples' signs.
@@ -221,11 +271,6 @@ class SignSearch {
     }
     for (std::size_t k = 1; k + 1 < points; ++k) node(interval.at(sample_place(k)), values[k]);
     node(interval.to, std::isfinite(interval.last) ? interval.sign : interval.last);
-  }
-
-  void by_ends(int first, int last) {
-    changes_.clear();
-    if (first * last < 0) changes_.push_back({0, 1, last, std::nullopt, 0});
   }
 
   void resolved(const Interval& interval, const BernsteinPolynomial& polynomial, By by, const Band& band) {
@@ -275,58 +320,34 @@ class SignSearch {
     search({from, to, first, last, sign_of(last)}, most_halvings / 2, By::full_order);
   }
 
-  /// Between two places of one sign the function comes close to zero and turns, by full order: golden sections lead to
-  /// where, or to a place of the other sign. What they do not tell from zero is a zero that is touched.
   void turn(double from, double to) {
-    const int sign = last_.sign;
-    if (sign == 0 || sign_of(sample(to, By::full_order)) != sign) return;
-    constexpr double golden = 0.38196601125010515;
-    double low = from, high = to, u = low + golden * (high - low), height = sign * sample(u, By::full_order);
-    for (int tries = 0; tries < most_turns && height > 0 && is_told() && high - low > 4 * epsilon; ++tries) {
-      const bool is_left = u - low > high - u;  // of the longer part
-      const double other = is_left ? u - golden * (u - low) : u + golden * (high - u);
-      const double there = sign * sample(other, By::full_order);
-      if (there < height) {
-        (is_left ? high : low) = u;
-        u = other;
-        height = there;
-      } else {
-        (is_left ? low : high) = other;
-      }
-    }
-    if (height < 0) node(u, -sign);
+    const auto value = [&](double u) { return sample(u, By::full_order); };
+    const auto other = other_sign(from, to, line_.sign(), value, [&] { return is_told(); });
+    if (other) node(*other, -line_.sign());
   }
 
   /// Goes on to a place where the function has a sign, 0 where that says nothing; a value that is not finite forgets
   /// all before it.
   void node(double u, double value) {
     if (!std::isfinite(value)) {
-      last_ = {u, 0, false};
+      line_.forget(u);
     } else {
       node(u, sign_of(value));
     }
   }
   void node(double u, int sign, const Curve* curve = nullptr) {
-    if (sign == 0) return;
-    if (last_.sign != 0 && sign != last_.sign) changes_.push_back(change(u, sign, curve));
-    last_ = {u, sign, false};
-  }
-
-  SignChange change(double u, int sign, const Curve* curve) const {
-    SignChange change{last_.at, last_.is_zero ? last_.at : u, sign, std::nullopt, 0};
-    if (curve == nullptr || last_.is_zero || last_.at < curve->interval.from) return change;
-    const double from = curve->local(last_.at), to = curve->local(u);
-    if (sign_of(curve->polynomial(from)) * sign_of(curve->polynomial(to)) >= 0) return change;
+    SignChange* const change = line_.go_on(u, sign);
+    if (change == nullptr || curve == nullptr || change->from < curve->interval.from) return;
+    const double from = curve->local(change->from), to = curve->local(change->to);
+    if (sign_of(curve->polynomial(from)) * sign_of(curve->polynomial(to)) >= 0) return;
     const double zero = curve->polynomial.zero(from, to);
-    change.guess = curve->interval.at(zero);
-    change.slope = curve->polynomial.derivative(zero) / (curve->interval.to - curve->interval.from);
-    return change;
+    change->guess = curve->interval.at(zero);
+    change->slope = curve->polynomial.derivative(zero) / (curve->interval.to - curve->interval.from);
   }
 
   Sight& sight_;
   std::size_t degree_;
-  std::vector<SignChange> changes_;
-  Node last_;
+  SignLine line_;
   int samples_left_ = 0;
   bool is_finite_ = true;
   double first_value_ = 0, last_value_ = 0;  // at the ends of the step
@@ -360,6 +381,19 @@ std::optional<double> locate(Sight& sight, const SignChange& change, double tole
   if (from == change.from && sign_of(sight.exact_value(from)) == change.sign) return std::nullopt;
   if (sign_of(sight.exact_value(to)) != change.sign) return std::nullopt;
   return to;
+}
+
+/// The same of a change that may be beside the places that it was seen between, as jumps are where states of full order
+/// are rounded: not far from there, and from `low` to `high`.
+template <class Sight>
+std::optional<double> locate_beside(Sight& sight, SignChange change, double low, double high, double tolerance) {
+  constexpr double furthest = 1e-6;
+  for (double more = 8 * tolerance + change.to - change.from; more < furthest; more *= 32) {
+    change = {std::max(low, change.from - more), std::min(high, change.to + more), change.sign, std::nullopt, 0};
+    if (sign_of(sight.exact_value(change.from)) != -change.sign) continue;
+    if (sign_of(sight.exact_value(change.to)) == change.sign) return locate(sight, change, tolerance);
+  }
+  return std::nullopt;
 }
 
 }  // namespace pendula

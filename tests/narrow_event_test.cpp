@@ -1,0 +1,275 @@
+// Events whose expressions are narrow, or turn faster than the motion, as scenarios have them: every change of sign,
+// once.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/run.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/event_reader.hpp"
+#include "support/random_chain.hpp"
+
+namespace pendula::test {
+namespace {
+
+/// When events happened, by their names.
+class Times : public Observer {
+ public:
+  void take(const Row& /*row*/) override {}
+  void happen(const EventRow& row) override { of[row.event.name].push_back(row.row.motion.time); }
+
+  std::map<std::string, std::vector<double>> of;
+};
+
+struct Watched {
+  std::map<std::string, std::vector<double>> times;
+  RunReport report;
+
+  std::vector<double> of(const std::string& name) const {
+    const auto found = times.find(name);
+    return found == times.end() ? std::vector<double>() : found->second;
+  }
+};
+
+Watched watch(RunSetup setup, const std::vector<io::EventPlan>& plans) {
+  setup.doubted = false;
+  setup.events = io::events_of(plans, setup.subject, setup.start);
+  Times times;
+  pendula::Run run(setup);
+  run.add(times);
+  const RunReport report = run.go();
+  EXPECT_EQ(report.end, RunEnd::complete);
+  for (const std::string& warning : report.warnings) ADD_FAILURE() << warning;
+  return {times.of, report};
+}
+
+io::EventPlan plan(const std::string& name, const std::string& when) {
+  io::EventPlan plan;
+  plan.name = name;
+  plan.when = when;
+  return plan;
+}
+
+/// Rods that go round and round: every column passes most of its values, quickly.
+template <class Space>
+RunSetup whirling(Random& random, int links, const RunOptions& options) {
+  const Eigen::VectorXd rates = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, 5, 8);
+  Eigen::VectorXd angles = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, 0.5, 2.5);
+  RunSetup setup{std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)), Motion(0, angles, rates),
+                 options, 3};
+  return setup;
+}
+
+/// An expression that is narrow at a level of a column, and the levels where it crosses zero.
+struct Narrow {
+  std::string when;
+  std::vector<double> levels;
+};
+
+Narrow narrow(int kind, const std::string& column, double level, double width) {
+  const std::string off = "(" + column + " - " + shortest(level) + ")", part = off + "/" + shortest(width);
+  const std::vector<double> beside = {level - width, level + width};
+  switch (kind) {
+    case 0: {
+      const double half = width * std::sqrt(std::numbers::ln2);
+      return {"exp(-(" + part + ")^2) - 0.5", {level - half, level + half}};
+    }
+    case 1:
+      return {shortest(width) + " - abs(" + off + ")", beside};
+    case 2:
+      return {"sqrt(abs(" + off + ")) - sqrt(" + shortest(width) + ")", beside};
+    case 3:
+      return {"1/(1 + (" + part + ")^2) - 0.5", beside};
+    case 4:
+      return {"tanh(" + part + ")", {level}};
+    case 5:
+      return {"sign(" + off + ") + 0.5", {level}};
+    case 6:
+      return {"abs(" + off + ") < " + shortest(width) + " ? 1 : -1", beside};
+    case 7:
+      return {"floor(" + part + ") + 0.5", {level}};
+    default:
+      return {"min(1 - abs(" + part + "), 0.5)", beside};
+  }
+}
+constexpr int kinds = 9;
+
+struct Case {
+  const char* name;
+  RunOptions options;
+  double off;  // how far instants may be apart that are looked for in two ways  [s]
+};
+
+class NarrowEvents : public ::testing::TestWithParam<Case> {};
+
+/// What they cross zero at is looked for as well, by expressions that are as slow as the motion.
+template <class Space>
+std::size_t compare_with_levels(unsigned seed, const std::vector<std::string>& columns, int links, const Case& given,
+                                EventCost& cost) {
+  Random random(seed);
+  std::vector<io::EventPlan> plans;
+  std::vector<Narrow> all;
+  for (int kind = 0; kind < kinds; ++kind) {
+    const auto which = static_cast<std::size_t>(random.uniform(0, static_cast<double>(columns.size()) - 1e-9));
+    const double width = std::pow(10, random.uniform(-6, -1));
+    all.push_back(narrow(kind, columns[which], random.uniform(-0.6, 0.6), width));
+    const std::string name = std::to_string(kind);
+    plans.push_back(plan(name, all.back().when));
+    for (std::size_t k = 0; k < all.back().levels.size(); ++k) {
+      const std::string level = shortest(all.back().levels[k]);
+      plans.push_back(plan(name + "_" + std::to_string(k), columns[which] + " - " + level));
+    }
+  }
+  const Watched watched = watch(whirling<Space>(random, links, given.options), plans);
+  std::size_t found = 0;
+  for (int kind = 0; kind < kinds; ++kind) {
+    const std::string name = std::to_string(kind);
+    const Narrow& narrow = all[static_cast<std::size_t>(kind)];
+    std::vector<double> expected;
+    for (std::size_t k = 0; k < narrow.levels.size(); ++k) {
+      for (const double time : watched.of(name + "_" + std::to_string(k))) expected.push_back(time);
+    }
+    std::ranges::sort(expected);
+    const std::vector<double> got = watched.of(name);
+    EXPECT_EQ(got.size(), expected.size()) << "seed " << seed << ": " << narrow.when;
+    for (std::size_t k = 0; k < std::min(got.size(), expected.size()); ++k) {
+      EXPECT_NEAR(got[k], expected[k], given.off) << "seed " << seed << ": " << narrow.when;
+    }
+    found += got.size();
+  }
+  cost.glances += watched.report.event_cost.glances;
+  cost.looks += watched.report.event_cost.looks;
+  return found;
+}
+
+TEST_P(NarrowEvents, AreAllFound) {
+  EventCost cost;
+  std::size_t found = 0;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    found += compare_with_levels<Planar>(seed, {"x_1", "y_1", "theta_1"}, 1, GetParam(), cost);
+    found += compare_with_levels<Planar>(seed, {"x_1", "y_1", "x_2", "y_2"}, 2, GetParam(), cost);
+    found += compare_with_levels<Spatial>(seed, {"x_1", "y_1", "z_1"}, 1, GetParam(), cost);
+  }
+  EXPECT_GT(found, 2000U);
+  std::printf("%s: %zu events, %.1f looks\n", GetParam().name, found, double(cost.looks) / double(found));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Methods, NarrowEvents,
+    ::testing::Values(Case{"gauss", {.stages = 8, .step = 0, .tolerance = 1e-10}, 1e-13},
+                      Case{"gauss_4", {.stages = 4, .step = 0.01}, 1e-13},
+                      Case{"gauss_2", {.stages = 2, .step = 0.002}, 1e-13},
+                      Case{"radau", {.method = Method::radau, .stages = 3, .step = 0.02}, 1e-13},
+                      Case{"rk4", {.method = Method::rk4, .step = 0.01}, 1e-13},
+                      Case{"dopri5", {.method = Method::dopri5, .tolerance = 1e-9}, 1e-13},
+                      Case{"fehlberg78", {.method = Method::fehlberg78, .tolerance = 1e-9}, 1e-13},
+                      Case{"bulirsch_stoer", {.method = Method::bulirsch_stoer, .tolerance = 1e-10}, 1e-7},
+                      Case{"taylor", {.method = Method::taylor, .tolerance = 1e-10}, 1e-13}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+/// A motion whose steps are long.
+RunSetup slow_motion(const RunOptions& options, double duration) {
+  const Eigen::VectorXd one = Eigen::VectorXd::Constant(1, 0.1);
+  return {std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(1)), Motion(0, one, one), options, duration};
+}
+
+const std::vector<RunOptions> few_methods = {{.stages = 8, .step = 0, .tolerance = 1e-9},
+                                             {.method = Method::radau, .stages = 3, .step = 0.05},
+                                             {.method = Method::dopri5, .tolerance = 1e-6},
+                                             {.method = Method::bulirsch_stoer, .tolerance = 1e-9}};
+
+TEST(EventsOfTime, ThatHardlyReachZeroAreAllFound) {
+  Random random(1);
+  double off = 0;
+  std::size_t found = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const double turns = std::pow(10, random.uniform(0, 3)), phase = random.uniform(-3, 3);
+    const double depth = std::pow(10, random.uniform(-12, -3)), duration = std::min(3.0, 300 / turns);
+    const double least = 1 - depth, half = std::acos(least);
+    const std::string when = "cos(" + shortest(turns) + "*t + " + shortest(phase) + ") - " + shortest(least);
+    const std::string misses = "cos(" + shortest(turns) + "*t + " + shortest(phase) + ") - " + shortest(1 + depth);
+    std::vector<double> expected;
+    for (int k = -1; k < 60; ++k) {
+      for (const double side : {-half, half}) {
+        const double time = (2 * std::numbers::pi * k + side - phase) / turns;
+        if (time > 0 && time < duration) expected.push_back(time);
+      }
+    }
+    for (const RunOptions& options : few_methods) {
+      const Watched watched = watch(slow_motion(options, duration), {plan("reaches", when), plan("misses", misses)});
+      const std::vector<double> got = watched.of("reaches");
+      EXPECT_EQ(watched.of("misses").size(), 0U) << misses;
+      ASSERT_EQ(got.size(), expected.size()) << when << " by " << options.method;
+      for (std::size_t k = 0; k < got.size(); ++k) off = std::max(off, std::abs(got[k] - expected[k]) * turns * half);
+      found += got.size();
+    }
+  }
+  EXPECT_LT(off, 1e-12);  // radians times how steep it is: measured
+  EXPECT_GT(found, 1000U);
+  std::printf("off %g found %zu\n", off, found);
+}
+
+// Up, and soon afterwards down by a jump.
+TEST(EventsOfTime, BesideAJumpAreAllFound) {
+  Random random(2);
+  for (int trial = 0; trial < 100; ++trial) {
+    const double period = std::pow(10, random.uniform(-1.5, 0)),
+                 before = std::pow(10, random.uniform(-10, -1)) * period;
+    const double level = period - before;
+    const std::string when = "fmod(t, " + shortest(period) + ") - " + shortest(level);
+    std::vector<double> expected;
+    for (int k = 0; k < 100; ++k) {
+      for (const double time : {k * period + level, (k + 1) * period}) {
+        if (time < 3) expected.push_back(time);
+      }
+    }
+    for (const RunOptions& options : few_methods) {
+      const std::vector<double> got = watch(slow_motion(options, 3), {plan("saw", when)}).of("saw");
+      ASSERT_EQ(got.size(), expected.size()) << when << " by " << options.method;
+      for (std::size_t k = 0; k < got.size(); ++k) EXPECT_NEAR(got[k], expected[k], 4e-15) << when;  // measured
+    }
+  }
+}
+
+TEST(EventsOfTime, ThatLastForAlmostNoTimeAreFound) {
+  for (const RunOptions& options : few_methods) {
+    for (const double width : {1e-2, 1e-5, 1e-9, 1e-12}) {
+      const std::string off = "((t - 1.2345)/" + shortest(width) + ")";
+      const Watched watched = watch(slow_motion(options, 3), {plan("pulse", "exp(-" + off + "^2) - 0.5"),
+                                                              plan("window", "abs(" + off + ") < 1 ? 1 : -1"),
+                                                              plan("jump", "tanh(" + off + ") + 0.5")});
+      const double half = width * std::sqrt(std::numbers::ln2);
+      ASSERT_EQ(watched.of("pulse").size(), 2U) << width;
+      EXPECT_NEAR(watched.of("pulse")[0], 1.2345 - half, 1e-15);  // measured
+      EXPECT_NEAR(watched.of("pulse")[1], 1.2345 + half, 1e-15);
+      EXPECT_EQ(watched.of("window").size(), 2U) << width;
+      EXPECT_EQ(watched.of("jump").size(), 1U) << width;
+      EXPECT_LE(watched.report.event_cost.looks, 6);  // a state for each, and no more
+      EXPECT_EQ(watched.report.event_cost.glances, 0);
+    }
+  }
+}
+
+// More often in a step than can be followed: that is told, once.
+TEST(EventsOfTime, ThatTurnTooOftenAreToldOf) {
+  RunSetup setup = slow_motion(few_methods[0], 3);
+  setup.doubted = false;
+  setup.events = io::events_of({plan("hum", "sin(1e6*t)")}, setup.subject, setup.start);
+  const RunReport report = pendula::Run(setup).go();
+  ASSERT_EQ(report.warnings.size(), 1U);
+  EXPECT_TRUE(report.warnings[0].starts_with("event hum: changes too often for the steps before t = "));
+}
+
+}  // namespace
+}  // namespace pendula::test
