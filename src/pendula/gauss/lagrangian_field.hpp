@@ -33,8 +33,8 @@ class LagrangianField {
       missed[k] *= stages.h();
       sums[k] = stages.h() * sums[k] - stages.change(k);
     }
-    const double impulse = stages.size_of(missed, pace);
-    return {impulse, stages.size_of(sums, pace) + Unseen::of_impulse(impulse)};
+    const double impulse = stages.size_of(missed, pace), lacks = stages.size_of(sums, pace);
+    return {std::max(impulse, lacks), lacks + Unseen::of_impulse(impulse)};
   }
 
  private:

@@ -204,8 +204,8 @@ class VelocityNewton {
     look_.sum(accelerations, {sums.data(), count}, {missed.data(), count});
     const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
     const auto size_of = [&](const Vector& v) { return std::sqrt(v.cwiseProduct(weight_).squaredNorm() / fastest); };
-    const double h = coefficients_.h(), impulse = size_of(h * missed);
-    return {impulse, size_of(h * sums - increments()[1]) + Unseen::of_impulse(impulse)};
+    const double h = coefficients_.h(), impulse = size_of(h * missed), lacks = size_of(h * sums - increments()[1]);
+    return {std::max(impulse, lacks), lacks + Unseen::of_impulse(impulse)};
   }
 
   double work() const {

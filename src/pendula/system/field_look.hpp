@@ -133,7 +133,10 @@ class FieldLook {
       zoom(a, 0, samples_[i], samples_[i + 1], arguments);
     }
     if (!changes(a, here, before, smooth) && !changes(a, here, after, smooth)) return;
-    const double reach = std::max(std::abs(here - before), std::abs(here - after));
+    // Between samples an argument goes further than at them, by what it bends.
+    const std::size_t middle = std::clamp(i, std::size_t{1}, last - 1);
+    const double bend = std::abs(at(middle - 1, a) - 2 * at(middle, a) + at(middle + 1, a));
+    const double reach = std::max(std::abs(here - before), std::abs(here - after)) + bend / 4;
     for (const double sign : {1.0, -1.0}) {
       const double near = nearness(a, sign, here);
       if (near < nearness(a, sign, before) || near < nearness(a, sign, after)) continue;

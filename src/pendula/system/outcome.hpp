@@ -116,7 +116,7 @@ struct Unseen {
   double impulse = 0;  ///< the largest, to anywhere in the step
   double effect = 0;   ///< on the end of the step
   /// That an impulse may have, where the motion passes it as if it were not there.
-  static constexpr double of_impulse(double impulse) { return impulse * impulse; }
+  static constexpr double of_impulse(double impulse) { return impulse > 0.3 ? impulse : 0; }
 };
 
 /// Counts over a run.
