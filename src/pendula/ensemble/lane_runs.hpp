@@ -78,6 +78,7 @@ inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKi
   if (system == nullptr || library().system_lanes(options) == nullptr) return false;
   const bool is_seen = !system->info().depends_on_time && !misses_loads(setup, options);
   if (!is_explicit(options.method) && !is_seen) return false;
+  if (system->may_be_narrow()) return false;  // lanes do not look between their stages
   kind.kernel = system->entry().lanes;
   return true;
 }
@@ -86,7 +87,8 @@ inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKi
 
 /// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
 /// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
-/// on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods.
+/// on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods. None of systems whose forces
+/// may be narrow by other functions than powers and logarithms.
 inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;

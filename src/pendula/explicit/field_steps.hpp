@@ -28,6 +28,7 @@ class FieldSteps {
         place_(coordinates),
         rate_(coordinates),
         sums_(coordinates),
+        moments_(coordinates),
         missed_(coordinates) {}
 
   bool has_to_look() const { return look_.has_to_look(); }
@@ -60,7 +61,7 @@ class FieldSteps {
     };
     const bool is_found = look_.finds(arguments);
     if (is_found) {
-      look_.sum(accelerations, sums_, missed_);
+      look_.sum(accelerations, {sums_, moments_, missed_});
     } else if (is_blind_) {
       sum_roughly(accelerations);
     } else {
@@ -71,10 +72,11 @@ class FieldSteps {
       if (!(number <= largest)) largest = number;
     };
     for (std::size_t k = 0; k < path_.size(); ++k) {
-      const double gained = end[path_.size() + k] - x[path_.size() + k];
-      const double lacks = std::abs(h * sums_[k] - gained) / size(k), impulse = h * missed_[k] / size(k);
-      raise(most.impulse, is_blind_ ? std::max(impulse, lacks / path_error) : impulse);
-      raise(most.effect, lacks + Unseen::of_impulse(impulse));
+      const double before = x[path_.size() + k], after = end[path_.size() + k],
+                   here = std::max(std::abs(before), std::abs(after));
+      const double lacks = std::abs(h * sums_[k] - (after - before)) / size(k), missed = h * missed_[k];
+      raise(most.impulse, is_blind_ ? std::max(missed / size(k), lacks / path_error) : missed / size(k));
+      raise(most.effect, lacks + (missed > 0 ? Unseen::of_wall(missed / std::max(here, beside * size(k))) : 0));
     }
     return most;
   }
@@ -120,13 +122,14 @@ class FieldSteps {
   }
 
   static constexpr double path_error = 100;  // of a quintic, in errors of the step, about
+  static constexpr double beside = 1e-3;     // of others, that a coordinate at rest is compared with
 
   FieldLook look_;
   std::size_t arguments_;
   bool is_blind_, begin_is_known_ = false;
   std::vector<std::array<double, 6>> path_;  // coefficients of powers of the share
   std::vector<double> begin_, end_;          // rates; of the coordinates' nothing
-  std::vector<double> place_, rate_, sums_, missed_, found_;
+  std::vector<double> place_, rate_, sums_, moments_, missed_, found_;
 };
 
 }  // namespace pendula

@@ -27,14 +27,13 @@ class LagrangianField {
       find_arguments(stages, shares, found);
     };
     if (!look_.finds(arguments)) return {};
-    std::array<double, 2 * Stages::count> sums, missed;
-    look_.sum([&](std::span<const double> shares, double* found) { find_rates(stages, shares, found); }, sums, missed);
-    for (std::size_t k = 0; k < sums.size(); ++k) {
-      missed[k] *= stages.h();
-      sums[k] = stages.h() * sums[k] - stages.change(k);
-    }
-    const double impulse = stages.size_of(missed, pace);
-    return {impulse, stages.size_of(sums, pace) + Unseen::of_impulse(impulse)};
+    std::array<double, 2 * Stages::count> sums, moments, missed;
+    const auto rates = [&](std::span<const double> shares, double* found) { find_rates(stages, shares, found); };
+    look_.sum(rates, {sums, moments, missed});
+    stages.take_changes(sums, moments);
+    for (double& number : missed) number *= stages.h();
+    const double impulse = stages.size_of(missed, pace), lacks = stages.size_of(sums, pace);
+    return {std::max(impulse, lacks), lacks + Unseen::of_wall(impulse / stages.speed_here())};
   }
 
  private:

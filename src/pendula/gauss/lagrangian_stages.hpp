@@ -175,8 +175,17 @@ class LagrangianStages {
   }
   const Compensated<double>& momentum_before(std::size_t k) const { return p_[k]; }
 
-  /// What the stages of number k, a coordinate or a momentum, add up to.
-  double change(std::size_t k) const { return sum(U_[k]); }
+  /// Makes sums of the rates of coordinates and momenta over the step what the stages lack of them; what momenta lack
+  /// on the way displaces coordinates.
+  void take_changes(std::span<double> sums, std::span<const double> moments) const {
+    for (std::size_t k = 0; k < count; ++k) {
+      double moved = 0;
+      for (int j = 0; j < stages(); ++j) moved += (1 - columns_.c(static_cast<std::size_t>(j))) * U_[count + k][j];
+      const double displaced = step_ * (step_ * moments[count + k] - moved) / (weight_[k] * weight_[k]);
+      sums[k] = step_ * sums[k] - sum(U_[k]) + displaced;
+      sums[count + k] = step_ * sums[count + k] - sum(U_[count + k]);
+    }
+  }
   double h() const { return step_; }
 
   /// h b v of coordinate k, h b f of its momentum.
@@ -291,9 +300,10 @@ class LagrangianStages {
       places += place * place;
       pushes += push * push;
     }
-    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
-    return std::sqrt((pace * pace * places + pushes) / fastest);
+    return std::sqrt((pace * pace * places + pushes) / fastest());
   }
+  /// The fastest of the stages, of the speed of the motion.
+  double speed_here() const { return std::sqrt(fastest_here_ / fastest()); }
 
   /// Energy that forces, and what holds time, bring in the step.
   double work() const {
@@ -377,6 +387,8 @@ class LagrangianStages {
     return values;
   }
 
+  double fastest() const { return std::max({fastest_, fastest_here_, pace_.natural_speed_squared()}); }
+
   double sum(const Stored& increments) const {
     double sum = 0;
     for (int j = 0; j < stages(); ++j) sum += increments[j];
@@ -435,10 +447,9 @@ class LagrangianStages {
     speed.store(speeds);
     coefficients.store(squares);
     fastest_here_ = *std::max_element(speeds, speeds + stages());
-    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
     StepShape shape;
     shape.pace = pace_.of(powers[stages() / 2]);
-    const double scale = fastest > 0 ? shape.pace / std::sqrt(fastest) : 0;
+    const double scale = fastest() > 0 ? shape.pace / std::sqrt(fastest()) : 0;
     const double rounding = StepShape::visible * floor_ / invisible;
     for (int k = 0; k < stages(); ++k) {
       const double size = std::sqrt(squares[k]);

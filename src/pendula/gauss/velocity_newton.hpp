@@ -193,7 +193,7 @@ class VelocityNewton {
       });
     };
     if (!look_.finds(find_arguments)) return {};
-    Vector sums, missed;
+    Vector sums, moments, missed;
     const auto accelerations = [&](std::span<const double> shares, double* found) {
       at_all(shares, [&](std::size_t i, const State& there) {
         Vector a;
@@ -201,11 +201,12 @@ class VelocityNewton {
         std::copy_n(a.data(), count, found + i * count);
       });
     };
-    look_.sum(accelerations, {sums.data(), count}, {missed.data(), count});
+    look_.sum(accelerations, {{sums.data(), count}, {moments.data(), count}, {missed.data(), count}});
     const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
     const auto size_of = [&](const Vector& v) { return std::sqrt(v.cwiseProduct(weight_).squaredNorm() / fastest); };
-    const double h = coefficients_.h(), impulse = size_of(h * missed);
-    return {impulse, size_of(h * sums - increments()[1]) + Unseen::of_impulse(impulse)};
+    const double here = std::sqrt(fastest_here_ / fastest);
+    const double h = coefficients_.h(), impulse = size_of(h * missed), lacks = size_of(h * sums - increments()[1]);
+    return {std::max(impulse, lacks), lacks + Unseen::of_wall(impulse / here)};
   }
 
   double work() const {

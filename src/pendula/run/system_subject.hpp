@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numeric>
 #include <pendula/explicit/explicit_integrator.hpp>
@@ -53,6 +54,12 @@ class SystemSubject : public Subject {
     seen.kinetic = energies.kinetic;
     seen.energy = energies.total;
     return seen;
+  }
+
+  /// Whether forces may change within a short way by functions other than powers and logarithms (field_look.hpp).
+  bool may_be_narrow() const {
+    const std::unique_ptr<ForwardDynamics> dynamics = entry_->dynamics(numbers_.plain());
+    return !std::ranges::all_of(dynamics->arguments(), std::identity());
   }
 
   /// Rates that go with momenta; not finite where the mass matrix is singular.

@@ -72,22 +72,28 @@ class FieldLook {
     return !places_.empty();
   }
 
-  /// `count` numbers along the step, where something was found: their sums, and what nodes that lie about twice as
-  /// close as those of the method do not see of them; numbers(shares, found) are those, (shares, count). Found are, of
-  /// each,
-  ///   sums    ∫₀¹
-  ///   missed  the largest |∫ (number − polynomial through nodes)| from the start of a part of the step to anywhere in
-  ///           it, of all parts
+  /// Of some numbers along the step, where something was found, what they sum up to, and what nodes that lie about
+  /// twice as close as those of the method do not see of them.
+  ///   sums     ∫₀¹
+  ///   moments  ∫₀¹ (1 − share): of rates of rates, where they move to
+  ///   missed   the largest |∫ (number − polynomial through nodes)| from the start of a part of the step to anywhere in
+  ///            it, of all parts
+  struct Sums {
+    std::span<double> sums, moments, missed;
+  };
+
+  /// Finds them; numbers(shares, found) are the numbers, (shares, sums.size()).
   template <class Numbers>
-  void sum(Numbers&& numbers, std::span<double> sums, std::span<double> missed) {
+  void sum(Numbers&& numbers, const Sums& into) {
     find_borders();
-    std::fill(sums.begin(), sums.end(), 0.0);
-    std::fill(missed.begin(), missed.end(), 0.0);
+    for (const std::span<double> each : {into.sums, into.moments, into.missed}) {
+      std::fill(each.begin(), each.end(), 0.0);
+    }
     for (int part = 0; part < parts_; ++part) {
       const double from = static_cast<double>(part) / parts_, to = static_cast<double>(part + 1) / parts_;
       const auto first = std::upper_bound(borders_.begin(), borders_.end(), from);
       const auto last = std::lower_bound(first, borders_.end(), to);
-      sum_part(from, to, {first, last}, numbers, sums, missed);
+      sum_part(from, to, {first, last}, numbers, into);
     }
   }
 
@@ -133,7 +139,10 @@ class FieldLook {
       zoom(a, 0, samples_[i], samples_[i + 1], arguments);
     }
     if (!changes(a, here, before, smooth) && !changes(a, here, after, smooth)) return;
-    const double reach = std::max(std::abs(here - before), std::abs(here - after));
+    // Between samples an argument goes further than at them, by what it bends.
+    const std::size_t middle = std::clamp(i, std::size_t{1}, last - 1);
+    const double bend = std::abs(at(middle - 1, a) - 2 * at(middle, a) + at(middle + 1, a));
+    const double reach = std::max(std::abs(here - before), std::abs(here - after)) + bend / 4;
     for (const double sign : {1.0, -1.0}) {
       const double near = nearness(a, sign, here);
       if (near < nearness(a, sign, before) || near < nearness(a, sign, after)) continue;
@@ -206,9 +215,8 @@ class FieldLook {
   }
 
   template <class Numbers>
-  void sum_part(double from, double to, std::span<const double> borders, Numbers& numbers, std::span<double> sums,
-                std::span<double> missed) {
-    const std::size_t count = sums.size();
+  void sum_part(double from, double to, std::span<const double> borders, Numbers& numbers, const Sums& into) {
+    const std::size_t count = into.sums.size();
     evaluate_at_nodes(from, to - from, numbers, found_, count);
     here_.assign(count, 0.0);
     most_.assign(count, 0.0);
@@ -222,7 +230,9 @@ class FieldLook {
       for (std::size_t k = 0; k < count; ++k) {
         double by_nodes = 0;
         for (std::size_t j = 0; j < weights.size(); ++j) {
-          here_[k] += Gauss::b[j] * (here - before) * found[j * count + k];
+          const double part = Gauss::b[j] * (here - before) * found[j * count + k];
+          here_[k] += part;
+          into.moments[k] += part * (1 - before - Gauss::c[j] * (here - before));
           by_nodes += weights[j] * (to - from) * found_[j * count + k];
         }
         const double off = std::abs(here_[k] - by_nodes);
@@ -231,8 +241,8 @@ class FieldLook {
       before = here;
     }
     for (std::size_t k = 0; k < count; ++k) {
-      sums[k] += here_[k];
-      missed[k] += most_[k];
+      into.sums[k] += here_[k];
+      into.missed[k] += most_[k];
     }
   }
 

@@ -115,8 +115,10 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
 struct Unseen {
   double impulse = 0;  ///< the largest, to anywhere in the step
   double effect = 0;   ///< on the end of the step
-  /// That an impulse may have, where the motion passes it as if it were not there.
-  static constexpr double of_impulse(double impulse) { return impulse * impulse; }
+
+  /// Of an impulse, relative to the speed where it is, that is missed: a wall throws back what it takes half of that
+  /// from.
+  static constexpr double of_wall(double impulse) { return impulse > 0.4 ? impulse : 0; }
 };
 
 /// Counts over a run.
