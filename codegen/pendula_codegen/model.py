@@ -325,7 +325,11 @@ class Model:
         return Symbol(name, real=True)
 
     def _name(self, name: object) -> None:
-        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9_]*[A-Za-z0-9])?", name) or "__" in name:
+        if (
+            not isinstance(name, str)
+            or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9_]*[A-Za-z0-9])?", name)
+            or "__" in name
+        ):
             self._fail(f"expected a name of letters, digits and underscores, got {name!r}")
         if name in CPP_KEYWORDS or (keyword.iskeyword(name) and name != "lambda"):
             self._fail(f"expected a name that no programming language uses, got '{name}'")

@@ -1,6 +1,7 @@
 """Run files: what is in them for others to read, and runs that go on from them as if they had never stopped."""
 
 import json
+import math
 import random
 import re
 import resource
@@ -418,6 +419,25 @@ def test_a_run_that_went_on_says_how_long_it_is(pendula, scenario, tmp_path):
     with h5py.File(tmp_path / "run.h5") as run:
         assert run["run/set"].asstr()[()] == '["chain.gravity=1.62","run.duration=3"]'
     assert pendula("simulate", "--resume", "run.h5").status == 0
+
+
+def test_a_run_that_goes_on_is_looked_at_anew(pendula, scenario, tmp_path):
+    """By its accuracy the first part was right to 1e-9, which is not so of what chaos makes of it later."""
+    by_itself = DOUBLE.replace("step     = 5e-3", "")
+    file = scenario(by_itself.replace("theta = 1.5707963267948966", "theta = 2.0"))
+    assert pendula("simulate", file, "--set", "run.duration=10", "-o", "run.h5").err == ""
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=20", "--json").json
+    exact = pendula(
+        "simulate", file, "--set", "run.duration=20", "--set", "run.tolerance=1e-16", "--json"
+    ).json
+    off = math.dist(resumed["final"]["bobs"][1], exact["final"]["bobs"][1]) / 2
+    assert 1e-7 < off < resumed["expected_error"] < 1e-3  # measured 6e-6, 2e-5
+    assert "may be off by more than 2e-09" in resumed["warnings"][0] and 10 < resumed["trusted_until"] < 20
+    # A swing so small that its steps are as long as the method allows is right all the same.
+    small = scenario(by_itself.replace("theta = 1.5707963267948966", "theta = 0.001"))
+    assert pendula("simulate", small, "--set", "run.duration=1", "-o", "small.h5").err == ""
+    resumed = pendula("simulate", "--resume", "small.h5", "--set", "run.duration=3", "--json").json
+    assert resumed["warnings"] == [] and resumed["expected_error"] < 1e-9  # measured 7e-12
 
 
 def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monkeypatch):
