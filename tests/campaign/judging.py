@@ -622,7 +622,7 @@ def judge_ensemble(case: Case, room: truth.Room, program: Program) -> Verdict:
             if kept.failed(member):
                 continue
             try:
-                found, sure, errors = member_faults(case, changed, room, kept, member)
+                found, sure, is_told, errors = member_faults(case, changed, room, kept, member)
             except truth.NoReferenceError:
                 decided = False
                 continue
@@ -631,7 +631,8 @@ def judge_ensemble(case: Case, room: truth.Room, program: Program) -> Verdict:
             is_doubted = kept.is_doubted(member)
             if found and not is_doubted:
                 silent += [text for _, text in found]
-            if is_doubted and sure and not found and errors.error.max(initial=0) < DOUBTFUL[by] * asked:
+            is_right = sure and is_told and not found
+            if is_doubted and is_right and errors.error.max(initial=0) < DOUBTFUL[by] * asked:
                 falsely_doubted.append(f"member {member} is right")
             verdict.error = max(verdict.error, float(errors.error.max(initial=0)))
             verdict.ratio = max(verdict.ratio, float(errors.ratio.max(initial=0)))
@@ -716,6 +717,7 @@ def members_of(tables: dict, kept: Kept) -> Iterable[dict]:
 
 
 def member_faults(case, changed, room, kept, member):
+    """What is wrong; whether ends, and whether events, can be judged; RowErrors."""
     subject, run = subject_of(case, room, changed), changed["run"]
     duration = run["duration"]
     names = [
@@ -744,13 +746,14 @@ def member_faults(case, changed, room, kept, member):
                 f"member {member} at {float(t)!r}: off by {e:.2e}, {e / m:.1e} times what it may be (growth {g:.1e})",
             )
         )
-    sure = bool(errors.right.all())
+    sure, is_told = bool(errors.right.all()), True
     for event in changed.get("event", []):
         motion, ends = truth.dense(subject, duration)
         allowed = np.maximum(limits(run, ends.growth, True), 10 * ends.uncertainty)
         try:
             found = gaps_of(motion, ends, event["when"], allowed)
         except OverflowError:
+            is_told = False
             continue
         crossed = [gap for gap in found if gap.left * gap.right < 0]
         most = len(crossed) + sum(max(gap.zeros, 2) for gap in found if gap.left * gap.right >= 0)
@@ -771,7 +774,7 @@ def member_faults(case, changed, room, kept, member):
             wrong.append(
                 (first, f"member {member}: the first event at {first!r}, {crossed[0].start!r} is right")
             )
-    return wrong, sure, errors
+    return wrong, sure, is_told, errors
 
 
 def places(subject, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

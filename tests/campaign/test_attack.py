@@ -258,6 +258,38 @@ def test_lies_are_found(room, program, tmp_path, lie):
     assert verdict.kind == kind, verdict
 
 
+# Of an ensemble, as Python over `end`, an angle of each member, and `trusted`.
+LIES_OF_MEMBERS = {
+    "nothing": ("", "right"),
+    "an end": ("end[0] += 0.1", "SILENT"),
+    "an end, and says so": ("end[0] += 0.1; trusted[0] = 0", "said"),
+    "an end, and says so of another member": ("end[0] += 0.1; trusted[1] = 0", "SILENT"),
+    "a doubt": ("trusted[1] = 0", "false doubt"),
+}
+
+
+@pytest.mark.parametrize("lie", LIES_OF_MEMBERS)
+def test_lies_of_members_are_found(room, program, tmp_path, lie):
+    change, kind = LIES_OF_MEMBERS[lie]
+    liar = tmp_path / "liar"
+    liar.write_text(
+        f"""#!{sys.executable}
+import h5py, subprocess, sys
+done = subprocess.run([{str(program)!r}, *sys.argv[1:]], capture_output=True, text=True)
+with h5py.File("out.h5", "r+") as file:
+    end, trusted = file["theta_1"][...].ravel(), file["trusted"][...].ravel()
+    {change or "pass"}
+    file["theta_1"][...] = end.reshape(file["theta_1"].shape)
+    file["trusted"][...] = trusted.reshape(file["trusted"].shape)
+print(done.stdout)
+"""
+    )
+    liar.chmod(liar.stat().st_mode | stat.S_IXUSR)
+    case = drawing.draw("ensembles", 1, 3)
+    verdict = judging.judge(case, room, judging.Program(liar, tmp_path / "run"))
+    assert verdict.kind == kind, verdict
+
+
 def test_a_program_that_ends_in_a_traceback_is_told(room, tmp_path):
     broken = tmp_path / "broken"
     broken.write_text("#!/bin/sh\nexit 3\n")

@@ -534,7 +534,7 @@ def trusted(folder: Path, *arguments: str, scenario: str) -> tuple[np.ndarray, d
     return numbers.pop("trusted"), numbers, done.json
 
 
-@pytest.mark.parametrize("method", ["gauss", "radau"])  # in lanes, and one by one
+@pytest.mark.parametrize("method", ["gauss", "radau", "fehlberg78"])  # one by one; the last one in lanes
 def test_members_that_are_wrong_are_not_trusted(tmp_path, method):
     told, found, summary = trusted(tmp_path, "--set", f"run.method={method}", scenario=SETTLING)
     _, right, _ = trusted(tmp_path, "--set", "run.tolerance=1e-13", scenario=SETTLING)
@@ -598,6 +598,28 @@ def test_nobody_is_looked_at_again_where_that_is_not_wanted(tmp_path):
     told, _, summary = trusted(tmp_path, "--set", "run.estimate=false", scenario=SETTLING)
     assert (told == -1).all()
     assert (summary["looked_at"], summary["untrusted"], summary["warnings"]) == (0, 0, [])
+
+
+def test_second_looks_that_are_interrupted_are_taken_again(tmp_path):
+    """One by one, whose second looks take about as long as the runs."""
+    one_by_one = ("--threads", "1", "--set", "run.method=radau", "--set", "run.duration=200")
+    began = time.monotonic()
+    assert run(tmp_path, *one_by_one, scenario=SETTLING).status == 0
+    taken = time.monotonic() - began
+    whole = contents(tmp_path / "out.h5")
+    (tmp_path / "out.h5").unlink()
+    words = command(tmp_path, *one_by_one, scenario=SETTLING)
+    moments = random.Random(5)
+    resume: tuple[str, ...] = ()
+    while True:
+        process = subprocess.Popen([*words, *resume], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+        time.sleep(moments.uniform(0.1, 0.5) * taken)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        if process.returncode == 0:
+            break
+        resume = ("--resume",) if (tmp_path / "out.h5.parts").exists() else ()
+    assert contents(tmp_path / "out.h5") == whole
 
 
 def test_what_failed_is_neither_trusted_nor_not(tmp_path):

@@ -125,7 +125,7 @@ def test_one_axis_is_a_curve(pendula, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("out.h5", "theta_3", "-o", "map.png"), 'theta_2, theta_dot_1, theta_dot_2, got "theta_3"'),
+        (("out.h5", "theta_3", "-o", "map.png"), 'theta_dot_1, theta_dot_2, trusted, got "theta_3"'),
         (("out.h5", "theta_1", "-o", "map.gif"), "expected a name that ends in .svg, .png or .pdf"),
         (("double.toml", "theta_1", "-o", "map.png"), "double.toml: expected a file of pendula ensemble"),
         (("out.h5", "theta_1", "-o", "map.png", "--contour", "steps"), "expected KEY=VALUE"),

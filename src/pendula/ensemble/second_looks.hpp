@@ -140,6 +140,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
 /// one that errs less.
 inline void look_again(std::vector<Doubted>& members, const std::function<bool()>& stop) {
   std::vector<Doubted*> left;
+  left.reserve(members.size());
   for (Doubted& member : members) left.push_back(&member);
   look_by(
       left, [](const RunReport& run) { return std::optional(coarser(run.options, run.statistics)); }, stop);
