@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <numbers>
+#include <pendula/ensemble/run_members.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/run.hpp>
@@ -108,7 +109,9 @@ constexpr int kinds = 9;
 struct Case {
   const char* name;
   RunOptions options;
-  double off;  // how far instants may be apart that are looked for in two ways  [s]
+  double off;  // [s] of instants that are looked for in two ways: measured 4e-15, of the last two 2e-13
+  std::int64_t looks =
+      20;  // of a crossing, in the mean, with those of the plain expression: measured 11 to 17.3, by extrapolation 32
 };
 
 class NarrowEvents : public ::testing::TestWithParam<Case> {};
@@ -162,7 +165,7 @@ TEST_P(NarrowEvents, AreAllFound) {
     found += compare_with_levels<Spatial>(seed, {"x_1", "y_1", "z_1"}, 1, GetParam(), cost);
   }
   EXPECT_GT(found, 2000U);
-  std::printf("%s: %zu events, %.1f looks\n", GetParam().name, found, double(cost.looks) / double(found));
+  EXPECT_LE(cost.looks, GetParam().looks * static_cast<std::int64_t>(found));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -174,9 +177,50 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"rk4", {.method = Method::rk4, .step = 0.01}, 1e-13},
                       Case{"dopri5", {.method = Method::dopri5, .tolerance = 1e-9}, 1e-13},
                       Case{"fehlberg78", {.method = Method::fehlberg78, .tolerance = 1e-9}, 1e-13},
-                      Case{"bulirsch_stoer", {.method = Method::bulirsch_stoer, .tolerance = 1e-10}, 1e-7},
-                      Case{"taylor", {.method = Method::taylor, .tolerance = 1e-10}, 1e-13}),
+                      Case{"bulirsch_stoer", {.method = Method::bulirsch_stoer, .tolerance = 1e-10}, 1e-12, 40},
+                      Case{"taylor", {.method = Method::taylor, .tolerance = 1e-10}, 1e-12}),
     [](const auto& test) { return std::string(test.param.name); });
+
+// Of members that move side by side, each in its lane, and of ones whose steps lanes do not look into at full order.
+TEST(NarrowEventsInLanes, AreAllFound) {
+  const RunOptions gauss{.stages = 4, .step = 0.01}, dopri5{.method = Method::dopri5, .tolerance = 1e-9};
+  for (const RunOptions& options : {gauss, dopri5}) {
+    std::vector<RunSetup> setups;
+    std::vector<std::vector<std::pair<std::size_t, std::size_t>>> levels;  // of each member's narrow events
+    Random random(5);
+    for (int member = 0; member < 12; ++member) {
+      RunSetup setup = whirling<Planar>(random, 2, options);
+      std::vector<io::EventPlan> plans;
+      levels.emplace_back();
+      for (int kind = 0; kind < kinds; ++kind) {
+        const std::string column = kind % 2 == 0 ? "x_1" : "y_2";
+        const Narrow asked = narrow(kind, column, random.uniform(-0.6, 0.6), std::pow(10, random.uniform(-6, -1)));
+        plans.push_back(plan(std::to_string(plans.size()), asked.when));
+        for (const double level : asked.levels) {
+          plans.push_back(plan(std::to_string(plans.size()), column + " - " + shortest(level)));
+        }
+        levels.back().emplace_back(plans.size() - 1 - asked.levels.size(), asked.levels.size());
+      }
+      setup.doubted = false;
+      setup.events = io::events_of(plans, setup.subject, setup.start);
+      setups.push_back(setup);
+    }
+    const std::vector<RunReport> reports = run_members(setups);
+    std::int64_t found = 0;
+    for (std::size_t k = 0; k < setups.size(); ++k) {
+      ASSERT_TRUE(lane_kind(setups[k]));
+      EXPECT_EQ(reports[k].end, RunEnd::complete);
+      EXPECT_TRUE(reports[k].warnings.empty());
+      for (const auto& [event, count] : levels[k]) {
+        std::int64_t expected = 0;
+        for (std::size_t level = 1; level <= count; ++level) expected += reports[k].events[event + level].count;
+        EXPECT_EQ(reports[k].events[event].count, expected) << options.method << ' ' << k << ' ' << event;
+        found += expected;
+      }
+    }
+    EXPECT_GT(found, 500);
+  }
+}
 
 /// A motion whose steps are long.
 RunSetup slow_motion(const RunOptions& options, double duration) {
@@ -215,9 +259,8 @@ TEST(EventsOfTime, ThatHardlyReachZeroAreAllFound) {
       found += got.size();
     }
   }
-  EXPECT_LT(off, 1e-12);  // radians times how steep it is: measured
+  EXPECT_LT(off, 1e-13);  // in radians times how steep it is: measured 8e-15
   EXPECT_GT(found, 1000U);
-  std::printf("off %g found %zu\n", off, found);
 }
 
 // Up, and soon afterwards down by a jump.
@@ -237,7 +280,7 @@ TEST(EventsOfTime, BesideAJumpAreAllFound) {
     for (const RunOptions& options : few_methods) {
       const std::vector<double> got = watch(slow_motion(options, 3), {plan("saw", when)}).of("saw");
       ASSERT_EQ(got.size(), expected.size()) << when << " by " << options.method;
-      for (std::size_t k = 0; k < got.size(); ++k) EXPECT_NEAR(got[k], expected[k], 4e-15) << when;  // measured
+      for (std::size_t k = 0; k < got.size(); ++k) EXPECT_NEAR(got[k], expected[k], 4e-15) << when;  // measured 1.8e-15
     }
   }
 }
@@ -251,7 +294,7 @@ TEST(EventsOfTime, ThatLastForAlmostNoTimeAreFound) {
                                                               plan("jump", "tanh(" + off + ") + 0.5")});
       const double half = width * std::sqrt(std::numbers::ln2);
       ASSERT_EQ(watched.of("pulse").size(), 2U) << width;
-      EXPECT_NEAR(watched.of("pulse")[0], 1.2345 - half, 1e-15);  // measured
+      EXPECT_NEAR(watched.of("pulse")[0], 1.2345 - half, 1e-15);  // measured 9e-16
       EXPECT_NEAR(watched.of("pulse")[1], 1.2345 + half, 1e-15);
       EXPECT_EQ(watched.of("window").size(), 2U) << width;
       EXPECT_EQ(watched.of("jump").size(), 1U) << width;

@@ -551,6 +551,8 @@ def gaps_of(
 
     values = g(grid_of(motion, 0.0))
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0))
+    level = re.search(r" - ([\d.e+-]+)$", when)  # what is left of a difference has the rounding of its parts
+    largest += abs(float(level.group(1))) if level else 0
 
     def wide(at: np.ndarray) -> np.ndarray:
         part = np.interp(np.asarray(at, dtype=float), times, allowed)

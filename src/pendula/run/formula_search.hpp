@@ -49,14 +49,13 @@ class FormulaSearch {
     missed_.assign(sight_.size(), 0);
     largest_.assign(sight_.size(), 0);
     last_.assign(sight_.size(), 0);
-    is_measured_ = by == By::full_order;
     line_.begin(first, sign);
     if (sight_.size() == 0) {
       Doubtful doubtful;
       follow({}, {0, 1}, By::full_order, 0, doubtful);
       close(doubtful, 1, By::full_order, most_fits);
     } else if (by == By::full_order || !is_far_from_zero()) {
-      if (by == By::polynomial) compare_ends();
+      if (by == By::polynomial) measure();
       search(0, 1, by, 0, 1);
     }
     if (std::isfinite(last)) {
@@ -91,6 +90,7 @@ class FormulaSearch {
     /// How far samples may be off what is in between, relative to the largest; 0 where closer ones would not tell more.
     double roughness = 0;
     bool is_resolved = true;  // they are about what this says
+    bool is_blurred = false;  // they are as rough as they vary
 
     double width() const { return to - from; }
     double at(double x) const { return x == 1 ? to : from + x * width(); }
@@ -152,16 +152,12 @@ class FormulaSearch {
     return decide(reach, reach.value, {}, {0, 1}, By::polynomial, 0, none);
   }
 
-  /// How far the polynomial misses the ends of the step: rates by it do, coordinates do not.
-  void compare_ends() {
-    for (const double end : {0.0, 1.0}) compare(end, 1);
-  }
-  /// And where it misses most, and elsewhere, since a number may turn at one of these.
+  /// How far the polynomial misses: at the ends, where rates by it do, where it does most, and elsewhere, since a
+  /// number may turn at one of these places.
   void measure() {
     const double place = place_of_miss(degree_);
-    compare(place, 2);
-    compare(place == 0.5 ? 0.25 : 1 - place, 2);
-    is_measured_ = true;
+    for (const double end : {0.0, 1.0}) compare(end, 1);
+    for (const double within : {place, place == 0.5 ? 0.25 : 1 - place}) compare(within, 2);
   }
   void compare(double u, double safety) {
     const std::vector<double> shown = sample(u, By::polynomial);
@@ -189,13 +185,13 @@ class FormulaSearch {
       const double noise = 64 * epsilon * largest_[n];
       double tail = 2 * (sizes[points - 2] + sizes[points - 1]), miss = 0;
       if (by == By::polynomial) {
-        const double before_last = degree_ == 1 ? variation : sizes[degree_ - 1];
         const double whole = 1 / std::pow(fit.width(), static_cast<double>(degree_));  // from coefficients here
         tail = std::max(tail, std::abs(numbers_[n] - polynomial(odd_place)));
         if (sizes[degree_] > noise) last_[n] = std::max(last_[n], sizes[degree_] * whole);
-        miss = missed_[n] + (is_measured_ ? last_[n] : std::max(last_[n], before_last * whole));
+        miss = missed_[n] + last_[n];
       }
       fit.is_resolved &= tail <= 1e-3 * variation + noise;
+      fit.is_blurred |= tail > 1e-2 * variation + noise;
       if (tail > noise + miss) fit.roughness = std::max(fit.roughness, tail / largest_[n]);
       // Of a derivative by Markov's inequality.
       const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
@@ -234,9 +230,12 @@ class FormulaSearch {
   }
   void search(double from, double to, By by, int level, double roughness, Doubtful& doubtful) {
     Fit fit = fitted(from, to, by);
-    // What closer samples do not make better is no roughness, but noise of steps that are taken one by one.
-    const bool is_noise = by == By::full_order && fit.roughness > roughness / 4 && roughness < 1e-3;
-    if (is_noise) fit.roughness = 0;
+    // What closer samples do not make better is no roughness, but noise of steps that are taken one by one. Of the sign
+    // that says nothing where it is all that is seen.
+    const bool is_fine = by == By::full_order && fit.roughness < 1e-6;
+    const bool is_noise = is_fine && fit.roughness > roughness / 4;
+    if (is_noise || (is_fine && fit.is_blurred)) fit.roughness = 0;
+    if (is_fine && fit.is_blurred) return open(fit, from, 0, doubtful);
     if (fit.is_resolved || is_noise || level >= most_fits || !is_told()) {
       return follow(fit, {0, 1}, by, level, doubtful);
     }
@@ -262,6 +261,10 @@ class FormulaSearch {
       if (there.defined == Defined::everywhere) settle(fit, middle, there.value.side(), by, level, doubtful);
       return follow(fit, {middle, part.high}, by, level, doubtful);
     }
+    open(fit, from, slope, doubtful);
+  }
+
+  static void open(const Fit& fit, double from, int slope, Doubtful& doubtful) {
     if (!doubtful.open) doubtful = {true, from, slope};
     if (doubtful.slope != slope) doubtful.slope = 0;
     doubtful.roughness = std::max(doubtful.roughness, fit.roughness);
@@ -308,10 +311,7 @@ class FormulaSearch {
   void close(Doubtful& doubtful, double to, By by, int level) {
     const Doubtful seen = std::exchange(doubtful, {});
     if (!seen.open || seen.slope != 0 || !is_told()) return;
-    if (by == By::polynomial && !is_measured_) {
-      measure();
-      closer(seen, to, by, level);
-    } else if (seen.roughness > 0 && level < most_fits && to - seen.from > sight_.resolution()) {
+    if (seen.roughness > 0 && level < most_fits && to - seen.from > sight_.resolution()) {
       closer(seen, to, by, level + 1);
     } else if (by == By::polynomial) {
       closer(seen, to, By::full_order, most_fits - most_fits_at_full_order);
@@ -365,7 +365,7 @@ class FormulaSearch {
   // Of each number: the largest that was seen, by how much the polynomial was seen to miss it, and its last
   // coefficient.
   std::vector<double> largest_, missed_, last_;
-  bool is_measured_ = false, is_finite_ = true;
+  bool is_finite_ = true;
   int samples_left_ = 0, parts_left_ = 0;
 };
 

@@ -365,8 +365,8 @@ std::optional<double> locate(Sight& sight, const SignChange& change, double tole
   double moved = to - from, before = 0, value_before = 0;
   for (int tries = 0; tries < 100; ++tries) {
     const double value = sight.exact_value(u);
-    if (value == 0 || from == to) return u;
-    if (!std::isfinite(value)) return std::nullopt;
+    if (value == 0 || to == 0) return u;
+    if (!std::isfinite(value) || from == to) return std::nullopt;
     (sign_of(value) == change.sign ? to : from) = u;
     if (tries > 0 && std::abs(u - before) > 1e4 * tolerance) slope = (value - value_before) / (u - before);
     before = u;
