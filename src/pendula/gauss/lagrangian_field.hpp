@@ -19,14 +19,15 @@ class LagrangianField {
  public:
   using Stages = LagrangianStages<S, Width>;
 
-  explicit LagrangianField(int stages) : look_(stages, argument_bases<S>()) {}
+  explicit LagrangianField(int stages) : look_(stages, Width, argument_bases<S>()) {}
 
   Unseen unseen(Stages& stages) {
-    const double pace = stages.shape().pace;
+    stages.see_speed();
     const auto arguments = [&](std::span<const double> shares, double* found) {
       find_arguments(stages, shares, found);
     };
-    if (!look_.finds(arguments)) return {};
+    if (!look_.may_find(arguments) || !look_.finds(arguments)) return {};
+    const double pace = stages.shape().pace;
     std::array<double, 2 * Stages::count> sums, moments, missed;
     const auto rates = [&](std::span<const double> shares, double* found) { find_rates(stages, shares, found); };
     look_.sum(rates, {sums, moments, missed});

@@ -49,19 +49,32 @@ constexpr std::array<double, n + 1> legendre_polynomials(double x) {
 /// to it forces are summed over ever shorter intervals. Shares of the step are 0 to 1.
 class FieldLook {
  public:
-  /// For a method of so many nodes.
-  FieldLook(int nodes, std::span<const bool> is_base)
+  /// For a method of so many nodes; `few` samples of a step take little time.
+  FieldLook(int nodes, int few, std::span<const bool> is_base)
       : is_base_(is_base.begin(), is_base.end()), parts_(std::max(1, nodes / 2)) {
-    const int intervals = is_base.empty() ? 0 : std::max(least_intervals, 2 * nodes);
-    for (int i = 0; i <= intervals; ++i) samples_.push_back(static_cast<double>(i) / std::max(intervals, 1));
+    if (is_base.empty()) return;
+    few_ = spread(few - 1);
+    samples_ = spread(std::max(least_intervals, 2 * nodes));
     places_.reserve(most_places);
   }
 
   /// Whether a model has functions that may be narrow.
   bool has_to_look() const { return !is_base_.empty(); }
 
-  /// Whether any of them changes faster than samples of the step show; arguments(shares, found) are what functions are
-  /// taken of, (shares, arguments).
+  /// Whether few samples show that one of them may change fast; arguments(shares, found) are what functions are taken
+  /// of, (shares, arguments).
+  template <class Arguments>
+  bool may_find(Arguments&& arguments) {
+    evaluate(few_, arguments, found_);
+    for (std::size_t i = 1; i < few_.size(); ++i) {
+      for (std::size_t a = 0; a < is_base_.size(); ++a) {
+        if (changes(a, at(i - 1, a), at(i, a), smooth)) return true;
+      }
+    }
+    return false;
+  }
+
+  /// Whether any of them changes faster than samples of the step show.
   template <class Arguments>
   bool finds(Arguments&& arguments) {
     places_.clear();
@@ -112,6 +125,12 @@ class FieldLook {
   static constexpr double gone = 60;   // exp of minus that is nothing
   static constexpr double growth = 3;  // of intervals, away from a place
   static constexpr std::size_t most_places = 64;
+
+  static std::vector<double> spread(int intervals) {
+    std::vector<double> shares;
+    for (int i = 0; i <= intervals; ++i) shares.push_back(static_cast<double>(i) / intervals);
+    return shares;
+  }
 
   template <class Arguments>
   void evaluate(std::span<const double> shares, Arguments& arguments, std::vector<double>& found) {
@@ -268,7 +287,7 @@ class FieldLook {
 
   std::vector<bool> is_base_;
   int parts_;
-  std::vector<double> samples_, found_, near_, borders_, here_, most_;
+  std::vector<double> few_, samples_, found_, near_, borders_, here_, most_;
   std::vector<Place> places_;
 };
 
