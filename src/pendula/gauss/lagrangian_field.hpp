@@ -19,7 +19,7 @@ class LagrangianField {
  public:
   using Stages = LagrangianStages<S, Width>;
 
-  explicit LagrangianField(int stages) : look_(stages, Width, argument_bases<S>()) {}
+  explicit LagrangianField(int stages) : look_(stages, Width, argument_bases<S>(), stages < few_stages ? 0.1 : 0.5) {}
 
   Unseen unseen(Stages& stages) {
     stages.see_speed();
@@ -42,6 +42,7 @@ class LagrangianField {
   using Lanes = typename Stages::Lanes;
 
   static constexpr auto width = static_cast<std::size_t>(Width);
+  static constexpr int few_stages = 4;  // fewer tell little of their error where a small event is short
 
   // Where the system is at shares of the step; lanes beyond them repeat the last.
   struct There {

@@ -49,9 +49,10 @@ constexpr std::array<double, n + 1> legendre_polynomials(double x) {
 /// to it forces are summed over ever shorter intervals. Shares of the step are 0 to 1.
 class FieldLook {
  public:
-  /// For a method of so many nodes; `few` samples of a step take little time.
-  FieldLook(int nodes, int few, std::span<const bool> is_base)
-      : is_base_(is_base.begin(), is_base.end()), parts_(std::max(1, nodes / 2)) {
+  /// For a method of so many nodes; `few` samples of a step take little time. Functions that change by no more than
+  /// `smooth` from sample to sample, as `changes` tells it, are left to the error of the step.
+  FieldLook(int nodes, int few, std::span<const bool> is_base, double smooth = 0.5)
+      : is_base_(is_base.begin(), is_base.end()), smooth_(smooth), parts_(std::max(1, nodes / 2)) {
     if (is_base.empty()) return;
     few_ = spread(few - 1);
     samples_ = spread(std::max(least_intervals, 2 * nodes));
@@ -68,7 +69,7 @@ class FieldLook {
     evaluate(few_, arguments, found_);
     for (std::size_t i = 1; i < few_.size(); ++i) {
       for (std::size_t a = 0; a < is_base_.size(); ++a) {
-        if (changes(a, at(i - 1, a), at(i, a), smooth)) return true;
+        if (changes(a, at(i - 1, a), at(i, a), smooth_)) return true;
       }
     }
     return false;
@@ -121,7 +122,7 @@ class FieldLook {
 
   static constexpr int least_intervals = 8, sections = 7, most_rounds = 9;
   // Of an argument, from place to place; of a base, relative to itself. Functions that change by so little are smooth.
-  static constexpr double smooth = 0.5, flat = 0.25;
+  static constexpr double flat = 0.25;
   static constexpr double gone = 60;   // exp of minus that is nothing
   static constexpr double growth = 3;  // of intervals, away from a place
   static constexpr std::size_t most_places = 64;
@@ -154,10 +155,10 @@ class FieldLook {
   void look_at(std::size_t a, std::size_t i, Arguments& arguments) {
     const std::size_t last = samples_.size() - 1;
     const double here = at(i, a), before = at(i - (i > 0), a), after = at(i + (i < last), a);
-    if (i < last && (here < 0) != (after < 0) && changes(a, here, after, smooth)) {
+    if (i < last && (here < 0) != (after < 0) && changes(a, here, after, smooth_)) {
       zoom(a, 0, samples_[i], samples_[i + 1], arguments);
     }
-    if (!changes(a, here, before, smooth) && !changes(a, here, after, smooth)) return;
+    if (!changes(a, here, before, smooth_) && !changes(a, here, after, smooth_)) return;
     // Between samples an argument goes further than at them, by what it bends.
     const std::size_t middle = std::clamp(i, std::size_t{1}, last - 1);
     const double bend = std::abs(at(middle - 1, a) - 2 * at(middle, a) + at(middle + 1, a));
@@ -286,6 +287,7 @@ class FieldLook {
   }();
 
   std::vector<bool> is_base_;
+  double smooth_;
   int parts_;
   std::vector<double> few_, samples_, found_, near_, borders_, here_, most_;
   std::vector<Place> places_;
