@@ -68,9 +68,7 @@ METHODS = {
 }
 
 
-def scenario(
-    parameters: dict[str, float], method: str, start="theta = 0.0", end=10.0
-) -> str:
+def scenario(parameters: dict[str, float], method: str, start="theta = 0.0", end=10.0) -> str:
     numbers = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
     return (
         f'[system]\nmodel = "forced.py"\nparameters = {{ {numbers} }}\n[start]\n{start}\n'
@@ -96,9 +94,15 @@ def moved(pendula, tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("width", (0.5, 0.05, 0.01, 0.003, 1e-4, 1e-5))
 def test_a_pulse_after_rest_is_its_impulse(method, width, moved):
-    text = scenario({"push": 10.0, "width": width}, METHODS[method])
-    got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
-    speed = 10.0 * width * sqrt(2 * pi)
+    push = 10.0 if width > 1e-3 else 0.1 / width
+    got = json.loads(
+        moved(
+            scenario({"push": push, "width": width}, METHODS[method]),
+            "simulate",
+            "--json",
+        ).stdout
+    )
+    got, speed = got["final"], push * width * sqrt(2 * pi)
     # theta = speed (t - center) after it; worst measured 3e-4, of 2 stages
     assert (
         got["v"]["theta"] / speed,
@@ -109,34 +113,24 @@ def test_a_pulse_after_rest_is_its_impulse(method, width, moved):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_weak_force_that_turns_often_in_a_step_is_followed(method, moved):
     strength, omega = 0.01, 1000.0
-    text = scenario(
-        {"shaking": strength, "frequency": omega}, METHODS[method], "theta_dot = 3.0"
-    )
+    text = scenario({"shaking": strength, "frequency": omega}, METHODS[method], "theta_dot = 3.0")
     got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
     theta = 30 + strength / omega * (10 - sin(10 * omega) / omega)
     rate = 3 + strength / omega * (1 - cos(10 * omega))
-    assert (got["q"]["theta"], got["v"]["theta"]) == pytest.approx(
-        (theta, rate), abs=3e-5
-    )
+    assert (got["q"]["theta"], got["v"]["theta"]) == pytest.approx((theta, rate), abs=3e-5)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_what_begins_as_a_rounding_error_does_not_halt_a_run(method, moved):
-    text = scenario(
-        {"swell": 1.0, "width": 1.0, "center": 19.0}, METHODS[method], end=25.0
-    )
+    text = scenario({"swell": 1.0, "width": 1.0, "center": 19.0}, METHODS[method], end=25.0)
     got = json.loads(moved(text, "simulate", "--json").stdout)
-    rate = 25 + log(
-        cosh(6) / cosh(19)
-    )  # 1 + tanh(t) begins as an ulp of 1, and goes up by as much
+    rate = 25 + log(cosh(6) / cosh(19))  # 1 + tanh(t) begins as an ulp of 1, and goes up by as much
     assert got["final"]["v"]["theta"] == pytest.approx(rate, rel=1e-8)  # measured 6e-10
     assert got["steps"] < 10000  # measured 3241
 
 
 def test_pulses_in_lanes_are_their_impulses(moved, tmp_path):
-    text = scenario(
-        {"push": 10.0, "width": 0.004}, 'method = "dopri5"\ntolerance = 1e-8'
-    )
+    text = scenario({"push": 10.0, "width": 0.004}, 'method = "dopri5"\ntolerance = 1e-8')
     text += '[ensemble]\nkeep = ["final"]\n[[ensemble.axis]]\n'
     text += 'key = "system.parameters.center"\nfrom = 0.5\nto = 9.5\ncount = 50\n'
     moved(text, "ensemble", "-o", tmp_path / "out.h5")
@@ -156,35 +150,25 @@ def test_pulses_in_lanes_are_their_impulses(moved, tmp_path):
     ],
 )
 def test_forces_with_numbers_in_their_exponents_are_there(force, impulse, moved):
-    others = dict.fromkeys(
-        ("pulse", "narrower", "switched", "turning", "dying", "wall", "step"), 0.0
-    )
-    text = scenario({**others, force: 3.0}, "", "x = 0.3", 6.0).replace(
-        "forced", "sharp"
-    )
+    others = dict.fromkeys(("pulse", "narrower", "switched", "turning", "dying", "wall", "step"), 0.0)
+    text = scenario({**others, force: 3.0}, "", "x = 0.3", 6.0).replace("forced", "sharp")
     got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
     assert got["v"]["x"] == pytest.approx(3 * impulse, rel=1e-8)  # measured 1.6e-10
 
 
 def test_a_step_of_the_potential_is_smooth_far_away(moved):
     """Where it begins, (x − 5)/0.03 is 833, and exp of that is no double."""
-    others = dict.fromkeys(
-        ("pulse", "narrower", "switched", "turning", "dying", "wall"), 0.0
+    others = dict.fromkeys(("pulse", "narrower", "switched", "turning", "dying", "wall"), 0.0)
+    text = scenario({**others, "step": 8.0}, "step = 0.002", "x = 30.0\nx_dot = -10.0", 6.0).replace(
+        "forced", "sharp"
     )
-    text = scenario(
-        {**others, "step": 8.0}, "step = 0.002", "x = 30.0\nx_dot = -10.0", 6.0
-    ).replace("forced", "sharp")
     got = json.loads(moved(text, "simulate", "--json").stdout)["final"]
-    assert got["v"]["x"] == pytest.approx(
-        -sqrt(100 + 2 * 8), rel=1e-10
-    )  # measured 7e-13
+    assert got["v"]["x"] == pytest.approx(-sqrt(100 + 2 * 8), rel=1e-10)  # measured 7e-13
 
 
 def thrown_back(height: float, thin: float, place: float, end: float) -> float:
     """Where one comes to by the time `end` that begins at 0 with the rate 1, by a wall that it cannot pass."""
-    turn = sqrt(
-        log(2 * height)
-    )  # before the middle, in widths: there the wall is as high as the energy
+    turn = sqrt(log(2 * height))  # before the middle, in widths: there the wall is as high as the energy
     z, step = np.linspace(0, 3, 100001, retstep=True)  # widths from there: z²
     rate = np.sqrt(1 - 2 * height * np.exp(-((turn + z[1:] ** 2) ** 2)))
     slowness = np.concatenate([[2 / sqrt(2 * turn)], 2 * z[1:] / rate])
@@ -200,19 +184,16 @@ def test_a_narrow_wall_throws_back(method, moved):
     draw = random.Random(4)
     for thin in THIN:
         place = draw.uniform(2, 4)
-        text = scenario(
-            {"wall": 10.0, "thin": thin, "place": place},
-            METHODS[method],
-            "theta_dot = 1.0",
-            7.0,
-        )
+        text = scenario({"wall": 10.0, "thin": thin, "place": place}, METHODS[method], "theta_dot = 1.0", 7.0)
         got = json.loads(moved(text, "simulate", "--json").stdout)
-        end = (thrown_back(10.0, thin, place, 7.0), -1.0)
-        assert (
-            got["final"]["q"]["theta"],
-            got["final"]["v"]["theta"],
-        ) == pytest.approx(end, abs=1e-3), thin
-        assert got["warnings"] == [] and got["steps"] < 1000
+        ended = got["final"]["q"]["theta"], got["final"]["v"]["theta"]
+        # measured 3.1e-5, by Radau at a tolerance of 1e-6; 3.3e-10 by default
+        assert ended == pytest.approx((thrown_back(10.0, thin, place, 7.0), -1.0), abs=1e-4), thin
+        assert got["warnings"] == [] and got["steps"] < 300, thin  # measured 146, of 2 stages
+
+
+def trusted(summary: dict) -> float:
+    return summary["duration"] if summary["trusted_until"] is None else summary["trusted_until"]
 
 
 CONSTANT = {
@@ -245,9 +226,17 @@ def test_a_wall_that_constant_steps_pass_is_told(method, height, moved):
                 abs(got["final"]["q"]["theta"] - end[0]) / 7,
                 abs(got["final"]["v"]["theta"] - end[1]),
             )
-            assert off < 1e-3 or got["trusted_until"] <= place, thin
+            assert off < 1e-3 or trusted(got) <= place, thin
         else:
-            assert (
-                abs(got["final"]["v"]["theta"] - 1) < 1e-3
-                or got["trusted_until"] <= place
-            ), thin
+            assert abs(got["final"]["v"]["theta"] - 1) < 1e-3 or trusted(got) <= place, thin
+
+
+@pytest.mark.parametrize("method", {**METHODS, **CONSTANT})
+def test_a_wide_wall_is_not_doubted(method, moved):
+    """Nor is one that nothing comes to."""
+    for wall in ({"thin": 1.0}, {"thin": 1e-3, "place": 30.0}):
+        text = scenario({"wall": 0.2, **wall}, {**METHODS, **CONSTANT}[method], "theta_dot = 1.0", 7.0)
+        got = json.loads(moved(text, "simulate", "--json").stdout)
+        assert got["warnings"] == [] and abs(got["final"]["v"]["theta"] - 1) < 1e-3, (
+            wall
+        )  # 1 - 2e-7 behind it

@@ -19,8 +19,7 @@ class FieldSteps {
   /// For a method that is as good as a quadrature of so many nodes. `is_blind`: its estimate of errors does not see
   /// what a stage alone meets.
   FieldSteps(int nodes, const ForwardDynamics& dynamics, std::size_t coordinates, bool is_blind = false)
-      : look_(nodes, dynamics.arguments()),
-        arguments_(dynamics.arguments().size()),
+      : look_(nodes, few_samples, dynamics.arguments()),
         is_blind_(is_blind),
         path_(coordinates),
         begin_(2 * coordinates),
@@ -37,7 +36,7 @@ class FieldSteps {
   void forget() { begin_is_known_ = false; }
   void move_on() {
     begin_.swap(end_);
-    begin_is_known_ = has_to_look();
+    begin_is_known_ = end_is_known_;
   }
 
   /// Along each coordinate k, relative to size_of(rate at x)(k); the largest. The path from x = (q, q̇) to `end` is the
@@ -45,22 +44,24 @@ class FieldSteps {
   template <class SizeOf>
   Unseen unseen(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
                 const std::vector<double>& end, SizeOf&& size_of) {
+    const auto arguments = [&](std::span<const double> shares, double* found) {
+      find_arguments(dynamics, time, h, shares, found);
+    };
+    lay_roughly(h, x, end);
+    const bool may_find = look_.may_find(arguments);
+    if (!may_find && !is_blind_) {
+      end_is_known_ = false;
+      return {};
+    }
     lay_path(dynamics, time, h, x, end);
     const auto size = size_of(begin_);
-    const auto arguments = [&](std::span<const double> shares, double* found) {
-      for (std::size_t i = 0; i < shares.size(); ++i) {
-        go_to(shares[i], h);
-        dynamics.find_arguments(time + shares[i] * h, place_.data(), rate_.data(), found + i * arguments_);
-      }
-    };
     const auto accelerations = [&](std::span<const double> shares, double* found) {
       for (std::size_t i = 0; i < shares.size(); ++i) {
         go_to(shares[i], h);
         dynamics.acceleration(time + shares[i] * h, place_.data(), rate_.data(), found + i * path_.size());
       }
     };
-    const bool is_found = look_.finds(arguments);
-    if (is_found) {
+    if (may_find && look_.finds(arguments)) {
       look_.sum(accelerations, {sums_, moments_, missed_});
     } else if (is_blind_) {
       sum_roughly(accelerations);
@@ -82,11 +83,20 @@ class FieldSteps {
   }
 
  private:
+  // By the cubic through both ends.
+  void lay_roughly(double h, const std::vector<double>& x, const std::vector<double>& end) {
+    const std::size_t count = path_.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      const double v = h * x[count + k], after = h * end[count + k], moved = end[k] - x[k];
+      path_[k] = {x[k], v, 3 * moved - 2 * v - after, v + after - 2 * moved, 0, 0};
+    }
+  }
+
   void lay_path(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
                 const std::vector<double>& end) {
     const std::size_t count = path_.size();
     if (!begin_is_known_) dynamics.acceleration(time, x.data(), x.data() + count, begin_.data() + count);
-    begin_is_known_ = true;
+    begin_is_known_ = end_is_known_ = true;
     dynamics.acceleration(time + h, end.data(), end.data() + count, end_.data() + count);
     for (std::size_t k = 0; k < count; ++k) {
       const double v = h * x[count + k], a = h * h * begin_[count + k];
@@ -109,6 +119,20 @@ class FieldSteps {
     }
   }
 
+  void find_arguments(ForwardDynamics& dynamics, double time, double h, std::span<const double> shares, double* found) {
+    const std::size_t count = path_.size();
+    times_.resize(shares.size());
+    places_.resize(shares.size() * count);
+    rates_.resize(shares.size() * count);
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      times_[i] = time + shares[i] * h;
+      go_to(shares[i], h);
+      std::copy(place_.begin(), place_.end(), places_.data() + i * count);
+      std::copy(rate_.begin(), rate_.end(), rates_.data() + i * count);
+    }
+    dynamics.find_arguments(times_.data(), shares.size(), places_.data(), rates_.data(), found);
+  }
+
   template <class Accelerations>
   void sum_roughly(Accelerations& accelerations) {
     using Gauss = kernels::GaussTableau<3>;
@@ -122,14 +146,15 @@ class FieldSteps {
   }
 
   static constexpr double path_error = 100;  // of a quintic, in errors of the step, about
-  static constexpr double beside = 1e-3;     // of others, that a coordinate at rest is compared with
+  static constexpr int few_samples = 3;
+  static constexpr double beside = 1e-3;  // of others, that a coordinate at rest is compared with
 
   FieldLook look_;
-  std::size_t arguments_;
-  bool is_blind_, begin_is_known_ = false;
+  bool is_blind_, begin_is_known_ = false, end_is_known_ = false;
   std::vector<std::array<double, 6>> path_;  // coefficients of powers of the share
   std::vector<double> begin_, end_;          // rates; of the coordinates' nothing
   std::vector<double> place_, rate_, sums_, moments_, missed_, found_;
+  std::vector<double> times_, places_, rates_;
 };
 
 }  // namespace pendula

@@ -27,8 +27,9 @@ class ForwardDynamics {
 
   /// Of what its functions are taken of that may be narrow, whether it is the base of a power (field_look.hpp).
   virtual std::span<const bool> arguments() const { return {}; }
-  /// And what that is in a state.
-  virtual void find_arguments(double /*time*/, const double* /*q*/, const double* /*v*/, double* /*found*/) {}
+  /// And what that is in each of `count` states, (count, dof·n): (count, arguments).
+  virtual void find_arguments(const double* /*times*/, std::size_t /*count*/, const double* /*q*/, const double* /*v*/,
+                              double* /*found*/) {}
 };
 
 }  // namespace pendula

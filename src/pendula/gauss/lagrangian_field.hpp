@@ -19,14 +19,15 @@ class LagrangianField {
  public:
   using Stages = LagrangianStages<S, Width>;
 
-  explicit LagrangianField(int stages) : look_(stages, argument_bases<S>()) {}
+  explicit LagrangianField(int stages) : look_(stages, Width, argument_bases<S>(), stages < few_stages ? 0.1 : 0.5) {}
 
   Unseen unseen(Stages& stages) {
-    const double pace = stages.shape().pace;
+    stages.see_speed();
     const auto arguments = [&](std::span<const double> shares, double* found) {
       find_arguments(stages, shares, found);
     };
-    if (!look_.finds(arguments)) return {};
+    if (!look_.may_find(arguments) || !look_.finds(arguments)) return {};
+    const double pace = stages.shape().pace;
     std::array<double, 2 * Stages::count> sums, moments, missed;
     const auto rates = [&](std::span<const double> shares, double* found) { find_rates(stages, shares, found); };
     look_.sum(rates, {sums, moments, missed});
@@ -41,6 +42,7 @@ class LagrangianField {
   using Lanes = typename Stages::Lanes;
 
   static constexpr auto width = static_cast<std::size_t>(Width);
+  static constexpr int few_stages = 4;  // fewer tell little of their error where a small event is short
 
   // Where the system is at shares of the step; lanes beyond them repeat the last.
   struct There {

@@ -302,6 +302,18 @@ class LagrangianStages {
     }
     return std::sqrt((pace * pace * places + pushes) / fastest());
   }
+  /// Looks how fast stages are, that were solved.
+  void see_speed() {
+    const L inverse = inverse_hb();
+    L speed(0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+      const L v = L(weight_[k]) * L::load(U_[k]) * inverse;
+      speed = fma(v, v, speed);
+    }
+    alignas(pack_alignment) Stored speeds;
+    speed.store(speeds);
+    fastest_here_ = *std::max_element(speeds, speeds + stages());
+  }
   /// The fastest of the stages, of the speed of the motion.
   double speed_here() const { return std::sqrt(fastest_here_ / fastest()); }
 

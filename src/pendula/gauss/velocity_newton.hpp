@@ -45,7 +45,7 @@ class VelocityNewton {
         polynomials_(tableau_of<Eigen::Dynamic>(family, stages)),
         system_(stages),
         forcing_(family, stages),
-        look_(stages, argument_bases<S>()),
+        look_(stages, few_samples, argument_bases<S>()),
         at_(static_cast<std::size_t>(stages)) {
     for (Stage& stage : at_) stage.last_a.setZero();
   }
@@ -192,7 +192,7 @@ class VelocityNewton {
         std::copy_n(arguments.data(), arguments.size(), found + i * S::argument_is_base.size());
       });
     };
-    if (!look_.finds(find_arguments)) return {};
+    if (!look_.may_find(find_arguments) || !look_.finds(find_arguments)) return {};
     Vector sums, moments, missed;
     const auto accelerations = [&](std::span<const double> shares, double* found) {
       at_all(shares, [&](std::size_t i, const State& there) {
@@ -269,6 +269,7 @@ class VelocityNewton {
 
  private:
   static constexpr std::size_t count = S::coordinates;
+  static constexpr int few_samples = 3;  // for what may be narrow
 
   struct Stage {
     typename Model::Parameters parameters;

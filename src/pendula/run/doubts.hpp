@@ -74,7 +74,7 @@ inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trus
   if (std::isinf(statistics.unseen_from)) return {};
   trust.until = std::min(trust.until, statistics.unseen_from);
   trust.expected_error = std::numeric_limits<double>::quiet_NaN();
-  return "steps went past something narrow in the forces, " + rounded(statistics.unseen, 1) +
+  return "steps went past something narrow in the forces, " + pendula::rounded(statistics.unseen, 1) +
          " of the speed of the motion in all: " + untrusted_after(statistics.unseen_from, setup.start.time) + "; " +
          smaller_step_advice(setup.options);
 }

@@ -49,19 +49,33 @@ constexpr std::array<double, n + 1> legendre_polynomials(double x) {
 /// to it forces are summed over ever shorter intervals. Shares of the step are 0 to 1.
 class FieldLook {
  public:
-  /// For a method of so many nodes.
-  FieldLook(int nodes, std::span<const bool> is_base)
-      : is_base_(is_base.begin(), is_base.end()), parts_(std::max(1, nodes / 2)) {
-    const int intervals = is_base.empty() ? 0 : std::max(least_intervals, 2 * nodes);
-    for (int i = 0; i <= intervals; ++i) samples_.push_back(static_cast<double>(i) / std::max(intervals, 1));
+  /// For a method of so many nodes; `few` samples of a step take little time. Functions that change by no more than
+  /// `smooth` from sample to sample, as `changes` tells it, are left to the error of the step.
+  FieldLook(int nodes, int few, std::span<const bool> is_base, double smooth = 0.5)
+      : is_base_(is_base.begin(), is_base.end()), smooth_(smooth), parts_(std::max(1, nodes / 2)) {
+    if (is_base.empty()) return;
+    few_ = spread(few - 1);
+    samples_ = spread(std::max(least_intervals, 2 * nodes));
     places_.reserve(most_places);
   }
 
   /// Whether a model has functions that may be narrow.
   bool has_to_look() const { return !is_base_.empty(); }
 
-  /// Whether any of them changes faster than samples of the step show; arguments(shares, found) are what functions are
-  /// taken of, (shares, arguments).
+  /// Whether few samples show that one of them may change fast; arguments(shares, found) are what functions are taken
+  /// of, (shares, arguments).
+  template <class Arguments>
+  bool may_find(Arguments&& arguments) {
+    evaluate(few_, arguments, found_);
+    for (std::size_t i = 1; i < few_.size(); ++i) {
+      for (std::size_t a = 0; a < is_base_.size(); ++a) {
+        if (changes(a, at(i - 1, a), at(i, a), smooth_)) return true;
+      }
+    }
+    return false;
+  }
+
+  /// Whether any of them changes faster than samples of the step show.
   template <class Arguments>
   bool finds(Arguments&& arguments) {
     places_.clear();
@@ -108,10 +122,16 @@ class FieldLook {
 
   static constexpr int least_intervals = 8, sections = 7, most_rounds = 9;
   // Of an argument, from place to place; of a base, relative to itself. Functions that change by so little are smooth.
-  static constexpr double smooth = 0.5, flat = 0.25;
+  static constexpr double flat = 0.25;
   static constexpr double gone = 60;   // exp of minus that is nothing
   static constexpr double growth = 3;  // of intervals, away from a place
   static constexpr std::size_t most_places = 64;
+
+  static std::vector<double> spread(int intervals) {
+    std::vector<double> shares;
+    for (int i = 0; i <= intervals; ++i) shares.push_back(static_cast<double>(i) / intervals);
+    return shares;
+  }
 
   template <class Arguments>
   void evaluate(std::span<const double> shares, Arguments& arguments, std::vector<double>& found) {
@@ -135,10 +155,10 @@ class FieldLook {
   void look_at(std::size_t a, std::size_t i, Arguments& arguments) {
     const std::size_t last = samples_.size() - 1;
     const double here = at(i, a), before = at(i - (i > 0), a), after = at(i + (i < last), a);
-    if (i < last && (here < 0) != (after < 0) && changes(a, here, after, smooth)) {
+    if (i < last && (here < 0) != (after < 0) && changes(a, here, after, smooth_)) {
       zoom(a, 0, samples_[i], samples_[i + 1], arguments);
     }
-    if (!changes(a, here, before, smooth) && !changes(a, here, after, smooth)) return;
+    if (!changes(a, here, before, smooth_) && !changes(a, here, after, smooth_)) return;
     // Between samples an argument goes further than at them, by what it bends.
     const std::size_t middle = std::clamp(i, std::size_t{1}, last - 1);
     const double bend = std::abs(at(middle - 1, a) - 2 * at(middle, a) + at(middle + 1, a));
@@ -267,8 +287,9 @@ class FieldLook {
   }();
 
   std::vector<bool> is_base_;
+  double smooth_;
   int parts_;
-  std::vector<double> samples_, found_, near_, borders_, here_, most_;
+  std::vector<double> few_, samples_, found_, near_, borders_, here_, most_;
   std::vector<Place> places_;
 };
 
