@@ -42,7 +42,7 @@ WRONG = {
         "wrong.py:6: lagrangian: expected a SymPy expression, got str 'x'",
     ),
     "exception": (
-        "    x = model.coordinate('x', 'm')\n    model.lagrangian = model.rate(x)**2 / (1 - 1)\n    links / 0\n",
+        "    x = model.coordinate('x', 'm')\n    model.lagrangian = model.rate(x)**2 / 2\n    links / 0\n",
         "wrong.py:7: ZeroDivisionError: division by zero",
     ),
     "syntax error": ("    x = = 1\n", "wrong.py:5: invalid syntax"),
