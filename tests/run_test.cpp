@@ -137,7 +137,7 @@ TEST(Run, BeginsNoOtherTrialWhereItIsTold) {
   setup.options.step = 0;
   setup.accuracy.error = 1e-9;
   EXPECT_EQ(pendula::Run(setup).go([] { return true; }).end, RunEnd::stopped);
-  EXPECT_EQ(counted->made, 3);  // by the run, its first trial, and the run as the trials would have it
+  EXPECT_EQ(counted->made, 2);  // by the run and its first trial
 }
 
 // To ends that are no multiple of the step, by signals between rows and at rows: what ends a run leaves no trace.

@@ -32,8 +32,9 @@ STATEMENT = re.compile(
     re.MULTILINE,
 )
 READING = re.compile(r"^    const Real& (?P<left>\w+) = (?P<right>[\w.]+(?:\[\d\])?);", re.MULTILINE)
-# What says where numbers stand; and what subtracts products that are 0 where a mass matrix is diagonal.
-NO_PART_OF_IT = {"parameter_places", "solve_symmetric"}
+# What says where numbers stand; what subtracts products that are 0 where a mass matrix is diagonal; and what steps look
+# for narrow forces by, in which no factor matters.
+NO_PART_OF_IT = {"parameter_places", "solve_symmetric", "call_arguments"}
 
 
 def without_last_term(text: str) -> str | None:

@@ -65,8 +65,8 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
   trust.until = std::min(trust.until, *missed);
   const std::string advice =
       is_adaptive(run) ? "run.method = \"radau\" is made for damping that fast" : smaller_step_advice(run);
-  return "a step missed the velocity by " + pendula::rounded(defect, 2) + " of the fastest: " +
-         rows_after(*missed, setup.start.time) + " may be wrong; " + advice;
+  return "a step missed the velocity by " + pendula::rounded(defect, 2) +
+         " of the fastest: " + rows_after(*missed, setup.start.time) + " may be wrong; " + advice;
 }
 
 /// Steps went past something narrow in the forces, from a time on that shows in rows.

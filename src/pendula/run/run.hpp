@@ -116,7 +116,7 @@ class Run {
   };
 
   RunSetup setup_;
-  std::unique_ptr<Integrator> integrator_;  // one at a time: of a million links it takes a gigabyte
+  std::unique_ptr<Integrator> integrator_;     // one at a time: of a million links it takes a gigabyte
   std::vector<Observer*> observers_, takers_;  // all; those that take the rows of the run
   std::vector<Viewer> viewers_;                // of the others
   double viewing_seconds_ = 0;
