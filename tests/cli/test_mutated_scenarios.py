@@ -58,12 +58,46 @@ distribution = "normal"
 mean = 0.5
 deviation = 0.01
 """
-CHAINS = ("double_pendulum", "driven_damped", "hundred_links", "poincare", "spatial_chain", "triple_pendulum", "whip")
+CHAINS = (
+    "double_pendulum",
+    "driven_damped",
+    "hundred_links",
+    "poincare",
+    "spatial_chain",
+    "triple_pendulum",
+    "whip",
+)
 
 VALUES = (
-    *("0", "-1", "1", "2", "3", "1e308", "-1e308", "1e-308", "5e-324", "nan", "inf", "-inf", "1e400", "0x7f", "1_0"),
-    *("9223372036854775807", "9223372036854775808", "1e9", "4096", "1e-9", "0.1.2", "1979-05-27", "true", '"gauss"'),
-    *('""', '"\\u0000"', "'", "[]", "[[]]", "[1, [2]]", "[1, 'a']", "{}", "{ a = 1 }", "[nan, 1]", '"90°"', "[0.1, 0.2]"),
+    *(
+        "0",
+        "-1",
+        "1",
+        "2",
+        "3",
+        "1e308",
+        "-1e308",
+        "1e-308",
+        "5e-324",
+        "nan",
+        "inf",
+        "-inf",
+        "1e400",
+        "0x7f",
+        "1_0",
+    ),
+    *(
+        "9223372036854775807",
+        "9223372036854775808",
+        "1e9",
+        "4096",
+        "1e-9",
+        "0.1.2",
+        "1979-05-27",
+        "true",
+        '"gauss"',
+    ),
+    *('""', '"\\u0000"', "'", "[]", "[[]]", "[1, [2]]", "[1, 'a']", "{}", "{ a = 1 }", "[nan, 1]", '"90°"'),
 )
 NUMBER = re.compile(r"(?<![\w.])-?\d[\w.+-]*")
 WORD = re.compile(r"\w+")
@@ -109,7 +143,7 @@ def ended(command: list, folder) -> tuple[int | None, str, str]:
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        preexec_fn=room,  # noqa: PLW1509
+        preexec_fn=room,
     ) as run:
         try:
             out, err = run.communicate(timeout=1)
