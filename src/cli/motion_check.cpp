@@ -30,9 +30,13 @@ std::string label(const std::string& what, int stages, Form form) {
 // From a picosecond to thirty thousand years, by twos, up to the first time that is not followed: what acts for a
 // moment only, longer ones may step over. What is checked is checked over half of it, and less where that is not short
 // enough.
-MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, const Motion& start,
-                         std::vector<std::string> units, double energy_rounding)
-    : kernel_(kernel), subject_(subject), start_(start), units_(std::move(units)), energy_rounding_(energy_rounding) {
+MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
+                         double energy_rounding)
+    : kernel_(kernel),
+      subject_(subject),
+      start_(std::move(start)),
+      units_(std::move(units)),
+      energy_rounding_(energy_rounding) {
   for (double time = std::ldexp(1.0, -40); time < std::ldexp(1.0, 40) && follows(time); time *= 2) time_ = time;
   constexpr int most_spans = 8;
   for (int k = 1; k <= most_spans && time_ > 0; ++k) {

@@ -29,7 +29,7 @@ class MotionCheck {
  public:
   /// `units` are those of the coordinates; `energy_rounding` is what energies are off by, 0 where that is not known
   /// [J].
-  MotionCheck(std::string_view kernel, const Subject& subject, const Motion& start, std::vector<std::string> units,
+  MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
               double energy_rounding);
 
   /// How long eight steps of eight stages follow it; 0 where they do not even for a moment  [s].

@@ -217,12 +217,12 @@ inline Reach unequal(const Reach& a, const Reach& b) {
   return detail::compared(a, b, !(meet && a.value.is_number() && b.value.is_number()), !meet);
 }
 inline Reach both(const Reach& a, const Reach& b) {
-  using namespace detail;
-  return truth(may_be_true(a) && may_be_true(b), must_be_true(a) && must_be_true(b));
+  return detail::truth(detail::may_be_true(a) && detail::may_be_true(b),
+                       detail::must_be_true(a) && detail::must_be_true(b));
 }
 inline Reach either(const Reach& a, const Reach& b) {
-  using namespace detail;
-  return truth(may_be_true(a) || may_be_true(b), must_be_true(a) || must_be_true(b));
+  return detail::truth(detail::may_be_true(a) || detail::may_be_true(b),
+                       detail::must_be_true(a) || detail::must_be_true(b));
 }
 /// `yes` where `condition` is not 0, else `no`.
 inline Reach choose(const Reach& condition, const Reach& yes, const Reach& no) {

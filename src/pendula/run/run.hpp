@@ -404,8 +404,7 @@ inline detail::Doubt Run::look_again(RunReport& report, const std::function<bool
     });
     return Separation(*setup_.subject, *track_, other);
   };
-  const std::string unknown =
-      "it was interrupted while it ran again to see how far it can be trusted: that is not known";
+  std::string unknown = "it was interrupted while it ran again to see how far it can be trusted: that is not known";
   const detail::SecondLook coarser = detail::coarser(setup_.options, report.statistics);
   const Separation first = compare(coarser);
   if (stopped) return unknown;

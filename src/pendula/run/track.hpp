@@ -82,7 +82,7 @@ class Track {
     if (rows_.empty()) return;
     std::ranges::move(rows_, std::back_inserter(states_));
     rows_.clear();
-    std::ranges::stable_sort(states_, {}, &Motion::time);
+    std::ranges::sort(states_, {}, &Motion::time);
     const auto same = std::ranges::unique(states_, {}, &Motion::time);
     states_.erase(same.begin(), same.end());
   }

@@ -34,7 +34,7 @@ class KernelComparison {
     }
     for (const Written what : kernel_outputs) outputs_ += size(what);
     arguments_ = 1 + 3 * n_ + parameters_ + inputs_;
-    point_size_ = static_cast<std::size_t>(arguments_ + 2 * numbers);
+    point_size_ = static_cast<std::size_t>(arguments_) + 2 * static_cast<std::size_t>(numbers);
     count_ = said.empty() ? 0 : static_cast<std::size_t>(said.front());
     if (said.size() != 1 + count_ * point_size_) {
       throw std::invalid_argument("a kernel can be compared with what its own model says only");
