@@ -83,8 +83,8 @@ class Track {
     std::ranges::move(rows_, std::back_inserter(states_));
     rows_.clear();
     std::ranges::sort(states_, {}, &Motion::time);
-    const auto same = std::ranges::unique(states_, {}, &Motion::time);
-    states_.erase(same.begin(), same.end());
+    const auto is_same = [](const Motion& a, const Motion& b) { return a.time == b.time; };
+    states_.erase(std::unique(states_.begin(), states_.end(), is_same), states_.end());
   }
 
   bool is_complete() const { return is_complete_; }
