@@ -219,7 +219,8 @@ TEST_F(PageTest, WantsRowsAtTimesThatItCanKeep) {
           page.add_row(row);
         }
         page.close();
-        for (const nlohmann::json& run : description(text_of(file()))["runs"]) EXPECT_EQ(run["stride"], 1);
+        const nlohmann::json told = description(text_of(file()));
+        for (const nlohmann::json& run : told["runs"]) EXPECT_EQ(run["stride"], 1);
       }
     }
   }

@@ -23,7 +23,9 @@ execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" --target cpp_tests
                 COMMAND_ERROR_IS_FATAL ANY)
 # The long runs repeat what the others do, millions of times: without sanitizers they take seconds, here many minutes.
 set(long_runs EnergyAndAngularMomentumAreKept EnergyStaysWhatItIs FullTurnsAreCounted RandomCrossings WhatTurnsOften
-              OfAPublishedDoublePendulum ComeInPairs ReachesTheAccuracy)
+              OfAPublishedDoublePendulum ComeInPairs ReachesTheAccuracy NarrowEvents.AreAllFound/gauss_
+              NarrowEvents.AreAllFound/rk4 NarrowEvents.AreAllFound/dopri5 NarrowEventsInLanes
+              TangentsGrowAsThoseOfExplicitSteps)
 list(JOIN long_runs "|" long_runs)
 execute_process(COMMAND "${CMAKE_CTEST_COMMAND}" --test-dir "${BUILD}" --label-regex cpp --exclude-regex "${long_runs}"
                         --output-on-failure --parallel 2
