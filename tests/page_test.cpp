@@ -9,6 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/row_times.hpp>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -214,13 +215,15 @@ TEST_F(PageTest, WantsRowsAtTimesThatItCanKeep) {
           page.begin_run("");
           const RowTimes times = page.times(duration, run);
           std::vector<double> row(scene.columns.size());
-          for (std::int64_t k = 0; (row[0] = times.at(k)) <= duration; ++k) page.add_row(row);
-          row[0] = duration;
+          for (std::int64_t k = 0; !is_reached(duration, row[0] = times.at(k)); ++k) page.add_row(row);
+          row[0] = duration;  // as a run does, once
           page.add_row(row);
         }
         page.close();
         const nlohmann::json told = description(text_of(file()));
-        for (const nlohmann::json& run : told["runs"]) EXPECT_EQ(run["stride"], 1);
+        for (const nlohmann::json& run : told["runs"]) {
+          EXPECT_EQ(run["stride"], 1) << links << ' ' << runs << ' ' << duration;
+        }
       }
     }
   }

@@ -454,14 +454,11 @@ class ExpressionReader {
       case Operation::product:
         if (a.is_constant) made.turns = of_a * b.turns;
         if (b.is_constant) made.turns = a.turns * of_b;
-        made.is_plain = are_plain;
+        made.is_plain = are_plain && (a.is_constant || b.is_constant);
         break;
       case Operation::ratio:
         if (b.is_constant) made.turns = a.turns / of_b;
         made.is_plain = are_plain && b.is_constant;
-        break;
-      case Operation::power:
-        made.is_plain = are_plain && b.is_constant && (of_b == 2 || of_b == 3 || of_b == 4) && nodes_[last].number > 0;
         break;
       case Operation::sine:
       case Operation::cosine:

@@ -27,7 +27,7 @@ class Expression {
   /// Columns that it uses, each once.
   const std::vector<std::size_t>& columns() const { return columns_; }
 
-  /// Whether it turns about as fast as its columns do: a polynomial of low degree in them, and in sines of angles.
+  /// Whether it turns about as fast as its columns do: a sum of them, and of sines of them, with factors.
   bool is_plain() const { return is_plain_; }
 
   /// Its value for the numbers of `columns`; NaN where it has none.

@@ -21,6 +21,7 @@ import subprocess
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import crossings
@@ -94,6 +95,10 @@ def limits(run: dict, growth: np.ndarray, ensemble: bool = False) -> np.ndarray:
         return np.full(len(growth), asked)
     if kind == "accuracy":
         return np.full(len(growth), min(ROOM_FOR_ACCURACY * asked, NOTHING_ASKED))
+    if (
+        ensemble and run.get("method") in ADAPTIVE
+    ):  # a run tells what it expects, members do not: docs/ensembles.md
+        return np.full(len(growth), NOTHING_ASKED)
     room = ROOM_FOR_TOLERANCE.get(run.get("method", "gauss"), ROOM_FOR_TOLERANCE["radau"])
     return np.minimum(room * asked * growth, NOTHING_ASKED)
 
@@ -505,9 +510,9 @@ def event_faults(case, tables, subject, motion, ends, done, errors, duration) ->
             gaps = gaps_of(motion, ends, event["when"], allowed, beside)
         except OverflowError:
             continue
-        wrong = crossings.compare(gaps, mine, event.get("direction", "both"), until)
+        step = float(done.summary.get("largest_step") or run.get("step", 0))
+        wrong = crossings.compare(gaps, mine, event.get("direction", "both"), until, step)
         if case.around and ("sin(" in event["when"] or beside):  # it turns faster than the motion
-            step = float(done.summary.get("largest_step") or run.get("step", 0))
             wrong = [fault for fault in wrong if fault.lasts > SEEN * step]
         told = {e["name"]: e["count"] for e in done.summary.get("events", [])}.get(event["name"])
         if told != len(mine):
@@ -546,9 +551,7 @@ def gaps_of(
     sizes = {name: size_of(motion.subject, name, ends.sizes) for name in expression.columns}
     times = ends.columns["t"].astype(float)
 
-    def g(at: np.ndarray) -> np.ndarray:
-        return expression(crossings.columns_of(motion, expression, at))
-
+    g = partial(values_of, motion, expression)
     values = g(grid_of(motion, 0.0))
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0))
     level = re.search(r" - ([\d.e+-]+)$", when)  # what is left of a difference has the rounding of its parts
@@ -565,9 +568,20 @@ def gaps_of(
     ]  # no faster than 30 of its units
     found += [2 * np.pi / float(x) for x in re.findall(r"fmod\(t, ([\d.e-]+)\)", when)]
     grid = grid_of(motion, max(found, default=0.0))
-    for inner in map(crossings.Expression, beside):
-        grid = crossings.beside_zeros(lambda at, e=inner: e(crossings.columns_of(motion, e, at)), grid)
+    factors = re.fullmatch(
+        r"\((.*)\)\*\((.*)\)", when
+    )  # what is zero where one of them turns is so up to four times
+    for inner in map(crossings.Expression, [*beside, *(factors.groups() if factors else [])]):
+        of = partial(values_of, motion, inner)
+        if factors:
+            turns = crossings.turns(of, grid, of(grid), np.zeros(len(grid)))
+            grid = np.unique(np.concatenate([grid, turns]))
+        grid = crossings.beside_zeros(of, grid)
     return crossings.gaps(g, wide, grid)
+
+
+def values_of(motion: truth.Dense, expression: crossings.Expression, times: np.ndarray) -> np.ndarray:
+    return expression(crossings.columns_of(motion, expression, times))
 
 
 def size_of(subject: truth.Subject, name: str, sizes: np.ndarray) -> float:

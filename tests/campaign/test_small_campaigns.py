@@ -24,6 +24,7 @@ CASES = {
         "functions of time": [0, 4, 8, 57],
         "pairs at a jump": [12, 27],
         "pairs closer than an interpolant": [7],
+        "pairs of a product of what moves": [931],
         "narrow in the state": [3008, 3012, 3026],
         "right": [2, 21, 33],
     },

@@ -10,7 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
-COMPILER, *OPTIONS = [word for word in os.environ["PENDULA_CONSUMER_FLAGS"].split() if not word.endswith(".a")]
+COMPILER, *OPTIONS = [
+    word for word in os.environ["PENDULA_CONSUMER_FLAGS"].split() if not word.endswith(".a")
+]
 FOLDERS = [Path(option.removeprefix("-I")) for option in OPTIONS]
 # Most of the time of most headers. Read beforehand it changes nothing for those that read it anyway.
 SHARED = "Eigen/Core"
