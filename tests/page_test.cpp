@@ -205,7 +205,7 @@ TEST_F(PageTest, WantsRowsAtTimesThatItCanKeep) {
   for (const int links : {1, 3, 100}) {
     for (const std::size_t runs : {1U, 3U, 50U}) {
       const Scene scene = chain_scene<Spatial>(links);
-      for (const double duration : {1e-9, 0.1, 7.3, 10.0, 1000.0}) {
+      for (const double duration : {1e-9, 7.3, 1000.0}) {
         Page page(file(), scene, runs);
         const double first = page.times(duration).interval, later = page.times(duration, 1).interval;
         EXPECT_GT(duration / first, 100) << links << ' ' << runs << ' ' << duration;

@@ -24,7 +24,7 @@ execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" --target cpp_tests
 # The long runs repeat what the others do, millions of times: without sanitizers they take seconds, here many minutes.
 set(long_runs EnergyAndAngularMomentumAreKept EnergyStaysWhatItIs FullTurnsAreCounted RandomCrossings WhatTurnsOften
               OfAPublishedDoublePendulum ComeInPairs ReachesTheAccuracy NarrowEvents.AreAllFound/gauss_
-              NarrowEvents.AreAllFound/rk4 NarrowEvents.AreAllFound/dopri5 NarrowEventsInLanes
+              NarrowEvents.AreAllFound/[rdfb] NarrowEventsInLanes
               TangentsGrowAsThoseOfExplicitSteps)
 list(JOIN long_runs "|" long_runs)
 execute_process(COMMAND "${CMAKE_CTEST_COMMAND}" --test-dir "${BUILD}" --label-regex cpp --exclude-regex "${long_runs}"
