@@ -470,6 +470,24 @@ TEST(Run, SaysWhichAccuracyCannotBeReached) {
       << lost.warnings[0];
 }
 
+// Trials may part where the run and the finest of them do not.
+TEST(Run, SaysOfNoTimeThatItIsInfinite) {
+  RunSetup setup = double_pendulum(10);
+  setup.accuracy.error = 1e-6;
+  Track track(1);
+  track.begin(setup.start);
+  Motion last = setup.start;
+  last.time = 10;
+  track.finish(last, true);
+  Trust trust;
+  const auto told = detail::of_aim(setup, Separation(*setup.subject, track, track), {.trusted_until = 5}, trust);
+  ASSERT_TRUE(told);
+  EXPECT_EQ(*told,
+            "an accuracy of 1e-06 is not reached: even runs by the smallest useful tolerances part; "
+            "rows after t = 5 s may be less accurate");
+  EXPECT_EQ(trust.until, 5);
+}
+
 // Few stages would take steps without end by tolerances that many stages reach.
 TEST(Run, TriesNoToleranceThatItsOrderIsTooLowFor) {
   RunSetup setup = double_pendulum(10);

@@ -93,8 +93,11 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
            " of the size of the motion";
   }
   const double seen = parted ? parted->within(visible, start) : aim.trusted_until;
-  return of_wanted + "even runs by the smallest useful tolerances part; " + rows_after(trust.until, start) +
-         " are less accurate, " + untrusted_after(std::max(seen, trust.until), start);
+  const std::string of_those = of_wanted + "even runs by the smallest useful tolerances part; ";
+  // Chaos that shows in trials alone.
+  if (std::isinf(seen)) return of_those + rows_after(trust.until, start) + " may be less accurate";
+  return of_those + rows_after(trust.until, start) + " are less accurate, " +
+         untrusted_after(std::max(seen, trust.until), start);
 }
 
 /// Another run to compare one with.
