@@ -612,7 +612,7 @@ TEST(RunsInLanes, AreDoubtedWhereOthersEndElsewhere) {
                       .every = 1,
                       .doubted = false});
   }
-  if (!lane_kind(setups[0])) return;  // lanes are few
+  if (!lane_kind(setups[0])) GTEST_SKIP() << "lanes were compiled for few methods";
   const std::vector<RunReport> plain = run_members(setups);
   std::vector<RunSetup> finest = setups;
   for (RunSetup& setup : finest) setup.options.tolerance = 1e-13;

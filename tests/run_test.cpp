@@ -470,7 +470,7 @@ TEST(Run, SaysWhichAccuracyCannotBeReached) {
       << lost.warnings[0];
 }
 
-// Trials may part where the run and the finest of them do not.
+// Trials may part from each other, and the run not part from the finest of them.
 TEST(Run, SaysOfNoTimeThatItIsInfinite) {
   RunSetup setup = double_pendulum(10);
   setup.accuracy.error = 1e-6;

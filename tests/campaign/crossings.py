@@ -41,8 +41,8 @@ class Fault:
 
 
 class Expression:
-    """A bell that is cut is taken as the distance from its middle, which has the same sign: far from there the bell
-    says nothing of how near that is."""
+    """Text of an event, for arrays of columns. exp(-(u/w)^2) - 0.5 is replaced by w sqrt(ln 2) - |u|, which has the
+    same sign: where the exponential is 0, its slope does not tell how far zero is."""
 
     def __init__(self, text: str) -> None:
         if bell := re.fullmatch(r"exp\(-\((.*)/([\d.e-]+)\)\^2\) - 0\.5", text):
@@ -172,8 +172,8 @@ def gaps(
 def compare(
     found: list[Gap], events: list[tuple[float, str]], direction: str, until: float, step: float = 0.0
 ) -> list[Fault]:
-    """What is wrong with events (time, "up" or "down") that were found until then, in steps of about this size: times
-    are no better known than that times rounding."""
+    """What is wrong with events (time, "up" or "down") that were found until then. A time within a step is rounded as
+    the size of the step is, too: hence `step`."""
     wrong, slack = [], 8e-15
     taken = np.zeros(len(events), dtype=bool)
     times = np.array([t for t, _ in events])
@@ -203,7 +203,8 @@ def compare(
                 tell(f"one {wanted} more is right than {ups} up and {downs} down")
         if gap.left * gap.right > 0 and not over and direction == "both" and ups != downs:
             tell(f"half a pair: {ups} up and {downs} down")
-        # Rounding may lead to and fro across two levels that are as close as that.
+        # Errors of the state may lead to and fro across two levels that are closer than they: six events were seen
+        # where there are none (events 165).
         if ups + downs > 2 * max(gap.zeros, 1) + 6:
             tell(f"{ups + downs} events where {gap.zeros} are")
         if direction != "both" and (downs if direction == "up" else ups):

@@ -92,7 +92,8 @@ def set_path(commands: list[str]) -> list[str]:
 
 
 def count_tests(_: list[str]) -> list[str]:
-    """The line that ctest ends with when every test of the build passes: this runs inside one of them."""
+    """The line that ctest ends with when every test of the build passes: this runs inside one of them. Where there is
+    no Chromium, as on Ubuntu, the suite `view` is left out, and is counted all the same: README shows the whole."""
     listed = subprocess.run(
         ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N"],
         stdout=subprocess.PIPE,
@@ -101,7 +102,8 @@ def count_tests(_: list[str]) -> list[str]:
     )
     total = re.search(r"Total Tests: (\d+)", listed.stdout)
     assert total, listed.stdout
-    return [ELLIPSIS, f"100% tests passed, 0 tests failed out of {total[1]}", ELLIPSIS]
+    left_out = 0 if re.search(r"^ *Test +#\d+: view$", listed.stdout, re.MULTILINE) else 1
+    return [ELLIPSIS, f"100% tests passed, 0 tests failed out of {int(total[1]) + left_out}", ELLIPSIS]
 
 
 def run_cmake(commands: list[str]) -> list[str]:

@@ -94,7 +94,7 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
   }
   const double seen = parted ? parted->within(visible, start) : aim.trusted_until;
   const std::string of_those = of_wanted + "even runs by the smallest useful tolerances part; ";
-  // Chaos that shows in trials alone.
+  // The trials part from each other, this run does not part from the finest of them.
   if (std::isinf(seen)) return of_those + rows_after(trust.until, start) + " may be less accurate";
   return of_those + rows_after(trust.until, start) + " are less accurate, " +
          untrusted_after(std::max(seen, trust.until), start);
