@@ -567,6 +567,9 @@ def gaps_of(
     ]  # no faster than 30 of its units
     found += [2 * np.pi / float(x) for x in re.findall(r"fmod\(t, ([\d.e-]+)\)", when)]
     grid = grid_of(motion, max(found, default=0.0))
+    # A turn between the last two points, or the first two, shows by no point beside it.
+    ends = [np.linspace(grid[k], grid[k + 1], 65) for k in (0, -2)]
+    grid = np.unique(np.concatenate([grid, *ends]))
     # Where these turn close to zero they may be zero twice between two points of the grid.
     factors = re.fullmatch(r"\((.*)\)\*\((.*)\)", when)
     for inner in map(crossings.Expression, [*beside, *(factors.groups() if factors else [])]):
