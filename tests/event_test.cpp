@@ -344,6 +344,8 @@ struct Case {
   bool spatial;
   int links;
   double looks = 3.5, glances = 10;  // at most: of a crossing, and of a step for all 24 functions together
+
+  friend void PrintTo(const Case& given, std::ostream* out) { *out << given.name; }
 };
 
 class RandomCrossings : public ::testing::TestWithParam<Case> {};

@@ -110,8 +110,10 @@ struct Case {
   const char* name;
   RunOptions options;
   double off;  // [s] of instants that are looked for in two ways: measured 4e-15, of the last two 2e-13
-  std::int64_t looks =
-      20;  // of a crossing, in the mean, with those of the plain expression: measured 11 to 17.3, by extrapolation 32
+  // Of a crossing, in the mean, with those of the plain expression: measured 11 to 17.3, by extrapolation 32.
+  std::int64_t looks = 20;
+
+  friend void PrintTo(const Case& given, std::ostream* out) { *out << given.name; }
 };
 
 class NarrowEvents : public ::testing::TestWithParam<Case> {};

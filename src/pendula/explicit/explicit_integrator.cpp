@@ -26,19 +26,24 @@ namespace odeint = boost::numeric::odeint;
 
 using Vector = std::vector<double>;  // (q, q̇)
 
-/// rate = d/dt (q, q̇) = (q̇, q̈) at x and time.
-using RightHandSide = std::function<void(const Vector& x, Vector& rate, double time)>;
+/// rate = d/dt (q, q̇) = (q̇, q̈) at time, where the state has moved so far since its step began.
+using RightHandSide = std::function<void(const Vector& moved, Vector& rate, double time)>;
 
-/// What fixed and adaptive steps share.
+/// What fixed and adaptive steps share. Methods are given how far the state has moved since its step began, not the
+/// state: so what many small steps add to it is not lost to rounding.
 class ExplicitIntegrator : public PlainIntegrator {
  public:
   ExplicitIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel)
       : x_(2 * static_cast<std::size_t>(coordinates)),
+        low_(x_.size()),
+        next_(x_.size()),
+        next_low_(x_.size()),
         rate_(x_.size()),
+        place_(x_.size()),
         dynamics_(std::move(dynamics)),
         parts_(parts),
         kernel_(kernel),
-        right_hand_side_([this](const Vector& x, Vector& rate, double at) { find_rate(x, rate, at); }) {}
+        right_hand_side_([this](const Vector& moved, Vector& rate, double at) { find_rate(moved, rate, at); }) {}
 
   Outcome start(double time, const double* q, const double* v) override {
     time_.assign(time);
@@ -46,6 +51,7 @@ class ExplicitIntegrator : public PlainIntegrator {
     proposed_ = before_.step = 0;
     const std::size_t k = x_.size() / 2;
     std::copy_n(v, k, std::copy_n(q, k, x_.begin()));
+    std::fill(low_.begin(), low_.end(), 0.0);
     return require_finite_rate();
   }
 
@@ -81,13 +87,15 @@ class ExplicitIntegrator : public PlainIntegrator {
       read_state(q, v);
       return {.status = Status::ok, .time = time};
     }
-    Vector x = before_.x;
+    Vector moved = before_.low;
     const double h = time - before_.time;
-    advance(x, before_.time, h);
+    from_ = &before_.x;
+    advance(moved, before_.time, h);
+    from_ = &x_;
     if (is_stopped()) return interrupted(h);
-    if (!is_finite(x)) return {.status = Status::not_finite, .time = before_.time, .step = h};
-    const std::size_t k = x.size() / 2;
-    for (std::size_t i = 0; i < x.size(); ++i) (i < k ? q[i] : v[i - k]) = x[i];
+    if (!is_finite(moved)) return {.status = Status::not_finite, .time = before_.time, .step = h};
+    const std::size_t k = moved.size() / 2;
+    for (std::size_t i = 0; i < moved.size(); ++i) (i < k ? q[i] : v[i - k]) = before_.x[i] + moved[i];
     return {.status = Status::ok, .time = time, .step = h};
   }
 
@@ -102,6 +110,7 @@ class ExplicitIntegrator : public PlainIntegrator {
   void member(MemberNumbers& numbers) override {
     numbers(time_, statistics_, proposed_);
     numbers.range(x_.data(), x_.size());
+    numbers.range(low_.data(), low_.size());
     numbers.range(rate_.data(), rate_.size());
   }
 
@@ -109,15 +118,27 @@ class ExplicitIntegrator : public PlainIntegrator {
   RightHandSide& right_hand_side() { return right_hand_side_; }
   ForwardDynamics& dynamics() { return *dynamics_; }
 
-  /// Moves x on by h, which is part of a step that was accepted.
-  virtual void advance(Vector& x, double time, double h) = 0;
+  /// Moves on by h, which is part of a step that was accepted.
+  virtual void advance(Vector& moved, double time, double h) = 0;
 
-  /// The state is that of the end of a step; it began at `before`.
-  Outcome accept(double h, const Vector& before) {
+  /// Where a step ends that has moved the state so far.
+  void arrive(const Vector& moved) {
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      const Twofold<double> sum = exact_sum(x_[i], moved[i]);
+      next_[i] = sum.value;
+      next_low_[i] = sum.low;
+    }
+  }
+
+  /// The step ends where it has arrived; the state that it began at is in next_ after that.
+  Outcome accept(double h) {
+    x_.swap(next_);
+    low_.swap(next_low_);
     if (remembers_) {
       before_.time = time();
       before_.step = h;
-      before_.x = before;
+      before_.x = next_;
+      before_.low = next_low_;
       before_.has_rates = false;
     }
     time_.add(h);
@@ -138,13 +159,20 @@ class ExplicitIntegrator : public PlainIntegrator {
     return std::all_of(x.begin(), x.end(), [](double value) { return std::isfinite(value); });
   }
 
-  Vector x_, rate_;      // rate: of the start, or what a method hands on from its last step
-  double proposed_ = 0;  // size of the next step, of an adaptive method; 0: not yet known
+  Vector x_, low_;          // the state, and what is below its last bits
+  Vector next_, next_low_;  // where a step that is tried ends
+  Vector rate_;             // of the start, or what a method hands on from its last step
+  double proposed_ = 0;     // size of the next step, of an adaptive method; 0: not yet known
   Statistics statistics_;
 
  private:
-  void find_rate(const Vector& x, Vector& rate, double time) {
+  void find_rate(const Vector& moved, Vector& rate, double time) {
     if (is_stopped()) return;
+    std::transform(moved.begin(), moved.end(), from_->begin(), place_.begin(), std::plus<>());
+    find_rate_at(place_, rate, time);
+  }
+
+  void find_rate_at(const Vector& x, Vector& rate, double time) {
     const auto k = static_cast<std::ptrdiff_t>(x.size() / 2);
     std::copy(x.begin() + k, x.end(), rate.begin());
     dynamics_->acceleration(time, x.data(), x.data() + k, rate.data() + k);
@@ -152,7 +180,7 @@ class ExplicitIntegrator : public PlainIntegrator {
 
   // At a pole the accelerations are infinite: better to say so than to start.
   Outcome require_finite_rate() {
-    right_hand_side()(x_, rate_, time());
+    find_rate_at(x_, rate_, time());
     if (is_finite(rate_)) return {.status = Status::ok, .time = time()};
     return {.status = Status::singular_mass_matrix, .time = time(), .part = non_finite_part(rate_)};
   }
@@ -166,18 +194,20 @@ class ExplicitIntegrator : public PlainIntegrator {
     if (before_.has_rates) return;
     before_.rate.resize(x_.size());
     before_.end_rate.resize(x_.size());
-    right_hand_side_(before_.x, before_.rate, before_.time);
-    right_hand_side_(x_, before_.end_rate, time());
+    find_rate_at(before_.x, before_.rate, before_.time);
+    find_rate_at(x_, before_.end_rate, time());
     before_.has_rates = true;
   }
 
   // The last step.
   struct Remembered {
     double time = 0, step = 0;  // 0: there was none
-    Vector x, rate, end_rate;
+    Vector x, low, rate, end_rate;
     bool has_rates = false;
   };
 
+  const Vector* from_ = &x_;  // where the step begins that is taken
+  Vector place_;
   std::unique_ptr<ForwardDynamics> dynamics_;
   int parts_;
   std::string kernel_;
@@ -213,10 +243,9 @@ class FixedStepIntegrator : public ExplicitIntegrator {
       const bool is_good = try_in(parts, h);
       if (is_stopped()) return interrupted(h);
       if (is_good) {
-        x_.swap(next_);
         parts_of_last_ = parts;
         if (field_.has_to_look()) count_unseen(h);
-        return accept(h, next_);
+        return accept(h);
       }
       ++statistics_.rejected_steps;
     }
@@ -228,30 +257,31 @@ class FixedStepIntegrator : public ExplicitIntegrator {
   static constexpr int most_parts = 1024;
 
   bool try_in(int parts, double h) {
-    next_ = x_;
-    take(parts, next_, time(), h);
+    moved_ = low_;
+    take(parts, moved_, time(), h);
+    arrive(moved_);
     return is_finite(next_);
   }
 
-  void take(int parts, Vector& x, double time, double h) {
-    for (int part = 0; part < parts && is_finite(x); ++part) {
-      stepper_.do_step(std::ref(right_hand_side()), x, time + part * (h / parts), h / parts);
+  void take(int parts, Vector& moved, double time, double h) {
+    for (int part = 0; part < parts && is_finite(moved); ++part) {
+      stepper_.do_step(std::ref(right_hand_side()), moved, time + part * (h / parts), h / parts);
     }
   }
 
-  void advance(Vector& x, double time, double h) override { take(parts_of_last_, x, time, h); }
+  void advance(Vector& moved, double time, double h) override { take(parts_of_last_, moved, time, h); }
 
-  // Of the step that began at next_, relative to the fastest that a coordinate was, or others were, nearly.
+  // Of the step to next_, relative to the fastest that a coordinate was, or others were, nearly.
   void count_unseen(double h) {
     constexpr double beside = 1e-3;
     for (std::size_t k = 0; k < fastest_.size(); ++k) {
-      fastest_[k] = std::max(fastest_[k], std::abs(x_[fastest_.size() + k]));
+      fastest_[k] = std::max(fastest_[k], std::abs(next_[fastest_.size() + k]));
     }
     const double least = std::max(beside * *std::max_element(fastest_.begin(), fastest_.end()), nothing);
     const auto size_of = [&](const Vector&) {
       return [this, least](std::size_t k) { return std::max(fastest_[k], least); };
     };
-    statistics_.step_over(time(), field_.unseen(dynamics(), time(), h, next_, x_, size_of).effect, 0);
+    statistics_.step_over(time(), field_.unseen(dynamics(), time(), h, x_, next_, size_of).effect, 0);
     field_.move_on();
   }
 
@@ -260,7 +290,7 @@ class FixedStepIntegrator : public ExplicitIntegrator {
   odeint::runge_kutta4<Vector> stepper_;
   int parts_of_last_ = 1;
   FieldSteps field_;
-  Vector next_, fastest_;
+  Vector moved_, fastest_;
 };
 
 /// What the errors of a step are compared with: coordinates and rates themselves, and beside them a radian and one a
@@ -268,11 +298,16 @@ class FixedStepIntegrator : public ExplicitIntegrator {
 /// the step counts, too: forces may begin at nothing.
 class ErrorSize {
  public:
-  /// Of a step from x, whose derivative is `rate`, to `end`.
-  ErrorSize(const Vector& x, const Vector& rate, const Vector& end, double h, double tolerance)
+  /// Of a step that has moved x so far, with `rate` as its derivative.
+  ErrorSize(const Vector& x, const Vector& rate, const Vector& moved, double h, double tolerance)
       : x_(x), half_(x.size() / 2) {
-    const double q = std::max(largest(x, 0), largest(end, 0)), v = std::max(largest(x, half_), largest(end, half_));
-    const double a = largest(rate, half_);
+    double q = 0, v = 0, a = 0;
+    for (std::size_t i = 0; i < half_; ++i) {
+      const std::size_t k = half_ + i;
+      q = std::max({q, std::abs(x[i]), std::abs(x[i] + moved[i])});
+      v = std::max({v, std::abs(x[k]), std::abs(x[k] + moved[k])});
+      a = std::max(a, std::abs(rate[k]));
+    }
     const double rounding = rounded * q / (tolerance * h);  // what is left of rates at rest
     place_ = std::clamp(std::max(q, h * v), nothing, 1.0);
     turn_ = std::clamp(std::max({v, h * a, rounding}), nothing, 1.0);
@@ -281,12 +316,6 @@ class ErrorSize {
   double operator[](std::size_t i) const { return (i < half_ ? place_ : turn_) + std::abs(x_[i]); }
 
  private:
-  double largest(const Vector& x, std::size_t from) const {
-    double largest = 0;
-    for (std::size_t i = from; i < from + half_; ++i) largest = std::max(largest, std::abs(x[i]));
-    return largest;
-  }
-
   static constexpr double rounded = 1e-14, nothing = 1e-16;
 
   const Vector& x_;
@@ -302,7 +331,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   AdaptiveIntegrator(Gauss gauss, std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts,
                      std::string_view kernel, double tolerance, bool is_blind = false)
       : ExplicitIntegrator(std::move(dynamics), coordinates, parts, kernel),
-        next_(x_.size()),
+        moved_(x_.size()),
         next_rate_(x_.size()),
         tolerance_(tolerance),
         forcing_(gauss, static_cast<std::size_t>(coordinates), tolerance, is_blind),
@@ -336,23 +365,23 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
     if (is_stopped()) return interrupted(trial.size);
     statistics_.rejected_steps += trial.rejected;
     if (!trial.is_accepted) return failure(Status::tolerance_not_met, trial.proposed, next_);
-    x_.swap(next_);
     const bool tells = !is_cut || trial.proposed < trial.size;  // else that of the next one is not known from this
     if (tells) proposed_ = trial.proposed;
     hand_on(tells);
     if (!is_cut) statistics_.count_chosen(trial.size);
     statistics_.step_over(time(), trial.unseen, tolerance_);
     field_.move_on();
-    return accept(trial.size, next_);
+    return accept(trial.size);
   }
 
  protected:
-  /// Tries a step of the size `tried` to `next_`, and makes it the size that the next one should have.
+  /// Tries a step of the size `tried`, finds how far it has `moved_`, and makes `tried` the size that the next one
+  /// should have.
   virtual bool try_step(double& tried) = 0;
   /// After a step that was accepted; whether it says how to take the next one.
   virtual void hand_on(bool tells) = 0;
 
-  Vector next_, next_rate_;
+  Vector moved_, next_rate_;
   double tolerance_;
 
  private:
@@ -370,6 +399,7 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
     for (int attempt = 0; attempt < tries && trial.proposed > smallest_step() && !is_stopped(); ++attempt) {
       trial.size = trial.proposed;
       trial.is_accepted = try_step(trial.proposed);
+      arrive(moved_);
       if (!is_finite(next_) || !is_finite(next_rate_) || !std::isfinite(trial.proposed)) {
         trial.proposed = trial.size / 8;
         trial.is_accepted = false;
@@ -390,8 +420,9 @@ class AdaptiveIntegrator : public ExplicitIntegrator {
   // Of the step to next_.
   double unseen(double h) {
     const auto size_of = [&](const Vector& rate) {
-      return
-          [this, sizes = ErrorSize(x_, rate, next_, h, tolerance_)](std::size_t k) { return sizes[x_.size() / 2 + k]; };
+      return [this, sizes = ErrorSize(x_, rate, moved_, h, tolerance_)](std::size_t k) {
+        return sizes[x_.size() / 2 + k];
+      };
     };
     return field_.unseen(dynamics(), time(), h, x_, next_, size_of).impulse;
   }
@@ -410,14 +441,14 @@ class ErrorChecker {
  public:
   using value_type = double;
 
-  /// Steps are tried to `end`.
-  ErrorChecker(double tolerance, const Vector& end) : tolerance_(tolerance), end_(end) {}
+  /// Steps that are tried have `moved` x so far.
+  ErrorChecker(double tolerance, const Vector& x, const Vector& moved) : tolerance_(tolerance), x_(x), moved_(moved) {}
 
   template <class Algebra>
-  double error(Algebra& /*algebra*/, const Vector& x, const Vector& rate, const Vector& errors, double h) const {
-    const ErrorSize size(x, rate, end_, h, tolerance_);
+  double error(Algebra& /*algebra*/, const Vector& /*low*/, const Vector& rate, const Vector& errors, double h) const {
+    const ErrorSize size(x_, rate, moved_, h, tolerance_);
     double largest = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
+    for (std::size_t i = 0; i < errors.size(); ++i) {
       const double error = std::abs(errors[i]) / (tolerance_ * (size[i] + h * std::abs(rate[i])));
       if (!(error <= largest)) largest = error;
     }
@@ -426,7 +457,8 @@ class ErrorChecker {
 
  private:
   double tolerance_;
-  const Vector& end_;
+  const Vector& x_;
+  const Vector& moved_;
 };
 
 /// An embedded pair with odeint's step control, as good as a quadrature. Pairs of which one part differs from the other
@@ -437,25 +469,26 @@ class PairIntegrator : public AdaptiveIntegrator {
   PairIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, std::string_view kernel,
                  double tolerance)
       : AdaptiveIntegrator(Gauss(), std::move(dynamics), coordinates, parts, kernel, tolerance, is_blind),
-        stepper_(ErrorChecker(tolerance, next_)) {}
+        stepper_(ErrorChecker(tolerance, x_, moved_)) {}
 
  private:
   // The rate is kept here, not in the stepper, whose memory is no part of the member.
   bool try_step(double& tried) override {
     double at = time();
     if constexpr (hands_on_rate) {
-      return stepper_.try_step(std::ref(right_hand_side()), x_, rate_, at, next_, next_rate_, tried) == odeint::success;
+      return stepper_.try_step(std::ref(right_hand_side()), low_, rate_, at, moved_, next_rate_, tried) ==
+             odeint::success;
     } else {
-      return stepper_.try_step(std::ref(right_hand_side()), x_, at, next_, tried) == odeint::success;
+      return stepper_.try_step(std::ref(right_hand_side()), low_, at, moved_, tried) == odeint::success;
     }
   }
   void hand_on(bool) override {
     if (hands_on_rate) rate_.swap(next_rate_);
   }
 
-  void advance(Vector& x, double time, double h) override {
+  void advance(Vector& moved, double time, double h) override {
     Stepper plain;
-    plain.do_step(std::ref(right_hand_side()), x, time, h);
+    plain.do_step(std::ref(right_hand_side()), moved, time, h);
   }
 
   static constexpr bool hands_on_rate =
@@ -501,20 +534,20 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
   // Rows until one converges: the one that is expected to, or one of its neighbours.
   bool try_step(double& tried) override {
     const double h = tried;
-    right_hand_side()(x_, rate_, time());
+    right_hand_side()(low_, rate_, time());
     for (std::size_t row = 0; row <= row_ + 1; ++row) {
-      add_row(row, x_, time(), h);
+      add_row(row, low_, time(), h);
       if (row == 0) continue;
       const double error = largest_error(h);
       if (!std::isfinite(error)) break;
       best_[row] = best_step(h, error, row);
       if (row + 1 < row_ || error > 1) continue;
-      next_ = table_[0];
+      moved_ = table_[0];
       row_of_last_ = row;
       tried = choose(row);
       return true;
     }
-    next_ = table_[0];
+    moved_ = table_[0];
     tried = std::min(best_[row_], 0.7 * h);
     return false;
   }
@@ -523,21 +556,22 @@ class ExtrapolationIntegrator : public AdaptiveIntegrator {
     if (tells) row_ = next_row_;
   }
 
-  void advance(Vector& x, double time, double h) override {
+  void advance(Vector& moved, double time, double h) override {
     rate_.swap(next_rate_);  // which is part of the member
-    right_hand_side()(x, rate_, time);
-    for (std::size_t row = 0; row <= row_of_last_; ++row) add_row(row, x, time, h);
+    right_hand_side()(moved, rate_, time);
+    for (std::size_t row = 0; row <= row_of_last_; ++row) add_row(row, moved, time, h);
     rate_.swap(next_rate_);
-    x = table_[0];
+    moved = table_[0];
   }
 
-  /// The table by Aitken and Neville: its new row, from the last, whose ends stand in table_. The rates at x are known.
-  void add_row(std::size_t row, const Vector& x, double time, double h) {
+  /// The table by Aitken and Neville: its new row, from the last, whose ends stand in table_. The rates at the start
+  /// are known.
+  void add_row(std::size_t row, const Vector& start, double time, double h) {
     midpoint_.set_steps(substeps(row));
-    midpoint_.do_step(std::ref(right_hand_side()), x, rate_, time, table_[row], h);
+    midpoint_.do_step(std::ref(right_hand_side()), start, rate_, time, table_[row], h);
     for (std::size_t column = row; column > 0; --column) {
       const double ratio = static_cast<double>(substeps(row)) / substeps(column - 1);
-      for (std::size_t i = 0; i < x.size(); ++i) {
+      for (std::size_t i = 0; i < start.size(); ++i) {
         double& end = table_[column - 1][i];
         end = table_[column][i] + (table_[column][i] - end) / (ratio * ratio - 1);
       }
