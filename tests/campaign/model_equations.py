@@ -11,15 +11,23 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from sympy import Expr, Symbol, cse, diff, lambdify, sympify
+from sympy import Expr, Function, Symbol, cse, diff, lambdify, sympify
 from sympy.codegen.ast import float80, real
 from sympy.printing.c import C99CodePrinter
 
 # Beyond e^2500 there is none that is not 0 or infinite in a double; quotients of such must not be inf / inf.
 PRELUDE = """#include <math.h>
 typedef long double R;
-static R bounded_exp(R x) { return expl(x > 2500 ? 2500 : x); }
+static R bounded(R x) { return expl(x > 2500 ? 2500 : x); }
 """
+
+
+class Exponential(Function):
+    """e^x with x as it was written: of exp(3921 t - 7490) SymPy makes e^-7490 exp(3921 t)."""
+
+    def fdiff(self, argindex=1):
+        del argindex
+        return self
 
 
 class Said:
@@ -71,7 +79,7 @@ class Said:
 
 class Printer(C99CodePrinter):
     def __init__(self) -> None:
-        super().__init__({"type_aliases": {real: float80}, "user_functions": {"exp": "bounded_exp"}})
+        super().__init__({"type_aliases": {real: float80}, "user_functions": {"Exponential": "bounded"}})
 
 
 class Model:
@@ -82,6 +90,7 @@ class Model:
         self.said = Said(links)
         room: dict = {}
         exec(compile(text, "model.py", "exec"), room)
+        room["exp"] = Exponential
         room["define"](self.said, links)
         said = self.said
         self.q = said.coordinates
@@ -181,7 +190,7 @@ class Model:
         outputs = [energy, *(c for point in said.points.values() for c in point)]
         kinetic = sum(diff(said.lagrangian, v, w) * v * w / 2 for v in self.v for w in self.v)
         arguments = [*self.q, *self.v, said.time, *said.parameters]
-        return lambdify(arguments, [*outputs, kinetic], modules="numpy")
+        return lambdify(arguments, [*outputs, kinetic], modules=[{"Exponential": np.exp}, "numpy"])
 
     def columns(self, rows: np.ndarray, parameters: list[float]) -> dict[str, np.ndarray]:
         """What a trajectory has, of rows of coordinates, rates and time; and the kinetic energy."""

@@ -65,6 +65,21 @@ def test_a_pulse_gives_its_impulse(room, width):
     assert rows.uncertainty.max() < 1e-10  # measured 5e-12: the time is rounded, too
 
 
+def test_a_switch_late_in_a_run_is_thrown(room):
+    """A push of -1, from 1.9 s on of 1: what SymPy takes out of exp((t - 1.9)/w) is e^-7600."""
+    text = """
+from sympy import exp
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    model.lagrangian = model.rate(x)**2 / 2
+    model.force(x, 1 - 2 / (1 + exp(2 / 0.0005 * (model.time - 1.9))))
+"""
+    tables = {"system": {"model": "model.py"}, "start": {}, "run": {"duration": 4.0}}
+    rows = truth.rows_at(truth.ModelSubject(room, tables, text, [("t - 1.9", 5e-4)]), [1.9, 4.0], 4.0)
+    assert rows.columns["x_dot"].astype(float) == pytest.approx([-1.9, 0.2], abs=1e-3)  # within a width
+
+
 def test_friction_that_sticks_is_for_the_implicit_reference(room):
     """v/√(v² + ε) with ε = 1e-12, held by 0.3 against a push of 0.1: it creeps at √ε/√8."""
     text = """
