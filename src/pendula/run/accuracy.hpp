@@ -68,12 +68,22 @@ inline FinestTolerance finest_tolerance(const RunOptions& options, const Accurac
 
 /// What is known of the errors by two tolerances of which the finer one is good enough.
 struct AccuracyLadder {
-  AccuracyAim finest;  ///< which all others are compared with
-  double factor = 0;   ///< what the motion makes of a tolerance
+  AccuracyAim finest;      ///< which all others are compared with
+  double factor = 0;       ///< what the motion makes of a tolerance
+  bool is_enough = false;  ///< whether a finer one is possible, and need not be
+};
+
+/// Two tolerances to compare, and the trial by the coarser one.
+struct AccuracyRung {
+  double coarse = 0, fine = 0;
+  std::optional<Track> far = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
 };
 
 /// How far rows may be off what was wanted and not be told: errors scatter about what was seen in trials.
 inline constexpr double close_to_wanted = 2;
+
+/// What the error that is expected may be of the one that is wanted, and what it is aimed at.
+inline constexpr double enough = 0.3, aimed_at = 0.1;
 
 /// What runs are off each other by, at most, that still tell errors.
 inline constexpr double together = 0.01;
@@ -84,11 +94,10 @@ inline constexpr double together = 0.01;
 /// factor, the next is finer, and is compared with it. Errors scatter about what tolerances ask for by factors of ten
 /// and more, so that aims lie below what is wanted.
 template <class RunTrial, class Apart>
-AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start, RunTrial run, Apart apart) {
-  constexpr double step = 100, coarsest = 1e-3, enough = 0.3, aimed = 0.1;
+AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start, AccuracyRung from, RunTrial run,
+                          Apart apart) {
   constexpr double rounding = 2e-16;  // errs as a tolerance of that size would
-  double coarse = std::max(std::min(step * wanted, coarsest), step * smallest.good), fine = coarse / step;
-  std::optional<Track> far = run(coarse);
+  auto& [coarse, fine, far] = from;
   for (;;) {
     std::optional<Track> near = run(fine);
     const double finer = std::max(fine, rounding) / coarse;  // by which the finer one errs less
@@ -96,14 +105,15 @@ AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start,
     if (far && near) parted.emplace(apart(*far, *near));
     const double off = parted ? parted->largest() : std::numeric_limits<double>::infinity();
     const double finest = smallest.good / coarse * off <= wanted ? smallest.good : smallest.hopeless;
-    double next = fine / (10 * step);
+    double next = fine / 1000;
     if (off <= together) {
       const double factor = off / coarse, error = finer * off;
-      if (error <= enough * wanted) return {{fine, error, std::move(near)}, factor};
+      if (error <= enough * wanted)
+        return {{fine, error, std::move(near)}, factor, fine > std::max(rounding, smallest.good)};
       if (fine <= finest) {
         return {{fine, error, std::move(near), parted->within(close_to_wanted * wanted / finer, start)}, factor};
       }
-      next = std::min(aimed * wanted / factor, fine / 10);
+      next = std::min(aimed_at * wanted / factor, fine / 10);
     } else if (fine <= finest) {
       const double until = parted ? parted->within(close_to_wanted * wanted, start) : start;
       return {{fine, std::numeric_limits<double>::infinity(), std::move(near), until}};
@@ -115,9 +125,12 @@ AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start,
 }
 
 /// The finest tolerance may be good enough by far. So a coarser one, `coarsest` at most, is looked for by which a trial
-/// is off the finest one by a part of what is wanted, as was seen. `run` and `apart` as above.
+/// is off the finest one by a part of what is wanted, as was seen. `run` and `apart` as above. Nothing where a trial is
+/// off by more than a factor allows by which the finest one is good enough: the one that told the factor was right by
+/// chance; and `factor` becomes what was seen.
 template <class RunTrial, class Apart>
-AccuracyAim climb_up(double wanted, double coarsest, const AccuracyLadder& ladder, RunTrial run, Apart apart) {
+std::optional<AccuracyAim> climb_up(double wanted, double coarsest, const AccuracyLadder& ladder, double& factor,
+                                    RunTrial run, Apart apart) {
   constexpr double least = 0.03, most = 0.5, aimed = 0.15, step = 5, most_change = 100;
   constexpr int most_trials = 6;
   AccuracyAim best = ladder.finest;
@@ -128,6 +141,8 @@ AccuracyAim climb_up(double wanted, double coarsest, const AccuracyLadder& ladde
     tolerance = std::clamp(tolerance, low, high);
     const std::optional<Track> there = run(tolerance);
     const double error = there ? apart(*there, *best.finest).largest() : std::numeric_limits<double>::infinity();
+    if (error <= together) factor = std::max(factor, error / tolerance);
+    if (ladder.is_enough && factor * ladder.finest.tolerance > wanted) return {};
     if (error <= most * wanted) best.tolerance = tolerance, best.error = error;
     if (error >= least * wanted && error <= most * wanted) break;
     (error > most * wanted ? high : low) = tolerance;
@@ -136,6 +151,24 @@ AccuracyAim climb_up(double wanted, double coarsest, const AccuracyLadder& ladde
     if (tolerance <= low || tolerance >= high) tolerance = std::sqrt(low * high);
   }
   return best;
+}
+
+/// By `run` down to a tolerance that is good enough, and by `run_alike` up to one that is no finer than is needed.
+template <class RunTrial, class RunAlike, class Apart>
+AccuracyAim find_aim(double wanted, double coarsest, FinestTolerance smallest, double start, RunTrial run,
+                     RunAlike run_alike, Apart apart) {
+  constexpr double step = 100, coarsest_trial = 1e-3;
+  AccuracyRung rung;
+  rung.coarse = std::max(std::min(step * wanted, coarsest_trial), step * smallest.good);
+  rung.fine = rung.coarse / step;
+  rung.far = run(rung.coarse);
+  for (;;) {
+    AccuracyLadder ladder = climb_down(wanted, smallest, start, std::move(rung), run, apart);
+    double factor = ladder.factor;
+    if (std::optional<AccuracyAim> aim = climb_up(wanted, coarsest, ladder, factor, run_alike, apart)) return *aim;
+    const double known = ladder.finest.tolerance, finer = std::min(aimed_at * wanted / factor, known / 10);
+    rung = {known, std::max(finer, smallest.good), std::move(ladder.finest.finest)};
+  }
 }
 
 }  // namespace detail

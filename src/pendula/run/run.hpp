@@ -199,8 +199,7 @@ inline bool Run::aim(const std::function<bool()>& stop) {
   const detail::FinestTolerance finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
   const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides what was before
   const double start = setup_.start.time;
-  kept_.aim =
-      detail::climb_up(wanted, coarsest, detail::climb_down(wanted, finest, start, run, apart), run_alike, apart);
+  kept_.aim = detail::find_aim(wanted, coarsest, finest, start, run, run_alike, apart);
   if (!stopped) follow_aim();
   return !stopped;
 }
