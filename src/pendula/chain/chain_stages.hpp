@@ -629,7 +629,6 @@ class ChainStages {
   detail::PerLink<AngleAnchor<Space, Real>, N> anchors_, saved_anchors_{anchors_}, remembered_anchors_{anchors_};
   detail::LinkArray<per_link, N, Real> stages_;
   detail::LinkArray<Space::torque_components * Z, N, Real> torque_;
-  Real fastest_fall_;   // g/l of the shortest link
   double fastest_ = 0;  // bob, squared  [m²/s²]
   bool torque_is_set_ = false, is_predicted_ = false, hangs_ = false;
   double step_ = 0;  // of the stages

@@ -128,20 +128,4 @@ Real dissipation(const Chain<Space, N>& chain, const Motion& motion) {
   return power;
 }
 
-/// Power that torque and damping bring, Σ torque_i·(û_i × û̇_i) − λ_i |û̇_i|²  [W]; torque: (torque_components x n).
-template <class Space, int N, class Motion, class Derived, class Real = NumberOf<Motion>>
-Real load_power(const Chain<Space, N>& chain, const Motion& motion, const Eigen::MatrixBase<Derived>& torque) {
-  Real power = -dissipation(chain, motion);
-  for (int i = 0; i < chain.links(); ++i) {
-    const detail::LinkMotion<Space, Real> link(motion, chain.links(), i);
-    typename Space::Link::template Torque<Real> on_link;
-    std::array<Real, Space::dimension> u, load;
-    for (std::size_t k = 0; k < on_link.size(); ++k) on_link[k] = Real(torque(static_cast<Eigen::Index>(k), i));
-    for (std::size_t k = 0; k < u.size(); ++k) u[k] = link.direction[static_cast<Eigen::Index>(k)];
-    Space::Link::torque_load(on_link, u, load);
-    for (std::size_t k = 0; k < u.size(); ++k) power += load[k] * link.rate[static_cast<Eigen::Index>(k)];
-  }
-  return power;
-}
-
 }  // namespace pendula

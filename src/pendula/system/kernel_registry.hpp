@@ -45,7 +45,6 @@ struct KernelEntry {
   KernelInfo info;
   std::unique_ptr<PlainIntegrator> (*make)(const PlainChain&, const RunOptions&);
   KernelCheck (*check)(unsigned seed);
-  MakeLaneDynamics* lanes;
 };
 
 /// Energies of a system in one state  [J].
