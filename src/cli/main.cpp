@@ -41,6 +41,12 @@ std::string instruction_set() {
   }
 }
 
+/// Told where it is not every processor of the kind.
+std::string where_it_runs() {
+  const std::string needed(needed_instruction_set());
+  return needed.empty() ? "" : ", on processors with " + needed + " only";
+}
+
 /// The command line: what can be asked for, and what was.
 struct CommandLine {
   CommandLine();
@@ -128,7 +134,7 @@ CommandLine::CommandLine() {
     return whole_number(text) >= 1 && whole_number(text) <= 1024;
   });
   app.set_version_flag(
-      "--version", [] { return "pendula " + std::string(version) + " (" + instruction_set() + ")"; },
+      "--version", [] { return "pendula " + std::string(version) + " (" + instruction_set() + where_it_runs() + ")"; },
       "Print the version and the instruction set in use, and end");
   app.set_help_flag("-h,--help", "Print this help and end");
   app.footer(

@@ -36,7 +36,8 @@ const Library& best() {
                                   [](const Library* copy) { return processor_has(copy->instruction_set); });
   if (found != library_copies.rend()) return **found;
   throw std::runtime_error("this processor has none of the instruction sets that pendula was compiled for: " +
-                           names([](std::string_view) { return true; }));
+                           names([](std::string_view) { return true; }) +
+                           "; -D PENDULA_ARCHS=\"sse2;avx2;avx512\" compiles it for any");
 }
 
 const Library& asked_for(std::string_view name) {
@@ -56,6 +57,11 @@ const Library& library() {
     return wanted == nullptr || *wanted == '\0' ? &best() : &asked_for(wanted);
   }();
   return *chosen;
+}
+
+std::string_view needed_instruction_set() {
+  const std::string_view least = library_copies.front()->instruction_set;
+  return least == "sse2" || least == "baseline" ? "" : least;
 }
 
 }  // namespace pendula

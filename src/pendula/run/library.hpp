@@ -46,6 +46,9 @@ struct Library {
 /// this build, or one that the processor lacks; std::runtime_error where the processor has none of this build.
 const Library& library();
 
+/// The instruction set without which a processor runs nothing of this build; empty where it runs on all of its kind.
+std::string_view needed_instruction_set();
+
 /// Its part for one space.
 template <class Space>
 const SpaceLibrary& library_of() {
