@@ -29,13 +29,13 @@ function(_pendula_possible_archs out_archs)
   endif()
 endfunction()
 
-# The best of ARCHS that the processor of this machine has, which the compiler knows.
+# The best of ARCHS that this machine's processor has: the compiler says which features that are.
 function(_pendula_native_arch out_arch archs)
   list(GET archs 0 best)
   set(macros "")
   if(NOT best STREQUAL "baseline")
     if(CMAKE_CROSSCOMPILING)
-      message(FATAL_ERROR "PENDULA_ARCHS: expected some of ${archs}, got native, which this machine is not")
+      message(FATAL_ERROR "PENDULA_ARCHS: expected some of ${archs}, got native, which says nothing of another machine")
     endif()
     execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -march=native -dM -E -x c++ /dev/null OUTPUT_VARIABLE macros
                     COMMAND_ERROR_IS_FATAL ANY)
@@ -61,10 +61,10 @@ endfunction()
 _pendula_possible_archs(_pendula_archs)
 if(NOT "$ENV{PENDULA_ARCHS}" STREQUAL "")
   set(_pendula_default "$ENV{PENDULA_ARCHS}")
-elseif(PROJECT_IS_TOP_LEVEL)
+elseif(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CROSSCOMPILING)
   set(_pendula_default native)
 else()
-  set(_pendula_default "${_pendula_archs}")  # nobody knows where that program goes
+  set(_pendula_default "${_pendula_archs}")  # it is not known where that program will run
 endif()
 set(PENDULA_ARCHS "${_pendula_default}" CACHE STRING
     "Instruction sets to compile the library for, of ${_pendula_archs}; native: the best one of this machine")

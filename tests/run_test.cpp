@@ -451,7 +451,7 @@ TEST(Run, ReachesTheAccuracyThatItIsAskedForWhereChaosAllows) {
   expect_reached<Spatial>(1e-9, 1, 30);  // measured 50 of 50, 15
 }
 
-// Two trials were off by as much, so that they parted by little, and the finer one was taken for good.
+// Two trials were off by as much to the same side. So they parted by little, and the finer one was thought to be good.
 TEST(Run, IsNotTakenInByATrialThatIsRightByChance) {
   ChainParameters<Planar> parameters;
   parameters.masses = Eigen::VectorXd::Constant(1, 0.9630623825974343);

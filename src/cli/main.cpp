@@ -41,7 +41,7 @@ std::string instruction_set() {
   }
 }
 
-/// Told where it is not every processor of the kind.
+/// Added to the version where some processors can run nothing of this build.
 std::string where_it_runs() {
   const std::string needed(needed_instruction_set());
   return needed.empty() ? "" : ", on processors with " + needed + " only";

@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "io/fingerprint.hpp"
+#include "io/input_error.hpp"
 #include "io/output_error.hpp"
 
 namespace pendula::io {
@@ -135,7 +136,10 @@ bool read_record(Reader& reader, const JournalKind& kind, DoneChunk& chunk) {
 
 Journal::Journal(const std::string& folder, const JournalKind& kind) {
   std::error_code unknown;
-  if (mkdir(folder.c_str(), 0777) != 0 && !fs::is_directory(folder, unknown)) reject_output(folder, folder, errno);
+  if (mkdir(folder.c_str(), 0777) != 0 && !fs::is_directory(folder, unknown)) {
+    if (errno == EEXIST) throw InputError(folder + ": expected a folder for the journals, or nothing, got a file");
+    reject_output(folder, folder, errno);
+  }
   for (int k = 0; descriptor_ < 0; ++k) {
     name_ = folder + "/" + std::to_string(getpid()) + "-" + std::to_string(k) + std::string(ending);
     descriptor_ = open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0666);

@@ -77,7 +77,8 @@ def define(model, links):
 """
     tables = {"system": {"model": "model.py"}, "start": {}, "run": {"duration": 4.0}}
     rows = truth.rows_at(truth.ModelSubject(room, tables, text, [("t - 1.9", 5e-4)]), [1.9, 4.0], 4.0)
-    assert rows.columns["x_dot"].astype(float) == pytest.approx([-1.9, 0.2], abs=1e-3)  # within a width
+    halfway = -1.9 + 5e-4 * math.log(2)
+    assert rows.columns["x_dot"].astype(float) == pytest.approx([halfway, 0.2], abs=1e-14)  # measured 2e-17
 
 
 def test_friction_that_sticks_is_for_the_implicit_reference(room):

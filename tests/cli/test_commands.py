@@ -6,7 +6,7 @@ import re
 def test_version(pendula):
     run = pendula("--version")
     assert run.status == 0
-    assert re.fullmatch(r"pendula \d+\.\d+\.\d+ \(\w+.*\)\n", run.out)
+    assert re.fullmatch(r"pendula \d+\.\d+\.\d+ \(\w+(, on processors with \w+ only)?\)\n", run.out)
 
 
 def test_help_lists_the_commands(pendula):

@@ -227,8 +227,8 @@ def test_shards_that_end_at_once_make_one_whole_file(whole, tmp_path):
 
 @pytest.mark.skipif(not shutil.which("mpirun"), reason="no mpirun here")
 def test_a_rank_that_fails_ends_the_job_and_loses_nothing(whole, tmp_path):
-    """One of two ranks is where it cannot make its journal. (A limit on its files, or two commands for one job, mpirun
-    5.0.7 does not survive.)"""
+    """One of two ranks runs in a folder where it cannot make its journal. (mpirun 5.0.7 crashes where two commands make
+    one job, and where a rank has a small limit on its files.)"""
     astray = tmp_path / "astray"
     astray.mkdir()
     (astray / "out.h5.parts").touch()
@@ -239,7 +239,7 @@ def test_a_rank_that_fails_ends_the_job_and_loses_nothing(whole, tmp_path):
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     done = run(tmp_path, before=before, env=os.environ | allowed)
     assert done.status != 0
-    assert "rank 1: out.h5.parts: " in done.err
+    assert "rank 1: out.h5.parts: expected a folder for the journals, or nothing, got a file" in done.err
     assert run(tmp_path, "--resume").status == 0
     assert contents(tmp_path / "out.h5") == whole
 

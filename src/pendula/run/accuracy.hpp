@@ -68,9 +68,9 @@ inline FinestTolerance finest_tolerance(const RunOptions& options, const Accurac
 
 /// What is known of the errors by two tolerances of which the finer one is good enough.
 struct AccuracyLadder {
-  AccuracyAim finest;      ///< which all others are compared with
-  double factor = 0;       ///< what the motion makes of a tolerance
-  bool is_enough = false;  ///< whether a finer one is possible, and need not be
+  AccuracyAim finest;         ///< which all others are compared with
+  double factor = 0;          ///< what the motion makes of a tolerance
+  bool can_be_finer = false;  ///< whether it is good enough, and smaller tolerances are left to try
 };
 
 /// Two tolerances to compare, and the trial by the coarser one.
@@ -108,8 +108,9 @@ AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start,
     double next = fine / 1000;
     if (off <= together) {
       const double factor = off / coarse, error = finer * off;
-      if (error <= enough * wanted)
+      if (error <= enough * wanted) {
         return {{fine, error, std::move(near)}, factor, fine > std::max(rounding, smallest.good)};
+      }
       if (fine <= finest) {
         return {{fine, error, std::move(near), parted->within(close_to_wanted * wanted / finer, start)}, factor};
       }
@@ -125,9 +126,9 @@ AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start,
 }
 
 /// The finest tolerance may be good enough by far. So a coarser one, `coarsest` at most, is looked for by which a trial
-/// is off the finest one by a part of what is wanted, as was seen. `run` and `apart` as above. Nothing where a trial is
-/// off by more than a factor allows by which the finest one is good enough: the one that told the factor was right by
-/// chance; and `factor` becomes what was seen.
+/// is off the finest one by a part of what is wanted, as was seen. `run` and `apart` as above. `factor` becomes the
+/// largest that was seen. Returns nothing where the finest tolerance is not good enough by that factor: the trial that
+/// told the ladder's was right by chance.
 template <class RunTrial, class Apart>
 std::optional<AccuracyAim> climb_up(double wanted, double coarsest, const AccuracyLadder& ladder, double& factor,
                                     RunTrial run, Apart apart) {
@@ -142,7 +143,7 @@ std::optional<AccuracyAim> climb_up(double wanted, double coarsest, const Accura
     const std::optional<Track> there = run(tolerance);
     const double error = there ? apart(*there, *best.finest).largest() : std::numeric_limits<double>::infinity();
     if (error <= together) factor = std::max(factor, error / tolerance);
-    if (ladder.is_enough && factor * ladder.finest.tolerance > wanted) return {};
+    if (ladder.can_be_finer && factor * ladder.finest.tolerance > wanted) return {};
     if (error <= most * wanted) best.tolerance = tolerance, best.error = error;
     if (error >= least * wanted && error <= most * wanted) break;
     (error > most * wanted ? high : low) = tolerance;
