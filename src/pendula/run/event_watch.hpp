@@ -234,13 +234,17 @@ class EventWatch {
     const double last = events_[k].value(motion_);
     const int sign = std::isfinite(last) ? sign_of(last) : 0;
     const auto search_by = [&](SeenBy by) {
-      return locate_all(k, search.find(before.value, last, before.sign, by), values, resolution, found);
+      const std::vector<SignChange> changes = search.find(before.value, last, before.sign, by);
+      return search.is_told() && locate_all(k, changes, values, resolution, found);
     };
-    const bool is_found = search_by(SeenBy::polynomial) || search_by(SeenBy::full_order);
+    // States of full order are dear: a function that they did not tell once is not looked at by them again.
+    const bool may_tell = std::isnan(tallies_[k].not_told);
+    const bool is_found =
+        search_by(SeenBy::polynomial) || ((search.is_told() || may_tell) && search_by(SeenBy::full_order));
     if (!is_found) locate_all(k, changes_by_ends(before.sign, sign), values, resolution, found);
     sides_[k] = {last, sign != 0 || !std::isfinite(last) ? sign : before.sign};
     if (!search.is_finite() || !std::isfinite(last)) note(tallies_[k].not_finite);
-    if (!search.is_told() || !is_found) note(tallies_[k].not_told);
+    if (!is_found) note(tallies_[k].not_told);
   }
 
   /// Adds what happened at changes; nothing, and false, where the motion does not have one of them.
