@@ -1,9 +1,22 @@
 #include "cli/interrupt.hpp"
 
+#include <csignal>
 #include <cstddef>
 
 namespace pendula::cli {
 namespace {
+
+#ifdef __ELF__
+struct sigaction inherited_hang_up = {};
+bool is_known = false;  // not every system runs code that early
+
+// Run before the libraries' own code; sanitizers may not yet be ready.
+__attribute__((no_sanitize("address", "undefined"))) void note_inherited() {
+  is_known = sigaction(SIGHUP, nullptr, &inherited_hang_up) == 0;
+}
+
+[[gnu::section(".preinit_array"), gnu::used]] void (*const noted_before_libraries)() = &note_inherited;
+#endif
 
 volatile std::sig_atomic_t noted = 0;
 
@@ -12,6 +25,12 @@ void note(int) {
 }
 
 }  // namespace
+
+void restore_hang_up() {
+#ifdef __ELF__
+  if (is_known) sigaction(SIGHUP, &inherited_hang_up, nullptr);
+#endif
+}
 
 InterruptGuard::InterruptGuard() {
   noted = 0;

@@ -5,6 +5,10 @@
 
 namespace pendula::cli {
 
+/// A hang-up does again what it did when the program began. Libraries may have changed that before main: UCX, which
+/// comes with Open MPI 5, takes SIGHUP for itself, even where nohup had it ignored.
+void restore_hang_up();
+
 /// While it lives, the first interrupt (Ctrl-C), hang-up or request to end is noted, so that the run can stop at its
 /// next step and keep what it has; the second ends the program at once.
 class InterruptGuard {

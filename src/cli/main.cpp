@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "cli/interrupt.hpp"
 #include "io/input_error.hpp"
 #include "io/nearest_name.hpp"
 #include "io/provenance.hpp"
@@ -437,6 +438,7 @@ ExitStatus run(int argc, char** argv) {
 }  // namespace pendula::cli
 
 int main(int argc, char** argv) {
+  pendula::cli::restore_hang_up();
   try {
     return pendula::cli::run(argc, argv);
   } catch (const pendula::io::InputError& error) {

@@ -124,12 +124,12 @@ def test_a_signal_that_was_ignored_stays_ignored(double, tmp_path):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
     command = [program(), "simulate", str(double), "-o", "out.csv", "--quiet", *ENDLESS]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL, preexec_fn=nohup) as run:
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, preexec_fn=nohup) as run:
         wait_for(lambda: rows_in(tmp_path / "out.csv") > 0)
         run.send_signal(signal.SIGHUP)
         before = rows_in(tmp_path / "out.csv")
         wait_for(lambda: rows_in(tmp_path / "out.csv") > before)
-        assert run.poll() is None
+        assert run.poll() is None, run.stderr.read()
         run.send_signal(signal.SIGINT)
         assert run.wait(timeout=60) == 1
 
