@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -95,6 +96,14 @@ def program() -> str:
 def settings(*overrides: str) -> list[str]:
     """The words `--set KEY=VALUE` for each override."""
     return [word for override in overrides for word in ("--set", override)]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def signals_end_programs():
+    """Also where the tests themselves run by nohup, or in the background of a script, which ignore some for good."""
+    for which in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(which) is signal.SIG_IGN:
+            signal.signal(which, signal.SIG_DFL)
 
 
 @pytest.fixture

@@ -59,7 +59,7 @@ def version(run) -> str:
 def test_version_says_where_some_processors_can_run_nothing(pendula):
     least = available(pendula)[0]
     limit = "" if least in ("sse2", "baseline") else f", on processors with {least} only"
-    assert pendula("--version", PENDULA_ARCH=least).out == f"pendula 0.1.0 ({least}{limit})\n"
+    assert pendula("--version", PENDULA_ARCH=least).out.endswith(f" ({least}{limit})\n")
 
 
 def test_version_names_the_best_one_or_the_one_asked_for(pendula):

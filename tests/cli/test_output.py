@@ -5,6 +5,8 @@ import resource
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,15 +29,23 @@ def rows_in(file: Path) -> int:
     return file.read_text().count("\n") - 1 if file.exists() else 0
 
 
+@contextmanager
+def started(command: list[str], **options) -> Iterator[subprocess.Popen]:
+    """A run that is killed at the end, if it still goes on: also where a test fails."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes, **options) as run:
+        try:
+            yield run
+        finally:
+            run.kill()
+
+
 @pytest.fixture
 def endless(double, tmp_path):
-    """An endless run whose rows, far apart, go to out.csv; killed at the end of the test."""
-    command = [program(), "simulate", str(double), "-o", "out.csv", *ENDLESS]
-    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: rows_in(tmp_path / "out.csv") > 0)
-    yield run
-    run.kill()
-    run.communicate()
+    """An endless run whose rows, far apart, go to out.csv."""
+    with started([program(), "simulate", str(double), "-o", "out.csv", *ENDLESS], cwd=tmp_path) as run:
+        wait_for(lambda: rows_in(tmp_path / "out.csv") > 0)
+        yield run
 
 
 def test_a_minus_is_standard_output_and_the_summary_goes_to_standard_error(pendula, double, tmp_path):
@@ -102,9 +112,7 @@ def test_two_runs_do_not_write_one_file(pendula, double, tmp_path, endless):
 def test_an_interrupted_run_stops_at_once_and_keeps_its_last_state(double, tmp_path, which):
     never = settings("run.duration=1e12", "output.every=1000000000000")
     command = [program(), "simulate", str(double), "-o", "out.csv", *never]
-    with subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as run:
+    with started(command, cwd=tmp_path) as run:
         wait_for(lambda: rows_in(tmp_path / "out.csv") > 0)
         time.sleep(0.1)
         run.send_signal(which)
@@ -124,7 +132,7 @@ def test_a_signal_that_was_ignored_stays_ignored(double, tmp_path):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
     command = [program(), "simulate", str(double), "-o", "out.csv", "--quiet", *ENDLESS]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, preexec_fn=nohup) as run:
+    with started(command, cwd=tmp_path, preexec_fn=nohup) as run:
         wait_for(lambda: rows_in(tmp_path / "out.csv") > 0)
         run.send_signal(signal.SIGHUP)
         before = rows_in(tmp_path / "out.csv")
@@ -142,14 +150,7 @@ def test_a_reader_that_goes_away_ends_the_run(double, ignored):
         signal.signal(signal.SIGPIPE, signal.SIG_IGN if ignored else signal.SIG_DFL)
 
     command = [program(), "simulate", str(double), "-o", "-", "--quiet", *ENDLESS]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        restore_signals=False,
-        preexec_fn=ignore,
-    ) as run:
+    with started(command, restore_signals=False, preexec_fn=ignore) as run:
         assert run.stdout.readline().startswith("t,theta_1,")
         run.stdout.close()
         assert run.wait(timeout=60) == (1 if ignored else -signal.SIGPIPE)
