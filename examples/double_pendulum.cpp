@@ -12,7 +12,7 @@ int main() {
   const Chain<Planar> chain(parameters);
 
   using Kernel = kernels::Planar2;
-  GaussStepper<LagrangianSolver<Kernel>> stepper(system_of<Kernel>(chain), 2);
+  GaussStepper<LagrangianSolver<>> stepper(system_of<Kernel>(chain), 2);
   Outcome outcome = stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(std::numbers::pi / 2)));
   for (int step = 0; outcome && step < 20000; ++step) outcome = stepper.step(5e-4);
   if (!outcome) {

@@ -69,7 +69,7 @@ TEST_P(Order, TimeReversalReturnsToTheStart) {
 
 /// (q, p) after one step from (q, p), for a planar double pendulum.
 Eigen::Vector4d step_map(const Chain<Planar>& chain, const Eigen::Vector4d& qp, int stages, Form form) {
-  const auto parameters = system_of<kernels::Planar2>(chain).parameters(0);
+  const auto parameters = parameters_of<kernels::Planar2>(chain);
   Eigen::Vector2d q = qp.head<2>(), v, p;
   Eigen::Vector2d momentum = qp.tail<2>();
   kernels::Planar2::velocity_from_momentum(parameters, q, momentum, v);

@@ -16,9 +16,6 @@
 namespace pendula::test {
 namespace {
 
-/// Its one instance here: it is most of what this file takes to compile.
-using FourStages = LagrangianSolver<kernels::Planar2, 4>;
-
 State<Planar> swinging(int links) {
   return State<Planar>::from_angles(Eigen::VectorXd::Constant(links, 1.0));
 }
@@ -80,7 +77,7 @@ TEST(Factory, ChoosesTheChainSolverForAnyNumberOfLinks) {
 
 TEST(Factory, FixedSizeSteppersAgreeWithIt) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
-  GaussStepper<FourStages> stepper(system_of<kernels::Planar2>(chain), 3);
+  GaussStepper<LagrangianSolver<4>> stepper(system_of<kernels::Planar2>(chain), 3);
   const auto integrator = make_integrator(chain, gauss(3));
   ASSERT_TRUE(stepper.start(swinging(2)));
   ASSERT_TRUE(integrator->start(swinging(2)));
@@ -137,10 +134,10 @@ void expect_the_same_accelerations(const Chain<Space>& chain, ForwardDynamics& d
 TEST(ExplicitMethods, HaveTheSameAccelerationsWithoutAKernel) {
   Random random(3);
   const Chain<Planar> planar = random_chain<Planar>(random, 4, true);
-  SystemForwardDynamics<kernels::Planar4> planar_dense(system_of<kernels::Planar4>(planar));
+  SystemForwardDynamics planar_dense(system_of<kernels::Planar4>(planar));
   expect_the_same_accelerations(planar, planar_dense, random_state<Planar>(random, 4));
   const Chain<Spatial> spatial = random_chain<Spatial>(random, 3, true);
-  SystemForwardDynamics<kernels::Spatial3> spatial_dense(system_of<kernels::Spatial3>(spatial));
+  SystemForwardDynamics spatial_dense(system_of<kernels::Spatial3>(spatial));
   expect_the_same_accelerations(spatial, spatial_dense, random_state<Spatial>(random, 3));
   RunOptions options;
   options.method = Method::rk4;
@@ -283,7 +280,8 @@ TEST(Failure, AtThePoleNamesTheLink) {
 // A tenth of a second takes four iterations, its halves take three.
 TEST(Failure, OfAStepIsMendedByHalves) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
-  GaussStepper<FourStages> stepper(system_of<kernels::Planar2>(chain), 4, {.max_iterations = 3}, Iteration::newton);
+  GaussStepper<LagrangianSolver<4>> stepper(system_of<kernels::Planar2>(chain), 4, {.max_iterations = 3},
+                                            Iteration::newton);
   ASSERT_TRUE(stepper.start(swinging(2)));
   const Outcome outcome = stepper.step(0.1);
   ASSERT_TRUE(outcome) << outcome;
@@ -314,8 +312,8 @@ void expect_an_untouched_state_where_no_part_converges(const Model& model) {
 
 TEST(Failure, LeavesTheStateAndSaysHowFarItCame) {
   const auto system = system_of<kernels::Planar2>(equal_chain<Planar>(2));
-  expect_an_untouched_state_where_no_part_converges<FourStages>(system);
-  expect_an_untouched_state_where_no_part_converges<VelocityNewton<kernels::Planar2>>(system);
+  expect_an_untouched_state_where_no_part_converges<LagrangianSolver<4>>(system);
+  expect_an_untouched_state_where_no_part_converges<VelocityNewton<4>>(system);
   expect_an_untouched_state_where_no_part_converges<ChainSolver<Planar, 2>>(equal_chain<Planar>(2));
 }
 

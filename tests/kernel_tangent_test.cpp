@@ -16,16 +16,17 @@ template <class Kernel>
 class KernelTangents : public ::testing::Test {
  protected:
   using Space = SpaceOf<Kernel>;
-  using Vector = typename Kernel::template Vector<double>;
   static constexpr int K = Kernel::coordinates;
 
-  KernelTangents() : chain(driven_chain<Space>(random, Kernel::links)), model(system_of<Kernel>(chain)) {
-    start = random_state<Space>(random, Kernel::links);
+  KernelTangents()
+      : chain(driven_chain<Space>(random, Kernel::links)),
+        model(system_of<Kernel>(chain)),
+        start(random_state<Space>(random, Kernel::links)) {
     start.time = 0.3;
   }
 
-  static Eigen::VectorXd end(const SystemModel<Kernel>& moved, const SystemState<Kernel>& from, int stages, double h) {
-    GaussStepper<LagrangianSolver<Kernel>> stepper(moved, stages);
+  static Eigen::VectorXd end(const SystemModel& moved, const Motion& from, int stages, double h) {
+    GaussStepper<LagrangianSolver<>> stepper(moved, stages);
     EXPECT_TRUE(stepper.start(from));
     EXPECT_TRUE(stepper.step(h));
     Eigen::VectorXd end(2 * K);
@@ -34,7 +35,7 @@ class KernelTangents : public ::testing::Test {
   }
 
   Eigen::VectorXd end_of(int k, double change, int stages, double h) const {
-    SystemState<Kernel> from = start;
+    Motion from = start;
     (k < K ? from.q[k] : from.v[k - K]) += change;
     return end(model, from, stages, h);
   }
@@ -46,8 +47,8 @@ class KernelTangents : public ::testing::Test {
 
   Random random{7};
   Chain<Space> chain;
-  SystemModel<Kernel> model;
-  SystemState<Kernel> start;
+  SystemModel model;
+  Motion start;
 };
 /// Of one link and of several; what others have is the same text.
 using TangentKernels = ::testing::Types<kernels::Planar1, kernels::Planar3, kernels::Spatial1, kernels::Spatial2>;
@@ -57,13 +58,13 @@ TYPED_TEST(KernelTangents, AreThoseOfTheDiscreteStep) {
   constexpr int size = 2 * TypeParam::coordinates;
   for (const int stages : {1, 2, 3, 6}) {
     for (const double h : {0.01, 0.1}) {
-      GaussStepper<LagrangianSolver<TypeParam>> stepper(this->model, stages);
+      GaussStepper<LagrangianSolver<>> stepper(this->model, stages);
       stepper.linearize();
       ASSERT_TRUE(stepper.start(this->start));
       ASSERT_TRUE(stepper.step(h));
       auto& step = stepper.linearization();
-      const LagrangianVariation<TypeParam> at_start(this->model, this->start);
-      const LagrangianVariation<TypeParam> at_end(this->model, stepper.state());
+      const LagrangianVariation at_start(this->model, this->start);
+      const LagrangianVariation at_end(this->model, stepper.state());
       Directions<> tangents, found, sensitivities, found_of_parameters;
       at_start.tangents(identity(size), tangents);
       step.push(tangents);
@@ -88,7 +89,7 @@ TYPED_TEST(KernelTangents, AreThoseOfTheDiscreteStep) {
 TYPED_TEST(KernelTangents, AreSymplecticAndPulledByTheirTranspose) {
   const auto free = random_chain<SpaceOf<TypeParam>>(this->random, TypeParam::links);
   for (int stages = 1; stages <= 8; ++stages) {
-    GaussStepper<LagrangianSolver<TypeParam>> stepper(system_of<TypeParam>(free), stages);
+    GaussStepper<LagrangianSolver<>> stepper(system_of<TypeParam>(free), stages);
     stepper.linearize();
     ASSERT_TRUE(stepper.start(this->start));
     ASSERT_TRUE(stepper.step(0.05));
@@ -109,7 +110,7 @@ TYPED_TEST(KernelTangents, AreSymplecticAndPulledByTheirTranspose) {
 TYPED_TEST(KernelTangents, AreTheSameOneByOne) {
   for (const int stages : {1, 2, 3, 4, 5, 8}) {
     for (const double h : {-0.02, 0.01, 0.1, 0.4}) {
-      GaussStepper<LagrangianSolver<TypeParam>> stepper(this->model, stages);
+      GaussStepper<LagrangianSolver<>> stepper(this->model, stages);
       stepper.linearize();
       ASSERT_TRUE(stepper.start(this->start));
       ASSERT_TRUE(stepper.step(h));

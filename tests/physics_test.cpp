@@ -58,8 +58,8 @@ TYPED_TEST(PlanarModes, AreLaguerreZeros) {
   const Vector hanging = Vector::Zero();
   const typename Kernel::template Torque<double> none = Kernel::template Torque<double>::Zero();
   typename Kernel::template Matrix<double> mass, stiffness;
-  Kernel::residual_D_a(system_of<Kernel>(chain).parameters(0), hanging, hanging, hanging, none, mass);
-  Kernel::residual_D_q(system_of<Kernel>(chain).parameters(0), hanging, hanging, hanging, none, stiffness);
+  Kernel::residual_D_a(parameters_of<Kernel>(chain), hanging, hanging, hanging, none, mass);
+  Kernel::residual_D_q(parameters_of<Kernel>(chain), hanging, hanging, hanging, none, stiffness);
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(stiffness, mass);
   const Eigen::VectorXd expected = chain.gravity() * laguerre_zeros(Kernel::links);
   EXPECT_LT(((modes.eigenvalues() - expected).array() / expected.array()).abs().maxCoeff(), 3e-14);  // measured 2.6e-15

@@ -12,8 +12,8 @@
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/kernels/swinging_atwood.hpp>
-#include <pendula/lanes/lane_kernel.hpp>
 #include <pendula/lanes/lane_queue.hpp>
+#include <pendula/system/kernel_table.hpp>
 #include <type_traits>
 #include <vector>
 
@@ -29,9 +29,9 @@ using Members = std::vector<LaneSystemMember>;
 
 template <class System, int S = 4, class Register = MemberRegister>
 std::vector<LaneEnd> ends_of(const Members& members, const LaneOptions& options) {
-  LaneKernel<System, Register> kernel;
+  LaneDynamics<LanePack<Register>> dynamics(system_table<System>);
   std::vector<LaneEnd> ends(members.size());
-  GaussSystemLanes<S, Register> queue(kernel, options);
+  GaussSystemLanes<S, Register> queue(dynamics, options);
   queue.run(members, ends);
   return ends;
 }
@@ -43,15 +43,15 @@ double distance(const Motion& a, const Motion& b) {
 /// By the scalar stepper; a step of 0: by the tolerance.
 template <class System>
 Motion alone(const LaneSystemMember& member, int stages, double step, double tolerance = 0) {
-  using Stepper = GaussStepper<LagrangianSolver<System>>;
-  Stepper stepper(SystemModel<System>(member.system), stages, {.tolerance = tolerance}, Iteration::fixed_point);
-  EXPECT_TRUE(stepper.start({member.start.time, member.start.q, member.start.v}));
+  GaussStepper<LagrangianSolver<>> stepper(SystemModel(system_table<System>, member.system), stages,
+                                           {.tolerance = tolerance}, Iteration::fixed_point);
+  EXPECT_TRUE(stepper.start(member.start));
   double left = member.end - member.start.time;
   while (left > 1e-9) {
     EXPECT_TRUE(stepper.step(step > 0 ? std::min(step, left) : left));
     left = member.end - stepper.time();
   }
-  return {stepper.time(), stepper.state().q, stepper.state().v};
+  return stepper.state();
 }
 
 /// Swinging Atwood machines, whose bobs go round, or swing from rest.
@@ -175,10 +175,10 @@ TEST(SystemGaussLanes, HaveTheirOrder) {
 /// What tangents of members have grown by at their ends.
 template <class Queue, class System>
 std::vector<double> growths_of(const Members& members, const LaneOptions& options) {
-  LaneKernel<System> kernel;
+  LaneDynamics<typename Queue::L> dynamics(system_table<System>);
   std::vector<LaneEnd> ends(members.size());
   Growths growths(members.size());
-  Queue queue(kernel, options);
+  Queue queue(dynamics, options);
   queue.set_watch(growths);
   queue.run(members, ends);
   for (const LaneEnd& end : ends) EXPECT_EQ(end.status, Status::ok);

@@ -2,18 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <pendula/kernels/planar_2.hpp>
-#include <pendula/lanes/lane_dual_functions.hpp>
-#include <pendula/lanes/lane_functions.hpp>
-#include <pendula/lanes/lane_kernel.hpp>
 #include <pendula/lanes/lane_queue.hpp>
-#include <pendula/numeric/dual.hpp>
+#include <pendula/numeric/dual_functions.hpp>
+#include <pendula/numeric/functions.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/simulation.hpp>
+#include <pendula/system/kernel_table.hpp>
+#include <type_traits>
 #include <vector>
 
 #include "support/chain_systems.hpp"
@@ -25,9 +28,9 @@ using Kernel = kernels::Planar2;
 
 template <class Register = MemberRegister>
 std::vector<LaneEnd> ends_of(const std::vector<LaneSystemMember>& members, const LaneOptions& options) {
-  LaneKernel<Kernel, Register> kernel;
+  LaneDynamics<LanePack<Register>> dynamics(system_table<Kernel>);
   std::vector<LaneEnd> ends(members.size());
-  SystemLanes<DormandPrince5, Register> queue(kernel, options);
+  SystemLanes<DormandPrince5, Register> queue(dynamics, options);
   queue.run(members, ends);
   return ends;
 }
@@ -108,141 +111,108 @@ TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
   }
 }
 
-// A kernel compiled for other registers than the library.
-TEST(SystemLanes, ACompiledLibraryMovesItsOwnLanesOnly) {
-  const ChainSystems systems(3, false, 1);
-  class Watch : public LaneWatch {
-    bool wants_steps() const override { return false; }
-    void after_step(LaneSteps& /*steps*/) override {}
-    bool stops() override { return false; }
-  } watch;
-  RunOptions options;
-  options.method = Method::dopri5;
-  options.tolerance = 1e-8;
-  MoveSystemMembers* const move = library().system_lanes(options);
-  ASSERT_NE(move, nullptr);
-  std::vector<PlainSystemMember> members;
-  for (const LaneSystemMember& from : systems.members) {
-    members.push_back({from.system, from.start.time, from.end, from.start.q.data(), from.start.v.data()});
+// Accelerations are those without tangents, their derivatives those of the equations of motion.
+TEST(SystemLanes, AccelerationsHaveTheirDerivatives) {
+  const ChainSystems systems(MemberRegister::size, true, 1);
+  constexpr auto lanes = static_cast<std::size_t>(MemberRegister::size);
+  LaneDynamics<LanePack<MemberRegister>> dynamics(system_table<Kernel>);
+  PackRows<lanes> q(2), v(2), dq(2), dv(2), a(2), expected(2), da(2), times(1);
+  for (std::size_t k = 0; k < lanes; ++k) {
+    dynamics.take(static_cast<int>(k), systems.members[k].system);
+    times[0][k] = 0.1 * static_cast<double>(k);
+    for (std::size_t i = 0; i < 2; ++i) {
+      q[i][k] = systems.members[k].start.q[static_cast<Eigen::Index>(i)];
+      v[i][k] = systems.members[k].start.v[static_cast<Eigen::Index>(i)];
+      dq[i][k] = 0.3 + static_cast<double>(i * lanes + k);
+      dv[i][k] = 1.7 - static_cast<double>(k);
+    }
   }
-  Eigen::Matrix2Xd q(2, 3), v(2, 3);
-  const auto ends_by = [&](LaneDynamics& kernel) {
-    std::vector<PlainMemberEnd> ends;
-    for (Eigen::Index k = 0; k < 3; ++k) ends.push_back({&q(0, k), &v(0, k), 0, {}, 0, 0, 0, 0});
-    EXPECT_TRUE(move(kernel, options, 0, members, ends, watch));
-    return ends;
-  };
-  class Other : public LaneKernel<Kernel> {
-    int lanes() const override { return 3; }
-  } other;
-  const std::vector<PlainMemberEnd> left = ends_by(other);
-  for (std::size_t k = 0; k < left.size(); ++k) {
-    EXPECT_EQ(left[k].status, Status::not_converged);
-    EXPECT_EQ(left[k].time, 0.25);
-    EXPECT_EQ(Eigen::Map<const Eigen::Vector2d>(left[k].q), systems.members[k].start.q);
+  dynamics.accelerations(times[0], q[0], v[0], expected[0]);
+  dynamics.variations(times[0], q[0], v[0], dq[0], dv[0], a[0], da[0]);
+  for (std::size_t k = 0; k < lanes; ++k) {
+    const auto member = [k](const PackRows<lanes>& rows) { return Eigen::Vector2d(rows[0][k], rows[1][k]); };
+    SystemAt<1> here(SystemModel(system_table<Kernel>, systems.members[k].system));
+    here.set_time(times[0][k]);
+    const Eigen::Vector2d angles = member(q), rates = member(v), accelerations = member(a);
+    Eigen::Vector2d residual;
+    Eigen::Matrix<double, 2, 2, Eigen::RowMajor> by_q, by_v, by_a;
+    here(&SystemFunctions::residual_with_jacobians, angles.data(), rates.data(), accelerations.data(), residual.data(),
+         by_q.data(), by_v.data(), by_a.data());
+    const Eigen::Vector2d slopes = -by_a.inverse() * (by_q * member(dq) + by_v * member(dv));
+    EXPECT_EQ(accelerations, member(expected));
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double slope = slopes[static_cast<Eigen::Index>(i)];
+      EXPECT_NEAR(da[i][k], slope, 1e-13 * (1 + std::abs(slope)));  // seen: 3e-15
+    }
   }
 }
 
-// Accelerations are those without tangents, their derivatives those of dual numbers.
-TEST(SystemLanes, AccelerationsHaveTheirDerivatives) {
-  using Slopes = Dual<1>;
-  const ChainSystems systems(MemberRegister::size, true, 1);
-  constexpr auto lanes = static_cast<std::size_t>(MemberRegister::size);
-  LaneKernel<Kernel> kernel;
-  struct Numbers {
-    alignas(pack_alignment) double of[2 * lanes] = {};
-  } q, v, dq, dv, a, expected, da;
-  alignas(pack_alignment) double times[lanes];
-  for (std::size_t k = 0; k < lanes; ++k) {
-    kernel.take(static_cast<int>(k), systems.members[k].system);
-    times[k] = 0.1 * static_cast<double>(k);
-    for (std::size_t i = 0; i < 2; ++i) {
-      const std::size_t at = i * lanes + k;
-      q.of[at] = systems.members[k].start.q[static_cast<Eigen::Index>(i)];
-      v.of[at] = systems.members[k].start.v[static_cast<Eigen::Index>(i)];
-      dq.of[at] = 0.3 + static_cast<double>(at);
-      dv.of[at] = 1.7 - static_cast<double>(k);
-    }
-  }
-  kernel.accelerations(times, q.of, v.of, expected.of);
-  kernel.variations(times, q.of, v.of, dq.of, dv.of, a.of, da.of);
-  for (std::size_t k = 0; k < lanes; ++k) {
-    const Chain<Planar>& chain = systems.chains[k];
-    Kernel::Parameters<Slopes> parameters;
-    Kernel::Vector<Slopes> angles, rates, found;
-    Kernel::Inputs<Slopes> torque;
-    Torque<Planar, Eigen::Dynamic> acting;
-    chain.torque(times[k], acting);
-    parameters.gravity = Slopes(chain.gravity());
-    for (Eigen::Index i = 0; i < 2; ++i) {
-      const std::size_t at = static_cast<std::size_t>(i) * lanes + k;
-      parameters.masses[i] = Slopes(chain.masses()[i]);
-      parameters.lengths[i] = Slopes(chain.lengths()[i]);
-      parameters.damping[i] = Slopes(chain.damping()[i]);
-      angles[i] = Slopes(q.of[at]);
-      angles[i].slopes[0] = dq.of[at];
-      rates[i] = Slopes(v.of[at]);
-      rates[i].slopes[0] = dv.of[at];
-      torque(0, i) = Slopes(acting(0, i));
-    }
-    Kernel::acceleration(parameters, angles, rates, torque, found);
-    for (std::size_t i = 0; i < 2; ++i) {
-      const std::size_t at = i * lanes + k;
-      EXPECT_EQ(a.of[at], expected.of[at]);
-      const double slope = found[static_cast<Eigen::Index>(i)].slopes[0];
-      EXPECT_NEAR(da.of[at], slope, 1e-13 * (1 + std::abs(slope)));  // seen: 3e-15
-    }
-  }
+using Lanes = Pack<MemberRegister::size, MemberRegister>;
+
+double first(double x) {
+  return x;
+}
+double first(const Lanes& x) {
+  alignas(pack_alignment) double numbers[MemberRegister::size];
+  x.store(numbers);
+  return numbers[0];
 }
 
 TEST(LaneFunctions, HaveTheirDerivatives) {
-  using L = LaneDual<LanePack<MemberRegister>>;
-  for (const double number : {0.3, -0.7, 0.99}) {
-    const auto expect = [&](auto function, double at) {
-      L x(at);
-      x.slope = LanePack<MemberRegister>(-1.5);
-      Dual<1> same(at);
-      same.slopes[0] = -1.5;
-      const double slope = function(same).slopes[0];
-      EXPECT_NEAR(function(x).slope[0], slope, 4e-15 * (1 + std::abs(slope))) << at;  // seen: 3e-16
-      EXPECT_NEAR(function(x).value[0], function(same).value, 4e-16 * std::abs(function(same).value)) << at;
+  for (const double x : {0.3, -0.7, 0.99}) {
+    const double size = std::abs(x);
+    const auto expect_of = [](const auto& found, double value, double slope) {
+      EXPECT_NEAR(first(found.value), value, 4e-16 * std::abs(value));
+      EXPECT_NEAR(first(found.slope), -1.5 * slope, 4e-15 * (1 + std::abs(1.5 * slope)));  // seen: 3e-16
     };
-    expect([](const auto& x) { return sin(x); }, number);
-    expect([](const auto& x) { return cos(x); }, number);
-    expect([](const auto& x) { return tan(x); }, number);
-    expect([](const auto& x) { return asin(x); }, number);
-    expect([](const auto& x) { return acos(x); }, number);
-    expect([](const auto& x) { return atan(x); }, number);
-    expect([](const auto& x) { return sinh(x); }, number);
-    expect([](const auto& x) { return cosh(x); }, number);
-    expect([](const auto& x) { return tanh(x); }, number);
-    expect([](const auto& x) { return exp(x); }, number);
-    expect([](const auto& x) { return cbrt(x); }, number);
-    expect([](const auto& x) { return x / (x * x - x); }, number);
-    expect([](const auto& x) { return log(x); }, std::abs(number));
-    expect([](const auto& x) { return sqrt(x); }, std::abs(number));
-    expect([](const auto& x) { return pow(x, std::decay_t<decltype(x)>(-1.5)); }, std::abs(number));
+    const auto expect = [&](auto function, double at, double value, double slope) {
+      expect_of(function(Dual<double>(at, -1.5)), value, slope);
+      expect_of(function(Dual<Lanes>(Lanes(at), Lanes(-1.5))), value, slope);
+    };
+    expect([](const auto& y) { return sin(y); }, x, std::sin(x), std::cos(x));
+    expect([](const auto& y) { return cos(y); }, x, std::cos(x), -std::sin(x));
+    expect([](const auto& y) { return tan(y); }, x, std::tan(x), 1 / (std::cos(x) * std::cos(x)));
+    expect([](const auto& y) { return asin(y); }, x, std::asin(x), 1 / std::sqrt((1 - x) * (1 + x)));
+    expect([](const auto& y) { return acos(y); }, x, std::acos(x), -1 / std::sqrt((1 - x) * (1 + x)));
+    expect([](const auto& y) { return atan(y); }, x, std::atan(x), 1 / (1 + x * x));
+    expect([](const auto& y) { return sinh(y); }, x, std::sinh(x), std::cosh(x));
+    expect([](const auto& y) { return cosh(y); }, x, std::cosh(x), std::sinh(x));
+    expect([](const auto& y) { return tanh(y); }, x, std::tanh(x), 1 / (std::cosh(x) * std::cosh(x)));
+    expect([](const auto& y) { return exp(y); }, x, std::exp(x), std::exp(x));
+    expect([](const auto& y) { return cbrt(y); }, x, std::cbrt(x), std::cbrt(x) / (3 * x));
+    expect([](const auto& y) { return y / (y * y - y); }, x, 1 / (x - 1), -1 / ((x - 1) * (x - 1)));
+    expect([](const auto& y) { return log(y); }, size, std::log(size), 1 / size);
+    expect([](const auto& y) { return sqrt(y); }, size, std::sqrt(size), 0.5 / std::sqrt(size));
+    expect([](const auto& y) { return pow(y, std::decay_t<decltype(y)>(-1.5)); }, size, std::pow(size, -1.5),
+           -1.5 * std::pow(size, -2.5));
   }
 }
 
+// Whatever their neighbours are.
 TEST(LaneFunctions, AreThoseOfTheStandardLibrary) {
-  using L = LanePack<MemberRegister>;
   for (const double x : {0.3, -0.7, 0.99}) {
-    const L pack(x);
-    EXPECT_EQ(tan(pack)[0], std::tan(x));
-    EXPECT_EQ(asin(pack)[0], std::asin(x));
-    EXPECT_EQ(acos(pack)[0], std::acos(x));
-    EXPECT_EQ(atan(pack)[0], std::atan(x));
-    EXPECT_EQ(sinh(pack)[0], std::sinh(x));
-    EXPECT_EQ(cosh(pack)[0], std::cosh(x));
-    EXPECT_EQ(tanh(pack)[0], std::tanh(x));
-    EXPECT_EQ(cbrt(pack)[0], std::cbrt(x));
-    EXPECT_EQ(pow(abs(pack), L(-1.5))[0], std::pow(std::abs(x), -1.5));
-    EXPECT_NEAR(sin(pack)[0], std::sin(x), 2e-16);
-    EXPECT_NEAR(cos(pack)[0], std::cos(x), 2e-16);
+    alignas(pack_alignment) double numbers[MemberRegister::size];
+    std::fill(std::begin(numbers), std::end(numbers), 1e7);
+    numbers[0] = x;
+    const Lanes pack = Lanes::load(numbers);
+    EXPECT_EQ(first(tan(pack)), std::tan(x));
+    EXPECT_EQ(first(asin(pack)), std::asin(x));
+    EXPECT_EQ(first(acos(pack)), std::acos(x));
+    EXPECT_EQ(first(atan(pack)), std::atan(x));
+    EXPECT_EQ(first(sinh(pack)), std::sinh(x));
+    EXPECT_EQ(first(cosh(pack)), std::cosh(x));
+    EXPECT_EQ(first(tanh(pack)), std::tanh(x));
+    EXPECT_EQ(first(cbrt(pack)), std::cbrt(x));
+    EXPECT_EQ(first(pow(abs(pack), Lanes(-1.5))), std::pow(std::abs(x), -1.5));
+    EXPECT_EQ(first(exp(pack)), first(exp(Lanes(x))));
+    EXPECT_EQ(first(log(abs(pack))), first(log(Lanes(std::abs(x)))));
+    EXPECT_EQ(first(sin(pack)), first(sin(Lanes(x))));
+    EXPECT_EQ(first(cos(pack)), first(cos(Lanes(x))));
+    EXPECT_NEAR(first(sin(pack)), std::sin(x), 2e-16);
+    EXPECT_NEAR(first(cos(pack)), std::cos(x), 2e-16);
   }
-  EXPECT_EQ(sin(L(1e7))[0], std::sin(1e7));
-  EXPECT_EQ(cos(L(1e7))[0], std::cos(1e7));
+  EXPECT_EQ(first(sin(Lanes(1e7))), std::sin(1e7));
+  EXPECT_EQ(first(cos(Lanes(1e7))), std::cos(1e7));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_comparison.hpp>
 #include <span>
 #include <string>
@@ -108,14 +109,15 @@ void add(const MotionCheck& check, std::string_view kernel, Tally& tally) {
 template <class Space>
 void check_space(const CheckOptions& options, Tally& tally) {
   if (options.space && *options.space != Space::name) return;
-  for (const KernelEntry& entry : library_of<Space>().kernels) {
-    const int links = entry.info.links;
+  for (const SystemTable* kernel : library_of<Space>().kernels) {
+    const std::string_view name = kernel->info.name;
+    const int links = kernel->info.links;
     if (options.links && *options.links != links) continue;
-    add(entry.check(seed), entry.info.name, tally);
+    add(check_chain_kernel(*kernel, seed), name, tally);
     const ChainSubject<Space> subject(test_chain<Space>(links));
     const std::vector<std::string> units(static_cast<std::size_t>(links * Space::dof), "rad");
-    const MotionCheck check(entry.info.name, subject, test_start<Space>(links), units, 0);
-    add(check, entry.info.name, tally);
+    const MotionCheck check(name, subject, test_start<Space>(links), units, 0);
+    add(check, name, tally);
     for (const Iteration iteration : {Iteration::newton, Iteration::fixed_point}) {
       tally.add(check.dense_to_chain(iteration));
     }
@@ -136,8 +138,8 @@ void check_system(const ModelToCheck& checked, const io::Toolchain& toolchain, T
   const SystemInfo& info = checked.system->info();
   const std::vector<double> said = io::written_values(checked.model, checked.links, checked.folder, toolchain,
                                                       checked.system->numbers().parameters, checked.start, seed);
-  const KernelComparison comparison(info, said);
-  add(comparison.check(checked.system->entry().evaluate), info.name, tally);
+  const KernelComparison comparison(checked.system->table(), said);
+  add(comparison.check(), info.name, tally);
   if (tally.failures > 0) return;
   const std::vector<std::string> units(info.coordinate_units.begin(), info.coordinate_units.end());
   add(MotionCheck(info.name, *checked.system, checked.start, units, comparison.energy_rounding()), info.name, tally);
@@ -177,7 +179,7 @@ void check_model(const CheckOptions& options, Tally& tally) {
         checked.model = model;
         checked.links = links;
         checked.folder = folder;
-        return io::find_kernel(model, links, folder, toolchain, tell).entry;
+        return io::find_kernel(model, links, folder, toolchain, tell).table;
       };
       const io::AnyScenario any = io::read_scenario(*options.model, {}, find);
       const auto* scenario = std::get_if<io::SystemScenario>(&any);
@@ -185,8 +187,8 @@ void check_model(const CheckOptions& options, Tally& tally) {
       checked.system = scenario->system;
       checked.start = scenario->start;
     } else {
-      const auto entry = io::find_kernel(*options.model, options.links, "", toolchain, tell).entry;
-      checked.system = std::make_shared<const SystemSubject>(entry, usual_numbers(entry->info));
+      const auto kernel = io::find_kernel(*options.model, options.links, "", toolchain, tell).table;
+      checked.system = std::make_shared<const SystemSubject>(kernel, usual_numbers(kernel->info));
       checked.start = usual_start(*checked.system);
     }
     check_system(checked, toolchain, tally);

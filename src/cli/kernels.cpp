@@ -13,8 +13,8 @@ ExitStatus kernels() {
   for (const KernelInfo& kernel : built_in_kernels()) {
     std::cout << std::setw(14) << kernel.name << std::setw(9) << kernel.space << kernel.links << '\n';
   }
-  for (const SystemEntry* entry : library().systems) {
-    std::cout << std::setw(14) << entry->info.name << std::setw(9) << "-" << entry->info.links << '\n';
+  for (const SystemTable* table : library().systems) {
+    std::cout << std::setw(14) << table->info.name << std::setw(9) << "-" << table->info.links << '\n';
   }
   return done;
 }

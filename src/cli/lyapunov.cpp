@@ -29,7 +29,7 @@ io::AnyScenario read_scenario(const LyapunovOptions& options) {
                            [&](const std::string& what) {
                              if (!options.json) std::cerr << "pendula: " << what << '\n';
                            })
-        .entry;
+        .table;
   };
   const io::ScenarioText text = io::read_scenario_text(options.scenario);
   return io::parse_scenario(text.text, text.name, options.overrides, find);

@@ -47,17 +47,17 @@ io::AnyScenario MemberScenarios::parse(const std::vector<std::string>& overrides
   return io::parse_scenario(text_.text, text_.name, overrides, find());
 }
 
-std::shared_ptr<const SystemEntry> MemberScenarios::find_system(const std::string& name, std::optional<int> links,
+std::shared_ptr<const SystemTable> MemberScenarios::find_system(const std::string& name, std::optional<int> links,
                                                                 const std::filesystem::path& folder) {
   const std::scoped_lock lock(guard_);
-  std::shared_ptr<const SystemEntry>& found = systems_[{name, links.value_or(0)}];
+  std::shared_ptr<const SystemTable>& found = systems_[{name, links.value_or(0)}];
   if (found) return found;
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
   model_ = io::model_source(name, links, folder, toolchain);
   const auto say = [&](const std::string& what) {
     if (!quiet_) std::cerr << "pendula: " << what << '\n';
   };
-  found = io::find_kernel(name, links, folder, toolchain, say).entry;
+  found = io::find_kernel(name, links, folder, toolchain, say).table;
   return found;
 }
 

@@ -10,7 +10,7 @@
 #include <pendula/ensemble/chunks.hpp>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/run_report.hpp>
-#include <pendula/run/system_subject.hpp>
+#include <pendula/system/system_table.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -61,7 +61,7 @@ class MemberScenarios {
 
  private:
   io::AnyScenario parse(const std::vector<std::string>& overrides);
-  std::shared_ptr<const SystemEntry> find_system(const std::string& name, std::optional<int> links,
+  std::shared_ptr<const SystemTable> find_system(const std::string& name, std::optional<int> links,
                                                  const std::filesystem::path& folder);
 
   io::FindSystem find() {
@@ -75,7 +75,7 @@ class MemberScenarios {
   io::ScenarioDocument document_;
   bool quiet_;
   std::mutex guard_;
-  std::map<std::pair<std::string, int>, std::shared_ptr<const SystemEntry>> systems_;
+  std::map<std::pair<std::string, int>, std::shared_ptr<const SystemTable>> systems_;
   std::string model_;
 };
 

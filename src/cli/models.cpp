@@ -74,7 +74,7 @@ ExitStatus build(const BuildOptions& options) {
     const io::ModelKernel kernel =
         io::find_kernel(options.model, options.links, "", io::Toolchain::of_this_program(),
                         [](const std::string& what) { std::cerr << "pendula: " << what << '\n'; });
-    const SystemInfo& info = kernel.entry->info;
+    const SystemInfo& info = kernel.table->info;
     std::cout << info.name << ": coordinates";
     for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
       std::cout << (k == 0 ? " " : ", ") << info.coordinates[k] << " [" << info.coordinate_units[k] << ']';

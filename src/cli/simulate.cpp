@@ -369,7 +369,7 @@ ExitStatus simulate(const SimulateOptions& options) {
                            [&](const std::string& what) {
                              if (!options.quiet) std::cerr << "pendula: " << what << '\n';
                            })
-        .entry;
+        .table;
   };
   const io::AnyScenario any = io::parse_scenario(source.text.text, source.text.name, source.overrides, find);
   return std::visit(

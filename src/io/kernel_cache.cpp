@@ -189,11 +189,11 @@ void derive(const fs::path& model, std::optional<int> links, const fs::path& hea
 void compile(const std::string& name, const fs::path& folder, const fs::path& object, const Toolchain& toolchain) {
   const fs::path source = folder / "kernel.cpp";
   std::ofstream(source) << "#include \"" << name << ".hpp\"\n"
-                        << "#include <pendula/run/system_entry.hpp>\n"
+                        << "#include <pendula/system/kernel_table.hpp>\n"
                         << "#define EXPORTED extern \"C\" __attribute__((visibility(\"default\")))\n"
                         << "EXPORTED constinit const int pendula_interface = pendula::system_interface;\n"
-                        << "EXPORTED constinit const pendula::SystemEntry pendula_system =\n"
-                        << "    pendula::system_entry<pendula::kernels::" << name << "_kernel>();\n";
+                        << "EXPORTED constinit const pendula::SystemTable pendula_system =\n"
+                        << "    pendula::system_table<pendula::kernels::" << name << "_kernel>;\n";
   std::vector<std::string> command{toolchain.compiler,
                                    "-std=c++20",
                                    "-O3",
@@ -262,7 +262,7 @@ struct Loaded {
 };
 
 /// A kept kernel; none, and why in `problem`, where there is none that is whole, the user's own, and of this pendula.
-std::shared_ptr<const SystemEntry> load(const fs::path& object, std::string& problem) {
+std::shared_ptr<const SystemTable> load(const fs::path& object, std::string& problem) {
   Descriptor opened(open(object.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   struct stat status {};
   const auto none = [&](const std::string& why) {
@@ -277,10 +277,10 @@ std::shared_ptr<const SystemEntry> load(const fs::path& object, std::string& pro
   const auto loaded = std::make_shared<Loaded>(std::move(opened));
   if (loaded->handle == nullptr) return none(dlerror());
   const auto* interface = static_cast<const int*>(dlsym(loaded->handle, "pendula_interface"));
-  const auto* entry = static_cast<const SystemEntry*>(dlsym(loaded->handle, "pendula_system"));
-  if (interface == nullptr || entry == nullptr || *interface != system_interface)
+  const auto* table = static_cast<const SystemTable*>(dlsym(loaded->handle, "pendula_system"));
+  if (interface == nullptr || table == nullptr || *interface != system_interface)
     return none("it is of another pendula");
-  return {loaded, entry};
+  return {loaded, table};
 }
 
 /// Removes kernels that no run has taken for a quarter of a year: each version of a model and of pendula has its own.
@@ -310,10 +310,10 @@ std::string kernel_name(const std::string& model, std::optional<int> links) {
 }
 
 /// The kernel of a built-in model, where this program has it.
-const SystemEntry* built_in_entry(const std::string& model, std::optional<int> links) {
+const SystemTable* built_in_table(const std::string& model, std::optional<int> links) {
   if (model.ends_with(".py")) return nullptr;
-  for (const SystemEntry* entry : library().systems) {
-    if (entry->info.name == kernel_name(model, links)) return entry;
+  for (const SystemTable* table : library().systems) {
+    if (table->info.name == kernel_name(model, links)) return table;
   }
   return nullptr;
 }
@@ -385,12 +385,12 @@ std::string describe_models(const Toolchain& toolchain) {
 
 std::string model_source(const std::string& model, std::optional<int> links, const fs::path& folder,
                          const Toolchain& toolchain) {
-  return built_in_entry(model, links) ? "" : read_model(find_model(model, folder, toolchain));
+  return built_in_table(model, links) ? "" : read_model(find_model(model, folder, toolchain));
 }
 
 ModelKernel find_kernel(const std::string& model, std::optional<int> links, const fs::path& folder,
                         const Toolchain& toolchain, const std::function<void(const std::string&)>& tell) {
-  if (const SystemEntry* entry = built_in_entry(model, links)) return {{}, {entry, [](const SystemEntry*) {}}};
+  if (const SystemTable* table = built_in_table(model, links)) return {{}, {table, [](const SystemTable*) {}}};
   const std::string name = kernel_name(model, links);
   const fs::path file = find_model(model, folder, toolchain);
   Key key;
@@ -403,8 +403,8 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   }
   const fs::path cache = require_cache(toolchain.cache), object = cache / (name + "-" + key.text() + ".so");
   std::string problem;
-  std::shared_ptr<const SystemEntry> entry = load(object, problem);
-  const bool was_there = entry != nullptr;
+  std::shared_ptr<const SystemTable> table = load(object, problem);
+  const bool was_there = table != nullptr;
   if (was_there) {
     fs::last_write_time(object, fs::file_time_type::clock::now(), none);  // used again
   } else {
@@ -414,11 +414,11 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
     compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
     seal(workshop.folder() / "kernel.so");
     fs::rename(workshop.folder() / "kernel.so", object);
-    entry = load(object, problem);
-    if (!entry) throw ModelError("the kernel cannot be loaded: " + problem);
+    table = load(object, problem);
+    if (!table) throw ModelError("the kernel cannot be loaded: " + problem);
   }
   remove_unused_kernels(cache);
-  return {object, entry, was_there};
+  return {object, table, was_there};
 }
 
 std::vector<double> written_values(const std::string& model, std::optional<int> links, const fs::path& folder,

@@ -4,8 +4,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/motion.hpp>
+#include <pendula/system/system_table.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -39,7 +39,7 @@ struct Toolchain {
 /// A compiled kernel of a model.
 struct ModelKernel {
   std::filesystem::path file;  ///< empty where it is part of this program
-  std::shared_ptr<const SystemEntry> entry;
+  std::shared_ptr<const SystemTable> table;
   bool was_there = true;  ///< not made just now
 };
 

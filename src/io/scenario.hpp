@@ -11,9 +11,9 @@
 #include <pendula/run/accuracy.hpp>
 #include <pendula/run/row_times.hpp>
 #include <pendula/run/system_subject.hpp>
-#include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
+#include <pendula/system/system_table.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -69,11 +69,11 @@ using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>, SystemScen
 
 /// Finds the kernel of the system that a scenario names: a model file, relative to the scenario's folder, or the name
 /// of a built-in model; links are none where the scenario says nothing of them. Throws InputError without a place.
-using FindSystem = std::function<std::shared_ptr<const SystemEntry>(const std::string& model, std::optional<int> links,
+using FindSystem = std::function<std::shared_ptr<const SystemTable>(const std::string& model, std::optional<int> links,
                                                                     const std::filesystem::path& folder)>;
 
 /// One that knows the kernels of this build only.
-std::shared_ptr<const SystemEntry> built_in_system(const std::string& model, std::optional<int> links,
+std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std::optional<int> links,
                                                    const std::filesystem::path& folder);
 
 /// Reads a scenario from TOML text; `name` stands for the file in messages. Each override is `key.path=value`, the

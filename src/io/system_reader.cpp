@@ -239,8 +239,8 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer(1, most_links));
   SystemScenario scenario;
   try {
-    const auto entry = find(model.text(), links, folder);
-    scenario.system = std::make_shared<SystemSubject>(entry, read_numbers(table, entry->info));
+    const auto kernel = find(model.text(), links, folder);
+    scenario.system = std::make_shared<SystemSubject>(kernel, read_numbers(table, kernel->info));
   } catch (const ModelError& error) {
     throw InputError(model.place() + ": " + error.what());
   }
@@ -249,14 +249,14 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   return scenario;
 }
 
-std::shared_ptr<const SystemEntry> built_in_system(const std::string& model, std::optional<int> links,
+std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std::optional<int> links,
                                                    const std::filesystem::path&) {
   const std::string stem = std::filesystem::path(model).stem().string();
   const std::string name = links ? stem + "_" + std::to_string(*links) : stem;
   std::vector<std::string_view> names;
-  for (const SystemEntry* entry : library().systems) {
-    if (entry->info.name == name) return {entry, [](const SystemEntry*) {}};
-    names.push_back(entry->info.name);
+  for (const SystemTable* table : library().systems) {
+    if (table->info.name == name) return {table, [](const SystemTable*) {}};
+    names.push_back(table->info.name);
   }
   throw ModelError("no kernel of the model " + name + " in this build (it has " + listed(names) + ")");
 }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "library/chain_integrator.hpp"
+#include "library/system_integrator.hpp"
 #include "library/taylor_integrator.hpp"
 
 namespace pendula {
@@ -18,8 +19,8 @@ template <class Space>
 std::string no_kernel_message(int links) {
   const std::string wanted = std::string(Space::name) + ":" + std::to_string(links);
   std::string built;
-  for (const KernelEntry& entry : library_of<Space>().kernels) {
-    built += (built.empty() ? "" : ", ") + std::string(entry.info.name);
+  for (const SystemTable* kernel : library_of<Space>().kernels) {
+    built += (built.empty() ? "" : ", ") + std::string(kernel->info.name);
   }
   return "no kernel for a " + std::string(Space::name) + " chain of " + std::to_string(links) +
          (links == 1 ? " link" : " links") + " in this build (it has " + (built.empty() ? "none" : built) +
@@ -27,23 +28,30 @@ std::string no_kernel_message(int links) {
 }
 
 template <class Space>
-const KernelEntry* find_kernel(int links) {
-  for (const KernelEntry& entry : library_of<Space>().kernels) {
-    if (entry.info.links == links) return &entry;
+const SystemTable* find_kernel(int links) {
+  for (const SystemTable* kernel : library_of<Space>().kernels) {
+    if (kernel->info.links == links) return kernel;
   }
   return nullptr;
 }
 
 template <class Space>
-const KernelEntry& require_kernel(int links) {
-  if (const KernelEntry* kernel = find_kernel<Space>(links)) return *kernel;
+const SystemTable& require_kernel(int links) {
+  if (const SystemTable* kernel = find_kernel<Space>(links)) return *kernel;
   throw NoKernel(no_kernel_message<Space>(links));
+}
+
+template <class Space>
+std::unique_ptr<PlainIntegrator> make_over(const SystemTable& kernel, const PlainChain& chain,
+                                           const RunOptions& options) {
+  const ChainSystem numbers(chain, Space::torque_components);
+  return make_system_integrator(kernel, numbers.plain(), options, chain.links);
 }
 
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
   if (options.method == Method::taylor) return make_taylor_integrator(chain_of<Space>(chain), options);
-  if (const KernelEntry* kernel = find_kernel<Space>(chain.links)) return kernel->make(chain, options);
+  if (const SystemTable* kernel = find_kernel<Space>(chain.links)) return make_over<Space>(*kernel, chain, options);
   return make_explicit_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain_of<Space>(chain)),
                                   Space::dof * chain.links, chain.links, options, "");
 }
@@ -72,7 +80,7 @@ std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, 
   require_stages(options.stages);
   if (solver_for<Space>(chain.links, options) == Solver::chain)
     return make_chain_integrator(chain_of<Space>(chain), options);
-  return require_kernel<Space>(chain.links).make(chain, options);
+  return make_over<Space>(require_kernel<Space>(chain.links), chain, options);
 }
 
 template std::unique_ptr<PlainIntegrator> make_plain_integrator<Planar>(const PlainChain&, const RunOptions&);

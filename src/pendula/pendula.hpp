@@ -21,5 +21,6 @@
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/simulation.hpp>
+#include <pendula/system/kernel_table.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>

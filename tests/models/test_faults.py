@@ -101,6 +101,7 @@ inline int fault = 0;
 
 INCLUDES
 #include <pendula/system/kernel_comparison.hpp>
+#include <pendula/system/kernel_table.hpp>
 
 // How many lines of the check fail.
 template <pendula::System S>
@@ -109,8 +110,7 @@ int failures(const char* file) {
   std::vector<double> said;
   for (std::string word; stream >> word;) said.push_back(std::strtod(word.c_str(), nullptr));
   int count = 0;
-  const pendula::KernelComparison comparison(pendula::info_of<S>(), said);
-  const pendula::KernelCheck check = comparison.check(&pendula::evaluate_kernel<S>);
+  const pendula::KernelCheck check = pendula::KernelComparison(pendula::system_table<S>, said).check();
   for (int k = 0; k < check.count; ++k) count += !(check.lines[k].error <= check.lines[k].limit);
   return count;
 }

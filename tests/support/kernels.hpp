@@ -30,6 +30,15 @@ struct KernelName {
   }
 };
 
+/// A chain's numbers as its kernel takes them.
+template <class Kernel, class Space>
+typename Kernel::template Parameters<double> parameters_of(const Chain<Space>& chain) {
+  typename Kernel::template Parameters<double> parameters;
+  const ChainSystem numbers(plain(chain, {}), Space::torque_components);
+  Kernel::template read_parameters<double>(numbers.plain().parameters, parameters);
+  return parameters;
+}
+
 /// One seeded draw of everything that a kernel's entry points take.
 template <class Kernel>
 struct KernelInputs {
@@ -45,7 +54,7 @@ struct KernelInputs {
   explicit KernelInputs(unsigned seed)
       : random(seed),
         chain(random_chain<Space>(random, Kernel::links, true)),
-        parameters(system_of<Kernel>(chain).parameters(0)) {
+        parameters(parameters_of<Kernel>(chain)) {
     chain.torque(0, torque);
     const State<Space> state = random_state<Space>(random, Kernel::links);
     q = state.q;

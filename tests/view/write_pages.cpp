@@ -13,8 +13,8 @@
 #include <pendula/kernels/cart_chain_2.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/run.hpp>
-#include <pendula/run/system_entry.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/kernel_table.hpp>
 #include <pendula/version.hpp>
 #include <string>
 #include <utility>
@@ -134,14 +134,14 @@ void long_chain(Pages& pages, const std::string& name, int links, double step, d
 
 /// Two links on a cart; and the same as if it had no points.
 void model(Pages& pages) {
-  static constexpr SystemEntry entry = system_entry<kernels::CartChain2>();
+  const SystemTable& table = system_table<kernels::CartChain2>;
   SystemNumbers numbers{{}, {0}, {}};
-  for (std::size_t k = 0; k < entry.info.parameters.size(); ++k) {
-    const double standard = entry.info.parameter_defaults[k];
-    const auto count = static_cast<std::size_t>(entry.info.parameter_sizes[k]);
+  for (std::size_t k = 0; k < table.info.parameters.size(); ++k) {
+    const double standard = table.info.parameter_defaults[k];
+    const auto count = static_cast<std::size_t>(table.info.parameter_sizes[k]);
     numbers.parameters.insert(numbers.parameters.end(), count, std::isnan(standard) ? 1 : standard);
   }
-  const std::shared_ptr<const SystemEntry> unowned(&entry, [](const SystemEntry*) {});
+  const std::shared_ptr<const SystemTable> unowned(&table, [](const SystemTable*) {});
   const auto subject = std::make_shared<SystemSubject>(unowned, numbers);
   Motion start;
   start.q = Eigen::Vector3d(0, 1.2, 2.0);

@@ -417,7 +417,7 @@ def statements_of_numbers(parameters: Sequence[Parameter], statement: Callable[[
     for parameter in parameters:
         name, size = parameter.name, len(parameter.symbols)
         if parameter.per_link:
-            lines.append(f"for (int i = 0; i < {size}; ++i) {statement(f'{at} + i', f'{name}[i]')}")
+            lines.append(f"for (unsigned i = 0; i < {size}; ++i) {statement(f'{at} + i', f'{name}[i]')}")
         else:
             lines.append(statement(str(at), name))
         at += size

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/plain_chain.hpp>
+#include <pendula/system/kernel_table.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
@@ -91,13 +92,13 @@ using SpaceOf = std::conditional_t<Kernel::dof == 1, Planar, Spatial>;
 /// The system that a generated kernel makes of a chain. Throws std::invalid_argument if the kernel is for another
 /// number of links.
 template <class Kernel, class Space, int N>
-SystemModel<Kernel> system_of(const Chain<Space, N>& chain) {
+SystemModel system_of(const Chain<Space, N>& chain) {
   if (chain.links() != Kernel::links) {
     throw std::invalid_argument("kernel " + std::string(Kernel::name) + ": expected a chain of " +
                                 std::to_string(Kernel::links) + " links, got " + std::to_string(chain.links()));
   }
   const std::vector<PlainChain::Drive> drives = plain_drives(chain);
-  return SystemModel<Kernel>(ChainSystem(plain(chain, drives), Space::torque_components).plain());
+  return SystemModel(system_table<Kernel>, ChainSystem(plain(chain, drives), Space::torque_components).plain());
 }
 
 }  // namespace pendula

@@ -22,6 +22,7 @@
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/run/track.hpp>
+#include <pendula/system/system_table.hpp>
 #include <span>
 #include <string>
 #include <tuple>
@@ -32,8 +33,8 @@ namespace pendula {
 
 /// Runs that members in lanes can take together: all that their steps have in common.
 struct LaneKind {
-  int dimension = 0, links = 0;        // of chains
-  MakeLaneDynamics* kernel = nullptr;  // of others
+  int dimension = 0, links = 0;         // of chains
+  const SystemTable* kernel = nullptr;  // of others
   int stages = 0;
   Method method = Method::gauss;
   Iteration iteration = Iteration::automatic;
@@ -79,7 +80,7 @@ inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKi
   const bool is_seen = !system->info().depends_on_time && !misses_loads(setup, options);
   if (!is_explicit(options.method) && !is_seen) return false;
   if (system->may_be_narrow()) return false;  // lanes do not look between their stages
-  kind.kernel = system->entry().lanes;
+  kind.kernel = &system->table();
   return true;
 }
 
@@ -178,8 +179,9 @@ class PlainChains : public PlainEnds {
 /// The same of what generated kernels move.
 class PlainSystems : public PlainEnds {
  public:
+  /// `setups` must outlive it.
   explicit PlainSystems(std::span<const RunSetup* const> setups)
-      : PlainEnds(setups), dynamics_(system(*setups[0]).entry().lanes()) {
+      : PlainEnds(setups), table_(system(*setups[0]).table()) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const double end = start.time + setup->duration;
@@ -188,10 +190,10 @@ class PlainSystems : public PlainEnds {
   }
 
   bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
-    return library().system_lanes(options)(*dynamics_, options, every, members_, ends(), watch);
+    return library().system_lanes(options)(table_, options, every, members_, ends(), watch);
   }
   bool move_with_tangents(const RunOptions& options, LaneWatch& watch) {
-    return library().system_tangent_lanes(options)(*dynamics_, options, 0, members_, ends(), watch);
+    return library().system_tangent_lanes(options)(table_, options, 0, members_, ends(), watch);
   }
 
   static constexpr Solver solver = Solver::dense;
@@ -204,7 +206,7 @@ class PlainSystems : public PlainEnds {
     return static_cast<const SystemSubject&>(*setup.subject);
   }
 
-  std::unique_ptr<LaneDynamics> dynamics_;
+  const SystemTable& table_;
   std::vector<PlainSystemMember> members_;
 };
 

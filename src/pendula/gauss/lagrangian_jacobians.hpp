@@ -2,68 +2,73 @@
 
 #include <cstddef>
 #include <pendula/gauss/lagrangian_stages.hpp>
-#include <vector>
 
 namespace pendula {
 
 /// What the kernel's generated Jacobians make of the stage equations of any system in momentum form: p and f at the
-/// stages and their derivatives, and the exact matrix of the equations for the stage rates V (lagrangian_newton.hpp).
-template <System S, int Width>
+/// stages and their derivatives, all stages of one number in the lanes of a pack, and the exact matrix of the equations
+/// for the stage rates V (lagrangian_newton.hpp).
+template <int Width>
 class LagrangianJacobians {
  public:
-  using Stages = LagrangianStages<S, Width>;
-  using Vector = typename Stages::Vector;
-  using Matrix = typename Stages::Matrix;
+  using Stages = LagrangianStages<Width>;
+  using L = typename Stages::L;
+  using Rows = typename Stages::Rows;
 
-  struct Stage {
-    Vector q, v, p, f;
-    Matrix p_D_q, p_D_v, f_D_q, f_D_v;
-  };
+  explicit LagrangianJacobians(std::size_t coordinates)
+      : count_(coordinates), vectors_(4 * count_), matrices_(4 * count_ * count_) {}
 
-  explicit LagrangianJacobians(int stages) : at_(static_cast<std::size_t>(stages)) {}
-
-  int stages() const { return static_cast<int>(at_.size()); }
-  Stage& operator[](int i) { return at_[index(i)]; }
-  const Stage& operator[](int i) const { return at_[index(i)]; }
+  std::size_t count() const { return count_; }
 
   /// Coordinates and rates of the stages as they are.
   void place(const Stages& stages) {
-    alignas(pack_alignment) typename Stages::Stored q;
-    for (std::size_t k = 0; k < Stages::count; ++k) {
-      stages.position(k).store(q);
-      for (int i = 0; i < stages.stages(); ++i) {
-        at_[index(i)].q[index(k)] = q[i];
-        at_[index(i)].v[index(k)] = stages.moved(k)[i] / stages.columns().hb(index(i));
-      }
+    alignas(pack_alignment) typename Stages::Stored inverse = {};  // beyond the stages nothing moves
+    for (std::size_t j = 0; j < static_cast<std::size_t>(stages.stages()); ++j) inverse[j] = 1 / stages.columns().hb(j);
+    for (std::size_t k = 0; k < count_; ++k) {
+      stages.position(k).store(vectors_[k]);
+      (L::load(inverse) * L::load(stages.moved(k))).store(vectors_[count_ + k]);
     }
+  }
+
+  /// p and f there.
+  void evaluate_forms(const Stages& stages) {
+    place(stages);
+    stages.at_stages()(&SystemFunctions::momentum_form, q(), v(), vector(2), vector(3));
   }
 
   /// All of it.
   void evaluate(const Stages& stages) {
     place(stages);
-    for (int i = 0; i < stages.stages(); ++i) {
-      Stage& at = at_[index(i)];
-      const double time = stages.time_of(i);
-      S::momentum_form_with_jacobians(stages.model().parameters(time), at.q, at.v, stages.model().inputs(time), at.p,
-                                      at.f, at.p_D_q, at.p_D_v, at.f_D_q, at.f_D_v);
-    }
+    stages.at_stages()(&SystemFunctions::momentum_form_with_jacobians, q(), v(), vector(2), vector(3), matrix(0),
+                       matrix(1), matrix(2), matrix(3));
   }
 
-  /// ∂(residual i)/∂V_k, by the chain rule through Q_j = … + h a_jk V_k.
-  Matrix block(const typename Stages::Columns& columns, int i, int k) const {
-    Matrix block = columns.ha(index(i), index(k)) * (at_[index(i)].p_D_q - at_[index(k)].f_D_v);
-    if (i == k) block += at_[index(i)].p_D_v;
-    for (int j = 0; j < columns.stages(); ++j) {
-      block -= (columns.ha(index(i), index(j)) * columns.ha(index(j), index(k))) * at_[index(j)].f_D_q;
-    }
-    return block;
+  const double* q() const { return vectors_[0]; }
+  const double* v() const { return vectors_[count_]; }
+  L p(std::size_t k) const { return L::load(vectors_[2 * count_ + k]); }
+  L f(std::size_t k) const { return L::load(vectors_[3 * count_ + k]); }
+  L p_D_q(std::size_t i, std::size_t j) const { return L::load(entry(0, i, j)); }
+  L p_D_v(std::size_t i, std::size_t j) const { return L::load(entry(1, i, j)); }
+  L f_D_q(std::size_t i, std::size_t j) const { return L::load(entry(2, i, j)); }
+  L f_D_v(std::size_t i, std::size_t j) const { return L::load(entry(3, i, j)); }
+
+  /// ∂(residual of row, stage i)/∂(V of column, stage k) of all i, by the chain rule through Q_j = … + h a_jk V_k.
+  L derivative(const typename Stages::Columns& columns, std::size_t row, std::size_t column, std::size_t k) const {
+    const L ha = columns.ha(k), through_q = columns.integral(columns.hb() * (ha * f_D_q(row, column)));
+    const L direct = ha * (p_D_q(row, column) - L(entry(3, row, column)[k]));
+    return fma(L(entry(1, row, column)[k]), columns.unit(k), direct - through_q);
   }
 
  private:
-  static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
-  static constexpr std::size_t index(int j) { return static_cast<std::size_t>(j); }
+  double* vector(std::size_t which) { return vectors_[which * count_]; }
+  double* matrix(std::size_t which) { return matrices_[which * count_ * count_]; }
+  const double* entry(std::size_t which, std::size_t i, std::size_t j) const {
+    return matrices_[(which * count_ + i) * count_ + j];
+  }
 
-  std::vector<Stage> at_;
+  std::size_t count_;
+  Rows vectors_;   // q, v, p, f
+  Rows matrices_;  // ∂p/∂q, ∂p/∂v, ∂f/∂q, ∂f/∂v
 };
 
 }  // namespace pendula

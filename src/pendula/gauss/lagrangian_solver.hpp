@@ -5,7 +5,6 @@
 #include <limits>
 #include <pendula/gauss/iteration_choice.hpp>
 #include <pendula/gauss/lagrangian_field.hpp>
-#include <pendula/gauss/lagrangian_fixed_point.hpp>
 #include <pendula/gauss/lagrangian_newton.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
 #include <pendula/gauss/lagrangian_tangent.hpp>
@@ -21,26 +20,35 @@
 namespace pendula {
 
 /// The stage equations of any system in momentum form, q̇ = v, ṗ = ∂L/∂q + Q, p = ∂L/∂v, over its generated kernel:
-/// symplectic. Solved by exact Newton, by fixed point, or by whichever takes less. Up to `Width` stages, 4 or 8.
-template <System S, int Width = max_stages>
+/// symplectic. Solved by exact Newton, by fixed point, or by whichever takes less. Up to `Width` stages: 2, 4 or
+/// 8.
+template <int Width = max_stages>
 class LagrangianSolver {
  public:
-  using Model = SystemModel<S>;
+  using Model = SystemModel;
   using Real = double;
-  using Vector = typename S::template Vector<double>;
-  using State = SystemState<S>;
+  using State = Motion;
 
   /// Throws std::invalid_argument unless the method has so many stages, at most Width.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
                    Family family = Family::gauss)
       : family_(family),
         stages_(model, checked(stages), family),
-        newton_(stages),
-        forcing_(family, stages),
-        field_(stages),
-        choice_(iteration, newton_cost(stages)) {}
+        newton_(model.coordinates(), stages),
+        forcing_(model, family, stages),
+        field_(model, stages),
+        choice_(iteration, newton_cost(stages)),
+        // Where lengths change, motion may be singular beside the stages, which angles alone never are. What depends on
+        // time keeps no energy.
+        may_miss_(family != Family::radau && !model.info().depends_on_time &&
+                  !std::ranges::all_of(model.info().is_angle, std::identity())) {}
 
-  Status start(const State& state) { return stages_.start(state.time, state.q, state.v); }
+  /// Throws std::invalid_argument on another number of coordinates.
+  Status start(const State& state) {
+    require_size("q", state.q.size());
+    require_size("v", state.v.size());
+    return stages_.start(state.time, state.q.data(), state.v.data());
+  }
 
   void prepare(double time, double h) {
     stages_.prepare(time, h);
@@ -56,18 +64,23 @@ class LagrangianSolver {
   Correction correct() {
     ++count_;
     choice_.count_iteration();
-    forces_are_found_ = choice_.active() == Iteration::fixed_point;
-    if (!forces_are_found_) return last_ = newton_.correct(stages_);
-    const Correction correction = fixed_point_.correct(stages_);
-    if (choice_.is_automatic() &&
-        diverges(correction.relative, last_.relative, count_, usual_rounding(parts(), epsilon), epsilon)) {
-      if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN(), -1};
+    if (choice_.active() == Iteration::fixed_point) {
+      const double change = stages_.iterate();
+      if (!gives_up(change)) {
+        forces_are_found_ = true;
+        last_change_ = change;
+        last_part_ = -1;
+        return {change, -1};
+      }
+      if (!choice_.newton_is_allowed()) return {std::numeric_limits<double>::quiet_NaN(), -1};
       stages_.start_cold();
       choice_.give_up_fixed_point();
-      forces_are_found_ = false;
-      return last_ = newton_.correct(stages_);
     }
-    return last_ = correction;
+    forces_are_found_ = false;
+    const Correction correction = newton_.correct(stages_);
+    last_change_ = correction.relative;
+    last_part_ = correction.part;
+    return correction;
   }
 
   void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
@@ -76,15 +89,12 @@ class LagrangianSolver {
     return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
   }
 
-  int worst_part() { return last_.part >= 0 ? last_.part : fixed_point_.worst_coordinate(stages_); }
+  int worst_part() { return last_part_ >= 0 ? last_part_ : stages_.most_changing_coordinate(); }
   int singular_part() const { return stages_.singular_coordinate(); }
   static constexpr bool continues() { return true; }
 
   // Where inertia may vanish, coordinates may move faster than all else.
-  static constexpr double largest_turn() { return S::constant_masses ? 3 : 0.25; }
-  // Where lengths change, motion may be singular beside the stages, which angles alone never are. What depends on time
-  // keeps no energy.
-  static constexpr bool may_miss = !holds_time<S> && !std::ranges::all_of(S::coordinate_is_angle, std::identity());
+  double largest_turn() const { return stages_.info().constant_masses ? 3 : 0.25; }
   double turn() const { return stages_.turn(); }
   int turning_part() const { return stages_.turning_coordinate(); }
   double defect() { return stages_.defect(); }
@@ -92,28 +102,31 @@ class LagrangianSolver {
   Tempo tempo() const { return stages_.tempo(); }
   StepShape shape() {
     StepShape shape = stages_.shape();
-    if (may_miss && !dissipates()) {
+    if (may_miss_) {
       find_forces();
       shape.imbalance = stages_.imbalance();
     }
     return shape;
   }
   /// Of what forces do between the stages that were solved.
-  Unseen unseen() requires tells_arguments<S> {
+  Unseen unseen() {
+    if (!has_to_look()) return {};
     find_forces();
     return field_.unseen(stages_);
   }
   bool loaded() const { return stages_.model().loaded(); }
   bool damped() const { return stages_.model().damped(); }
   double followed(double time, double h, double tolerance) {
-    return forcing_.followed(stages_.model(), h, tolerance, [&] {
-      return std::pair(State{time, stages_.position(), stages_.velocity(time)}, stages_.tempo().pace);
+    return forcing_.followed(h, tolerance, [&] {
+      const double pace = stages_.tempo().pace;
+      const auto [q, v] = stages_.place(time);
+      return SystemForcing::Here{time, q, v, pace};
     });
   }
   bool dissipates() const { return family_ == Family::radau; }
   int stages() const { return stages_.stages(); }
-  static constexpr int parts() { return S::coordinates; }
-  static constexpr int coordinates() { return S::coordinates; }
+  int parts() const { return coordinates(); }
+  int coordinates() const { return static_cast<int>(stages_.count()); }
   double work() const { return stages_.work(); }
   double energy_defect() {
     find_forces();
@@ -127,12 +140,11 @@ class LagrangianSolver {
   }
 
   /// The derivative of the step that was solved and not yet accepted.
-  using Tangent = LagrangianTangent<S, Width>;
+  using Tangent = LagrangianTangent<Width>;
   Tangent make_tangent() const { return Tangent(stages_); }
   void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
 
-  State state(double time) const { return {time, stages_.position_with_turns(), stages_.velocity(time)}; }
-  Vector momentum() const { return stages_.momentum(); }
+  State state(double time) const { return stages_.motion(time); }
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(stages_, choice_);
@@ -158,9 +170,23 @@ class LagrangianSolver {
                                 std::to_string(stages));
   }
 
+  void require_size(const char* what, Eigen::Index size) const {
+    if (size == coordinates()) return;
+    throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(coordinates()) + " numbers, got " +
+                                std::to_string(size));
+  }
+
   // Of a Newton iteration in fixed-point iterations, as measured on kernels of one to six coordinates (g++ 12, AVX2 and
   // AVX-512): within a third.
-  static double newton_cost(int stages) { return stages * std::min(1.6 + 0.75 * S::coordinates, 5.5); }
+  double newton_cost(int stages) const { return stages * std::min(1.6 + 0.75 * coordinates(), 5.5); }
+
+  bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }
+
+  // Whether a fixed point that changed so much leaves the step to Newton.
+  bool gives_up(double change) const {
+    return choice_.is_automatic() &&
+           diverges(change, last_change_, count_, usual_rounding(parts(), epsilon), epsilon);
+  }
 
   // Newton leaves the forces of the rates before its last correction.
   void find_forces() {
@@ -169,13 +195,14 @@ class LagrangianSolver {
   }
 
   Family family_;
-  LagrangianStages<S, Width> stages_;
-  LagrangianNewton<S, Width> newton_;
-  LagrangianFixedPoint<S, Width> fixed_point_;
-  SystemForcing<S> forcing_;
-  LagrangianField<S, Width> field_;
+  LagrangianStages<Width> stages_;
+  LagrangianNewton<Width> newton_;
+  SystemForcing forcing_;
+  LagrangianField<Width> field_;
   IterationChoice choice_;
-  Correction last_;
+  bool may_miss_;
+  double last_change_ = 0;  // of the last correction, apart from the next: written and read one by one
+  int last_part_ = -1;
   int count_ = 0;
   bool forces_are_found_ = true;
 };

@@ -7,54 +7,12 @@
 #include <pendula/gauss/lagrangian_direction.hpp>
 #include <pendula/gauss/lagrangian_jacobians.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
-#include <pendula/numeric/dual.hpp>
-#include <pendula/numeric/linear_system.hpp>
+#include <pendula/gauss/parameter_slopes.hpp>
+#include <pendula/gauss/stage_system.hpp>
 #include <pendula/system/system_model.hpp>
+#include <vector>
 
 namespace pendula {
-
-/// What a system's momenta and forces change by where its parameters and inputs vary, exactly: its kernel in dual
-/// numbers. Variations are numbered as parameter_names and then input_names are.
-template <System S>
-class ParameterSlopes {
- public:
-  using Vector = typename S::template Vector<double>;
-  static constexpr int count = parameter_count<S>() + static_cast<int>(S::template Inputs<double>::SizeAtCompileTime);
-  /// One column a parameter or input.
-  using Matrix = Eigen::Matrix<double, S::coordinates, count>;
-
-  Matrix p, f;  ///< ∂p/∂θ, ∂f/∂θ at given q and v
-
-  void evaluate(const SystemModel<S>& model, double time, const Vector& q, const Vector& v) {
-    typename S::template Parameters<Number> varied;
-    S::cast_parameters(model.parameters(time), varied);
-    std::array<Number*, static_cast<std::size_t>(count)> places{};
-    S::parameter_places(varied, places.data());
-    for (std::size_t k = 0; k < given; ++k) places[k]->slopes[k] = 1;
-    const auto inputs = model.inputs(time);
-    typename S::template Inputs<Number> driven;
-    for (Eigen::Index k = 0; k < inputs.size(); ++k) {
-      driven.data()[k] = Number(inputs.data()[k]);
-      driven.data()[k].slopes[given + static_cast<std::size_t>(k)] = 1;
-    }
-    typename S::template Vector<Number> at, rate, momentum, force;
-    for (Eigen::Index k = 0; k < q.size(); ++k) {
-      at[k] = Number(q[k]);
-      rate[k] = Number(v[k]);
-    }
-    S::momentum_form(varied, at, rate, driven, momentum, force);
-    for (Eigen::Index k = 0; k < q.size(); ++k) {
-      for (Eigen::Index j = 0; j < count; ++j) {
-        p(k, j) = momentum[k].slopes[static_cast<std::size_t>(j)];
-        f(k, j) = force[k].slopes[static_cast<std::size_t>(j)];
-      }
-    }
-  }
-
- private:
-  using Number = Dual<count>;
-  static constexpr auto given = static_cast<std::size_t>(parameter_count<S>());
-};
 
 /// The derivative of one Gauss step of any system in momentum form, exactly that of the discrete step: the stage
 /// equations of lagrangian_newton.hpp, linearised where they are solved (implicit function theorem).
@@ -65,33 +23,41 @@ class ParameterSlopes {
 /// With C what the end of the step changes by with V, and A Newton's matrix, E = −C A⁻¹ is what it changes by with the
 /// residuals of the stages: everything else follows by products. A few tangents take less by themselves, each by a
 /// fixed point on what the stages of it are, all of them in the lanes of SIMD registers (lagrangian_direction.hpp).
-template <System S, int Width>
+template <int Width>
 class LagrangianTangent {
  public:
   using Real = double;
-  using Stages = LagrangianStages<S, Width>;
+  using Stages = LagrangianStages<Width>;
 
   explicit LagrangianTangent(const Stages& stages)
-      : model_(stages.model()),
-        columns_(stages.columns()),
-        jacobians_(stages.stages()),
-        system_(K * stages.stages()),
-        of_residuals_(K * stages.stages(), 2 * K) {}
+      : columns_(stages.columns()),
+        jacobians_(stages.count()),
+        direction_(stages.count()),
+        system_(stages.count(), stages.stages()),
+        of_residuals_(system_.at(stages.count(), 0), 2 * eigen_count()),
+        residuals_(of_residuals_.rows(), 0),
+        state_(2 * eigen_count(), 2 * eigen_count()),
+        slopes_(stages.model()),
+        of_parameters_(2 * eigen_count(), slopes_.p.cols()),
+        from_(static_cast<std::size_t>(size()) * together),
+        to_(from_) {}
 
-  static constexpr int size() { return 2 * K; }
-  static constexpr int parameters() { return ParameterSlopes<S>::count; }
+  int size() const { return 2 * static_cast<int>(count()); }
+  int parameters() const { return static_cast<int>(slopes_.p.cols()); }
 
   /// The derivative of the step whose stages are found and that was not accepted yet.
   void linearize(const Stages& stages) {
     columns_.prepare(stages.columns().h(), 0);
+    jacobians_.evaluate(stages);
     direction_.linearize(stages);
-    for (int i = 0; i < columns_.stages(); ++i) times_[index(i)] = stages.time_of(i);
+    for (int i = 0; i < columns_.stages(); ++i) times_[static_cast<std::size_t>(i)] = stages.time_of(i);
     has_state_ = has_parameters_ = false;
   }
 
   /// Replaces tangents at the start of the step, (size x count) row by row, by those at its end.
   void push(double* tangents, int count) {
-    if (!has_state_ && count <= K && direction_.push(columns_, tangents, count)) return;
+    const bool few = !has_state_ && count <= static_cast<int>(this->count());
+    if (few && direction_.push(jacobians_, columns_, tangents, count)) return;
     find_state();
     replace(tangents, count, state_);
   }
@@ -118,43 +84,67 @@ class LagrangianTangent {
   }
 
  private:
-  static constexpr int K = S::coordinates;
-  using Matrix = typename Stages::Matrix;
-  using State = Eigen::Matrix<double, 2 * K, 2 * K>;
+  using L = typename Stages::L;
 
-  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
-  double hb(int j) const { return columns_.hb(index(j)); }
-  double ha(int i, int j) const { return columns_.ha(index(i), index(j)); }
+  std::size_t count() const { return jacobians_.count(); }
+  static Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
+  Eigen::Index eigen_count() const { return index(count()); }
+
+  // Lanes of the stages into a column of numbers, stages of coordinate `row` of which stand together.
+  template <class Matrix>
+  void write(const L& lanes, Matrix& to, std::size_t row, Eigen::Index column) const {
+    alignas(pack_alignment) typename Stages::Stored numbers;
+    lanes.store(numbers);
+    for (std::size_t i = 0; i < system_.stages(); ++i) to(system_.at(row, i), column) = numbers[i];
+  }
+  double total(const L& lanes) const {
+    alignas(pack_alignment) typename Stages::Stored numbers;
+    lanes.store(numbers);
+    double total = 0;
+    for (std::size_t i = 0; i < system_.stages(); ++i) total += numbers[i];
+    return total;
+  }
 
   // Only where a few tangents are not all that is asked for.
   void find_state() {
     if (has_state_) return;
     has_state_ = true;
-    direction_.read(jacobians_);
     find_response();
+    const Eigen::Index K = eigen_count();
+    residuals_.resize(of_residuals_.rows(), K);
     state_.setIdentity();
-    const int stages = columns_.stages();
-    for (int j = 0; j < stages; ++j) state_.template block<K, K>(K, 0) += hb(j) * jacobians_[j].f_D_q;
-    for (int i = 0; i < stages; ++i) {
-      Matrix of_position = jacobians_[i].p_D_q;
-      for (int j = 0; j < stages; ++j) of_position -= ha(i, j) * jacobians_[j].f_D_q;
-      const auto response = of_residuals_.template middleRows<K>(K * i);
-      state_.template leftCols<K>() += response.transpose().lazyProduct(of_position);
-      state_.template rightCols<K>() -= response.transpose();
+    for (std::size_t row = 0; row < count(); ++row) {
+      for (std::size_t column = 0; column < count(); ++column) {
+        const L forced = columns_.hb() * jacobians_.f_D_q(row, column);
+        state_(K + index(row), index(column)) += total(forced);
+        write(jacobians_.p_D_q(row, column) - columns_.integral(forced), residuals_, row, index(column));
+      }
+      for (std::size_t i = 0; i < system_.stages(); ++i) {
+        state_.col(K + index(row)) -= of_residuals_.row(system_.at(row, i)).transpose();
+      }
     }
+    state_.leftCols(K) += of_residuals_.transpose().lazyProduct(residuals_);
   }
 
-  // Eᵀ, of Aᵀ Eᵀ = −Cᵀ: rows of stage i are what its residual does to (q, p) at the end.
+  // Eᵀ, of Aᵀ Eᵀ = −Cᵀ: rows of a stage are what its residual does to (q, p) at the end.
   void find_response() {
-    const int stages = columns_.stages();
-    for (int k = 0; k < stages; ++k) {
-      Matrix pushed = hb(k) * jacobians_[k].f_D_v;
-      for (int j = 0; j < stages; ++j) pushed += (hb(j) * ha(j, k)) * jacobians_[j].f_D_q;
-      auto rows = of_residuals_.template middleRows<K>(K * k);
-      rows.template leftCols<K>() = -hb(k) * Matrix::Identity();
-      rows.template rightCols<K>() = -pushed.transpose();
-      for (int i = 0; i < stages; ++i) {
-        system_.matrix.template block<K, K>(K * k, K * i) = jacobians_.block(columns_, i, k).transpose();
+    const Eigen::Index K = eigen_count();
+    of_residuals_.setZero();
+    for (std::size_t column = 0; column < count(); ++column) {
+      for (std::size_t k = 0; k < system_.stages(); ++k) {
+        const Eigen::Index unknown = system_.at(column, k);
+        of_residuals_(unknown, index(column)) = -columns_.hb(k);
+        for (std::size_t row = 0; row < count(); ++row) {
+          alignas(pack_alignment) typename Stages::Stored forced;
+          jacobians_.f_D_v(row, column).store(forced);
+          const L through_q = (columns_.hb() * columns_.ha(k)) * jacobians_.f_D_q(row, column);
+          of_residuals_(unknown, K + index(row)) = -(columns_.hb(k) * forced[k] + total(through_q));
+          alignas(pack_alignment) typename Stages::Stored derivative;
+          jacobians_.derivative(columns_, row, column, k).store(derivative);
+          for (std::size_t i = 0; i < system_.stages(); ++i) {
+            system_.matrix(unknown, system_.at(row, i)) = derivative[i];
+          }
+        }
       }
     }
     system_.solve(of_residuals_.data(), 2 * K);
@@ -165,17 +155,24 @@ class LagrangianTangent {
     if (has_parameters_) return;
     find_state();
     has_parameters_ = true;
+    const Eigen::Index K = eigen_count(), stages = index(system_.stages());
+    std::vector<Eigen::MatrixXd> momenta, forces;
+    for (std::size_t i = 0; i < system_.stages(); ++i) {
+      slopes_.evaluate(times_[i], jacobians_.q() + i, jacobians_.v() + i, static_cast<std::size_t>(Width));
+      momenta.push_back(slopes_.p);
+      forces.push_back(slopes_.f);
+    }
     of_parameters_.setZero();
-    const int stages = columns_.stages();
-    for (int i = 0; i < stages; ++i) {
-      slopes_[index(i)].evaluate(model_, times_[index(i)], jacobians_[i].q, jacobians_[i].v);
-      of_parameters_.template bottomRows<K>() += hb(i) * slopes_[index(i)].f;
+    residuals_.resize(of_residuals_.rows(), of_parameters_.cols());
+    for (Eigen::Index i = 0; i < stages; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      of_parameters_.bottomRows(K) += columns_.hb(at) * forces[at];
+      for (std::size_t j = 0; j < system_.stages(); ++j) momenta[at] -= columns_.ha(at, j) * forces[j];
+      for (std::size_t row = 0; row < count(); ++row) {
+        residuals_.row(system_.at(row, at)) = momenta[at].row(index(row));
+      }
     }
-    for (int i = 0; i < stages; ++i) {
-      auto residual = slopes_[index(i)].p;
-      for (int j = 0; j < stages; ++j) residual -= ha(i, j) * slopes_[index(j)].f;
-      of_parameters_ += of_residuals_.template middleRows<K>(K * i).transpose().lazyProduct(residual);
-    }
+    of_parameters_ += of_residuals_.transpose().lazyProduct(residuals_);
   }
 
   // y += A x, row by row: what stands in a row is many directions.
@@ -192,28 +189,27 @@ class LagrangianTangent {
   }
 
   template <class A>
-  static void replace(double* x, int count, const A& a) {
+  void replace(double* x, int count, const A& a) {
     for (int begin = 0; begin < count; begin += together) {
       const int columns = std::min(together, count - begin);
-      double from[held], to[held] = {};
-      for (int i = 0; i < 2 * K; ++i) std::copy_n(x + i * count + begin, columns, from + i * columns);
-      add(to, columns, a, from);
-      for (int i = 0; i < 2 * K; ++i) std::copy_n(to + i * columns, columns, x + i * count + begin);
+      std::fill(to_.begin(), to_.end(), 0.0);
+      for (int i = 0; i < size(); ++i) std::copy_n(x + i * count + begin, columns, from_.data() + i * columns);
+      add(to_.data(), columns, a, from_.data());
+      for (int i = 0; i < size(); ++i) std::copy_n(to_.data() + i * columns, columns, x + i * count + begin);
     }
   }
 
   static constexpr int together = 16;  // columns
-  static constexpr std::size_t held = static_cast<std::size_t>(2 * K) * together;
 
-  SystemModel<S> model_;
   typename Stages::Columns columns_;
-  LagrangianDirection<S, Width> direction_;
-  LagrangianJacobians<S, Width> jacobians_;
-  LinearSystem system_;
-  Eigen::MatrixXd of_residuals_;
-  State state_;
-  Eigen::Matrix<double, 2 * K, ParameterSlopes<S>::count> of_parameters_;
-  std::array<ParameterSlopes<S>, static_cast<std::size_t>(Width)> slopes_;
+  LagrangianJacobians<Width> jacobians_;
+  LagrangianDirection<Width> direction_;
+  detail::StageSystem system_;
+  Eigen::MatrixXd of_residuals_, residuals_;
+  Eigen::MatrixXd state_;
+  ParameterSlopes slopes_;
+  Eigen::MatrixXd of_parameters_;
+  std::vector<double> from_, to_;  // workspace
   std::array<double, static_cast<std::size_t>(Width)> times_{};
   bool has_state_ = false;
   bool has_parameters_ = false;

@@ -5,33 +5,40 @@
 #include <cstddef>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/system/system_model.hpp>
+#include <span>
+#include <vector>
 
 namespace pendula {
 
 /// How fast a system goes on: R² = κ + (Σ v_k⁸)^(1/4) over the angles, κ the fastest that a coordinate alone would
 /// swing with, or begin to, where the motion starts. 1/R is the time in which the motion changes.
-template <System S>
 class Pace {
-  using Vector = typename S::template Vector<double>;
-  using Matrix = typename S::template Matrix<double>;
-
  public:
-  void start(const SystemModel<S>& model, double time, const Vector& q, const Vector& v) {
-    Vector p, f;
-    Matrix p_D_q, p_D_v, f_D_q, f_D_v;
-    S::momentum_form_with_jacobians(model.parameters(time), q, v, model.inputs(time), p, f, p_D_q, p_D_v, f_D_q, f_D_v);
+  /// `info` has to outlive it.
+  explicit Pace(const SystemInfo& info) : is_angle_(info.is_angle) {}
+
+  /// Of a system at q and v  (coordinates).
+  void start(const SystemAt<1>& here, const double* q, const double* v) {
+    const std::size_t count = is_angle_.size();
+    std::vector<double> p(count), f(count), p_D_q(count * count), p_D_v(p_D_q), f_D_q(p_D_q), f_D_v(p_D_q);
+    here(&SystemFunctions::momentum_form_with_jacobians, q, v, p.data(), f.data(), p_D_q.data(), p_D_v.data(),
+         f_D_q.data(), f_D_v.data());
+    const auto diagonal = [&](const std::vector<double>& matrix, std::size_t k) { return matrix[k * count + k]; };
     slowest_squared_ = natural_speed_squared_ = 0;
-    for (Eigen::Index k = 0; k < q.size(); ++k) {
-      const bool is_angle = S::coordinate_is_angle[static_cast<std::size_t>(k)];
-      const double swing = std::abs(f_D_q(k, k)), push = is_angle ? std::abs(f[k]) : 0;
-      const double squared = std::max(swing, push) / p_D_v(k, k);
+    for (std::size_t k = 0; k < count; ++k) {
+      const double swing = std::abs(diagonal(f_D_q, k)), push = is_angle_[k] ? std::abs(f[k]) : 0;
+      const double squared = std::max(swing, push) / diagonal(p_D_v, k);
       if (std::isfinite(squared)) slowest_squared_ = std::max(slowest_squared_, squared);
     }
-    for (Eigen::Index k = 0; k < q.size() && slowest_squared_ > 0; ++k) {
-      const double squared = f[k] * f[k] / p_D_v(k, k) / slowest_squared_;
+    for (std::size_t k = 0; k < count && slowest_squared_ > 0; ++k) {
+      const double squared = f[k] * f[k] / diagonal(p_D_v, k) / slowest_squared_;
       if (std::isfinite(squared)) natural_speed_squared_ += squared;
     }
-    start_from_nothing(v, p_D_v);
+    // Where nothing turns or pushes yet, 1/s is as good as any; where nothing moves, one unit of length a second.
+    if (slowest_squared_ > 0 || at(v, v).pace > 0) return;
+    slowest_squared_ = 1;
+    if (!std::all_of(v, v + count, [](double rate) { return rate == 0; })) return;
+    for (std::size_t k = 0; k < count; ++k) natural_speed_squared_ += diagonal(p_D_v, k);
   }
 
   /// κ  [1/s²].
@@ -43,11 +50,11 @@ class Pace {
   /// R, from Σ v_k⁸ over the angles.
   double of(double eighth_powers) const { return std::sqrt(slowest_squared_ + std::pow(eighth_powers, 0.25)); }
 
-  /// The same from rates, and how it grows by their accelerations.
-  Tempo at(const Vector& v, const Vector& a) const {
+  /// The same from rates, and how it grows by their accelerations  (coordinates).
+  Tempo at(const double* v, const double* a) const {
     double sum = 0, growth = 0;  // of Σ v_k⁸, an eighth of it
-    for (Eigen::Index k = 0; k < v.size(); ++k) {
-      if (!S::coordinate_is_angle[static_cast<std::size_t>(k)]) continue;
+    for (std::size_t k = 0; k < is_angle_.size(); ++k) {
+      if (!is_angle_[k]) continue;
       const double squared = v[k] * v[k], sixth = squared * squared * squared;
       sum += sixth * squared;
       growth += sixth * v[k] * a[k];
@@ -62,13 +69,7 @@ class Pace {
   }
 
  private:
-  // Where nothing turns or pushes yet, 1/s is as good as any; where nothing moves, one unit of length a second.
-  void start_from_nothing(const Vector& v, const Matrix& mass) {
-    if (slowest_squared_ > 0 || at(v, v).pace > 0) return;
-    slowest_squared_ = 1;
-    if ((v.array() == 0).all()) natural_speed_squared_ = mass.diagonal().sum();
-  }
-
+  std::span<const bool> is_angle_;
   double slowest_squared_ = 0, natural_speed_squared_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/stage_product.hpp>
 
 namespace pendula::detail {
 
@@ -54,10 +55,19 @@ class StageColumns {
   Real hb(std::size_t j) const { return hb_[j]; }
   Real ha(std::size_t i, std::size_t j) const { return m_[j][i] * hb_[j]; }
 
+  const Real* m() const { return &m_[0][0]; }  ///< column by column
+  const Real* each_hb() const { return hb_; }
+
   L c() const { return L::load(c_); }
   L hb() const { return L::load(hb_); }          ///< h b
   L hc() const { return L::load(hc_); }          ///< h c
   L hc_low() const { return L::load(hc_low_); }  ///< what hc lost to rounding
+
+  /// h a_ij of all i.
+  L ha(std::size_t j) const { return L(hb_[j]) * L::load(m_[j]); }
+
+  /// 1 in lane j, 0 elsewhere.
+  static L unit(std::size_t j) { return L::load(units.values[j]); }
 
   /// Σ_j m_ij x_j for all i, with x already times h b_j, added to `start`.
   L integral(const Real* x, const L& start) const { return product(m_, x, start); }
@@ -132,15 +142,8 @@ class StageColumns {
     predict_at(Real(1), Real(1));
   }
 
-  static L product(const Real (&column)[columns][Z], const Real* x, const L& start = L(Real(0))) {
-    L even = fma(L(x[0]), L::load(column[0]), start);
-    if constexpr (columns == 1) return even;
-    L odd = L(x[columns > 1]) * L::load(column[columns > 1]);
-    for (std::size_t j = 2; j < columns; j += 2) {
-      even = fma(L(x[j]), L::load(column[j]), even);
-      if (j + 1 < columns) odd = fma(L(x[j + 1]), L::load(column[j + 1]), odd);
-    }
-    return even + odd;
+  [[gnu::always_inline]] static L product(const Real (&column)[columns][Z], const Real* x, const L& start = L(Real(0))) {
+    return stage_product<L, columns, Z>(&column[0][0], x, start);
   }
 
   void fold() {
@@ -152,6 +155,14 @@ class StageColumns {
     }
     round_weights(family_, h_, hb_, stages());
   }
+
+  struct Units {
+    alignas(pack_alignment) Real values[columns][Z] = {};
+    constexpr Units() {
+      for (std::size_t j = 0; j < columns; ++j) values[j][j] = Real(1);
+    }
+  };
+  static constexpr Units units{};
 
   Family family_;
   std::size_t stages_;

@@ -1,19 +1,50 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <cstddef>
 #include <pendula/numeric/linear_system.hpp>
 
 namespace pendula::detail {
 
-/// The linear system of one Newton iteration: one block row and column a stage.
-template <int Block>
+/// The linear system of one Newton iteration: a row and a column for each stage of each coordinate, those of one
+/// coordinate side by side, as stages lie in packs.
 class StageSystem : public LinearSystem {
  public:
-  explicit StageSystem(int stages) : LinearSystem(Block * stages) {}
+  StageSystem(std::size_t coordinates, int stages)
+      : LinearSystem(static_cast<Index>(coordinates) * stages), stages_(static_cast<std::size_t>(stages)) {}
 
-  auto block(int i, int j) { return matrix.block<Block, Block>(Block * i, Block * j); }
-  auto residual(int i) { return right.segment<Block>(Block * i); }
-  auto correction(int i) const { return solution.segment<Block>(Block * i); }
+  std::size_t stages() const { return stages_; }
+
+  /// Of the residuals of coordinate `row` at all stages by the unknown of `column` at stage k.
+  template <class L>
+  void set_derivative(std::size_t row, std::size_t column, std::size_t k, const L& lanes) {
+    write(lanes, &matrix(at(row, 0), at(column, k)));
+  }
+  template <class L>
+  void set_residual(std::size_t row, const L& lanes) {
+    write(lanes, &right[at(row, 0)]);
+  }
+  /// Of coordinate k at stage i.
+  double correction(std::size_t k, std::size_t i) const { return solution[at(k, i)]; }
+
+  /// Where coordinate k at stage i stands.
+  Index at(std::size_t k, std::size_t i) const { return static_cast<Index>(k * stages_ + i); }
+
+ private:
+  template <class L>
+  void write(const L& lanes, double* to) const {
+    constexpr auto width = static_cast<std::size_t>(L::size);
+    if (stages_ == width) {
+      lanes.store_unaligned(to);
+      return;
+    }
+    alignas(pack_alignment) double numbers[width];
+    lanes.store(numbers);
+    for (std::size_t i = 0; i < width; ++i) {  // of a known number: else a compiler calls memmove
+      if (i < stages_) to[i] = numbers[i];
+    }
+  }
+
+  std::size_t stages_;
 };
 
 }  // namespace pendula::detail

@@ -1,22 +1,28 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <pendula/gauss/node_polynomials.hpp>
 #include <pendula/gauss/pace.hpp>
+#include <pendula/gauss/stage_columns.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/stage_system.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/field_look.hpp>
 #include <pendula/system/mass_scale.hpp>
+#include <pendula/system/motion.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,50 +34,66 @@ namespace pendula {
 /// Unknown are the stage accelerations K_i, so that the mass matrix is never inverted;
 ///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,  residual E(Q_i, V_i, K_i, t_i)  (paper eq.
 ///   27).
-template <System S>
+/// All stages of one number are in the lanes of a pack of `Width`, which is at least the number of stages.
+template <int Width = max_stages>
 class VelocityNewton {
- public:
-  using Model = SystemModel<S>;
-  using Real = double;
-  using Vector = typename S::template Vector<double>;
-  using Matrix = typename S::template Matrix<double>;
-  using State = SystemState<S>;
+  using L = Pack<Width, RegisterFor<Width>>;
+  using Rows = PackRows<static_cast<std::size_t>(Width)>;
+  using Stored = double[static_cast<std::size_t>(Width)];
 
-  /// Throws std::invalid_argument unless the method has so many stages.
+ public:
+  using Model = SystemModel;
+  using Real = double;
+  using State = Motion;
+
+  /// Throws std::invalid_argument unless the method has so many stages, at most Width.
   VelocityNewton(const Model& model, int stages, Family family = Family::gauss)
       : family_(family),
-        model_(model),
-        coefficients_(tableau_of<Eigen::Dynamic>(family, stages)),
-        polynomials_(tableau_of<Eigen::Dynamic>(family, stages)),
-        system_(stages),
-        forcing_(family, stages),
-        look_(stages, few_samples, argument_bases<S>()),
-        at_(static_cast<std::size_t>(stages)) {
-    for (Stage& stage : at_) stage.last_a.setZero();
-  }
+        at_(model),
+        here_(model),
+        columns_(family, stages),
+        count_(model.coordinates()),
+        system_(count_, stages),
+        forcing_(model, family, stages),
+        look_(stages, few_samples, model.info().argument_is_base),
+        stages_(4 * count_),
+        last_a_(count_),
+        jacobians_(3 * count_ * count_),
+        state_(2 * count_),
+        saved_(state_),
+        remembered_(state_),
+        acceleration_(count_),
+        weight_(count_),
+        masses_(model.info()),
+        pace_(model.info()),
+        numbers_(4 * count_),
+        sums_(3 * count_) {}
 
   Status start(const State& state) {
+    require_size("q", state.q.size());
+    require_size("v", state.v.size());
     forget();
     fastest_ = fastest_here_ = most_kinetic_ = 0;
     time_ = state.time;
-    q_.assign(state.q);
-    v_.assign(state.v);
-    const auto parameters = model_.parameters(time_);
-    pace_.start(model_, time_, state.q, state.v);
-    masses_.start(parameters, state.q);
+    for (std::size_t k = 0; k < count_; ++k) {
+      state_[k] = {state.q[index(k)], 0};
+      state_[count_ + k] = {state.v[index(k)], 0};
+    }
+    const SystemAt<1>& here = at(time_);
+    pace_.start(here, state.q.data(), state.v.data());
+    masses_.start(here, state.q.data());
     if (masses_.singular() >= 0) return Status::singular_mass_matrix;
-    S::acceleration(parameters, state.q, state.v, model_.inputs(time_), acceleration_);
+    here(&SystemFunctions::acceleration, state.q.data(), state.v.data(), acceleration_.data());
     return Status::ok;
   }
 
   void prepare(double time, double h) {
-    coefficients_.prepare(h, last_h_);
-    set_context(time);
-    for (int i = 0; i < stages(); ++i) {
-      at(i).a = acceleration_;
-      if (last_h_ != 0) extrapolate(at(i).a, i);
-    }
+    columns_.prepare(h, last_h_);
+    set_times(time);
     is_predicted_ = last_h_ != 0;
+    for (std::size_t k = 0; k < count_; ++k) {
+      (is_predicted_ ? columns_.extrapolated(last_a_[k]) : L(acceleration_[k])).store(a(k));
+    }
     last_h_ = 0;  // what was predicted from is gone until the step is accepted
     set_weights();
   }
@@ -79,26 +101,27 @@ class VelocityNewton {
   /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
   /// one's.
   void prepare_again(double time, double h) {
-    const bool is_accepted = last_h_ != 0;
-    const double ratio = h / (is_accepted ? last_h_ : coefficients_.h());
-    coefficients_.prepare(h, 0);
-    set_context(time);
-    std::array<Vector, max_stages> found;
-    for (int i = 0; i < stages(); ++i) found[static_cast<std::size_t>(i)] = is_accepted ? at(i).last_a : at(i).a;
-    for (int i = 0; i < stages(); ++i) {
-      at(i).a.setZero();
-      for (int j = 0; j < stages(); ++j) {
-        at(i).a += coefficients_.lagrange(j, ratio * coefficients_.c(i)) * found[static_cast<std::size_t>(j)];
-      }
-    }
+    const Rows& found = last_h_ != 0 ? last_a_ : stages_;
+    columns_.predict_at(0, h / (last_h_ != 0 ? last_h_ : columns_.h()));
+    columns_.prepare(h, 0);
+    set_times(time);
+    for (std::size_t k = 0; k < count_; ++k) columns_.extrapolated(found[k]).store(a(k));
     set_weights();
   }
 
   Correction correct() {
-    evaluate_with_jacobians();
-    for (int i = 0; i < stages(); ++i) {
-      system_.residual(i) = at(i).residual;
-      for (int j = 0; j < stages(); ++j) system_.block(i, j) = block(i, j);
+    place_stages();
+    at_(&SystemFunctions::residual_with_jacobians, q(0), v(0), a(0), stages_[3 * count_], jacobian(0, 0, 0),
+        jacobian(1, 0, 0), jacobian(2, 0, 0));
+    for (int i = 0; i < stages(); ++i) masses_.see(jacobian(2, 0, 0) + i, static_cast<std::size_t>(Width));
+    for (std::size_t row = 0; row < count_; ++row) system_.set_residual(row, L::load(stages_[3 * count_ + row]));
+    for (std::size_t k = 0; k < system_.stages(); ++k) {
+      const L ha = columns_.ha(k), h2a2 = columns_.integral(columns_.hb() * ha);
+      for (std::size_t column = 0; column < count_; ++column) {
+        for (std::size_t row = 0; row < count_; ++row) {
+          system_.set_derivative(row, column, k, derivative(row, column, k, ha, h2a2));
+        }
+      }
     }
     system_.solve();
     return apply();
@@ -110,156 +133,178 @@ class VelocityNewton {
   static constexpr int worst_part() { return -1; }
   int singular_part() const { return masses_.singular(); }
   static constexpr bool continues() { return true; }
-  static constexpr double largest_turn() { return S::constant_masses ? 3 : 0.25; }
-  bool loaded() const { return model_.loaded(); }
-  bool damped() const { return model_.damped(); }
+  double largest_turn() const { return info().constant_masses ? 3 : 0.25; }
+  bool loaded() const { return at_.model().loaded(); }
+  bool damped() const { return at_.model().damped(); }
   double followed(double time, double h, double tolerance) {
-    return forcing_.followed(model_, h, tolerance, [&] {
-      return std::pair(State{time, q_.value, v_.value}, tempo().pace);
+    return forcing_.followed(h, tolerance, [&] {
+      const double pace = tempo().pace;
+      read_state(numbers(0), numbers(1));
+      return SystemForcing::Here{time, numbers(0), numbers(1), pace};
     });
   }
   bool dissipates() const { return family_ == Family::radau; }
-  int stages() const { return coefficients_.stages(); }
-  static constexpr int parts() { return S::coordinates; }
-  static constexpr int coordinates() { return S::coordinates; }
-  double predictor_gain() const { return is_predicted_ ? coefficients_.predictor_gain() : 1; }
+  int stages() const { return columns_.stages(); }
+  int parts() const { return coordinates(); }
+  int coordinates() const { return static_cast<int>(count_); }
+  double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
 
   double turn() const { return farthest_turn().first; }
   int turning_part() const { return farthest_turn().second; }
 
   double energy_defect() {
-    const auto [moved, pushed] = increments();
-    const double brought = model_.loaded() ? work() : 0;
-    const auto [h, T] = energies(time_, q_.value, v_.value);
-    const auto [h_end, T_end] = energies(time_ + coefficients_.h(), q_.value + moved, v_.value + pushed);
-    most_kinetic_ = std::max(most_kinetic_, T);
-    const double scale = std::max(most_kinetic_, T_end) + std::abs(brought);
-    return scale > 0 ? (h_end - h - brought) / scale : 0;
+    find_increments();
+    const double brought = loaded() ? work() : 0;
+    double *const q_at = numbers(2), *const v_at = numbers(3);
+    read_state(q_at, v_at);
+    const auto [start, kinetic] = energies(time_, q_at, v_at);
+    for (std::size_t k = 0; k < count_; ++k) {
+      q_at[k] += numbers(0)[k];
+      v_at[k] += numbers(1)[k];
+    }
+    const auto [end, kinetic_at_end] = energies(time_ + columns_.h(), q_at, v_at);
+    most_kinetic_ = std::max(most_kinetic_, kinetic);
+    const double scale = std::max(most_kinetic_, kinetic_at_end) + std::abs(brought);
+    return scale > 0 ? (end - start - brought) / scale : 0;
   }
 
   double defect() {
-    const auto squared = [&](const Vector& v) { return v.cwiseProduct(weight_).squaredNorm(); };
-    fastest_ = std::max({fastest_, squared(v_.value), squared(at(stages() - 1).v)});
-    const double off = squared(missed_at_start());
+    double first = 0, last = 0;
+    for (std::size_t k = 0; k < count_; ++k) {
+      const double squared = weight_[k] * weight_[k], rate = state_[count_ + k].value, later = v(k)[stages() - 1];
+      first += squared * rate * rate;
+      last += squared * later * later;
+    }
+    fastest_ = std::max({fastest_, first, last});
+    const double off = missed_at_start();
     return off > 0 ? std::sqrt(off / fastest_) : 0;
   }
 
   Tempo tempo() const {
-    Vector a;
-    S::acceleration(model_.parameters(time_), q_.value, v_.value, model_.inputs(time_), a);
-    return pace_.at(v_.value, a);
+    read_state(numbers(0), numbers(1));
+    at(time_)(&SystemFunctions::acceleration, numbers(0), numbers(1), numbers(2));
+    return pace_.at(numbers(1), numbers(2));
   }
 
   StepShape shape() {
     place_stages();
-    const auto squared = [&](const Vector& v) { return v.cwiseProduct(weight_).squaredNorm(); };
-    fastest_here_ = 0;
-    for (int i = 0; i < stages(); ++i) fastest_here_ = std::max(fastest_here_, squared(at(i).v));
-    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
-    StepShape shape;
-    shape.pace = pace_.at(at(stages() / 2).v, Vector::Zero()).pace;
+    L speed(0.0), coefficients(0.0);
     double largest = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double size = std::max(std::abs(q_.value[index(k)]), S::coordinate_is_angle[k] ? 1.0 : 0.0);
-      largest = std::max(largest, weight_[index(k)] * size);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const L rate = L(weight_[k]) * L::load(v(k));
+      alignas(pack_alignment) Stored advance;
+      (columns_.hb() * rate).store(advance);
+      const L coefficient = columns_.legendre(advance);
+      speed = fma(rate, rate, speed);
+      coefficients = fma(coefficient, coefficient, coefficients);
+      const double size = std::max(std::abs(state_[k].value), info().is_angle[k] ? 1.0 : 0.0);
+      largest = std::max(largest, weight_[k] * size);
+      numbers(0)[k] = v(k)[stages() / 2];
+      numbers(1)[k] = 0;
     }
+    alignas(pack_alignment) Stored speeds, squares;
+    speed.store(speeds);
+    coefficients.store(squares);
+    fastest_here_ = *std::max_element(speeds, speeds + stages());
+    const double fastest = this->fastest();
+    StepShape shape;
+    shape.pace = pace_.at(numbers(0), numbers(1)).pace;
     const double rounding = StepShape::visible * largest;
     for (int k = 0; k < stages(); ++k) {
-      Vector coefficient = Vector::Zero();
-      for (int j = 0; j < stages(); ++j) {
-        coefficient += polynomials_.legendre(static_cast<std::size_t>(k), static_cast<std::size_t>(j)) * at(j).v;
-      }
-      const double h = std::abs(coefficients_.h()), size = h * std::sqrt(squared(coefficient));
+      const double size = std::sqrt(squares[k]);
       if (size > rounding) shape.decay[static_cast<std::size_t>(k)] = size * shape.pace / std::sqrt(fastest);
     }
     if (stages() == StepShape::few_stages && loaded()) {
-      const double size = std::abs(coefficients_.h()) * std::sqrt(squared(missed_at_start()));
+      const double size = std::abs(columns_.h()) * std::sqrt(missed_at_start());
       if (size > rounding) shape.beyond = size * shape.pace / std::sqrt(fastest);
     }
     return shape;
   }
 
   /// Of what forces do between the stages that were solved.
-  Unseen unseen() requires tells_arguments<S> {
+  Unseen unseen() {
+    if (!look_.has_to_look()) return {};
     shape();  // places the stages
-    const auto at_all = [&](std::span<const double> shares, auto&& tell) {
-      for (std::size_t i = 0; i < shares.size(); ++i) tell(i, along(shares[i]));
-    };
+    const std::size_t arguments = info().argument_is_base.size();
     const auto find_arguments = [&](std::span<const double> shares, double* found) {
-      at_all(shares, [&](std::size_t i, const State& there) {
-        typename S::template Arguments<double> arguments;
-        S::call_arguments(model_.parameters(there.time), there.q, there.v, model_.inputs(there.time), arguments);
-        std::copy_n(arguments.data(), arguments.size(), found + i * S::argument_is_base.size());
-      });
+      for (std::size_t i = 0; i < shares.size(); ++i) {
+        along(shares[i])(&SystemFunctions::call_arguments, numbers(2), numbers(3), found + i * arguments);
+      }
     };
     if (!look_.may_find(find_arguments) || !look_.finds(find_arguments)) return {};
-    Vector sums, moments, missed;
     const auto accelerations = [&](std::span<const double> shares, double* found) {
-      at_all(shares, [&](std::size_t i, const State& there) {
-        Vector a;
-        S::acceleration(model_.parameters(there.time), there.q, there.v, model_.inputs(there.time), a);
-        std::copy_n(a.data(), count, found + i * count);
-      });
+      for (std::size_t i = 0; i < shares.size(); ++i) {
+        along(shares[i])(&SystemFunctions::acceleration, numbers(2), numbers(3), found + i * count_);
+      }
     };
-    look_.sum(accelerations, {{sums.data(), count}, {moments.data(), count}, {missed.data(), count}});
-    const double fastest = std::max({fastest_, fastest_here_, pace_.natural_speed_squared()});
-    const auto size_of = [&](const Vector& v) { return std::sqrt(v.cwiseProduct(weight_).squaredNorm() / fastest); };
-    const double here = std::sqrt(fastest_here_ / fastest);
-    const double h = coefficients_.h(), impulse = size_of(h * missed), lacks = size_of(h * sums - increments()[1]);
-    return {std::max(impulse, lacks), lacks + Unseen::of_wall(impulse / here)};
+    const std::span<double> sums(sums_.data(), count_), moments(sums.data() + count_, count_),
+        missed(moments.data() + count_, count_);
+    look_.sum(accelerations, {sums, moments, missed});
+    find_increments();
+    const double fastest = this->fastest(), h = columns_.h();
+    double impulse_squared = 0, lack_squared = 0;
+    for (std::size_t k = 0; k < count_; ++k) {
+      const double impulse = weight_[k] * h * missed[k], lack = weight_[k] * (h * sums[k] - numbers(1)[k]);
+      impulse_squared += impulse * impulse;
+      lack_squared += lack * lack;
+    }
+    const double impulse = std::sqrt(impulse_squared / fastest), lacks = std::sqrt(lack_squared / fastest);
+    return {std::max(impulse, lacks), lacks + Unseen::of_wall(impulse / std::sqrt(fastest_here_ / fastest))};
   }
 
   double work() const {
+    alignas(pack_alignment) Stored powers;
+    at_(&SystemFunctions::power, q(0), v(0), powers);
     double work = 0;
-    for (int i = 0; i < stages(); ++i) {
-      double power = 0;
-      S::power(at(i).parameters, at(i).q, at(i).v, at(i).inputs, power);
-      work += coefficients_.hb(i) * power;
-    }
+    for (std::size_t i = 0; i < system_.stages(); ++i) work += columns_.hb(i) * powers[i];
     return work;
   }
 
   void accept() {
-    const auto [moved, pushed] = increments();
-    q_.add(moved);
-    v_.add(pushed);
-    last_h_ = coefficients_.h();
+    find_increments();
+    for (std::size_t k = 0; k < 2 * count_; ++k) state_[k].add(numbers_[k]);
+    last_h_ = columns_.h();
     time_ += last_h_;
-    for (Stage& stage : at_) stage.last_a = stage.a;
+    for (std::size_t k = 0; k < count_; ++k) std::copy_n(a(k), Width, last_a_[k]);
     fastest_ = std::max(fastest_, std::exchange(fastest_here_, 0));
   }
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, q_, v_, acceleration_, last_h_, masses_, pace_, fastest_, most_kinetic_);
-    for (Stage& stage : at_) numbers(stage.last_a);
+    numbers(time_, state_, acceleration_, last_h_, masses_, pace_, fastest_, most_kinetic_, last_a_);
   }
-  void save() { saved_ = {q_, v_}; }
+  void save() { saved_ = state_; }
 
   void restore() {
-    q_ = saved_[0];
-    v_ = saved_[1];
+    state_ = saved_;
     forget();
   }
 
-  State state(double time) const { return {time, q_.value, v_.value}; }
-
-  void remember() { remembered_ = {q_, v_}; }
-  void return_to_start() {
-    q_ = remembered_[0];
-    v_ = remembered_[1];
+  State state(double time) const {
+    State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
+    read_state(state.q.data(), state.v.data());
+    return state;
   }
+
+  void remember() { remembered_ = state_; }
+  void return_to_start() { state_ = remembered_; }
 
   /// The state at x of the last step, by the polynomials through its rates and accelerations.
   State glance(double time, double x) const {
-    const auto up_to = polynomials_.integrals(x);
-    State state{time, remembered_[0].value, remembered_[1].value};
-    for (int j = 0; j < stages(); ++j) {
-      Vector v = remembered_[1].value;
-      for (int k = 0; k < stages(); ++k) v += coefficients_.m(j, k) * (last_h_ * coefficients_.b(k)) * at(k).last_a;
-      const double weight = last_h_ * up_to[static_cast<std::size_t>(j)];
-      state.q += weight * v;
-      state.v += weight * at(j).last_a;
+    const auto up_to = columns_.up_to(x);
+    State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
+    for (std::size_t k = 0; k < count_; ++k) {
+      alignas(pack_alignment) Stored pushed, moved;
+      (columns_.hb() * L::load(last_a_[k])).store(pushed);
+      const double rate = remembered_[count_ + k].value;
+      (columns_.hb() * columns_.integral(pushed, L(rate))).store(moved);
+      double place = remembered_[k].value, speed = rate;
+      for (std::size_t j = 0; j < system_.stages(); ++j) {
+        place += up_to[j] * moved[j];
+        speed += up_to[j] * pushed[j];
+      }
+      state.q[index(k)] = place;
+      state.v[index(k)] = speed;
     }
     return state;
   }
@@ -268,156 +313,171 @@ class VelocityNewton {
   void forget() { last_h_ = 0; }
 
  private:
-  static constexpr std::size_t count = S::coordinates;
   static constexpr int few_samples = 3;  // for what may be narrow
 
-  struct Stage {
-    typename Model::Parameters parameters;
-    typename Model::Inputs inputs;
-    Vector q, v, a, last_a, residual;
-    Matrix E_D_q, E_D_v, E_D_a;
-  };
-
   static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
-  Stage& at(int i) { return at_[static_cast<std::size_t>(i)]; }
-  const Stage& at(int i) const { return at_[static_cast<std::size_t>(i)]; }
 
-  void set_context(double time) {
-    time_ = time;
-    for (int i = 0; i < stages(); ++i) {
-      at(i).parameters = model_.parameters(time + coefficients_.hc(i));
-      at(i).inputs = model_.inputs(time + coefficients_.hc(i));
+  const SystemInfo& info() const { return at_.model().info(); }
+
+  void require_size(const char* what, Eigen::Index size) const {
+    if (size == coordinates()) return;
+    throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(coordinates()) + " numbers, got " +
+                                std::to_string(size));
+  }
+
+  // Of the stages: K, Q, V of coordinate k.
+  double* a(std::size_t k) { return stages_[k]; }
+  const double* a(std::size_t k) const { return stages_[k]; }
+  double* q(std::size_t k) { return stages_[count_ + k]; }
+  const double* q(std::size_t k) const { return stages_[count_ + k]; }
+  double* v(std::size_t k) { return stages_[2 * count_ + k]; }
+  const double* v(std::size_t k) const { return stages_[2 * count_ + k]; }
+  // ∂E/∂q, ∂E/∂v, ∂E/∂a.
+  double* jacobian(std::size_t which, std::size_t row, std::size_t column) {
+    return jacobians_[(which * count_ + row) * count_ + column];
+  }
+
+  // Room for numbers of one state, (coordinates) each.
+  double* numbers(std::size_t which) const { return numbers_.data() + which * count_; }
+
+  // The system at one time.
+  const SystemAt<1>& at(double time) const {
+    here_.set_time(time);
+    return here_;
+  }
+
+  void read_state(double* q, double* v) const {
+    for (std::size_t k = 0; k < count_; ++k) {
+      q[k] = state_[k].value;
+      v[k] = state_[count_ + k].value;
     }
   }
 
-  void extrapolate(Vector& a, int i) const {
-    a.setZero();
-    for (int j = 0; j < stages(); ++j) a += coefficients_.extrapolation(i, j) * at(j).last_a;
+  double fastest() const { return std::max({fastest_, fastest_here_, pace_.natural_speed_squared()}); }
+
+  // Lanes beyond the stages hold the start of the step.
+  void set_times(double time) {
+    time_ = time;
+    at_.set_times([&](std::size_t j) { return j < system_.stages() ? time + columns_.h() * columns_.c(j) : time; });
   }
 
   void set_weights() {
-    for (std::size_t k = 0; k < count; ++k) weight_[index(k)] = std::sqrt(masses_.inertia(k));
+    for (std::size_t k = 0; k < count_; ++k) weight_[k] = std::sqrt(masses_.inertia(k));
   }
 
   void place_stages() {
-    for (int i = 0; i < stages(); ++i) {
-      Vector moved = q_.compensation + coefficients_.hc(i) * v_.value;
-      Vector pushed = v_.compensation;
-      for (int j = 0; j < stages(); ++j) {
-        moved += coefficients_.h2a2(i, j) * at(j).a;
-        pushed += coefficients_.m(i, j) * (coefficients_.hb(j) * at(j).a);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const Compensated<double>&place = state_[k], &rate = state_[count_ + k];
+      const L pushed = columns_.integral(columns_.hb() * L::load(a(k)), L(rate.compensation));
+      const L moved = columns_.integral(columns_.hb() * pushed, fma(columns_.hc(), L(rate.value), L(place.compensation)));
+      (L(place.value) + moved).store(q(k));
+      (L(rate.value) + pushed).store(v(k));
+    }
+  }
+
+  // ∂(residual of row, stage i)/∂(K of column, stage k) of all i.
+  L derivative(std::size_t row, std::size_t column, std::size_t k, const L& ha, const L& h2a2) {
+    return fma(ha, L::load(jacobian(1, row, column)),
+               fma(h2a2, L::load(jacobian(0, row, column)), L(jacobian(2, row, column)[k]) * columns_.unit(k)));
+  }
+
+  // The system at a share of the step, and its q and v in numbers(2), numbers(3), by the polynomials through the rates
+  // and accelerations of the stages, which are placed.
+  const SystemAt<1>& along(double share) {
+    const auto up_to = columns_.up_to(share);
+    read_state(numbers(2), numbers(3));
+    for (std::size_t k = 0; k < count_; ++k) {
+      for (std::size_t j = 0; j < system_.stages(); ++j) {
+        numbers(2)[k] += up_to[j] * columns_.hb(j) * v(k)[j];
+        numbers(3)[k] += up_to[j] * columns_.hb(j) * a(k)[j];
       }
-      at(i).q = q_.value + moved;
-      at(i).v = v_.value + pushed;
     }
+    return at(time_ + columns_.h() * share);
   }
 
-  // At a share of the step, by the polynomials through the rates and accelerations of its stages, which are placed.
-  State along(double share) const {
-    const double h = coefficients_.h();
-    const auto up_to = polynomials_.integrals(share);
-    State state{time_ + h * share, q_.value, v_.value};
-    for (int j = 0; j < stages(); ++j) {
-      state.q += h * up_to[static_cast<std::size_t>(j)] * at(j).v;
-      state.v += h * up_to[static_cast<std::size_t>(j)] * at(j).a;
+  // By how much the polynomial through the stages' rates is off at the start of the step: Σ M_kk of it².
+  double missed_at_start() const {
+    double missed = 0;
+    for (std::size_t k = 0; k < count_; ++k) {
+      alignas(pack_alignment) Stored advance;
+      (columns_.hb() * L::load(v(k))).store(advance);
+      const double off = weight_[k] * (columns_.at_start(advance) - state_[count_ + k].value);
+      missed += off * off;
     }
-    return state;
-  }
-
-  // By how much the polynomial through the stages' rates is off at the start of the step.
-  Vector missed_at_start() const {
-    Vector missed = -v_.value;
-    for (int i = 0; i < stages(); ++i) missed += coefficients_.lagrange(i, 0) * at(i).v;
     return missed;
   }
 
   // Of all angles, one whose inertia nearly vanishes counted twice; and whose it is.
   std::pair<double, int> farthest_turn() const {
     std::pair<double, int> farthest{0, -1};
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!S::coordinate_is_angle[k]) continue;
+    for (std::size_t k = 0; k < count_; ++k) {
+      if (!info().is_angle[k]) continue;
       double turn = 0;
-      for (int i = 0; i < stages(); ++i) turn += std::abs(coefficients_.hb(i) * at(i).v[index(k)]);
+      for (std::size_t i = 0; i < system_.stages(); ++i) turn += std::abs(columns_.hb(i) * v(k)[i]);
       if (masses_.is_small(k)) turn *= 2;
       if (turn > farthest.first) farthest = {turn, static_cast<int>(k)};
     }
     return farthest;
   }
 
-  // Of q and v, over the step.
-  std::array<Vector, 2> increments() {
+  // Of q and v, over the step, into numbers(0), numbers(1).
+  void find_increments() {
     place_stages();
-    Vector moved = Vector::Zero(), pushed = Vector::Zero();
-    for (int j = 0; j < stages(); ++j) {
-      moved += coefficients_.hb(j) * at(j).v;
-      pushed += coefficients_.hb(j) * at(j).a;
+    for (std::size_t k = 0; k < count_; ++k) {
+      numbers(0)[k] = numbers(1)[k] = 0;
+      for (std::size_t j = 0; j < system_.stages(); ++j) {
+        numbers(0)[k] += columns_.hb(j) * v(k)[j];
+        numbers(1)[k] += columns_.hb(j) * a(k)[j];
+      }
     }
-    return {moved, pushed};
-  }
-
-  void evaluate_with_jacobians() {
-    place_stages();
-    for (Stage& stage : at_) {
-      S::residual_with_jacobians(stage.parameters, stage.q, stage.v, stage.a, stage.inputs, stage.residual, stage.E_D_q,
-                                 stage.E_D_v, stage.E_D_a);
-      masses_.see(stage.E_D_a);
-    }
-  }
-
-  Matrix block(int i, int k) const {
-    Matrix block = coefficients_.ha(i, k) * at(i).E_D_v + coefficients_.h2a2(i, k) * at(i).E_D_q;
-    if (i == k) block += at(i).E_D_a;
-    return block;
   }
 
   // Subtracts the solution from the accelerations; compared are the changes of rates that they make.
   Correction apply() {
-    const double h = std::abs(coefficients_.h());
-    double scale = v_.value.cwiseProduct(weight_).cwiseAbs().maxCoeff(), largest = 0;
+    const double h = std::abs(columns_.h());
+    double scale = 0, largest = 0;
     int worst = -1;
-    for (int i = 0; i < stages(); ++i) {
-      const Vector change = system_.correction(i);
-      if (!change.allFinite()) return {std::numeric_limits<double>::quiet_NaN(), first_not_finite(change)};
-      at(i).a -= change;
-      scale = std::max(scale, h * at(i).a.cwiseProduct(weight_).cwiseAbs().maxCoeff());
-      Eigen::Index k = 0;
-      const double size = h * change.cwiseProduct(weight_).cwiseAbs().maxCoeff(&k);
-      if (size < largest) continue;
-      largest = size;
-      worst = static_cast<int>(k);
+    for (std::size_t k = 0; k < count_; ++k) scale = std::max(scale, weight_[k] * std::abs(state_[count_ + k].value));
+    for (std::size_t i = 0; i < system_.stages(); ++i) {
+      for (std::size_t k = 0; k < count_; ++k) {
+        const double change = system_.correction(k, i);
+        if (!std::isfinite(change)) return {std::numeric_limits<double>::quiet_NaN(), static_cast<int>(k)};
+        a(k)[i] -= change;
+        scale = std::max(scale, h * weight_[k] * std::abs(a(k)[i]));
+        const double size = h * weight_[k] * std::abs(change);
+        if (size < largest) continue;
+        largest = size;
+        worst = static_cast<int>(k);
+      }
     }
     return {largest > 0 ? largest / scale : 0, worst};
   }
 
-  static int first_not_finite(const Vector& x) {
-    Eigen::Index i = 0;
-    while (i + 1 < x.size() && std::isfinite(x[i])) ++i;
-    return static_cast<int>(i);
-  }
-
   // h and T.
-  std::array<double, 2> energies(double time, const Vector& q, const Vector& v) const {
-    const auto parameters = model_.parameters(time);
+  std::array<double, 2> energies(double time, const double* q, const double* v) const {
     double energy = 0, kinetic = 0;
-    S::energy(parameters, q, v, energy);
-    S::kinetic_energy(parameters, q, v, kinetic);
+    at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
     return {energy, kinetic};
   }
 
   Family family_;
-  Model model_;
-  StepCoefficients<Eigen::Dynamic> coefficients_;
-  detail::NodePolynomials<Eigen::Dynamic, double> polynomials_;
-  detail::StageSystem<S::coordinates> system_;
-  SystemForcing<S> forcing_;
+  SystemAt<Width> at_;
+  mutable SystemAt<1> here_;
+  detail::StageColumns<Eigen::Dynamic, double, Width> columns_;
+  std::size_t count_;
+  detail::StageSystem system_;
+  SystemForcing forcing_;
   FieldLook look_;
-  std::vector<Stage> at_;
-  Compensated<Vector> q_, v_;
-  std::array<Compensated<Vector>, 2> saved_, remembered_;
-  Vector acceleration_;  // at the start: the cold start of the predictor
-  Vector weight_;
-  MassScale<S> masses_;
-  Pace<S> pace_;
+  Rows stages_;     // K, Q, V, E
+  Rows last_a_;     // of the last step
+  Rows jacobians_;  // ∂E/∂q, ∂E/∂v, ∂E/∂a
+  std::vector<Compensated<double>> state_, saved_, remembered_;  // q, then v
+  std::vector<double> acceleration_;                             // at the start: the cold start of the predictor
+  std::vector<double> weight_;
+  MassScale masses_;
+  Pace pace_;
+  mutable std::vector<double> numbers_;  // workspace: four numbers of each coordinate
+  std::vector<double> sums_;
   double time_ = 0, most_kinetic_ = 0;
   double last_h_ = 0;  // of the step that the last accelerations belong to; 0: they belong to none
   bool is_predicted_ = false;

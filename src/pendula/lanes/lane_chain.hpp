@@ -8,12 +8,12 @@
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/lanes/lane_chain_tangent.hpp>
 #include <pendula/lanes/lane_columns.hpp>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_prediction.hpp>
 #include <pendula/lanes/lane_stage_loads.hpp>
 #include <pendula/lanes/lane_stop.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 #include <type_traits>
 
 namespace pendula {
@@ -32,7 +32,7 @@ class LaneChain {
   using SpaceType = Space;
   using Subject = int;
   using Stop = LaneStop<L>;
-  using Number = std::conditional_t<with_tangent, LaneDual<L>, L>;
+  using Number = std::conditional_t<with_tangent, Dual<L>, L>;
   static constexpr int stages = S, links_known = N;
   static constexpr bool has_tangent = with_tangent;
   static constexpr std::size_t D = Space::dimension;

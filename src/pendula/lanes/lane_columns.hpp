@@ -88,7 +88,7 @@ class LaneColumns {
   const L& hc(int j) const { return hc_[at(j)]; }          ///< h c_j
   const L& hc_low(int j) const { return hc_low_[at(j)]; }  ///< what it lost to rounding
 
-  /// start + Σ_j m_ij x_j for all i, x times h b. Number: L, or one with its derivative (LaneDual).
+  /// start + Σ_j m_ij x_j for all i, x times h b. Number: L, or one with its derivative (Dual).
   template <class Number>
   [[gnu::always_inline]] void integrate(const StagesOf<Number>& x, const Number& start,
                                         StagesOf<Number>& integral) const {

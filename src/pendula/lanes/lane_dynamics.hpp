@@ -1,6 +1,14 @@
 #pragma once
 
+#include <cstddef>
+#include <numeric>
+#include <pendula/gauss/pace.hpp>
+#include <pendula/lanes/lane_inputs.hpp>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/mass_scale.hpp>
 #include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_model.hpp>
+#include <pendula/system/system_table.hpp>
 
 namespace pendula {
 
@@ -11,48 +19,95 @@ struct LaneStart {
   bool loaded = false;               ///< energy may come from outside, or go there
 };
 
-/// Several systems of one kernel, one in each lane: what a kernel is for the steppers of the compiled library, which
-/// have no loop over stages of their own for each kernel. Numbers of all lanes lie side by side, those of a coordinate
-/// after those of the one before, all of them aligned as LanePack wants it.
+/// Several systems of one kernel, one in each lane: every member has parameters, inputs and times of its own. Numbers
+/// of all lanes lie side by side, those of a coordinate after those of the one before, aligned to `pack_alignment`.
+template <class L>
 class LaneDynamics {
  public:
-  LaneDynamics() = default;
+  /// `table` must outlive it.
+  explicit LaneDynamics(const SystemTable& table)
+      : table_(table),
+        functions_(functions_of<L::size>(table)),
+        parameters_(1 + parameter_count(table.info)),  // none has an address, too
+        inputs_now_(1 + table.info.inputs.size()),
+        inputs_(table.info.inputs.size()) {}
   LaneDynamics(const LaneDynamics&) = delete;
   LaneDynamics& operator=(const LaneDynamics&) = delete;
-  virtual ~LaneDynamics() = default;
 
-  /// A library that was compiled for others moves nobody.
-  virtual int lanes() const = 0;
-  virtual int coordinates() const = 0;
+  int coordinates() const { return static_cast<int>(info().coordinates.size()); }
   /// What kind of numbers coordinates are.
-  virtual bool is_angle(int coordinate) const = 0;
-  virtual bool of_one_unit(int coordinate, int other) const = 0;
-  virtual bool is_periodic(int coordinate) const = 0;
-  /// Whether the mass matrix is the same wherever they are.
-  virtual bool constant_masses() const = 0;
+  bool is_angle(int i) const { return info().is_angle[static_cast<std::size_t>(i)]; }
+  bool of_one_unit(int i, int j) const {
+    return info().coordinate_units[static_cast<std::size_t>(i)] == info().coordinate_units[static_cast<std::size_t>(j)];
+  }
+  bool is_periodic(int i) const { return info().is_periodic[static_cast<std::size_t>(i)]; }
+  /// Whether pivots of the mass matrix are the same wherever they are.
+  bool constant_masses() const { return info().constant_masses; }
+  /// Whether they depend on time other than by inputs.
+  bool depends_on_time() const { return info().depends_on_time; }
 
   /// A member's numbers come into a lane.
-  virtual void take(int lane, const PlainSystem& system) = 0;
-  /// q̈ at the times (lanes), of q and q̇ (coordinates, lanes).
-  virtual void accelerations(const double* times, const double* q, const double* v, double* a) = 0;
-  /// The same, and its derivative along tangents (dq, dv) of the motions.
-  virtual void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv,
-                          double* a, double* da) = 0;
-  /// Highest frequency of what drives each of them  (lanes)  [rad/s].
-  virtual void fastest_drives(double* frequencies) const = 0;
-  /// Whether they depend on time in other ways.
-  virtual bool depends_on_time() const = 0;
+  void take(int lane, const PlainSystem& system) {
+    for (std::size_t k = 0; k < parameter_count(info()); ++k) parameters_[k][lane] = system.parameters[k];
+    inputs_.take(lane, system.inputs, system.sines);
+  }
+  /// Highest frequency of a sine that is added to their inputs  [rad/s].
+  L fastest_drives() const { return inputs_.fastest(); }
+
   /// What starts at q and v  (coordinates): its momenta there, and the largest pivots that its mass matrix has.
-  virtual LaneStart start(const PlainSystem& system, double time, const double* q, const double* v, double* p,
-                          double* pivots) const = 0;
+  LaneStart start(const PlainSystem& system, double time, const double* q, const double* v, double* p,
+                  double* pivots) const {
+    const SystemModel model(table_, system);
+    SystemAt<1> here(model);
+    here.set_time(time);
+    here(&SystemFunctions::momentum_from_velocity, q, v, p);
+    Pace pace(info());
+    pace.start(here, q, v);
+    MassScale masses(info());
+    masses.start(here, q);
+    for (std::size_t k = 0; k < info().coordinates.size(); ++k) pivots[k] = masses.largest_pivot(k);
+    return {pace.slowest_squared(), pace.natural_speed_squared(), model.loaded()};
+  }
+
+  /// q̈ at the times (lanes), of q and q̇ (coordinates, lanes).
+  void accelerations(const double* times, const double* q, const double* v, double* a) {
+    functions_.acceleration(at(times), q, v, a);
+  }
+  /// The same, and its derivative along tangents (dq, dv) of the motions.
+  void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv, double* a,
+                  double* da) {
+    functions_.acceleration_along(at(times), q, v, dq, dv, a, da);
+  }
   /// q̇ and ṗ of q and p.
-  virtual void hamiltonian_form(const double* times, const double* q, const double* p, double* v, double* f) = 0;
+  void hamiltonian_form(const double* times, const double* q, const double* p, double* v, double* f) {
+    functions_.hamiltonian_form(at(times), q, p, v, f);
+  }
   /// M  (coordinates, coordinates, lanes).
-  virtual void masses(const double* times, const double* q, double* masses) = 0;
+  void masses(const double* times, const double* q, double* masses) { functions_.mass_matrix(at(times), q, masses); }
   /// What forces bring  (lanes)  [W].
-  virtual void powers(const double* times, const double* q, const double* v, double* powers) = 0;
+  void powers(const double* times, const double* q, const double* v, double* powers) {
+    functions_.power(at(times), q, v, powers);
+  }
   /// T, and T + U  (lanes)  [J].
-  virtual void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) = 0;
+  void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) {
+    functions_.energies(at(times), q, v, kinetic, total);
+  }
+
+ private:
+  static std::size_t parameter_count(const SystemInfo& info) {
+    return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), std::size_t{0});
+  }
+  const SystemInfo& info() const { return table_.info; }
+
+  Conditions at(const double* times) {
+    inputs_.at(L::load(times), inputs_now_);
+    return {table_.context, parameters_[0], times, inputs_now_[0]};
+  }
+
+  const SystemTable& table_;
+  SystemFunctions functions_;
+  PackRows<L::width> parameters_, inputs_now_;
+  LaneInputs<L> inputs_;
 };
 
 }  // namespace pendula

@@ -3,10 +3,10 @@
 #include <array>
 #include <cmath>
 #include <pendula/lanes/explicit_tableau.hpp>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_error_controller.hpp>
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_state.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <utility>
 #include <vector>

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_registers.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/mass_scale.hpp>
 #include <vector>
 
@@ -16,10 +16,10 @@ class LaneInertia {
   using Mask = typename L::Mask;
 
   /// `dynamics` must outlive it.
-  explicit LaneInertia(LaneDynamics& dynamics)
+  explicit LaneInertia(LaneDynamics<L>& dynamics)
       : dynamics_(dynamics),
         count_(dynamics.coordinates()),
-        masses_(count_ * count_),
+        masses_(at(count_ * count_)),
         inertias_(static_cast<std::size_t>(count_), L(1.0)),
         largest_(inertias_),
         turns_by_(inertias_) {}
@@ -53,19 +53,19 @@ class LaneInertia {
 
  private:
   static std::size_t at(int k) { return static_cast<std::size_t>(k); }
-  L mass(int i, int j) const { return masses_.load(i * count_ + j); }
+  L mass(int i, int j) const { return L::load(masses_[at(i * count_ + j)]); }
 
   // Of L D Lᵀ.
   void eliminate(int k, const L& pivot) {
     for (int i = k + 1; i < count_; ++i) {
       const L factor = mass(i, k) / pivot;
-      for (int j = k + 1; j < count_; ++j) (mass(i, j) - factor * mass(k, j)).store(masses_[i * count_ + j]);
+      for (int j = k + 1; j < count_; ++j) (mass(i, j) - factor * mass(k, j)).store(masses_[at(i * count_ + j)]);
     }
   }
 
-  LaneDynamics& dynamics_;
+  LaneDynamics<L>& dynamics_;
   int count_;
-  LaneRegisters<L> masses_;
+  PackRows<L::width> masses_;
   std::vector<L> inertias_, largest_, turns_by_;
   L singular_{0.0};
 };

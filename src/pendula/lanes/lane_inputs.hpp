@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstddef>
-#include <pendula/lanes/lane_functions.hpp>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <span>
 #include <vector>
@@ -43,12 +43,12 @@ class LaneInputs {
     return fastest;
   }
 
-  /// What they are at `time`; `inputs`: (count).
-  void at(const L& time, std::span<L> inputs) const {
-    for (std::size_t k = 0; k < inputs.size(); ++k) inputs[k] = constant_[k];
+  /// What they are at `time`, each a row of `inputs`.
+  void at(const L& time, PackRows<L::width>& inputs) const {
+    for (std::size_t k = 0; k < constant_.size(); ++k) constant_[k].store(inputs[k]);
     for (const Sine& sine : sines_) {
-      L& input = inputs[static_cast<std::size_t>(sine.input)];
-      input = fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), input);
+      double* const input = inputs[static_cast<std::size_t>(sine.input)];
+      fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), L::load(input)).store(input);
     }
   }
 

@@ -7,16 +7,16 @@
 #include <limits>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/lanes/lane_columns.hpp>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_inertia.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_prediction.hpp>
-#include <pendula/lanes/lane_registers.hpp>
 #include <pendula/lanes/lane_stage_tangent.hpp>
 #include <pendula/lanes/lane_stop.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/lanes/lane_turned.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <type_traits>
 #include <vector>
@@ -32,7 +32,7 @@ class LaneLagrangian {
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
   using SpaceType = CoordinateSpace;
-  using Subject = LaneDynamics&;
+  using Subject = LaneDynamics<L>&;
   using Stop = LaneStop<L, 2>;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
@@ -43,13 +43,13 @@ class LaneLagrangian {
   using Stages = typename Columns::Stages;
 
   /// `dynamics` must outlive it.
-  explicit LaneLagrangian(LaneDynamics& dynamics)
+  explicit LaneLagrangian(LaneDynamics<L>& dynamics)
       : dynamics_(dynamics),
         count_(dynamics.coordinates()),
         coordinates_(static_cast<std::size_t>(count_)),
         inertia_(dynamics),
-        calls_(S * per_call()),
-        state_(3 * count_ + 4),
+        calls_(static_cast<std::size_t>(S * per_call())),
+        state_(3 * coordinates_.size() + 4),
         tangent_(dynamics, columns_) {
     for (int k = 0; k < links(); ++k) {
       Coordinate& coordinate = at(k);
@@ -95,7 +95,7 @@ class LaneLagrangian {
   template <class Visit>
   void for_each_rate(Visit visit) {
     find_rates();
-    for (int i = 0; i < links(); ++i) visit(i, Vector{state_.load(rate_at(i))}, L(0.0));
+    for (int i = 0; i < links(); ++i) visit(i, Vector{L::load(state(1, i))}, L(0.0));
   }
 
   /// Whether fixed points may ask for shorter steps than errors do: forces and lengths may be anything.
@@ -127,13 +127,13 @@ class LaneLagrangian {
   /// R and d ln R/dt, as Pace.
   void tempo(L& pace, L& quickening) {
     find_rates();
-    dynamics_.accelerations(state_[time_at()], state_[0], state_[rate_at(0)], state_[other_at(0)]);
+    dynamics_.accelerations(state(3), state(0), state(1), state(2));
     L sum(0.0), growth(0.0);
     for (int k = 0; k < links(); ++k) {
       if (!at(k).is_angle) continue;
-      const L v = state_.load(rate_at(k)), squared = v * v, sixth = squared * squared * squared;
+      const L v = L::load(state(1, k)), squared = v * v, sixth = squared * squared * squared;
       sum = fma(sixth, squared, sum);
-      growth = fma(sixth * v, state_.load(other_at(k)), growth);
+      growth = fma(sixth * v, L::load(state(2, k)), growth);
     }
     const L root = sqrt(sqrt(sum)), squared = slowest_squared_ + root;
     pace = sqrt(squared);
@@ -142,9 +142,7 @@ class LaneLagrangian {
 
   /// The longest step in which stages sum up what inputs are driven by, to a tolerance.
   L longest_step(double tolerance) const {
-    alignas(pack_alignment) double fastest[L::width];
-    dynamics_.fastest_drives(fastest);
-    return L(SineTurn(S, 2 * S).within(tolerance)) / L::load(fastest);
+    return L(SineTurn(S, 2 * S).within(tolerance)) / dynamics_.fastest_drives();
   }
 
   // --- A step ---
@@ -160,7 +158,7 @@ class LaneLagrangian {
       predict(coordinate, &Past::pushed, coordinate.pushed);
     }
     if (xsimd::any(from.cold)) start_cold(from.cold);
-    if constexpr (has_tangent) tangent_.prepare(from, state_[time_at()], state_[0], state_[rate_at(0)]);
+    if constexpr (has_tangent) tangent_.prepare(from, state(3), state(0), state(1));
     find_scale();
   }
 
@@ -319,7 +317,7 @@ class LaneLagrangian {
   static constexpr double invisible = 1e-9;  // LagrangianStages's
 
   struct NoTangent {
-    NoTangent(LaneDynamics& /*dynamics*/, const Columns& /*columns*/) {}
+    NoTangent(LaneDynamics<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
 
   // What steps are predicted from: h q̇ and h ṗ.
@@ -356,24 +354,23 @@ class LaneLagrangian {
 
   // Of each stage: q, p, v, f of all coordinates, and the time.
   int per_call() const { return 4 * links() + 1; }
-  double* call(int j, int which) { return calls_[j * per_call() + which * links()]; }
-  int place(int j, int which, int k) const { return j * per_call() + which * links() + k; }
+  double* call(int j, int which, int k = 0) {
+    return calls_[static_cast<std::size_t>(j * per_call() + which * links() + k)];
+  }
 
-  // Of the state: q, v, and p or what nobody asks for, of all coordinates; the time, and energies.
-  int rate_at(int k) const { return links() + k; }
-  int other_at(int k) const { return 2 * links() + k; }
-  int time_at() const { return 3 * links(); }
+  // Of the state: q, v, and p or what nobody asks for, of all coordinates; the time, two energies, and a power.
+  double* state(int which, int k = 0) { return state_[static_cast<std::size_t>(which * links() + k)]; }
 
   // Writes a state with its rates.
   template <class Place, class Momentum>
   void write_state(Place q, Momentum p, const L& time) {
-    time.store(state_[time_at()]);
+    time.store(state(3));
     for (int k = 0; k < links(); ++k) {
-      q(at(k)).store(state_[k]);
-      p(at(k)).store(state_[other_at(k)]);
+      q(at(k)).store(state(0, k));
+      p(at(k)).store(state(2, k));
     }
     // Forces go where nobody reads them.
-    dynamics_.hamiltonian_form(state_[time_at()], state_[0], state_[other_at(0)], state_[rate_at(0)], call(0, 3));
+    dynamics_.hamiltonian_form(state(3), state(0), state(2), state(1), call(0, 3));
   }
   void find_rates() {
     write_state([](const Coordinate& k) { return k.q.value; }, [](const Coordinate& k) { return k.p.value; }, now_);
@@ -381,14 +378,14 @@ class LaneLagrangian {
 
   // Of the state that was written.
   Energies energies() {
-    dynamics_.energies(state_[time_at()], state_[0], state_[rate_at(0)], state_[time_at() + 1], state_[time_at() + 2]);
-    return {state_.load(time_at() + 1), state_.load(time_at() + 2)};
+    dynamics_.energies(state(3), state(0), state(1), state(3, 1), state(3, 2));
+    return {L::load(state(3, 1)), L::load(state(3, 2))};
   }
 
   void read_inertia() {
-    for (int k = 0; k < links(); ++k) at(k).q.value.store(state_[k]);
-    now_.store(state_[time_at()]);
-    inertia_.read(state_[time_at()], state_[0]);
+    for (int k = 0; k < links(); ++k) at(k).q.value.store(state(0, k));
+    now_.store(state(3));
+    inertia_.read(state(3), state(0));
   }
 
   // --- The step ---
@@ -407,7 +404,7 @@ class LaneLagrangian {
     find_rates();
     for (int k = 0; k < links(); ++k) {
       Coordinate& coordinate = at(k);
-      const L v = state_.load(rate_at(k)), f = calls_.load(place(0, 3, k));
+      const L v = L::load(state(1, k)), f = L::load(call(0, 3, k));
       for (std::size_t j = 0; j < static_cast<std::size_t>(S); ++j) {
         const L& hb = columns_.hb(static_cast<int>(j));
         coordinate.moved[j] = select(cold, hb * v, coordinate.moved[j]);
@@ -448,18 +445,16 @@ class LaneLagrangian {
     const Coordinate& coordinate = at(k);
     Stages added;
     columns_.integrate(coordinate.moved, coordinate.q.low, added);
-    detail::unrolled<S>([&](auto j)
-                            PENDULA_WRITTEN_OUT { (coordinate.q.value + added[j]).store(calls_[place(j, 0, k)]); });
+    detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { (coordinate.q.value + added[j]).store(call(j, 0, k)); });
     columns_.integrate(coordinate.pushed, coordinate.p.low, added);
-    detail::unrolled<S>([&](auto j)
-                            PENDULA_WRITTEN_OUT { (coordinate.p.value + added[j]).store(calls_[place(j, 1, k)]); });
+    detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { (coordinate.p.value + added[j]).store(call(j, 1, k)); });
   }
 
   // Increments of coordinate k by what was found at the stages; what changed, squared.
   [[gnu::always_inline]] L replace(int which, int k, const Mask& active, Stages& increments) {
     L changed(0.0);
     detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT {
-      const L found = columns_.hb(j) * calls_.load(place(j, which, k)), change = found - increments[j];
+      const L found = columns_.hb(j) * L::load(call(j, which, k)), change = found - increments[j];
       changed = fma(change, change, changed);
       increments[j] = select(active, found, increments[j]);
     });
@@ -475,19 +470,19 @@ class LaneLagrangian {
     for (int j = 0; j < S; ++j) {
       for (int k = 0; k < links(); ++k) {
         const L rate = (inverse_h * L(columns_.inverse_b(j))) * at(k).moved[static_cast<std::size_t>(j)];
-        rate.store(calls_[place(j, 2, k)]);
+        rate.store(call(j, 2, k));
       }
-      dynamics_.powers(call(j, 4), call(j, 0), call(j, 2), state_[time_at() + 3]);
-      work = fma(columns_.hb(j), state_.load(time_at() + 3), work);
+      dynamics_.powers(call(j, 4), call(j, 0), call(j, 2), state(3, 3));
+      work = fma(columns_.hb(j), L::load(state(3, 3)), work);
     }
     return select(loaded(), work, L(0.0));
   }
 
-  LaneDynamics& dynamics_;
+  LaneDynamics<L>& dynamics_;
   int count_;
   std::vector<Coordinate> coordinates_;
   LaneInertia<L> inertia_;
-  LaneRegisters<L> calls_, state_;
+  PackRows<L::width> calls_, state_;
   Columns columns_;
   bool may_miss_ = false;  // lengths are among the coordinates
   std::size_t newest_ = 0;

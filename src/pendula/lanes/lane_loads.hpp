@@ -7,6 +7,7 @@
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/lanes/lane_links.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <vector>
 
 namespace pendula {
@@ -19,7 +20,7 @@ class LaneLoads {
 
  public:
   explicit LaneLoads(int links)
-      : links_(links), torques_(components * static_cast<std::size_t>(links), L(0.0)), inputs_(torques_.size()) {}
+      : links_(links), torques_(components * static_cast<std::size_t>(links)), inputs_(torques_.rows()) {}
 
   /// Whether any member that came has some, and who of those in the lanes has.
   bool any() const { return any_; }
@@ -45,7 +46,7 @@ class LaneLoads {
   auto torque(int i, const LaneLink<L>& link) const {
     typename Space::Link::template Torque<L> torque;
     for (std::size_t k = 0; k < components; ++k) {
-      torque[k] = link.inverse_square * torques_[static_cast<std::size_t>(i) * components + k];
+      torque[k] = link.inverse_square * L::load(torques_[static_cast<std::size_t>(i) * components + k]);
     }
     return torque;
   }
@@ -67,9 +68,9 @@ class LaneLoads {
   int links_;
   bool any_ = false;
   L loaded_{0.0};
-  std::vector<L> torques_;  // now
-  LaneInputs<L> inputs_;    // the same at any time
-  std::vector<L> drag_;     // λ_i/l_i²
+  PackRows<L::width> torques_;  // now
+  LaneInputs<L> inputs_;        // the same at any time
+  std::vector<L> drag_;         // λ_i/l_i²
 };
 
 }  // namespace pendula

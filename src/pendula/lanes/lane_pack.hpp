@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/sincos.hpp>
 #include <utility>
 #include <xsimd/xsimd.hpp>
 
@@ -65,6 +66,11 @@ class LanePack {
   friend LanePack abs(const LanePack& a) { return LanePack(Register(xsimd::abs(a.held_))); }
   friend LanePack atan2(const LanePack& y, const LanePack& x) {
     return LanePack(Register(xsimd::atan2(y.held_, x.held_)));
+  }
+  friend LanePack sin(const LanePack& a) {
+    Register sine, cosine;
+    sincos(a.held_, sine, cosine);
+    return LanePack(sine);
   }
   friend LanePack floor(const LanePack& a) { return LanePack(Register(xsimd::floor(a.held_))); }
   friend LanePack exp(const LanePack& a) { return LanePack(Register(xsimd::exp(a.held_))); }

@@ -313,7 +313,7 @@ using TaylorLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, Register>>>;
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TaylorTangentLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, Register, true>>>;
 
-/// By explicit steps, of systems of a generated kernel (LaneKernel).
+/// By explicit steps, of systems of one kernel (LaneDynamics).
 template <class Method, class Register = MemberRegister>
 using SystemLanes =
     LaneQueue<LaneExplicit<LaneSystem<Register>, Method>, LaneSystemSeats<LaneExplicit<LaneSystem<Register>, Method>>>;

@@ -8,11 +8,11 @@
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/lanes/lane_chain_tangent.hpp>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_loads.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 #include <type_traits>
 
 namespace pendula {
@@ -27,7 +27,7 @@ class LaneRods {
   using SpaceType = Space;
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
-  using Number = std::conditional_t<with_tangent, LaneDual<L>, L>;
+  using Number = std::conditional_t<with_tangent, Dual<L>, L>;
   static constexpr int links_known = N;
   static constexpr bool has_tangent = with_tangent, is_short = detail::is_short_chain<N>;
   static constexpr std::size_t D = Space::dimension;

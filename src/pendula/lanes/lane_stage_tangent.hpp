@@ -6,8 +6,8 @@
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_prediction.hpp>
-#include <pendula/lanes/lane_registers.hpp>
 #include <pendula/lanes/lane_system_tangent.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <vector>
 
 namespace pendula {
@@ -24,12 +24,12 @@ class LaneStageTangent {
   using Stages = typename Columns::Stages;
 
   /// Both must outlive it.
-  LaneStageTangent(LaneDynamics& dynamics, const Columns& columns)
+  LaneStageTangent(LaneDynamics<L>& dynamics, const Columns& columns)
       : dynamics_(dynamics),
         columns_(columns),
         measure_(dynamics),
         parts_(static_cast<std::size_t>(dynamics.coordinates())),
-        calls_(kinds * dynamics.coordinates()) {}
+        calls_(kinds * parts_.size()) {}
   LaneStageTangent(const LaneStageTangent&) = delete;
   LaneStageTangent& operator=(const LaneStageTangent&) = delete;
 
@@ -143,7 +143,7 @@ class LaneStageTangent {
 
  private:
   static constexpr std::size_t pasts = static_cast<std::size_t>(Columns::most_depth);
-  static constexpr int kinds = 4;  // δq, δq̇, q̈, δq̈
+  static constexpr std::size_t kinds = 4;  // δq, δq̇, q̈, δq̈
 
   // What steps are predicted from: h δq̇ and h δq̈.
   struct Past {
@@ -160,7 +160,7 @@ class LaneStageTangent {
   int count() const { return static_cast<int>(parts_.size()); }
   Part& at(int k) { return parts_[static_cast<std::size_t>(k)]; }
   const Part& at(int k) const { return parts_[static_cast<std::size_t>(k)]; }
-  double* numbers(int which, int k) { return calls_[which * count() + k]; }
+  double* numbers(int which, int k) { return calls_[static_cast<std::size_t>(which * count() + k)]; }
 
   L squared() const {
     return measure_.squared([&](int k) -> const L& { return at(k).place; },
@@ -201,11 +201,11 @@ class LaneStageTangent {
     }
   }
 
-  LaneDynamics& dynamics_;
+  LaneDynamics<L>& dynamics_;
   const Columns& columns_;
   LaneSystemTangent<L> measure_;
   std::vector<Part> parts_;
-  LaneRegisters<L> calls_;
+  PackRows<L::width> calls_;
   std::size_t newest_ = 0;
   L scale_{0.0};
 };

@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstddef>
-#include <pendula/lanes/lane_dual.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 
 namespace pendula {
 

@@ -5,20 +5,20 @@
 #include <cstddef>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_registers.hpp>
 #include <pendula/lanes/lane_system_tangent.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <type_traits>
 #include <vector>
 
 namespace pendula {
 
-/// The forward dynamics of several systems at once, one in each lane, by whatever tells their accelerations.
+/// The forward dynamics of several systems at once, one in each lane, by their accelerations.
 ///
 /// With a tangent, every number has its derivative along one tangent of each member's motion.
 template <class Register = MemberRegister, bool with_tangent = false>
@@ -27,8 +27,8 @@ class LaneSystem {
   using SpaceType = CoordinateSpace;
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
-  using Number = std::conditional_t<with_tangent, LaneDual<L>, L>;
-  using Subject = LaneDynamics&;
+  using Number = std::conditional_t<with_tangent, Dual<L>, L>;
+  using Subject = LaneDynamics<L>&;
   static constexpr int links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
   static constexpr std::size_t D = 1;
@@ -36,8 +36,8 @@ class LaneSystem {
   using Parts = detail::PerLink<Part, links_known>;
 
   /// `dynamics` must outlive it.
-  explicit LaneSystem(LaneDynamics& dynamics)
-      : dynamics_(dynamics), registers_(kinds * dynamics.coordinates() + 1), tangent_(dynamics) {}
+  explicit LaneSystem(LaneDynamics<L>& dynamics)
+      : dynamics_(dynamics), rows_(static_cast<std::size_t>(kinds * parts()) + 1), tangent_(dynamics) {}
   LaneSystem(const LaneSystem&) = delete;
   LaneSystem& operator=(const LaneSystem&) = delete;
 
@@ -132,9 +132,7 @@ class LaneSystem {
   /// closely as ForcingLook does, for a method that is as good as a quadrature of so many nodes.
   template <int nodes>
   L longest_step(double turn) const {
-    alignas(pack_alignment) double fastest[L::width];
-    dynamics_.fastest_drives(fastest);
-    const L longest = L(turn) / L::load(fastest);
+    const L longest = L(turn) / dynamics_.fastest_drives();
     if (!depends_on_time()) return longest;
     const double looks = ForcingLook::least_parts * nodes / ForcingLook::looks;
     return min(longest, L(looks) / natural_pace());
@@ -213,9 +211,9 @@ class LaneSystem {
 
   // q, q̇, q̈, with their derivatives, and a time.
   static constexpr int kinds = with_tangent ? 6 : 3;
-  double* times() { return registers_[kinds * parts()]; }
   // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈; 3, 4, 5: their derivatives.
-  double* numbers(int which, int i) { return registers_[which * parts() + i]; }
+  double* numbers(int which, int i) { return rows_[static_cast<std::size_t>(which * parts() + i)]; }
+  double* times() { return numbers(kinds, 0); }
 
   void write(const L& time, const Parts& parts) {
     time.store(times());
@@ -255,11 +253,11 @@ class LaneSystem {
   }
 
   struct NoTangent {
-    explicit NoTangent(LaneDynamics& /*dynamics*/) {}
+    explicit NoTangent(LaneDynamics<L>& /*dynamics*/) {}
   };
 
-  LaneDynamics& dynamics_;
-  LaneRegisters<L> registers_;
+  LaneDynamics<L>& dynamics_;
+  PackRows<L::width> rows_;
   L pace_squared_{1.0}, energy_sum_{0.0};
   Sums coarse_, fine_;
   [[no_unique_address]] std::conditional_t<with_tangent, LaneSystemTangent<L>, NoTangent> tangent_;

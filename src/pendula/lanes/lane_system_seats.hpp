@@ -22,14 +22,13 @@ class LaneSystemSeats {
   using Mask = typename Stepper::L::Mask;
 
  public:
-  using Common = LaneDynamics&;
+  using Common = LaneDynamics<typename Stepper::L>&;
   using Member = LaneSystemMember;
   using Sight = LaneSight<Stepper, NoTurns>;
 
-  LaneSystemSeats(const LaneDynamics& dynamics, Stepper& stepper)
-      : coordinates_(dynamics.coordinates()), stepper_(stepper) {}
+  LaneSystemSeats(Common dynamics, Stepper& stepper) : coordinates_(dynamics.coordinates()), stepper_(stepper) {}
 
-  static LaneDynamics& subject_of(Common dynamics) { return dynamics; }
+  static Common subject_of(Common dynamics) { return dynamics; }
   void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }
 
   Eigen::Index coordinates() const { return coordinates_; }

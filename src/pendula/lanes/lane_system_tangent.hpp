@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_registers.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <random>
 #include <vector>
 
@@ -18,10 +18,10 @@ template <class L>
 class LaneSystemTangent {
  public:
   /// `dynamics` must outlive it.
-  explicit LaneSystemTangent(LaneDynamics& dynamics)
+  explicit LaneSystemTangent(LaneDynamics<L>& dynamics)
       : dynamics_(dynamics),
-        registers_(kinds * dynamics.coordinates() + 1),
-        inverse_sizes_(static_cast<std::size_t>(dynamics.coordinates()), L(1.0)) {}
+        rows_(static_cast<std::size_t>(kinds * count()) + 1),
+        inverse_sizes_(static_cast<std::size_t>(count()), L(1.0)) {}
 
   /// δq and δq̇ of one lane.
   struct Tangent {
@@ -85,7 +85,7 @@ class LaneSystemTangent {
   static constexpr int kinds = 6;
 
   int count() const { return dynamics_.coordinates(); }
-  double* numbers(int which, int i) { return registers_[which * count() + i]; }
+  double* numbers(int which, int i) { return rows_[static_cast<std::size_t>(which * count() + i)]; }
 
   double size_at(int i, const double* q) const {
     if (dynamics_.is_angle(i)) return 1;
@@ -98,7 +98,7 @@ class LaneSystemTangent {
 
   // δq̈ along a tangent.
   std::vector<double> pushed(int lane, double time, const double* q, const double* v, const Tangent& tangent) {
-    double* const times = registers_[kinds * count()];
+    double* const times = numbers(kinds, 0);
     L(time).store(times);
     for (int i = 0; i < count(); ++i) {
       const auto k = static_cast<std::size_t>(i);
@@ -114,8 +114,8 @@ class LaneSystemTangent {
     return found;
   }
 
-  LaneDynamics& dynamics_;
-  LaneRegisters<L> registers_;
+  LaneDynamics<L>& dynamics_;
+  PackRows<L::width> rows_;
   std::vector<L> inverse_sizes_;
   L inverse_pace_squared_{1.0};
 };

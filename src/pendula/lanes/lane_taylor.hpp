@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <pendula/lanes/lane_dual.hpp>
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_series.hpp>
 #include <pendula/lanes/lane_state.hpp>
+#include <pendula/lanes/lane_tangent.hpp>
 
 namespace pendula {
 

@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <pendula/chain/plain_chain.hpp>
-#include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_table.hpp>
 #include <span>
 
 namespace pendula {
@@ -87,8 +87,8 @@ struct PlainMemberEnd {
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                          std::span<PlainMemberEnd> ends, LaneWatch& watch);
 
-/// The same of systems whose motion `dynamics` tells, in as many lanes as the library has: otherwise all fail.
-using MoveSystemMembers = bool(LaneDynamics& dynamics, const RunOptions& options, std::int64_t every,
+/// The same of systems of one kernel.
+using MoveSystemMembers = bool(const SystemTable& table, const RunOptions& options, std::int64_t every,
                                std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends,
                                LaneWatch& watch);
 

@@ -1,113 +1,72 @@
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <cstddef>
+#include <pendula/numeric/lanes.hpp>
+#include <type_traits>
 
 namespace pendula {
 
-/// A number with its derivatives in `Count` directions: generated kernels, computed in it, give theirs, exactly.
-template <int Count>
+namespace detail {
+
+/// a b + c, rounded once where that is fast.
+template <class L>
+L sum_of_product(const L& a, const L& b, const L& c) {
+  if constexpr (std::is_floating_point_v<L>) {
+    return fused(a, b, c);
+  } else {
+    return fma(a, b, c);
+  }
+}
+
+}  // namespace detail
+
+/// A number with its derivative along one direction: what is computed in it gives its own, exactly. L: double, or
+/// several numbers, each with its own (Pack, LanePack). What is computed of values is what would be computed without
+/// derivatives, to the last bit.
+template <class L>
 struct Dual {
-  double value = 0;
-  std::array<double, static_cast<std::size_t>(Count)> slopes{};
+  L value{0.0}, slope{0.0};
 
   Dual() = default;
-  explicit Dual(double number) : value(number) {}
+  explicit Dual(double number) requires(!std::is_same_v<L, double>) : value(number) {}
+  explicit Dual(const L& number) : value(number) {}
+  Dual(const L& number, const L& derivative) : value(number), slope(derivative) {}
 
-  friend Dual operator+(const Dual& a, const Dual& b) { return combined(a.value + b.value, 1, a, 1, b); }
-  friend Dual operator-(const Dual& a, const Dual& b) { return combined(a.value - b.value, 1, a, -1, b); }
-  friend Dual operator*(const Dual& a, const Dual& b) { return combined(a.value * b.value, b.value, a, a.value, b); }
+  friend Dual operator+(const Dual& a, const Dual& b) { return {a.value + b.value, a.slope + b.slope}; }
+  friend Dual operator-(const Dual& a, const Dual& b) { return {a.value - b.value, a.slope - b.slope}; }
+  friend Dual operator-(const Dual& a) { return {-a.value, -a.slope}; }
+  friend Dual operator*(const Dual& a, const Dual& b) {
+    return {a.value * b.value, detail::sum_of_product(a.slope, b.value, a.value * b.slope)};
+  }
+  friend Dual operator*(const L& a, const Dual& b) { return {a * b.value, a * b.slope}; }
+  friend Dual operator*(const Dual& a, const L& b) { return {a.value * b, a.slope * b}; }
   friend Dual operator/(const Dual& a, const Dual& b) {
-    const double ratio = a.value / b.value;
-    return combined(ratio, 1 / b.value, a, -ratio / b.value, b);
-  }
-  friend Dual operator-(const Dual& a) { return chained(-a.value, -1, a); }
-  Dual& operator+=(const Dual& b) { return *this = *this + b; }
-  Dual& operator-=(const Dual& b) { return *this = *this - b; }
-  Dual& operator*=(const Dual& b) { return *this = *this * b; }
-  Dual& operator/=(const Dual& b) { return *this = *this / b; }
-
-  /// f(x) of value f and slope f'.
-  static Dual chained(double f, double slope, const Dual& x) {
-    Dual result(f);
-    for (std::size_t k = 0; k < result.slopes.size(); ++k) result.slopes[k] = slope * x.slopes[k];
-    return result;
+    const L inverse = L(1.0) / b.value, ratio = a.value / b.value;
+    return {ratio, detail::sum_of_product(-ratio, b.slope, a.slope) * inverse};
   }
 
- private:
-  static Dual combined(double value, double of_a, const Dual& a, double of_b, const Dual& b) {
-    Dual result(value);
-    for (std::size_t k = 0; k < result.slopes.size(); ++k) {
-      result.slopes[k] = of_a * a.slopes[k] + of_b * b.slopes[k];
-    }
-    return result;
+  friend Dual fma(const Dual& a, const Dual& b, const Dual& c) {
+    return {detail::sum_of_product(a.value, b.value, c.value),
+            detail::sum_of_product(a.value, b.slope, detail::sum_of_product(a.slope, b.value, c.slope))};
   }
+  friend Dual fma(const L& a, const Dual& b, const Dual& c) {
+    return {detail::sum_of_product(a, b.value, c.value), detail::sum_of_product(a, b.slope, c.slope)};
+  }
+  friend Dual fma(const Dual& a, const L& b, const Dual& c) { return fma(b, a, c); }
+  friend Dual fma(const L& a, const L& b, const Dual& c) { return {detail::sum_of_product(a, b, c.value), c.slope}; }
 };
 
-/// The functions that a generated kernel may hold.
-template <int Count>
-Dual<Count> sin(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::sin(x.value), std::cos(x.value), x);
+namespace detail {
+
+/// What a number is without its derivative.
+template <class L>
+const L& value_of(const L& x) {
+  return x;
 }
-template <int Count>
-Dual<Count> cos(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::cos(x.value), -std::sin(x.value), x);
+template <class L>
+const L& value_of(const Dual<L>& x) {
+  return x.value;
 }
-template <int Count>
-Dual<Count> tan(const Dual<Count>& x) {
-  const double f = std::tan(x.value);
-  return Dual<Count>::chained(f, 1 + f * f, x);
-}
-template <int Count>
-Dual<Count> asin(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::asin(x.value), 1 / std::sqrt(1 - x.value * x.value), x);
-}
-template <int Count>
-Dual<Count> acos(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::acos(x.value), -1 / std::sqrt(1 - x.value * x.value), x);
-}
-template <int Count>
-Dual<Count> atan(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::atan(x.value), 1 / (1 + x.value * x.value), x);
-}
-template <int Count>
-Dual<Count> sinh(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::sinh(x.value), std::cosh(x.value), x);
-}
-template <int Count>
-Dual<Count> cosh(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::cosh(x.value), std::sinh(x.value), x);
-}
-template <int Count>
-Dual<Count> tanh(const Dual<Count>& x) {
-  const double f = std::tanh(x.value);
-  return Dual<Count>::chained(f, 1 - f * f, x);
-}
-template <int Count>
-Dual<Count> exp(const Dual<Count>& x) {
-  const double f = std::exp(x.value);
-  return Dual<Count>::chained(f, f, x);
-}
-template <int Count>
-Dual<Count> log(const Dual<Count>& x) {
-  return Dual<Count>::chained(std::log(x.value), 1 / x.value, x);
-}
-template <int Count>
-Dual<Count> sqrt(const Dual<Count>& x) {
-  const double f = std::sqrt(x.value);
-  return Dual<Count>::chained(f, 0.5 / f, x);
-}
-template <int Count>
-Dual<Count> cbrt(const Dual<Count>& x) {
-  const double f = std::cbrt(x.value);
-  return Dual<Count>::chained(f, 1 / (3 * f * f), x);
-}
-/// Of a constant exponent, which is all that kernels have.
-template <int Count>
-Dual<Count> pow(const Dual<Count>& x, const Dual<Count>& exponent) {
-  const double p = exponent.value;
-  return Dual<Count>::chained(std::pow(x.value, p), p * std::pow(x.value, p - 1), x);
-}
+
+}  // namespace detail
 
 }  // namespace pendula

@@ -1,14 +1,47 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/sincos.hpp>
 #include <xsimd/xsimd.hpp>
 
 namespace pendula {
 
+namespace detail {
+
+/// function(x) of every number of a pack, one after the other: what xsimd has of these takes another way for all
+/// numbers of a register where one of them asks for it, so that members of an ensemble would see their neighbours.
+template <int Size, class Register, class Function>
+[[gnu::noinline]] Pack<Size, Register> one_by_one(const Pack<Size, Register>& x, Function function) {
+  alignas(pack_alignment) typename Pack<Size, Register>::Scalar numbers[static_cast<std::size_t>(Size)];
+  x.store(numbers);
+  for (auto& number : numbers) number = function(number);
+  return Pack<Size, Register>::load(numbers);
+}
+
+}  // namespace detail
+
 /// The functions that a generated kernel may hold, of every number of a pack.
-#define PENDULA_OF_PACKS(function)                               \
+#define PENDULA_ONE_BY_ONE(function)                             \
+  template <int Size, class Register>                            \
+  Pack<Size, Register> function(const Pack<Size, Register>& x) { \
+    return detail::one_by_one(x, [](const auto& number) {        \
+      using std::function;                                       \
+      return function(number);                                   \
+    });                                                          \
+  }
+PENDULA_ONE_BY_ONE(tan)
+PENDULA_ONE_BY_ONE(asin)
+PENDULA_ONE_BY_ONE(acos)
+PENDULA_ONE_BY_ONE(atan)
+PENDULA_ONE_BY_ONE(sinh)
+PENDULA_ONE_BY_ONE(cosh)
+PENDULA_ONE_BY_ONE(tanh)
+PENDULA_ONE_BY_ONE(cbrt)
+#undef PENDULA_ONE_BY_ONE
+
+#define PENDULA_OF_REGISTERS(function)                           \
   template <int Size, class Register>                            \
   Pack<Size, Register> function(const Pack<Size, Register>& x) { \
     return mapped(                                               \
@@ -18,18 +51,10 @@ namespace pendula {
         },                                                       \
         x);                                                      \
   }
-PENDULA_OF_PACKS(tan)
-PENDULA_OF_PACKS(asin)
-PENDULA_OF_PACKS(acos)
-PENDULA_OF_PACKS(atan)
-PENDULA_OF_PACKS(sinh)
-PENDULA_OF_PACKS(cosh)
-PENDULA_OF_PACKS(tanh)
-PENDULA_OF_PACKS(exp)
-PENDULA_OF_PACKS(log)
-PENDULA_OF_PACKS(sqrt)
-PENDULA_OF_PACKS(cbrt)
-#undef PENDULA_OF_PACKS
+PENDULA_OF_REGISTERS(exp)
+PENDULA_OF_REGISTERS(log)
+PENDULA_OF_REGISTERS(sqrt)
+#undef PENDULA_OF_REGISTERS
 
 template <int Size, class Register>
 Pack<Size, Register> sin(const Pack<Size, Register>& x) {
@@ -47,7 +72,12 @@ Pack<Size, Register> cos(const Pack<Size, Register>& x) {
 
 template <int Size, class Register>
 Pack<Size, Register> pow(const Pack<Size, Register>& x, const Pack<Size, Register>& exponent) {
-  return exp(exponent * log(x));
+  alignas(pack_alignment) typename Pack<Size, Register>::Scalar exponents[static_cast<std::size_t>(Size)];
+  exponent.store(exponents);
+  return detail::one_by_one(x, [next = exponents](const auto& number) mutable {
+    using std::pow;
+    return pow(number, *next++);
+  });
 }
 
 }  // namespace pendula

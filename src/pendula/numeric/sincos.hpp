@@ -38,14 +38,20 @@ struct ReducedSinCos {
   }
 };
 
-/// The same by the standard library, for numbers of any size.
+/// From where on reduced arguments lose digits.
+inline constexpr double large_angle = 1e5;
+
+/// The numbers that are large, or none, by the standard library; the others stay, and do not notice.
 template <class Arch>
 [[gnu::noinline, gnu::cold]] void sincos_of_large(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sine,
                                                   xsimd::batch<double, Arch>& cosine) {
   using Batch = xsimd::batch<double, Arch>;
   alignas(pack_alignment) double at[Batch::size], s[Batch::size], c[Batch::size];
   x.store_aligned(at);
+  sine.store_aligned(s);
+  cosine.store_aligned(c);
   for (std::size_t i = 0; i < Batch::size; ++i) {
+    if (std::abs(at[i]) < large_angle) continue;
     s[i] = std::sin(at[i]);
     c[i] = std::cos(at[i]);
   }
@@ -83,7 +89,7 @@ void sincos(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sin
   sine = std::bit_cast<Batch>((bits(reduced.sine) ^ difference) ^ sine_sign);
   cosine = std::bit_cast<Batch>((bits(reduced.cosine) ^ difference) ^ cosine_sign);
 
-  if (!xsimd::all(xsimd::abs(x) < Batch(1e5))) [[unlikely]]
+  if (!xsimd::all(xsimd::abs(x) < Batch(detail::large_angle))) [[unlikely]]
     detail::sincos_of_large(x, sine, cosine);
 }
 

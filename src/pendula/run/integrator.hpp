@@ -161,11 +161,19 @@ std::unique_ptr<Integrator> make_integrator(const Chain<Space>& chain, const Run
                                       Space::dof * chain.links(), "chain");
 }
 
-/// The fixed-n kernels in this build, by space and number of links.
+/// A fixed-n kernel of a chain.
+struct KernelInfo {
+  std::string_view name;   ///< "planar_2"
+  std::string_view space;  ///< "planar" or "spatial"
+  int links = 0;
+};
+
+/// Those in this build, by space and number of links.
 inline std::vector<KernelInfo> built_in_kernels() {
   std::vector<KernelInfo> kernels;
-  for (const KernelEntry& entry : library().planar.kernels) kernels.push_back(entry.info);
-  for (const KernelEntry& entry : library().spatial.kernels) kernels.push_back(entry.info);
+  for (const auto& tables : {library().planar.kernels, library().spatial.kernels}) {
+    for (const SystemTable* table : tables) kernels.push_back({table->info.name, table->info.model, table->info.links});
+  }
   return kernels;
 }
 

@@ -4,9 +4,9 @@
 #include <memory>
 #include <pendula/chain/plain_chain.hpp>
 #include <pendula/lanes/plain_lanes.hpp>
-#include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/system_table.hpp>
 #include <span>
 #include <string_view>
 
@@ -17,7 +17,7 @@ struct SpaceLibrary {
   /// As make_integrator, of integrator.hpp.
   std::unique_ptr<PlainIntegrator> (*make_integrator)(const PlainChain&, const RunOptions&);
   /// The fixed-n kernels of this build, by number of links.
-  std::span<const KernelEntry> kernels;
+  std::span<const SystemTable* const> kernels;
   /// Members in lanes; nullptr for methods and stages that move them one by one.
   MoveMembers* (*lanes)(const RunOptions&);
   /// The same with a tangent of each; nullptr for methods that have none.
@@ -31,7 +31,11 @@ struct SpaceLibrary {
 struct Library {
   std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" where there is one only
   SpaceLibrary planar, spatial;
-  std::span<const SystemEntry* const> systems;  ///< kernels of this build that are no chains
+  std::span<const SystemTable* const> systems;  ///< kernels of this build that are no chains
+  /// Every method over these, and over any other kernel; `parts` is what failures name, 0 for the coordinates. Throws
+  /// as make_integrator.
+  std::unique_ptr<PlainIntegrator> (*make_system_integrator)(const SystemTable&, const PlainSystem&, const RunOptions&,
+                                                             int parts);
   /// Members of these, and of any other kernel, in lanes; nullptr for methods that move them one by one.
   MoveSystemMembers* (*system_lanes)(const RunOptions&);
   /// The same with a tangent of each; nullptr for methods that have none.

@@ -5,72 +5,56 @@
 #include <functional>
 #include <memory>
 #include <numeric>
-#include <pendula/explicit/explicit_integrator.hpp>
+#include <pendula/run/library.hpp>
 #include <pendula/run/subject.hpp>
-#include <pendula/system/kernel_registry.hpp>
 #include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_model.hpp>
+#include <pendula/system/system_table.hpp>
 #include <stdexcept>
 #include <utility>
 
 namespace pendula {
 
-/// The numbers of a system that is no chain.
-struct SystemNumbers {
-  std::vector<double> parameters, inputs;  ///< in the order of SystemInfo; inputs are their constant part
-  std::vector<InputSine> sines;
-
-  /// Lives as long as this.
-  PlainSystem plain() const { return {parameters.data(), inputs.data(), sines}; }
-};
-
 /// A system of any other kind as what a run moves.
 class SystemSubject : public Subject {
  public:
-  /// `entry` is kept, with whatever it was loaded from.
-  SystemSubject(std::shared_ptr<const SystemEntry> entry, SystemNumbers numbers)
-      : entry_(std::move(entry)), numbers_(std::move(numbers)) {}
+  /// `table` is kept, with whatever it was loaded from.
+  SystemSubject(std::shared_ptr<const SystemTable> table, SystemNumbers numbers)
+      : table_(std::move(table)), numbers_(std::move(numbers)) {}
 
-  const SystemEntry& entry() const { return *entry_; }
-  const SystemInfo& info() const { return entry_->info; }
+  const SystemTable& table() const { return *table_; }
+  const SystemInfo& info() const { return table_->info; }
   const SystemNumbers& numbers() const { return numbers_; }
 
   std::unique_ptr<Integrator> make_integrator(const RunOptions& options) const override {
-    const int count = static_cast<int>(info().coordinates.size());
     if (options.solver == Solver::chain) {
       throw std::invalid_argument("solver: the chain solver is for chains, got chain; dense is for any system");
     }
-    std::unique_ptr<PlainIntegrator> integrator =
-        is_explicit(options.method)
-            ? make_explicit_integrator(entry_->dynamics(numbers_.plain()), count, count, options, info().name)
-            : entry_->make(numbers_.plain(), options);
-    return std::make_unique<Integrator>(std::move(integrator), count, "system");
+    return std::make_unique<Integrator>(library().make_system_integrator(*table_, numbers_.plain(), options, 0),
+                                        static_cast<Eigen::Index>(info().coordinates.size()), "system");
   }
 
   Observation observe(const Motion& motion) const override {
     Observation seen;
     seen.points.resize(point_components());
-    const SystemEnergies energies =
-        entry_->observe(numbers_.plain(), motion.time, motion.q.data(), motion.v.data(), seen.points.data());
-    seen.kinetic = energies.kinetic;
-    seen.energy = energies.total;
+    const Conditions at = conditions(motion.time);
+    table_->of_1.energies(at, motion.q.data(), motion.v.data(), &seen.kinetic, &seen.energy);
+    if (seen.points.size() > 0) table_->plain.positions(at, motion.q.data(), seen.points.data());
     return seen;
   }
 
   /// Whether forces may change within a short way by functions other than powers and logarithms (field_look.hpp).
-  bool may_be_narrow() const {
-    const std::unique_ptr<ForwardDynamics> dynamics = entry_->dynamics(numbers_.plain());
-    return !std::ranges::all_of(dynamics->arguments(), std::identity());
-  }
+  bool may_be_narrow() const { return !std::ranges::all_of(info().argument_is_base, std::identity()); }
 
   /// Rates that go with momenta; not finite where the mass matrix is singular.
   Eigen::VectorXd rates(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& p) const {
     Eigen::VectorXd v(q.size());
-    entry_->rates(numbers_.plain(), time, q.data(), p.data(), v.data());
+    table_->of_1.velocity_from_momentum(conditions(time), q.data(), p.data(), v.data());
     return v;
   }
 
   std::optional<double> energy_scale() const override { return std::nullopt; }
-  bool loaded() const override { return entry_->loaded(numbers_.plain()); }
+  bool loaded() const override { return SystemModel(*table_, numbers_.plain()).loaded(); }
   bool damped() const override { return loaded(); }
   /// What depends on time may bring and take energy many times in a step that the motion does not need to be shorter.
   bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
@@ -165,6 +149,11 @@ class SystemSubject : public Subject {
  private:
   static std::string rate_unit(std::string_view unit) { return (unit.empty() ? "1" : std::string(unit)) + "/s"; }
 
+  // For functions that depend on no inputs; `time` has to outlive them.
+  Conditions conditions(const double& time) const {
+    return {table_->context, numbers_.parameters.data(), &time, numbers_.inputs.data()};
+  }
+
   void append_inputs(double time, std::vector<double>& row) const {
     const std::size_t first = row.size();
     row.insert(row.end(), numbers_.inputs.begin(), numbers_.inputs.end());
@@ -185,7 +174,7 @@ class SystemSubject : public Subject {
     return largest;
   }
 
-  std::shared_ptr<const SystemEntry> entry_;
+  std::shared_ptr<const SystemTable> table_;
   SystemNumbers numbers_;
 };
 

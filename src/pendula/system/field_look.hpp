@@ -10,20 +10,6 @@
 
 namespace pendula {
 
-/// Whether a kernel tells what its functions are taken of: S::call_arguments, and of each whether that is the base of a
-/// power (pendula_codegen/model_kernel.py).
-template <class S>
-inline constexpr bool tells_arguments = requires {
-  S::argument_is_base;
-};
-
-/// Which they are; none where a kernel tells of none.
-template <class S>
-std::span<const bool> argument_bases() {
-  if constexpr (tells_arguments<S>) return S::argument_is_base;
-  return {};
-}
-
 namespace detail {
 
 /// Legendre's polynomials on (0, 1), P_0 to P_n.

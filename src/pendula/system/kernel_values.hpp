@@ -1,10 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <pendula/system/plain_system.hpp>
-#include <pendula/system/system_model.hpp>
+#include <pendula/system/system_table.hpp>
 
 namespace pendula {
 
@@ -71,68 +69,8 @@ enum class Solved {
 };
 inline constexpr int solved_count = 4;
 
-/// Every function of a kernel at one point.
-template <System S>
-void evaluate_kernel(const PlainSystem& plain, double time, const double* q, const double* v, const double* a,
-                     double* values) {
-  using Vector = typename S::template Vector<double>;
-  using Matrix = typename S::template Matrix<double>;
-  const auto parameters = SystemModel<S>::read(plain, time);
-  typename S::template Inputs<double> inputs;
-  std::copy_n(plain.inputs, inputs.size(), inputs.data());
-  const Vector position = Eigen::Map<const Vector>(q), velocity = Eigen::Map<const Vector>(v),
-               acceleration = Eigen::Map<const Vector>(a);
-  const auto put_number = [&](double number) { *values++ = number; };
-  const auto put = [&](const auto& matrix) {
-    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-      for (Eigen::Index j = 0; j < matrix.cols(); ++j) put_number(matrix(i, j));
-    }
-  };
-  double number = 0;
-  Vector p, f, E, solved;
-  Matrix mass, A, B, C;
-  S::kinetic_energy(parameters, position, velocity, number);
-  put_number(number);
-  S::energy(parameters, position, velocity, number);
-  put_number(number);
-  S::mass_matrix(parameters, position, mass);
-  put(mass);
-  S::momentum_from_velocity(parameters, position, velocity, p);
-  put(p);
-  const Vector momenta = p;
-  S::momentum_form(parameters, position, velocity, inputs, p, f);
-  put(p);
-  put(f);
-  S::momentum_form_with_jacobians(parameters, position, velocity, inputs, p, f, A, mass, B, C);
-  put(p);
-  put(f);
-  put(A);
-  put(mass);
-  put(B);
-  put(C);
-  S::residual(parameters, position, velocity, acceleration, inputs, E);
-  put(E);
-  S::residual_with_jacobians(parameters, position, velocity, acceleration, inputs, E, A, B, mass);
-  put(E);
-  put(A);
-  put(B);
-  put(mass);
-  S::power(parameters, position, velocity, inputs, number);
-  put_number(number);
-  if constexpr (requires { &S::template positions<double>; }) {
-    typename S::template Points<double> points;
-    S::positions(parameters, position, points);
-    put(points);
-    S::velocities(parameters, position, velocity, points);
-    put(points);
-  }
-  S::acceleration(parameters, position, velocity, inputs, solved);
-  put(solved);
-  S::velocity_from_momentum(parameters, position, momenta, solved);
-  put(solved);
-  S::hamiltonian_form(parameters, position, momenta, inputs, solved, f);
-  put(solved);
-  put(f);
-}
+/// Every function of a kernel at one point of a system without sines.
+void evaluate_kernel(const SystemTable& table, const PlainSystem& system, double time, const double* q, const double* v,
+                     const double* a, double* values);
 
 }  // namespace pendula

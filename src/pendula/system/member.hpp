@@ -59,6 +59,10 @@ class MemberNumbers {
   void pass(std::array<Value, size>& values) {
     for (Value& value : values) pass(value);
   }
+  template <class Value>
+  void pass(std::vector<Value>& values) {
+    for (Value& value : values) pass(value);
+  }
   template <class Value, std::size_t size>
   void pass(Value (&values)[size]) {
     for (Value& value : values) pass(value);

@@ -4,6 +4,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 namespace pendula {
 
@@ -24,13 +25,22 @@ struct PlainSystem {
 };
 static_assert(std::is_trivially_copyable_v<PlainSystem> && std::is_standard_layout_v<PlainSystem>);
 
+/// The same with the memory that they lie in.
+struct SystemNumbers {
+  std::vector<double> parameters, inputs;  ///< in the order of SystemInfo; inputs are their constant part
+  std::vector<InputSine> sines;
+
+  /// Lives as long as this.
+  PlainSystem plain() const { return {parameters.data(), inputs.data(), sines}; }
+};
+
 /// What a kernel says of itself, as it crosses from compiled code to a program.
 struct SystemInfo {
   std::string_view name;   ///< "cart_chain_2"
   std::string_view model;  ///< "cart_chain"
   int links = 1;
   std::span<const std::string_view> coordinates, coordinate_units;
-  std::span<const bool> is_angle;
+  std::span<const bool> is_angle, is_periodic;
   std::span<const std::string_view> parameters, parameter_units;
   std::span<const int> parameter_sizes;
   std::span<const double> parameter_defaults;  ///< NaN where there is none
@@ -39,6 +49,9 @@ struct SystemInfo {
   std::span<const std::string_view> points;
   std::span<const int> point_sizes;  ///< components of each
   bool depends_on_time;              ///< other than by inputs
+  bool constant_masses;              ///< whether pivots of the mass matrix are the same wherever it is
+  /// Of what its functions are taken of that may be narrow, whether it is the base of a power (field_look.hpp).
+  std::span<const bool> argument_is_base;
 };
 
 /// What the generated kernel S says of itself.
@@ -50,6 +63,7 @@ constexpr SystemInfo info_of() {
           S::coordinate_names,
           S::coordinate_units,
           S::coordinate_is_angle,
+          S::coordinate_is_periodic,
           S::parameter_names,
           S::parameter_units,
           S::parameter_sizes,
@@ -60,7 +74,9 @@ constexpr SystemInfo info_of() {
           S::input_units,
           S::point_names,
           S::point_sizes,
-          holds_time<S>};
+          holds_time<S>,
+          S::constant_masses,
+          argument_bases<S>()};
 }
 
 }  // namespace pendula

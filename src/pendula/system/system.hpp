@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <span>
 #include <string_view>
 
 namespace pendula {
@@ -45,6 +46,20 @@ constexpr int parameter_count() {
   int count = 0;
   for (const int size : S::parameter_sizes) count += size;
   return count;
+}
+
+/// Whether a kernel tells what its functions are taken of: S::call_arguments, and of each whether that is the base of a
+/// power (pendula_codegen/model_kernel.py).
+template <class S>
+inline constexpr bool tells_arguments = requires {
+  S::argument_is_base;
+};
+
+/// Which they are; none where a kernel tells of none.
+template <class S>
+constexpr std::span<const bool> argument_bases() {
+  if constexpr (tells_arguments<S>) return S::argument_is_base;
+  return {};
 }
 
 }  // namespace pendula

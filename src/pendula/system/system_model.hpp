@@ -1,66 +1,48 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/plain_system.hpp>
-#include <pendula/system/system.hpp>
+#include <pendula/system/system_table.hpp>
+#include <span>
 #include <utility>
 #include <vector>
 
 namespace pendula {
 
-/// A system with its numbers: immutable.
-template <System S>
+/// A system with its numbers: immutable. Its table has to outlive it.
 class SystemModel {
  public:
-  using Parameters = typename S::template Parameters<double>;
-  using Inputs = typename S::template Inputs<double>;
-  using Vector = typename S::template Vector<double>;
-
-  /// `inputs` are constant; `sines` are added to them. In `parameters` time may be anything.
-  explicit SystemModel(const Parameters& parameters, const Inputs& inputs = none(), std::vector<InputSine> sines = {})
-      : parameters_(parameters), constant_(inputs), sines_(std::move(sines)) {
+  SystemModel(const SystemTable& table, const PlainSystem& plain)
+      : table_(&table),
+        parameters_(plain.parameters, plain.parameters + parameter_count(table.info)),
+        constant_(plain.inputs, plain.inputs + table.info.inputs.size()),
+        sines_(plain.sines.begin(), plain.sines.end()),
+        loaded_(table.info.depends_on_time) {
     sample_power();
   }
 
-  /// The same from plain numbers.
-  explicit SystemModel(const PlainSystem& plain)
-      : SystemModel(read(plain), read_inputs(plain), {plain.sines.begin(), plain.sines.end()}) {}
+  const SystemTable& table() const { return *table_; }
+  const SystemInfo& info() const { return table_->info; }
+  std::size_t coordinates() const { return info().coordinates.size(); }
 
-  /// Parameters out of plain numbers, at `time`.
-  static Parameters read(const PlainSystem& plain, double time = 0) {
-    Parameters parameters{};
-    S::template read_parameters<double>(plain.parameters, parameters);
-    if constexpr (holds_time<S>) parameters.time = time;
-    return parameters;
-  }
+  std::span<const double> parameters() const { return parameters_; }
+  std::size_t inputs() const { return constant_.size(); }
 
-  /// Inputs of a system that nobody drives.
-  static Inputs none() {
-    Inputs inputs;
-    std::fill_n(inputs.data(), inputs.size(), 0.0);
-    return inputs;
-  }
-
-  /// The parameters, at `time` where the system holds it.
-  Parameters parameters(double time) const {
-    Parameters parameters = parameters_;
-    if constexpr (holds_time<S>) parameters.time = time;
-    return parameters;
-  }
-
-  Inputs inputs(double time) const {
-    Inputs inputs = constant_;
+  /// Its inputs at `time`, each `apart` numbers from the one before.
+  void inputs(double time, double* found, std::size_t apart = 1) const {
+    for (std::size_t k = 0; k < constant_.size(); ++k) found[k * apart] = constant_[k];
     for (const InputSine& sine : sines_) {
-      inputs.data()[sine.input] += sine.amplitude * std::sin(sine.frequency * time + sine.phase);
+      found[static_cast<std::size_t>(sine.input) * apart] +=
+          sine.amplitude * std::sin(sine.frequency * time + sine.phase);
     }
-    return inputs;
   }
 
   /// Whether anything depends on time.
-  bool driven() const { return holds_time<S> || !sines_.empty(); }
+  bool driven() const { return info().depends_on_time || !sines_.empty(); }
 
   /// Highest frequency of a sine that is added to an input; 0 where there is none  [rad/s].
   double fastest_drive() const {
@@ -78,51 +60,85 @@ class SystemModel {
   bool damped() const { return damped_; }
 
  private:
-  static Inputs read_inputs(const PlainSystem& plain) {
-    Inputs inputs;
-    std::copy_n(plain.inputs, inputs.size(), inputs.data());
-    return inputs;
+  static int parameter_count(const SystemInfo& info) {
+    return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), 0);
   }
 
   // Forces are loads where they bring power somewhere: looked for in a few states, none of which is special. What
   // depends on time may bring it at others.
   void sample_power() {
+    std::vector<double> q(coordinates()), v(coordinates()), driven(inputs());
+    const std::vector<double> none(inputs());
     for (int k = 1; k <= samples; ++k) {
-      Vector q, v;
-      for (Eigen::Index i = 0; i < q.size(); ++i) {
+      for (std::size_t i = 0; i < q.size(); ++i) {
         q[i] = 0.5 + std::sin(1.7 * k + 2.3 * static_cast<double>(i));
         v[i] = std::cos(1.1 * k + 3.1 * static_cast<double>(i));
       }
-      double power = 0, own = 0;
-      S::power(parameters(0.37 * k), q, v, inputs(0.37 * k), power);
-      S::power(parameters(0.37 * k), q, v, none(), own);
-      loaded_ = loaded_ || power != 0;
-      damped_ = damped_ || own < 0;
+      const double time = 0.37 * k;
+      inputs(time, driven.data());
+      const auto power = [&](const std::vector<double>& given) {
+        double found = 0;
+        table_->of_1.power({table_->context, parameters_.data(), &time, given.data()}, q.data(), v.data(), &found);
+        return found;
+      };
+      loaded_ = loaded_ || power(driven) != 0;
+      damped_ = damped_ || power(none) < 0;
     }
   }
 
   static constexpr int samples = 4;
 
-  Parameters parameters_;
-  Inputs constant_;
+  const SystemTable* table_;
+  std::vector<double> parameters_, constant_;
   std::vector<InputSine> sines_;
-  bool loaded_ = holds_time<S>, damped_ = false;
+  bool loaded_, damped_ = false;
 };
 
-/// Coordinates and rates of a system at one time.
-template <System S>
-struct SystemState {
-  using Vector = typename S::template Vector<double>;
+/// W states of a system, each at a time of its own: what its functions are taken at, and they.
+template <int W>
+class SystemAt {
+  static constexpr auto width = static_cast<std::size_t>(W);
 
-  double time = 0;  ///< s
-  Vector q, v;
+ public:
+  explicit SystemAt(const SystemModel& model)
+      : model_(model),
+        functions_(functions_of<W>(model.table())),
+        parameters_(model.parameters().size() + 1),
+        times_(1),
+        inputs_(model.inputs() + 1) {  // none has an address, too
+    for (std::size_t k = 0; k < model.parameters().size(); ++k) {
+      std::fill_n(parameters_[k], width, model.parameters()[k]);
+    }
+    for (std::size_t lane = 0; lane < width; ++lane) model.inputs(0, inputs_[0] + lane, width);
+  }
 
-  SystemState() = default;
-  SystemState(double at, const Vector& position, const Vector& velocity) : time(at), q(position), v(velocity) {}
-  /// Of whatever has a time, coordinates and rates: the state of a chain, say.
-  template <class Other>
-  requires requires(const Other& other) { Vector(other.q), Vector(other.v), other.time; }
-  SystemState(const Other& other) : time(other.time), q(other.q), v(other.v) {}  // NOLINT(google-explicit-constructor)
+  const SystemModel& model() const { return model_; }
+
+  /// All of them at one time, or at times(k) each.
+  void set_time(double time) {
+    set_times([&](std::size_t /*lane*/) { return time; });
+  }
+  template <class Times>
+  void set_times(Times&& times) {
+    if (!model_.driven()) return;
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      times_[0][lane] = times(lane);
+      model_.inputs(times_[0][lane], inputs_[0] + lane, width);
+    }
+  }
+
+  Conditions conditions() const { return {model_.table().context, parameters_[0], times_[0], inputs_[0]}; }
+
+  /// Calls one of its functions: at(&SystemFunctions::acceleration, q, v, a).
+  template <class Result, class... Given, class... Numbers>
+  Result operator()(Result (*SystemFunctions::*function)(const Conditions&, Given...), Numbers... numbers) const {
+    return (functions_.*function)(conditions(), numbers...);
+  }
+
+ private:
+  SystemModel model_;
+  SystemFunctions functions_;
+  PackRows<width> parameters_, times_, inputs_;
 };
 
 }  // namespace pendula

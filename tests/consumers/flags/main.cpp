@@ -100,7 +100,7 @@ int main() {
   good = same("in the plane", by_library<Planar>(exact_chain), by_library<Planar>(exact_dense)) && good;
   good = same("in space", by_library<Spatial>(exact_chain), by_library<Spatial>(exact_dense)) && good;
   // The method from there, the accelerations from here.
-  auto accelerations = std::make_unique<SystemForwardDynamics<kernels::Planar3>>(system_of<kernels::Planar3>(planar));
+  auto accelerations = std::make_unique<SystemForwardDynamics>(system_of<kernels::Planar3>(planar));
   Integrator ours(make_explicit_integrator(std::move(accelerations), 3, 3, rk4, ""), 3, "chain");
   good = same("explicit ones", by_library<Planar>(rk4), end_of_run<Planar>(ours)) && good;
 

@@ -24,7 +24,7 @@ Chain<Space> unit_chain(int links) {
 // Compiled here, over this project's own kernel, with the number of stages known.
 Eigen::Vector3d last_bob_in_space(const Eigen::VectorXd& theta) {
   const auto chain = unit_chain<Spatial>(4);
-  GaussStepper<LagrangianSolver<kernels::Spatial4, 4>> stepper(system_of<kernels::Spatial4>(chain), 2);
+  GaussStepper<LagrangianSolver<4>> stepper(system_of<kernels::Spatial4>(chain), 2);
   const Eigen::VectorXd phi = Eigen::VectorXd::Constant(4, azimuth);
   for (auto outcome = stepper.start(State<Spatial>::from_angles(theta, phi)); stepper.time() < duration - step / 2;) {
     if (outcome) outcome = stepper.step(step);

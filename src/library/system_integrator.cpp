@@ -1,0 +1,44 @@
+#include "library/system_integrator.hpp"
+
+#include <pendula/explicit/explicit_integrator.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
+#include <pendula/gauss/gauss_integrator.hpp>
+#include <pendula/gauss/lagrangian_solver.hpp>
+#include <pendula/gauss/velocity_newton.hpp>
+
+namespace pendula {
+namespace {
+
+/// An implicit method, by the narrowest lanes that hold its stages.
+template <template <int> class OfWidth, class... SolverOptions>
+std::unique_ptr<PlainIntegrator> make_gauss(const SystemModel& model, const RunOptions& options,
+                                            const GaussDescription& described, const SolverOptions&... solver_options) {
+  const auto make = [&]<int width>() -> std::unique_ptr<PlainIntegrator> {
+    return std::make_unique<GaussIntegrator<OfWidth<width>>>(model, options, described, solver_options...);
+  };
+  if (options.stages <= 2) return make.template operator()<2>();
+  return options.stages <= 4 ? make.template operator()<4>() : make.template operator()<8>();
+}
+
+}  // namespace
+
+std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table, const PlainSystem& plain,
+                                                        const RunOptions& options, int parts) {
+  const SystemModel model(table, plain);
+  const auto coordinates = static_cast<int>(model.coordinates());
+  if (parts == 0) parts = coordinates;
+  if (is_explicit(options.method)) {
+    return make_explicit_integrator(std::make_unique<SystemForwardDynamics>(model), coordinates, parts, options,
+                                    table.info.name);
+  }
+  const GaussDescription described{"dense", table.info.name, parts};
+  const Family family = family_of(options.method);
+  require_stages(options.stages);
+  if (options.form == Form::velocity) {
+    require_newton(options.iteration);
+    return make_gauss<VelocityNewton>(model, options, described, family);
+  }
+  return make_gauss<LagrangianSolver>(model, options, described, options.iteration, family);
+}
+
+}  // namespace pendula

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/dual.hpp>
+
+namespace pendula {
+
+/// Of what a tangent errs by, relative to itself, what chosen steps heed.
+inline constexpr double tangent_share = 0.01;
+
+// What numbers in lanes with derivatives along tangents (Dual) need besides arithmetic.
+
+template <class L>
+Dual<L> in_register(const Dual<L>& a) {
+  return {in_register(a.value), in_register(a.slope)};
+}
+
+template <class Mask, class L>
+Dual<L> select(const Mask& which, const Dual<L>& yes, const Dual<L>& no) {
+  return {select(which, yes.value, no.value), select(which, yes.slope, no.slope)};
+}
+
+/// Of derivatives no more is kept than they are rounded to.
+template <class L>
+Twofold<Dual<L>> exact_sum(const Dual<L>& a, const Dual<L>& b) {
+  const Twofold<L> sum = exact_sum(a.value, b.value);
+  return {{sum.value, a.slope + b.slope}, Dual<L>(sum.low)};
+}
+template <class L>
+Twofold<Dual<L>> ordered_sum(const Dual<L>& a, const Dual<L>& b) {
+  const Twofold<L> sum = ordered_sum(a.value, b.value);
+  return {{sum.value, a.slope + b.slope}, Dual<L>(sum.low)};
+}
+template <class L>
+Twofold<Dual<L>> exact_product(const Dual<L>& a, const Dual<L>& b) {
+  const Twofold<L> product = exact_product(a.value, b.value);
+  return {{product.value, fma(a.slope, b.value, a.value * b.slope)}, Dual<L>(product.low)};
+}
+template <class L>
+Twofold<Dual<L>> exact_product(const Dual<L>& a, const L& b) {
+  const Twofold<L> product = exact_product(a.value, b);
+  return {{product.value, a.slope * b}, Dual<L>(product.low)};
+}
+template <class L>
+Twofold<Dual<L>> exact_product(const L& a, const Dual<L>& b) {
+  return exact_product(b, a);
+}
+
+namespace detail {
+
+/// What the numbers of a vector are without their derivatives.
+template <class L, std::size_t D>
+const std::array<L, D>& values_of(const std::array<L, D>& x) {
+  return x;
+}
+template <class L, std::size_t D>
+std::array<L, D> values_of(const std::array<Dual<L>, D>& x) {
+  std::array<L, D> values;
+  for (std::size_t k = 0; k < D; ++k) values[k] = x[k].value;
+  return values;
+}
+
+template <class L, std::size_t D>
+std::array<L, D> slopes_of(const std::array<Dual<L>, D>& x) {
+  std::array<L, D> slopes;
+  for (std::size_t k = 0; k < D; ++k) slopes[k] = x[k].slope;
+  return slopes;
+}
+
+/// Sets a member's, and leaves its derivative.
+template <class L>
+void set_value(int lane, double value, L& x) {
+  x.set(lane, value);
+}
+template <class L>
+void set_value(int lane, double value, Dual<L>& x) {
+  x.value.set(lane, value);
+}
+
+}  // namespace detail
+
+}  // namespace pendula

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <pendula/numeric/lanes.hpp>
+#include <vector>
+
+namespace pendula {
+
+namespace detail {
+
+/// Memory that packs may be loaded from.
+template <class Number>
+struct PackAllocator {
+  using value_type = Number;
+
+  PackAllocator() = default;
+  template <class Other>
+  PackAllocator(const PackAllocator<Other>& /*other*/) {}  // NOLINT(google-explicit-constructor)
+
+  Number* allocate(std::size_t count) {
+    return static_cast<Number*>(::operator new(count * sizeof(Number), std::align_val_t{pack_alignment}));
+  }
+  void deallocate(Number* numbers, std::size_t /*count*/) {
+    ::operator delete(numbers, std::align_val_t{pack_alignment});
+  }
+  friend bool operator==(const PackAllocator&, const PackAllocator&) { return true; }
+};
+
+}  // namespace detail
+
+/// Rows of `Width` numbers each, one after the other, that are loaded as packs: zero at first.
+template <std::size_t Width>
+class PackRows {
+ public:
+  explicit PackRows(std::size_t rows = 0) : numbers_(rows * Width) {}
+
+  std::size_t rows() const { return numbers_.size() / Width; }
+  double* operator[](std::size_t k) { return numbers_.data() + k * Width; }
+  const double* operator[](std::size_t k) const { return numbers_.data() + k * Width; }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers.range(numbers_.data(), numbers_.size());
+  }
+
+ private:
+  std::vector<double, detail::PackAllocator<double>> numbers_;
+};
+
+}  // namespace pendula

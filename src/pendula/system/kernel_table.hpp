@@ -1,0 +1,407 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <pendula/numeric/dual_functions.hpp>
+#include <pendula/numeric/functions.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/stage_product.hpp>
+#include <pendula/system/system.hpp>
+#include <pendula/system/system_model.hpp>
+#include <pendula/system/system_table.hpp>
+#include <type_traits>
+
+namespace pendula {
+
+namespace detail {
+
+/// The functions of the generated kernel S, of W states at once.
+template <System S, int W>
+class KernelFunctions {
+  using L = std::conditional_t<W == 1, double, Pack<W, RegisterFor<W>>>;
+  static constexpr auto width = static_cast<std::size_t>(W);
+  template <class Number>
+  using Vector = typename S::template Vector<Number>;
+  template <class Number>
+  using Matrix = typename S::template Matrix<Number>;
+  template <class Number>
+  using Parameters = typename S::template Parameters<Number>;
+  template <class Number>
+  using Inputs = typename S::template Inputs<Number>;
+
+ public:
+  static constexpr SystemFunctions functions() {
+    return {&hamiltonian_form,
+            &momentum_form,
+            &momentum_form_with_jacobians,
+            &residual_with_jacobians,
+            &momentum_from_velocity,
+            &velocity_from_momentum,
+            &acceleration,
+            &mass_matrix,
+            &energies,
+            &power,
+            &acceleration_along,
+            &momentum_form_along,
+            tells_arguments<S> ? &call_arguments : nullptr,
+            &iterate};
+  }
+
+  static void residual(const Conditions& at, const double* q, const double* v, const double* a, double* E) {
+    Vector<L> found;
+    S::residual(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
+    write(found, E);
+  }
+  static void positions(const Conditions& at, const double* q, double* points) {
+    if constexpr (has_points) {
+      typename S::template Points<L> found;
+      S::positions(parameters(at), vector(q), found);
+      write_columns(found, points);
+    }
+  }
+  static void velocities(const Conditions& at, const double* q, const double* v, double* velocities) {
+    if constexpr (has_points) {
+      typename S::template Points<L> found;
+      S::velocities(parameters(at), vector(q), vector(v), found);
+      write_columns(found, velocities);
+    }
+  }
+  static constexpr bool has_points = requires { &S::template positions<double>; };
+
+  static constexpr ChainFunctions chain_functions() {
+    return {&residual_D_q,       &residual_D_v,         &residual_D_a, &force,
+            &force_with_jacobians, &potential_energy,   &lagrangian,   &lagrangian_gradient,
+            &lagrangian_hessian, &hamiltonian};
+  }
+
+ private:
+  // --- Numbers as they cross ---
+
+  static L load(const double* from) {
+    if constexpr (W == 1) {
+      return *from;
+    } else {
+      return L::load(from);
+    }
+  }
+  static void store(const L& number, double* to) {
+    if constexpr (W == 1) {
+      *to = number;
+    } else {
+      number.store(to);
+    }
+  }
+
+  // Rows of W numbers, and with their derivatives.
+  struct Rows {
+    const double* from;
+    L operator[](std::size_t k) const { return load(from + k * W); }
+  };
+  struct VariedRows {
+    const double *from, *slopes;
+    Dual<L> operator[](std::size_t k) const { return {load(from + k * W), load(slopes + k * W)}; }
+  };
+
+  // Their loops are short, and what is not used of them need not be read: inlined, compilers see that.
+  template <class Number, class From>
+  [[gnu::always_inline]] static Parameters<Number> read_parameters(const From& from, const Conditions& at) {
+    Parameters<Number> parameters;
+    S::template read_parameters<Number>(from, parameters);
+    if constexpr (holds_time<S>) parameters.time = Number(load(at.times));
+    return parameters;
+  }
+  [[gnu::always_inline]] static Parameters<L> parameters(const Conditions& at) {
+    return read_parameters<L>(Rows{at.parameters}, at);
+  }
+  template <class Matrix, class From>
+  [[gnu::always_inline]] static Matrix read(const From& from) {
+    Matrix numbers;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(Matrix::SizeAtCompileTime); ++k) numbers.data()[k] = from[k];
+    return numbers;
+  }
+  [[gnu::always_inline]] static Inputs<L> inputs(const Conditions& at) { return read<Inputs<L>>(Rows{at.inputs}); }
+  [[gnu::always_inline]] static Vector<L> vector(const double* from) { return read<Vector<L>>(Rows{from}); }
+
+  template <class Matrix>
+  [[gnu::always_inline]] static void write(const Matrix& numbers, double* to) {
+    for (Eigen::Index i = 0; i < numbers.rows(); ++i) {
+      for (Eigen::Index j = 0; j < numbers.cols(); ++j, to += W) store(numbers(i, j), to);
+    }
+  }
+  template <class Matrix>
+  [[gnu::always_inline]] static void write_columns(const Matrix& numbers, double* to) {
+    for (Eigen::Index k = 0; k < numbers.size(); ++k) store(numbers.data()[k], to + k * W);
+  }
+
+  // --- The functions ---
+
+  static void hamiltonian_form(const Conditions& at, const double* q, const double* p, double* v, double* f) {
+    Vector<L> rates, forces;
+    S::hamiltonian_form(parameters(at), vector(q), vector(p), inputs(at), rates, forces);
+    write(rates, v);
+    write(forces, f);
+  }
+  static void momentum_form(const Conditions& at, const double* q, const double* v, double* p, double* f) {
+    Vector<L> momenta, forces;
+    S::momentum_form(parameters(at), vector(q), vector(v), inputs(at), momenta, forces);
+    write(momenta, p);
+    write(forces, f);
+  }
+  static void momentum_form_with_jacobians(const Conditions& at, const double* q, const double* v, double* p, double* f,
+                                           double* p_D_q, double* p_D_v, double* f_D_q, double* f_D_v) {
+    Vector<L> momenta, forces;
+    Matrix<L> momenta_q, momenta_v, forces_q, forces_v;
+    S::momentum_form_with_jacobians(parameters(at), vector(q), vector(v), inputs(at), momenta, forces, momenta_q,
+                                    momenta_v, forces_q, forces_v);
+    write(momenta, p);
+    write(forces, f);
+    write(momenta_q, p_D_q);
+    write(momenta_v, p_D_v);
+    write(forces_q, f_D_q);
+    write(forces_v, f_D_v);
+  }
+  static void residual_with_jacobians(const Conditions& at, const double* q, const double* v, const double* a,
+                                      double* E, double* E_D_q, double* E_D_v, double* E_D_a) {
+    Vector<L> found;
+    Matrix<L> by_q, by_v, by_a;
+    S::residual_with_jacobians(parameters(at), vector(q), vector(v), vector(a), inputs(at), found, by_q, by_v, by_a);
+    write(found, E);
+    write(by_q, E_D_q);
+    write(by_v, E_D_v);
+    write(by_a, E_D_a);
+  }
+  static void momentum_from_velocity(const Conditions& at, const double* q, const double* v, double* p) {
+    Vector<L> found;
+    S::momentum_from_velocity(parameters(at), vector(q), vector(v), found);
+    write(found, p);
+  }
+  static void velocity_from_momentum(const Conditions& at, const double* q, const double* p, double* v) {
+    Vector<L> found;
+    S::velocity_from_momentum(parameters(at), vector(q), vector(p), found);
+    write(found, v);
+  }
+  static void acceleration(const Conditions& at, const double* q, const double* v, double* a) {
+    Vector<L> found;
+    S::acceleration(parameters(at), vector(q), vector(v), inputs(at), found);
+    write(found, a);
+  }
+  static void mass_matrix(const Conditions& at, const double* q, double* M) {
+    Matrix<L> found;
+    S::mass_matrix(parameters(at), vector(q), found);
+    write(found, M);
+  }
+  static void energies(const Conditions& at, const double* q, const double* v, double* kinetic, double* total) {
+    L found;
+    S::kinetic_energy(parameters(at), vector(q), vector(v), found);
+    store(found, kinetic);
+    S::energy(parameters(at), vector(q), vector(v), found);
+    store(found, total);
+  }
+  static void power(const Conditions& at, const double* q, const double* v, double* power) {
+    L found;
+    S::power(parameters(at), vector(q), vector(v), inputs(at), found);
+    store(found, power);
+  }
+  static void call_arguments(const Conditions& at, const double* q, const double* v, double* arguments) {
+    if constexpr (tells_arguments<S>) {
+      typename S::template Arguments<L> found;
+      S::call_arguments(parameters(at), vector(q), vector(v), inputs(at), found);
+      write(found, arguments);
+    }
+  }
+
+  // --- Derivatives along a direction: the functions in dual numbers ---
+
+  static void acceleration_along(const Conditions& at, const double* q, const double* v, const double* dq,
+                                 const double* dv, double* a, double* da) {
+    const Inputs<L> given = inputs(at);
+    Inputs<Dual<L>> fixed;
+    for (Eigen::Index k = 0; k < given.size(); ++k) fixed.data()[k] = Dual<L>(given.data()[k]);
+    const Parameters<Dual<L>> parameters = read_parameters<Dual<L>>(Rows{at.parameters}, at);
+    Vector<Dual<L>> found;
+    S::acceleration(parameters, read<Vector<Dual<L>>>(VariedRows{q, dq}), read<Vector<Dual<L>>>(VariedRows{v, dv}),
+                    fixed, found);
+    for (Eigen::Index k = 0; k < found.size(); ++k) {
+      store(found[k].value, a + k * W);
+      store(found[k].slope, da + k * W);
+    }
+  }
+  static void momentum_form_along(const Conditions& at, const double* varied_parameters, const double* varied_inputs,
+                                  const double* q, const double* v, double* dp, double* df) {
+    const Vector<L> places = vector(q), rates = vector(v);
+    Vector<Dual<L>> fixed_q, fixed_v, momenta, forces;
+    for (Eigen::Index k = 0; k < places.size(); ++k) {
+      fixed_q[k] = Dual<L>(places[k]);
+      fixed_v[k] = Dual<L>(rates[k]);
+    }
+    S::momentum_form(read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at), fixed_q, fixed_v,
+                     read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}), momenta, forces);
+    for (Eigen::Index k = 0; k < momenta.size(); ++k) {
+      store(momenta[k].slope, dp + k * W);
+      store(forces[k].slope, df + k * W);
+    }
+  }
+
+  // --- The loop that is compiled with a kernel: a call of its functions would cost what few coordinates take ---
+
+  PENDULA_IN_REGISTERS static StageChange iterate(const Conditions& at, const StageIteration& on) {
+    constexpr std::size_t count = S::coordinates;
+    using P = Pack<W, RegisterFor<W>>;
+    const auto reached = [&](std::size_t k) {
+      const Compensated<double>& start = on.start[k];
+      return P(start.value) + stage_product<P, W, W>(on.m, on.increments + k * W, P(start.compensation));
+    };
+    Vector<L> Q, momenta, V, F;
+    for (std::size_t k = 0; k < count; ++k) {
+      Q[static_cast<Eigen::Index>(k)] = number(reached(k));
+      momenta[static_cast<Eigen::Index>(k)] = number(reached(count + k));
+    }
+    S::hamiltonian_form(parameters(at), Q, momenta, inputs(at), V, F);
+    const P hb = P::load(on.hb);
+    P largest(0.0), scale(0.0), all(0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+      const P weight(on.weights[k]), push_weight(on.weights[count + k]);
+      double *const moved_at = on.increments + k * W, *const pushed_at = on.increments + (count + k) * W;
+      const P moved = hb * P(pack(V[static_cast<Eigen::Index>(k)])),
+              pushed = hb * P(pack(F[static_cast<Eigen::Index>(k)]));
+      const P moved_change = moved - P::load(moved_at), pushed_change = pushed - P::load(pushed_at);
+      largest = max(largest, max(weight * abs(moved_change), push_weight * abs(pushed_change)));
+      scale = max(scale, max(weight * abs(moved), push_weight * abs(pushed)));
+      all = all + (moved_change + pushed_change);
+      moved.store(moved_at);
+      pushed.store(pushed_at);
+    }
+    // NaN if any change is no number: that reaches their sum, though not always the largest.
+    if (!std::isfinite(total(all))) return {std::numeric_limits<double>::quiet_NaN(), largest_of(scale)};
+    return {largest_of(largest), largest_of(scale)};
+  }
+
+  static L number(const Pack<W, RegisterFor<W>>& pack) {
+    if constexpr (W == 1) {
+      double number = 0;
+      pack.store(&number);
+      return number;
+    } else {
+      return pack;
+    }
+  }
+  static Pack<W, RegisterFor<W>> pack(const L& number) { return Pack<W, RegisterFor<W>>(number); }
+
+  static double largest_of(const Pack<W, RegisterFor<W>>& numbers) {
+    alignas(pack_alignment) double each[width];
+    numbers.store(each);
+    return *std::max_element(each, each + W);
+  }
+  static double total(const Pack<W, RegisterFor<W>>& numbers) {
+    alignas(pack_alignment) double each[width];
+    numbers.store(each);
+    double total = each[0];
+    for (int k = 1; k < W; ++k) total += each[k];
+    return total;
+  }
+
+  // --- Of chains ---
+
+  static void residual_D_q(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_q) {
+    Matrix<L> found;
+    S::residual_D_q(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
+    write(found, E_D_q);
+  }
+  static void residual_D_v(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_v) {
+    Matrix<L> found;
+    S::residual_D_v(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
+    write(found, E_D_v);
+  }
+  static void residual_D_a(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_a) {
+    Matrix<L> found;
+    S::residual_D_a(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
+    write(found, E_D_a);
+  }
+  static void force(const Conditions& at, const double* q, const double* v, double* Q) {
+    Vector<L> found;
+    S::generalized_force(parameters(at), vector(q), vector(v), inputs(at), found);
+    write(found, Q);
+  }
+  static void force_with_jacobians(const Conditions& at, const double* q, const double* v, double* Q, double* Q_D_q,
+                                   double* Q_D_v) {
+    Vector<L> found;
+    Matrix<L> by_q, by_v;
+    S::generalized_force_with_jacobians(parameters(at), vector(q), vector(v), inputs(at), found, by_q, by_v);
+    write(found, Q);
+    write(by_q, Q_D_q);
+    write(by_v, Q_D_v);
+  }
+  static void potential_energy(const Conditions& at, const double* q, double* U) {
+    S::potential_energy(parameters(at), vector(q), *U);
+  }
+  static void lagrangian(const Conditions& at, const double* q, const double* v, double* value) {
+    S::lagrangian(parameters(at), vector(q), vector(v), *value);
+  }
+  static void lagrangian_gradient(const Conditions& at, const double* q, const double* v, double* L_D_q,
+                                  double* L_D_v) {
+    Vector<L> by_q, by_v;
+    S::lagrangian_gradient(parameters(at), vector(q), vector(v), by_q, by_v);
+    write(by_q, L_D_q);
+    write(by_v, L_D_v);
+  }
+  static void lagrangian_hessian(const Conditions& at, const double* q, const double* v, double* L_D_qq,
+                                 double* L_D_qv, double* L_D_vv) {
+    Matrix<L> qq, qv, vv;
+    S::lagrangian_hessian(parameters(at), vector(q), vector(v), qq, qv, vv);
+    write(qq, L_D_qq);
+    write(qv, L_D_qv);
+    write(vv, L_D_vv);
+  }
+  static void hamiltonian(const Conditions& at, const double* q, const double* p, double* H) {
+    S::hamiltonian(parameters(at), vector(q), vector(p), *H);
+  }
+};
+
+template <System S>
+constexpr PlainFunctions plain_functions() {
+  using Functions = KernelFunctions<S, 1>;
+  return {&Functions::residual, Functions::has_points ? &Functions::positions : nullptr,
+          Functions::has_points ? &Functions::velocities : nullptr};
+}
+
+template <System S>
+inline constexpr ChainFunctions chain_functions = KernelFunctions<S, 1>::chain_functions();
+
+template <System S>
+constexpr const ChainFunctions* chain_functions_of() {
+  if constexpr (requires { &S::template lagrangian_hessian<double>; }) return &chain_functions<S>;
+  return nullptr;
+}
+
+}  // namespace detail
+
+/// All that is compiled from the generated kernel S.
+template <System S>
+inline constexpr SystemTable system_table = {info_of<S>(),
+                                             nullptr,
+                                             detail::KernelFunctions<S, 1>::functions(),
+                                             detail::KernelFunctions<S, 2>::functions(),
+                                             detail::KernelFunctions<S, 4>::functions(),
+                                             detail::KernelFunctions<S, 8>::functions(),
+                                             detail::plain_functions<S>(),
+                                             detail::chain_functions_of<S>()};
+
+/// A system with its numbers, of the generated kernel S: `parameters` as it has them (time may be anything), constant
+/// `inputs`, and sines that are added to them.
+template <System S>
+SystemModel model_of(typename S::template Parameters<double> parameters,
+                     const typename S::template Inputs<double>* inputs = nullptr, std::vector<InputSine> sines = {}) {
+  std::array<double*, static_cast<std::size_t>(parameter_count<S>()) + 1> places{};
+  S::template parameter_places<double>(parameters, places.data());
+  SystemNumbers numbers;
+  for (int k = 0; k < parameter_count<S>(); ++k) numbers.parameters.push_back(*places[static_cast<std::size_t>(k)]);
+  numbers.inputs.assign(S::input_names.size(), 0.0);
+  if (inputs != nullptr) std::copy_n(inputs->data(), numbers.inputs.size(), numbers.inputs.begin());
+  numbers.sines = std::move(sines);
+  return SystemModel(system_table<S>, numbers.plain());
+}
+
+}  // namespace pendula
