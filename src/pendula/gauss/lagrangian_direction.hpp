@@ -80,9 +80,7 @@ class LagrangianDirection {
       for (std::size_t i = 0; i < count_; ++i) {
         if (i == k) continue;
         const L factor = -L::load(mass(i, k));
-        const auto add = [&](const double* from, double* to) {
-          fma(factor, L::load(from), L::load(to)).store(to);
-        };
+        const auto add = [&](const double* from, double* to) { fma(factor, L::load(from), L::load(to)).store(to); };
         for (std::size_t j = 0; j < count_; ++j) {
           add(mass(k, j), mass(i, j));
           add(v_D_p(k, j), v_D_p(i, j));

@@ -40,9 +40,8 @@ class LagrangianField {
     if (!look_.may_find(arguments) || !look_.finds(arguments)) return {};
     const double pace = stages.shape().pace;
     const auto rates = [&](std::span<const double> shares, double* found) {
-      in_lanes(stages, shares, found, 2 * count_, [&] {
-        at_(&SystemFunctions::hamiltonian_form, there_[0], there_[count_], found_[0], found_[count_]);
-      });
+      in_lanes(stages, shares, found, 2 * count_,
+               [&] { at_(&SystemFunctions::hamiltonian_form, there_[0], there_[count_], found_[0], found_[count_]); });
     };
     look_.sum(rates, {sums_, moments_, missed_});
     stages.take_changes(sums_, moments_);

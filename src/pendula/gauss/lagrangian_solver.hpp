@@ -184,8 +184,7 @@ class LagrangianSolver {
 
   // Whether a fixed point that changed so much leaves the step to Newton.
   bool gives_up(double change) const {
-    return choice_.is_automatic() &&
-           diverges(change, last_change_, count_, usual_rounding(parts(), epsilon), epsilon);
+    return choice_.is_automatic() && diverges(change, last_change_, count_, usual_rounding(parts(), epsilon), epsilon);
   }
 
   // Newton leaves the forces of the rates before its last correction.

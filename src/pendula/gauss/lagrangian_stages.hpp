@@ -181,9 +181,8 @@ class LagrangianStages {
 
   /// Replaces the increments by a fixed-point iteration once; its change is relative to the size of the step.
   double iterate() {
-    const StageChange found =
-        at_(&SystemFunctions::iterate,
-            StageIteration{columns_.m(), columns_.each_hb(), state_.data(), weights_.data(), U_[0]});
+    const IterationChange found = at_(&SystemFunctions::iterate, StageIteration{columns_.m(), columns_.each_hb(),
+                                                                                state_.data(), weights_.data(), U_[0]});
     return found.change == 0 ? 0 : found.change / std::max(found.size, floor_);
   }
 

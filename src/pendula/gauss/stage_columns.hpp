@@ -142,7 +142,8 @@ class StageColumns {
     predict_at(Real(1), Real(1));
   }
 
-  [[gnu::always_inline]] static L product(const Real (&column)[columns][Z], const Real* x, const L& start = L(Real(0))) {
+  [[gnu::always_inline]] static L product(const Real (&column)[columns][Z], const Real* x,
+                                          const L& start = L(Real(0))) {
     return stage_product<L, columns, Z>(&column[0][0], x, start);
   }
 

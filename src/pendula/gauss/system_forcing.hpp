@@ -37,10 +37,9 @@ class SystemForcing {
     for (std::size_t k = 0; k < sizes_.size(); ++k) {  // of angles a radian at least
       sizes_[k] = std::max(std::abs(here.q[k]), model.info().is_angle[k] ? 1.0 : 0.0);
     }
-    return look_.resolved(here.time, h, here.pace, tolerance, std::span(here.v, sizes_.size()), sizes_,
-                          [&](std::span<const double> times, double* found) {
-                            at_times_.accelerations(times, here.q, here.v, found);
-                          });
+    return look_.resolved(
+        here.time, h, here.pace, tolerance, std::span(here.v, sizes_.size()), sizes_,
+        [&](std::span<const double> times, double* found) { at_times_.accelerations(times, here.q, here.v, found); });
   }
 
  private:

@@ -369,7 +369,8 @@ class VelocityNewton {
     for (std::size_t k = 0; k < count_; ++k) {
       const Compensated<double>&place = state_[k], &rate = state_[count_ + k];
       const L pushed = columns_.integral(columns_.hb() * L::load(a(k)), L(rate.compensation));
-      const L moved = columns_.integral(columns_.hb() * pushed, fma(columns_.hc(), L(rate.value), L(place.compensation)));
+      const L moved =
+          columns_.integral(columns_.hb() * pushed, fma(columns_.hc(), L(rate.value), L(place.compensation)));
       (L(place.value) + moved).store(q(k));
       (L(rate.value) + pushed).store(v(k));
     }
@@ -468,9 +469,9 @@ class VelocityNewton {
   detail::StageSystem system_;
   SystemForcing forcing_;
   FieldLook look_;
-  Rows stages_;     // K, Q, V, E
-  Rows last_a_;     // of the last step
-  Rows jacobians_;  // ∂E/∂q, ∂E/∂v, ∂E/∂a
+  Rows stages_;                                                  // K, Q, V, E
+  Rows last_a_;                                                  // of the last step
+  Rows jacobians_;                                               // ∂E/∂q, ∂E/∂v, ∂E/∂a
   std::vector<Compensated<double>> state_, saved_, remembered_;  // q, then v
   std::vector<double> acceleration_;                             // at the start: the cold start of the predictor
   std::vector<double> weight_;

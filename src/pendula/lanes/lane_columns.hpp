@@ -7,6 +7,16 @@
 
 namespace pendula {
 
+namespace detail {
+
+/// One copy for registers of all widths: what compilers inline they fuse in different ways.
+template <int S>
+[[gnu::noinline]] NodePolynomials<S, double> node_polynomials(const Tableau<S>& tableau) {
+  return NodePolynomials<S, double>(tableau);
+}
+
+}  // namespace detail
+
 /// The coefficients of a Gauss step whose size is every member's own.
 ///
 /// Nodes are symmetric, and so is what they are weighed with: m_ij = ½ + k_ij with k_ji = −k_ij and, i' being the stage
@@ -21,7 +31,7 @@ class LaneColumns {
   using Stages = StagesOf<L>;
   using Mask = typename L::Mask;
 
-  LaneColumns() : tableau_(tableau_of<S>(Family::gauss, S)), polynomials_(tableau_) {
+  LaneColumns() : tableau_(tableau_of<S>(Family::gauss, S)), polynomials_(detail::node_polynomials<S>(tableau_)) {
     for (int i = 0; i < half; ++i) {
       for (int j = 0; j < half; ++j) {
         const double same = tableau_.m(i, j) - 0.5, opposite = tableau_.m(i, S - 1 - j) - 0.5;

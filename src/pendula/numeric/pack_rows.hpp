@@ -19,10 +19,10 @@ struct PackAllocator {
   PackAllocator(const PackAllocator<Other>& /*other*/) {}  // NOLINT(google-explicit-constructor)
 
   Number* allocate(std::size_t count) {
-    return static_cast<Number*>(::operator new(count * sizeof(Number), std::align_val_t{pack_alignment}));
+    return static_cast<Number*>(::operator new (count * sizeof(Number), std::align_val_t{pack_alignment}));
   }
   void deallocate(Number* numbers, std::size_t /*count*/) {
-    ::operator delete(numbers, std::align_val_t{pack_alignment});
+    ::operator delete (numbers, std::align_val_t{pack_alignment});
   }
   friend bool operator==(const PackAllocator&, const PackAllocator&) { return true; }
 };

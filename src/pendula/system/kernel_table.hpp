@@ -72,9 +72,9 @@ class KernelFunctions {
   static constexpr bool has_points = requires { &S::template positions<double>; };
 
   static constexpr ChainFunctions chain_functions() {
-    return {&residual_D_q,       &residual_D_v,         &residual_D_a, &force,
-            &force_with_jacobians, &potential_energy,   &lagrangian,   &lagrangian_gradient,
-            &lagrangian_hessian, &hamiltonian};
+    return {&residual_D_q,         &residual_D_v,     &residual_D_a, &force,
+            &force_with_jacobians, &potential_energy, &lagrangian,   &lagrangian_gradient,
+            &lagrangian_hessian,   &hamiltonian};
   }
 
  private:
@@ -247,7 +247,7 @@ class KernelFunctions {
 
   // --- The loop that is compiled with a kernel: a call of its functions would cost what few coordinates take ---
 
-  PENDULA_IN_REGISTERS static StageChange iterate(const Conditions& at, const StageIteration& on) {
+  PENDULA_IN_REGISTERS static IterationChange iterate(const Conditions& at, const StageIteration& on) {
     constexpr std::size_t count = S::coordinates;
     using P = Pack<W, RegisterFor<W>>;
     const auto reached = [&](std::size_t k) {
@@ -347,8 +347,8 @@ class KernelFunctions {
     write(by_q, L_D_q);
     write(by_v, L_D_v);
   }
-  static void lagrangian_hessian(const Conditions& at, const double* q, const double* v, double* L_D_qq,
-                                 double* L_D_qv, double* L_D_vv) {
+  static void lagrangian_hessian(const Conditions& at, const double* q, const double* v, double* L_D_qq, double* L_D_qv,
+                                 double* L_D_vv) {
     Matrix<L> qq, qv, vv;
     S::lagrangian_hessian(parameters(at), vector(q), vector(v), qq, qv, vv);
     write(qq, L_D_qq);

@@ -8,7 +8,8 @@
 namespace pendula {
 
 /// What functions of W states are taken at besides the states. Here and below numbers of W states lie side by side,
-/// those of one parameter, coordinate … after those of the one before, matrices row by row, aligned to `pack_alignment`.
+/// those of one parameter, coordinate … after those of the one before, matrices row by row, aligned to
+/// `pack_alignment`.
 struct Conditions {
   const void* context;       ///< SystemTable::context
   const double* parameters;  ///< (parameters, W)
@@ -27,7 +28,7 @@ struct StageIteration {
 };
 
 /// What an iteration did.
-struct StageChange {
+struct IterationChange {
   double change;  ///< the largest weighed change of an increment; NaN where one is not finite
   double size;    ///< the largest weighed increment
 };
@@ -58,7 +59,7 @@ struct SystemFunctions {
   /// What functions of the model are taken of, (arguments, W) (field_look.hpp); none where they are not told.
   void (*call_arguments)(const Conditions&, Numbers q, Numbers v, double* found);
 
-  StageChange (*iterate)(const Conditions&, const StageIteration&);
+  IterationChange (*iterate)(const Conditions&, const StageIteration&);
 };
 
 /// Functions of one state that are not asked for within steps.
