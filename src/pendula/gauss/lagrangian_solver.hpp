@@ -45,8 +45,7 @@ class LagrangianSolver {
 
   /// Throws std::invalid_argument on another number of coordinates.
   Status start(const State& state) {
-    require_size("q", state.q.size());
-    require_size("v", state.v.size());
+    stages_.model().require(state);
     return stages_.start(state.time, state.q.data(), state.v.data());
   }
 
@@ -168,12 +167,6 @@ class LagrangianSolver {
     if (stages <= Width) return stages;
     throw std::invalid_argument("stages: this solver is compiled for up to " + std::to_string(Width) + ", got " +
                                 std::to_string(stages));
-  }
-
-  void require_size(const char* what, Eigen::Index size) const {
-    if (size == coordinates()) return;
-    throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(coordinates()) + " numbers, got " +
-                                std::to_string(size));
   }
 
   // Of a Newton iteration in fixed-point iterations, as measured on kernels of one to six coordinates (g++ 12, AVX2 and

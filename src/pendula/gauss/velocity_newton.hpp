@@ -21,8 +21,6 @@
 #include <pendula/system/motion.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
-#include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -70,8 +68,7 @@ class VelocityNewton {
         sums_(3 * count_) {}
 
   Status start(const State& state) {
-    require_size("q", state.q.size());
-    require_size("v", state.v.size());
+    at_.model().require(state);
     forget();
     fastest_ = fastest_here_ = most_kinetic_ = 0;
     time_ = state.time;
@@ -318,12 +315,6 @@ class VelocityNewton {
   static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
 
   const SystemInfo& info() const { return at_.model().info(); }
-
-  void require_size(const char* what, Eigen::Index size) const {
-    if (size == coordinates()) return;
-    throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(coordinates()) + " numbers, got " +
-                                std::to_string(size));
-  }
 
   // Of the stages: K, Q, V of coordinate k.
   double* a(std::size_t k) { return stages_[k]; }

@@ -5,9 +5,12 @@
 #include <cstddef>
 #include <numeric>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/motion.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,6 +31,15 @@ class SystemModel {
   const SystemTable& table() const { return *table_; }
   const SystemInfo& info() const { return table_->info; }
   std::size_t coordinates() const { return info().coordinates.size(); }
+
+  /// Throws std::invalid_argument unless a motion has as many coordinates and rates.
+  void require(const Motion& motion) const {
+    for (const auto& [name, numbers] : {std::pair{"q", &motion.q}, std::pair{"v", &motion.v}}) {
+      if (static_cast<std::size_t>(numbers->size()) == coordinates()) continue;
+      throw std::invalid_argument(std::string(name) + ": expected " + std::to_string(coordinates()) + " numbers, got " +
+                                  std::to_string(numbers->size()));
+    }
+  }
 
   std::span<const double> parameters() const { return parameters_; }
   std::size_t inputs() const { return constant_.size(); }
