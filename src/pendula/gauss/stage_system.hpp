@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/linear_system.hpp>
 
 namespace pendula::detail {

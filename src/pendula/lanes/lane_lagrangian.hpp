@@ -354,12 +354,10 @@ class LaneLagrangian {
 
   // Of each stage: q, p, v, f of all coordinates, and the time.
   int per_call() const { return 4 * links() + 1; }
-  double* call(int j, int which, int k = 0) {
-    return calls_[static_cast<std::size_t>(j * per_call() + which * links() + k)];
-  }
+  double* call(int j, int which, int k = 0) { return calls_[j * per_call() + which * links() + k]; }
 
   // Of the state: q, v, and p or what nobody asks for, of all coordinates; the time, two energies, and a power.
-  double* state(int which, int k = 0) { return state_[static_cast<std::size_t>(which * links() + k)]; }
+  double* state(int which, int k = 0) { return state_[which * links() + k]; }
 
   // Writes a state with its rates.
   template <class Place, class Momentum>

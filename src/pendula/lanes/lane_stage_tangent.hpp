@@ -160,7 +160,7 @@ class LaneStageTangent {
   int count() const { return static_cast<int>(parts_.size()); }
   Part& at(int k) { return parts_[static_cast<std::size_t>(k)]; }
   const Part& at(int k) const { return parts_[static_cast<std::size_t>(k)]; }
-  double* numbers(int which, int k) { return calls_[static_cast<std::size_t>(which * count() + k)]; }
+  double* numbers(int which, int k) { return calls_[which * count() + k]; }
 
   L squared() const {
     return measure_.squared([&](int k) -> const L& { return at(k).place; },

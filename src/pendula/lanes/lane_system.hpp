@@ -212,7 +212,7 @@ class LaneSystem {
   // q, q̇, q̈, with their derivatives, and a time.
   static constexpr int kinds = with_tangent ? 6 : 3;
   // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈; 3, 4, 5: their derivatives.
-  double* numbers(int which, int i) { return rows_[static_cast<std::size_t>(which * parts() + i)]; }
+  double* numbers(int which, int i) { return rows_[which * parts() + i]; }
   double* times() { return numbers(kinds, 0); }
 
   void write(const L& time, const Parts& parts) {

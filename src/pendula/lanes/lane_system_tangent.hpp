@@ -85,7 +85,7 @@ class LaneSystemTangent {
   static constexpr int kinds = 6;
 
   int count() const { return dynamics_.coordinates(); }
-  double* numbers(int which, int i) { return rows_[static_cast<std::size_t>(which * count() + i)]; }
+  double* numbers(int which, int i) { return rows_[which * count() + i]; }
 
   double size_at(int i, const double* q) const {
     if (dynamics_.is_angle(i)) return 1;

@@ -21,7 +21,7 @@ L sum_of_product(const L& a, const L& b, const L& c) {
 
 /// A number with its derivative along one direction: what is computed in it gives its own, exactly. L: double, or
 /// several numbers, each with its own (Pack, LanePack). What is computed of values is what would be computed without
-/// derivatives, to the last bit.
+/// derivatives: of LanePack, whose products are never fused with sums, to the last bit.
 template <class L>
 struct Dual {
   L value{0.0}, slope{0.0};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <new>
 #include <pendula/numeric/lanes.hpp>
@@ -36,8 +37,8 @@ class PackRows {
   explicit PackRows(std::size_t rows = 0) : numbers_(rows * Width) {}
 
   std::size_t rows() const { return numbers_.size() / Width; }
-  double* operator[](std::size_t k) { return numbers_.data() + k * Width; }
-  const double* operator[](std::size_t k) const { return numbers_.data() + k * Width; }
+  double* operator[](std::integral auto k) { return numbers_.data() + static_cast<std::size_t>(k) * Width; }
+  const double* operator[](std::integral auto k) const { return numbers_.data() + static_cast<std::size_t>(k) * Width; }
 
   template <class Numbers>
   void member(Numbers& numbers) {

@@ -335,10 +335,14 @@ class KernelFunctions {
     write(by_v, Q_D_v);
   }
   static void potential_energy(const Conditions& at, const double* q, double* U) {
-    S::potential_energy(parameters(at), vector(q), *U);
+    L found;
+    S::potential_energy(parameters(at), vector(q), found);
+    store(found, U);
   }
   static void lagrangian(const Conditions& at, const double* q, const double* v, double* value) {
-    S::lagrangian(parameters(at), vector(q), vector(v), *value);
+    L found;
+    S::lagrangian(parameters(at), vector(q), vector(v), found);
+    store(found, value);
   }
   static void lagrangian_gradient(const Conditions& at, const double* q, const double* v, double* L_D_q,
                                   double* L_D_v) {
@@ -356,7 +360,9 @@ class KernelFunctions {
     write(vv, L_D_vv);
   }
   static void hamiltonian(const Conditions& at, const double* q, const double* p, double* H) {
-    S::hamiltonian(parameters(at), vector(q), vector(p), *H);
+    L found;
+    S::hamiltonian(parameters(at), vector(q), vector(p), found);
+    store(found, H);
   }
 };
 
