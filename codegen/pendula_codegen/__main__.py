@@ -11,6 +11,7 @@ from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
+from pendula_codegen.kernel_program import render_bytecode, render_c
 from pendula_codegen.links import LINKS
 from pendula_codegen.model import read_model
 from pendula_codegen.models import find_model
@@ -66,6 +67,15 @@ def _parser() -> argparse.ArgumentParser:
     model.add_argument("--links", type=int, help="number of links, from 1, where the model has links")
     model.add_argument("--alias", default="", help="a further name of its structure, for programs")
     model.set_defaults(run=_run_model)
+
+    program = commands.add_parser("program", help="the kernel of a model as the program loads it")
+    program.add_argument("--model", required=True, help="as of the command model")
+    program.add_argument("--links", type=int, help="as of the command model")
+    program.add_argument(
+        "--as", dest="language", choices=("c", "bytecode"), default="c", help="bytecode is interpreted"
+    )
+    program.add_argument("--output", required=True, type=Path, help="a file")
+    program.set_defaults(run=_run_program)
 
     written = commands.add_parser(
         "written", help="what a model says at points about a start, for pendula check: numbers in a line"
@@ -125,6 +135,15 @@ def _run_link(options: argparse.Namespace) -> None:
 def _run_model(options: argparse.Namespace) -> None:
     model = read_model(find_model(options.model), options.links)
     _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name, options.alias))
+
+
+def _run_program(options: argparse.Namespace) -> None:
+    model = read_model(find_model(options.model), options.links)
+    if options.language == "bytecode":
+        text = render_bytecode(model)
+    else:
+        text = render_c(model, Path(options.model).name, options.output.name)
+    write_atomically(options.output, text)
 
 
 def _run_written(options: argparse.Namespace) -> None:

@@ -99,6 +99,15 @@ def in_range(value: Number) -> bool:
     return abs(size_of(value)) < 1000
 
 
+def as_double(value: Number) -> float:
+    """The double next to a number. Raises GenerationError where it is out of their range."""
+    if not in_range(value):
+        raise GenerationError(
+            f"a kernel holds a number of the size 2**{size_of(value)}, which no double can hold: expected other units"
+        )
+    return float(value)
+
+
 def unit(polynomial: Polynomial) -> Number:
     """What a sum is divided by that gets a name: multiples have the same name, and no coefficient is rounded."""
     values = [*polynomial.values()]

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import jinja2
-from sympy import Symbol, expand, pi
+from sympy import Symbol
 
 from pendula_codegen import __version__
 from pendula_codegen.backends import cpp
@@ -23,9 +23,9 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.links import find_link
-from pendula_codegen.mechanics import LagrangianSystem
 from pendula_codegen.model import Coordinate, Input, Model, Parameter
 from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.system_info import depends_on_time, has_constant_masses, is_periodic
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
 
 PACKAGE = Path(__file__).parent
@@ -52,23 +52,34 @@ class Header:
 
 # Sources that only some kinds of headers are made from; all others go into each. Those of no kind write none.
 KINDS = {
+    "backends/bytecode.py": {"program"},
+    "backends/c.py": {"program"},
     "blocks.py": {"kernel"},
     "chain.py": {"kernel"},
     "chain_kernel.py": {"kernel"},
-    "entry_points.py": {"kernel", "model"},
-    "linear_solve.py": {"kernel", "model"},
-    "mechanics.py": {"kernel", "model"},
-    "simplify.py": {"kernel", "model"},
+    "entry_points.py": {"kernel", "model", "program"},
+    "forward.py": {"program"},
+    "kernel_program.py": {"program"},
+    "linear_solve.py": {"kernel", "model", "program"},
+    "mechanics.py": {"kernel", "model", "program"},
+    "simplify.py": {"kernel", "model", "program"},
+    "system_info.py": {"kernel", "model", "program"},
+    "table.py": {"program"},
+    "tape.py": {"program"},
     "templates/kernel.hpp.j2": {"kernel", "model"},
     "comparison.py": set(),
-    "exact.py": {"model"},
-    "model.py": {"model"},
-    "model_kernel.py": {"model"},
+    "exact.py": {"model", "program"},
+    "model.py": {"model", "program"},
+    "model_kernel.py": {"model", "program"},
     "link.py": {"link"},
     "templates/link.hpp.j2": {"link"},
     "tableau.py": {"tableaux"},
     "written.py": set(),
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
+    **{
+        f"templates/{name}.c.j2": {"program"}
+        for name in ("kernel", "sincos", "exp", "log", "solve", "iterate")
+    },
     "__main__.py": set(),
     "counts.py": set(),
     "describe.py": set(),
@@ -214,9 +225,8 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
     ordered = model.ordered_parameters
     inputs, points = len(model.inputs), sum(len(p.components) for p in model.points)
     names = [c.symbol.name for c in model.coordinates]
-    holds_time = _holds_time(model)
+    holds_time = depends_on_time(model)
     bases = [is_base for _, is_base in kernel.call_arguments]
-    links = f" --links {model.links}" if model.name != Path(model.file).stem else ""
     words = Words(
         name=model.name,
         model=Path(model.file).stem,
@@ -225,7 +235,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
             f"Kernel of the system {model.name}.",
             "model",
             None,
-            f"--model {source}{links}{f' --alias {alias}' if alias else ''} --output {model.name}.hpp",
+            f"--model {source}{links_argument(model)}{f' --alias {alias}' if alias else ''} --output {model.name}.hpp",
             Path(model.file),
         ),
         about=[
@@ -257,27 +267,8 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
     return _render(kernel, words)
 
 
-def _holds_time(model: Model) -> bool:
-    system = model.system
-    held = [system.lagrangian, *system.forces, *(c for p in model.points for c in p.components)]
-    return any(expression.has(model.time) for expression in held)
-
-
-def _constant_masses(kernel: SystemKernel) -> bool:
-    """Whether no entry on the diagonal of the mass matrix depends on the coordinates."""
-    changing = {*kernel.system.coordinates}
-    diagonal = (expand(kernel.mass[k, k]) for k in range(kernel.mass.rows))
-    return not any(entry.free_symbols & changing for entry in diagonal)
-
-
-def _is_periodic(system: LagrangianSystem, coordinate: Symbol) -> bool:
-    """Whether the motion is the same a full turn further: of an angle that nothing winds up."""
-    turned = {coordinate: coordinate + 2 * pi}
-    return all(expression.subs(turned) == expression for expression in (system.lagrangian, *system.forces))
-
-
 def _render(kernel: SystemKernel, words: Words) -> Header:
-    periodic = [c.is_angle and _is_periodic(kernel.system, c.symbol) for c in words.coordinates]
+    periodic = [c.is_angle and is_periodic(kernel.system, c.symbol) for c in words.coordinates]
     functions = [cpp.render_function(kernel, function) for function in kernel.functions()]
     text = ENVIRONMENT.get_template("kernel.hpp.j2").render(
         words=words,
@@ -287,7 +278,7 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
             words.parameters,
             words.inputs,
             words.points,
-            _constant_masses(kernel),
+            has_constant_masses(kernel),
             periodic,
             words.bases,
         ),
@@ -298,6 +289,11 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
         size=len(kernel.system.coordinates),
     )
     return Header(text, {function.name: function.counts for function in functions})
+
+
+def links_argument(model: Model) -> str:
+    """What a banner says of a model's number of links."""
+    return f" --links {model.links}" if model.name != Path(model.file).stem else ""
 
 
 def render_link(space: str) -> Header:

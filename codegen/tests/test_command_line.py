@@ -56,6 +56,27 @@ def test_same_bytes_whatever_the_hash_seed(space, links, tmp_path, fresh_headers
         assert (tmp_path / name).read_bytes() == fresh_headers[name].encode()
 
 
+@pytest.mark.parametrize("language", ["c", "bytecode"])
+def test_programs_have_the_same_bytes_whatever_the_hash_seed(language, tmp_path):
+    files = [tmp_path / seed / "cart_chain_2.c" for seed in ("1", "20261121")]
+    for file in files:
+        command = [
+            "program",
+            "--model",
+            "cart_chain",
+            "--links",
+            "2",
+            "--as",
+            language,
+            "--output",
+            str(file),
+        ]
+        done = run(*command, seed=file.parent.name)
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    first, second = (file.read_bytes() for file in files)
+    assert first == second
+
+
 WRONG = [
     (["kernel", "--space", "planar", "--links", "0"], "a chain has at least one link: got --links 0"),
     (["kernel", "--space", "planar", "--links", "-2"], "a chain has at least one link: got --links -2"),
@@ -66,6 +87,11 @@ WRONG = [
     (["link", "--space", "cubic"], "unknown model 'cubic': expected one of planar, spatial"),
     (["kernel", "--space", "planar", "--links", "two"], "argument --links: invalid int value: 'two'"),
     (["kernel", "--space", "planar"], "the following arguments are required: --links"),
+    (
+        ["program", "--model", "cubic"],
+        "unknown model 'cubic': expected a file ending in .py, or one of cart_chain, driven_chain, furuta, "
+        "joint_springs, rods, spring_pendulum, swinging_atwood",
+    ),
     (["tableaux", "--depth", "3"], "unrecognized arguments: --depth 3"),
 ]
 

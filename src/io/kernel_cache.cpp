@@ -14,14 +14,20 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <future>
 #include <iomanip>
+#include <iterator>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/system/c_kernel.hpp>
+#include <pendula/system/interpreted_kernel.hpp>
 #include <pendula/version.hpp>
 #include <span>
 #include <sstream>
+#include <stdexcept>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "io/descriptor.hpp"
@@ -54,6 +60,19 @@ fs::path cache_folder() {
   const fs::path kept = environment("XDG_CACHE_HOME", ""), home = environment("HOME", "");
   if (kept.is_absolute()) return kept / "pendula";
   return home.is_absolute() ? home / ".cache" / "pendula" : fs::path();
+}
+
+/// The first of the usual C compilers that is in a folder of PATH; empty where none is.
+std::string find_compiler() {
+  const std::string path = environment("PATH", "");
+  for (const char* name : {"cc", "gcc", "clang"}) {
+    std::istringstream folders(path);
+    for (std::string folder; std::getline(folders, folder, ':');) {
+      const fs::path file = fs::path(folder) / name;
+      if (file.is_absolute() && access(file.c_str(), X_OK) == 0) return file.string();
+    }
+  }
+  return "";
 }
 
 /// Of whatever decides what a compiled kernel is.
@@ -180,45 +199,66 @@ std::vector<std::string> about(const char* command, const fs::path& model, std::
   return arguments;
 }
 
-void derive(const fs::path& model, std::optional<int> links, const fs::path& header, const Toolchain& toolchain) {
-  std::vector<std::string> arguments = about("model", model, links);
-  arguments.insert(arguments.end(), {"--output", header.string()});
-  run_generator(arguments, toolchain);
+constexpr const char* flags_of_kernels[] = {
+    "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=fast", "-fno-math-errno", "-w"};
+
+/// What a compiler complains of, in a line.
+std::string first_error(const std::string& output) {
+  return last_line(output.substr(0, output.find('\n', output.find("error"))));
 }
 
-void compile(const std::string& name, const fs::path& folder, const fs::path& object, const Toolchain& toolchain) {
-  const fs::path source = folder / "kernel.cpp";
-  std::ofstream(source) << "#include \"" << name << ".hpp\"\n"
-                        << "#include <pendula/system/kernel_table.hpp>\n"
-                        << "#define EXPORTED extern \"C\" __attribute__((visibility(\"default\")))\n"
-                        << "EXPORTED constinit const int pendula_interface = pendula::system_interface;\n"
-                        << "EXPORTED constinit const pendula::SystemTable pendula_system =\n"
-                        << "    pendula::system_table<pendula::kernels::" << name << "_kernel>;\n";
-  std::vector<std::string> command{toolchain.compiler,
-                                   "-std=c++20",
-                                   "-O3",
-                                   "-DNDEBUG",
-                                   "-w",
-                                   "-fPIC",
-                                   "-shared",
-                                   "-fvisibility=hidden",
-                                   "-fvisibility-inlines-hidden",
-                                   "-Wl,-Bsymbolic"};
-  for (const std::string& flag : architecture_flags()) command.push_back(flag);
-  for (const std::string& flag : toolchain.flags) command.push_back(flag);
-  for (const fs::path& include : toolchain.includes) command.push_back("-I" + include.string());
-  command.insert(command.end(), {source.string(), "-o", object.string()});
-  const Ended ended = run_process(command);
-  if (ended.status == 0) return;
-  std::string error = ended.output.substr(0, ended.output.find('\n', ended.output.find("error")));
+/// Throws ModelError where a compiler has failed.
+void require_compiled(const Ended& ended, const std::string& compiler, const std::string& name) {
   if (ended.status == 127) {
-    throw ModelError("models take a C++20 compiler; " + toolchain.compiler + ": " + ended.output +
-                     " (CXX names another one)");
+    throw ModelError("models take a C compiler; " + compiler + ": " + ended.output + " (CC names another one)");
   }
-  throw ModelError("the compiler " + toolchain.compiler + " refuses the kernel of " + name + ": " + last_line(error));
+  if (ended.status != 0) {
+    throw ModelError("the compiler " + compiler + " refuses the kernel of " + name + ": " + first_error(ended.output) +
+                     " (PENDULA_KERNELS_BY=interpreter does without)");
+  }
 }
 
-constexpr std::size_t largest_object = std::size_t{256} << 20;
+/// Runs commands of a compiler side by side. Throws ModelError where one fails.
+void run_compilers(const std::vector<std::vector<std::string>>& commands, const std::string& name) {
+  std::vector<std::future<Ended>> running(commands.size());
+  std::ranges::transform(commands, running.begin(), [](const std::vector<std::string>& command) {
+    return std::async(std::launch::async, [&command] { return run_process(command); });
+  });
+  for (std::future<Ended>& one : running) require_compiled(one.get(), commands.front().front(), name);
+}
+
+/// Compiles a kernel; its shared object, beside the text.
+fs::path compile(const std::string& name, const fs::path& text, const Toolchain& toolchain) {
+  std::vector<std::string> compiler{toolchain.compiler};
+  compiler.insert(compiler.end(), std::begin(flags_of_kernels), std::end(flags_of_kernels));
+  for (const std::string& flag : architecture_flags()) compiler.push_back(flag);
+  for (const std::string& flag : toolchain.flags) compiler.push_back(flag);
+  const auto with = [&](std::initializer_list<std::string> more) {
+    std::vector<std::string> command = compiler;
+    command.insert(command.end(), more);
+    return command;
+  };
+  // The widths of its functions, shared among processors.
+  const unsigned processors = std::thread::hardware_concurrency();
+  std::vector<int> shares{1 + 2 + 4 + 8};
+  if (processors > 1) shares = {1 + 8, 2 + 4};
+  if (processors > 3) shares = {1, 2, 4, 8};
+  std::vector<std::vector<std::string>> commands;
+  const fs::path made = fs::path(text).replace_extension(".so");
+  std::vector<std::string> link = with({"-shared", "-o", made.string()});
+  for (const int share : shares) {
+    const std::string widths = std::to_string(share);
+    const std::string object = fs::path(text).replace_extension(widths + ".o").string();
+    commands.push_back(with({"-DWIDTHS=" + widths, "-c", text.string(), "-o", object}));
+    link.push_back(object);
+  }
+  link.emplace_back("-lm");
+  run_compilers(commands, name);
+  run_compilers({link}, name);
+  return made;
+}
+
+constexpr std::size_t largest_kernel = std::size_t{256} << 20;
 
 /// What a kept kernel ends in, behind the shared object, whose loader does not look there: a hash of that.
 std::string seal_of(std::string_view object) {
@@ -235,7 +275,7 @@ bool is_sealed(std::string_view file) {
 }
 
 void seal(const fs::path& object) {
-  const InputFile made = read_input_file(object, largest_object);
+  const InputFile made = read_input_file(object, largest_kernel);
   std::ofstream stream(object, std::ios::binary | std::ios::app);
   stream << seal_of(made.text);
   stream.close();
@@ -261,26 +301,63 @@ struct Loaded {
   std::string name() const { return "/proc/self/fd/" + std::to_string(file.get()); }
 };
 
+constexpr const char *compiled = ".so", *interpreted = ".program";  // what files of kernels end in
+
+std::shared_ptr<const SystemTable> table_of_object(Descriptor file) {
+  const auto loaded = std::make_shared<Loaded>(std::move(file));
+  if (loaded->handle == nullptr) throw std::invalid_argument(dlerror());
+  const auto* kernel = static_cast<const CKernel*>(dlsym(loaded->handle, "pendula_kernel"));
+  if (kernel == nullptr) throw std::invalid_argument("it has no pendula_kernel");
+  return table_of(*kernel, loaded);
+}
+
 /// A kept kernel; none, and why in `problem`, where there is none that is whole, the user's own, and of this pendula.
-std::shared_ptr<const SystemTable> load(const fs::path& object, std::string& problem) {
-  Descriptor opened(open(object.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+std::shared_ptr<const SystemTable> load(const fs::path& kept, std::string& problem) {
+  Descriptor opened(open(kept.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   struct stat status {};
-  const auto none = [&](const std::string& why) {
-    problem = object.string() + ": " + why;
+  const auto none = [&](const std::string& why) -> std::shared_ptr<const SystemTable> {
+    problem = kept.string() + ": " + why;
     return nullptr;
   };
   if (opened.get() < 0 || fstat(opened.get(), &status) != 0) return none(std::strerror(errno));
   if (status.st_uid != geteuid() && status.st_uid != 0) return none("it belongs to somebody else");
-  const InputFile file = read_input_file("/proc/self/fd/" + std::to_string(opened.get()), largest_object);
+  InputFile file = read_input_file("/proc/self/fd/" + std::to_string(opened.get()), largest_kernel);
   if (!file.problem.empty()) return none(file.problem);
   if (!is_sealed(file.text)) return none("it is not what was written");
-  const auto loaded = std::make_shared<Loaded>(std::move(opened));
-  if (loaded->handle == nullptr) return none(dlerror());
-  const auto* interface = static_cast<const int*>(dlsym(loaded->handle, "pendula_interface"));
-  const auto* table = static_cast<const SystemTable*>(dlsym(loaded->handle, "pendula_system"));
-  if (interface == nullptr || table == nullptr || *interface != system_interface)
-    return none("it is of another pendula");
-  return {loaded, table};
+  try {
+    if (kept.extension() == compiled) return table_of_object(std::move(opened));
+    file.text.resize(file.text.size() - seal_of({}).size());
+    return table_of(std::move(file.text), *library().interpreter);
+  } catch (const std::invalid_argument& error) {
+    return none(error.what());
+  }
+}
+
+/// What files of kernels end in that are made here. Throws ModelError where the environment asks for something else.
+const char* kind_of_kernels(const Toolchain& toolchain) {
+  const std::string& by = toolchain.kernels_by;
+  if (by == "interpreter" || (by == "auto" && toolchain.compiler.empty())) return interpreted;
+  if (by != "compiler" && by != "auto") {
+    throw ModelError("PENDULA_KERNELS_BY: expected compiler, interpreter or auto, got " + by);
+  }
+  if (toolchain.compiler.empty()) throw ModelError("models take a C compiler, got no cc, gcc or clang (CC names one)");
+  return compiled;
+}
+
+/// In words.
+std::string how(std::string_view kind, const Toolchain& toolchain) {
+  if (kind == compiled) return "compiled by " + toolchain.compiler;
+  return toolchain.kernels_by == "auto" ? "interpreted: no C compiler was found (CC names one)" : "interpreted";
+}
+
+/// Makes a kernel in `folder`, by arguments of the generator; its file.
+fs::path make(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
+              const fs::path& folder, const Toolchain& toolchain) {
+  const bool compiles = kind == compiled;
+  const fs::path text = folder / (compiles ? "kernel.c" : "kernel.program");
+  arguments.insert(arguments.end(), {"--as", compiles ? "c" : "bytecode", "--output", text.string()});
+  run_generator(arguments, toolchain);
+  return compiles ? compile(name, text, toolchain) : text;
 }
 
 /// Removes kernels that no run has taken for a quarter of a year: each version of a model and of pendula has its own.
@@ -289,7 +366,8 @@ void remove_unused_kernels(const fs::path& cache) {
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(cache, none)) {
     const fs::file_time_type used = entry.last_write_time(none);
-    if (!none && entry.path().extension() == ".so" && used < oldest) fs::remove(entry.path(), none);
+    const fs::path kind = entry.path().extension();
+    if (!none && (kind == compiled || kind == interpreted) && used < oldest) fs::remove(entry.path(), none);
   }
 }
 
@@ -323,7 +401,7 @@ const SystemTable* built_in_table(const std::string& model, std::optional<int> l
 Toolchain Toolchain::of_this_program() {
   Toolchain toolchain;
   const fs::path folder = this_program().parent_path(), prefix = folder.parent_path();
-  // Of a program in its build folder: a Python, the generator, the plots, scenarios, folders of headers, a line each.
+  // Of a program in its build folder: a Python, the generator, the plots, scenarios, a line each.
   std::ifstream beside(folder / "pendula.toolchain");
   if (beside) {
     std::string line;
@@ -331,19 +409,17 @@ Toolchain Toolchain::of_this_program() {
     for (fs::path* package : {&toolchain.codegen, &toolchain.plotting, &toolchain.examples}) {
       if (std::getline(beside, line)) *package = line;
     }
-    while (std::getline(beside, line)) toolchain.includes.emplace_back(line);
   } else {
     const fs::path own = prefix / configured::installed_python;  // made by setup()
     toolchain.python = fs::exists(own) ? own.string() : "python3";
     toolchain.codegen = prefix / configured::installed_codegen;
     toolchain.plotting = prefix / configured::installed_plotting;
     toolchain.examples = prefix / configured::installed_examples;
-    toolchain.includes.push_back(prefix / configured::installed_include);
   }
-  for (const char* include : configured::includes) toolchain.includes.emplace_back(include);
   toolchain.python = environment("PENDULA_PYTHON", toolchain.python);
-  toolchain.compiler = environment("CXX", configured::compiler);
-  std::istringstream flags(environment("CXXFLAGS", ""));
+  toolchain.compiler = environment("CC", find_compiler());
+  toolchain.kernels_by = environment("PENDULA_KERNELS_BY", "auto");
+  std::istringstream flags(environment("CFLAGS", ""));
   for (std::string flag; flags >> flag;) toolchain.flags.push_back(flag);
   toolchain.cache = cache_folder();
   return toolchain;
@@ -401,24 +477,24 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   for (const auto& part : fs::recursive_directory_iterator(toolchain.codegen / "pendula_codegen", none)) {
     if (part.path().extension() == ".py" || part.path().extension() == ".j2") key.add_file(part.path());
   }
-  const fs::path cache = require_cache(toolchain.cache), object = cache / (name + "-" + key.text() + ".so");
+  const char* const kind = kind_of_kernels(toolchain);
+  const fs::path cache = require_cache(toolchain.cache), kept = cache / (name + "-" + key.text() + kind);
   std::string problem;
-  std::shared_ptr<const SystemTable> table = load(object, problem);
+  std::shared_ptr<const SystemTable> table = load(kept, problem);
   const bool was_there = table != nullptr;
   if (was_there) {
-    fs::last_write_time(object, fs::file_time_type::clock::now(), none);  // used again
+    fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // used again
   } else {
     const Workshop workshop(cache);
-    tell("deriving and compiling the kernel of " + name + ", once");
-    derive(file, links, workshop.folder() / (name + ".hpp"), toolchain);
-    compile(name, workshop.folder(), workshop.folder() / "kernel.so", toolchain);
-    seal(workshop.folder() / "kernel.so");
-    fs::rename(workshop.folder() / "kernel.so", object);
-    table = load(object, problem);
+    tell("deriving the kernel of " + name + ", once; " + how(kind, toolchain));
+    const fs::path made = make(kind, name, about("program", file, links), workshop.folder(), toolchain);
+    seal(made);
+    fs::rename(made, kept);
+    table = load(kept, problem);
     if (!table) throw ModelError("the kernel cannot be loaded: " + problem);
   }
   remove_unused_kernels(cache);
-  return {object, table, was_there};
+  return {kept, table, was_there};
 }
 
 std::vector<double> written_values(const std::string& model, std::optional<int> links, const fs::path& folder,

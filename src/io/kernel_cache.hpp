@@ -16,18 +16,19 @@ namespace pendula::io {
 
 /// What it takes to make a kernel of a model and where it is kept, and what else runs in Python.
 struct Toolchain {
-  std::string python;                           ///< with the packages of the generator
-  std::string compiler;                         ///< C++20
-  std::vector<std::string> flags;               ///< of the user, after those that kernels are compiled with
-  std::filesystem::path codegen;                ///< folder of the Python package pendula_codegen
-  std::filesystem::path plotting;               ///< folder of the Python package pendula_plot
-  std::filesystem::path examples;               ///< folder of the scenarios that come with pendula
-  std::vector<std::filesystem::path> includes;  ///< of pendula, its generated headers, Eigen and xsimd
-  std::filesystem::path cache;                  ///< folder of compiled kernels; empty where none is named
+  std::string python;              ///< with the packages of the generator
+  std::string compiler;            ///< of C; empty where there is none
+  std::string kernels_by;          ///< "compiler", "interpreter", or "auto": by a compiler where there is one
+  std::vector<std::string> flags;  ///< of the user, after those that kernels are compiled with
+  std::filesystem::path codegen;   ///< folder of the Python package pendula_codegen
+  std::filesystem::path plotting;  ///< folder of the Python package pendula_plot
+  std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
+  std::filesystem::path cache;     ///< folder of kernels; empty where none is named
 
   /// That of this program: of its build, told by the file pendula.toolchain beside it, or of where it is installed;
-  /// PENDULA_PYTHON and CXX in the environment go before, and CXXFLAGS has the flags. The cache is
-  /// $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  /// PENDULA_PYTHON in the environment goes before. The compiler is that which CC names, else cc, gcc or clang, and
+  /// CFLAGS has the flags; PENDULA_KERNELS_BY says what kernels are run by. The cache is $XDG_CACHE_HOME/pendula, else
+  /// ~/.cache/pendula.
   static Toolchain of_this_program();
 
   /// The command line that runs a Python package of `folder`, and nothing out of the working folder or PYTHONPATH.
@@ -36,16 +37,16 @@ struct Toolchain {
   std::filesystem::path setup() const;
 };
 
-/// A compiled kernel of a model.
+/// The kernel of a model, compiled or interpreted.
 struct ModelKernel {
   std::filesystem::path file;  ///< empty where it is part of this program
   std::shared_ptr<const SystemTable> table;
   bool was_there = true;  ///< not made just now
 };
 
-/// Finds the kernel of a model: one of this build, one kept, or one derived and compiled now. `model` is a file ending
-/// in .py, relative to `folder`, or the name of a built-in model; tell(what) is called before anything takes long.
-/// Throws ModelError where the model is wrong or something is missing that it takes.
+/// Finds the kernel of a model: one of this build, one kept, or one derived now, and compiled or not. `model` is a file
+/// ending in .py, relative to `folder`, or the name of a built-in model; tell(what) is called before anything takes
+/// long. Throws ModelError where the model is wrong or something is missing that it takes.
 ModelKernel find_kernel(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
                         const Toolchain& toolchain, const std::function<void(const std::string&)>& tell);
 

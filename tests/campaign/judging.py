@@ -823,6 +823,5 @@ def judge(case: Case, room: truth.Room, program: Program) -> Verdict:
 
 
 def environment(cache: Path) -> None:
-    """Kernels of models compile in less time, and stay with the campaign."""
+    """Kernels of models stay with the campaign."""
     os.environ.setdefault("XDG_CACHE_HOME", str(cache))
-    os.environ.setdefault("CXXFLAGS", "-O1")

@@ -177,9 +177,8 @@ done
 def test_a_kernel_without_a_force_does_not_pass(pendula, environment, tmp_path):
     (tmp_path / "sharp.py").write_text(SHARP)
     python = tmp_path / "python"
-    python.write_text(
-        FAULTY.format(python=environment["PENDULA_PYTHON"], right=r"f\[0\] = [^+]*+ ", wrong="f[0] = ")
-    )
+    right, wrong = "WRITE(f, 0) = .*;", "WRITE(f, 0) = SPLAT(0.0);"
+    python.write_text(FAULTY.format(python=environment["PENDULA_PYTHON"], right=right, wrong=wrong))
     python.chmod(0o755)
     ended = pendula("check", tmp_path / "sharp.py", PENDULA_PYTHON=str(python))
     assert ended.returncode == 1, ended.stdout + ended.stderr

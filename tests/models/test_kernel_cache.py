@@ -38,7 +38,7 @@ def makes_it_anew(cache: Path, environment: dict[str, str]) -> bool:
     assert (told == "") == out.endswith(
         f"kept in {cache}/pendula/{next((cache / 'pendula').glob('*.so')).name}\n"
     )
-    return told == "pendula: deriving and compiling the kernel of spring_pendulum, once\n"
+    return told.startswith("pendula: deriving the kernel of spring_pendulum, once; compiled by ")
 
 
 def flipped(data: bytes) -> bytes:

@@ -163,9 +163,9 @@ def test_missing_tools_are_named(pendula, tmp_path):
     no_python = pendula("build", "furuta", XDG_CACHE_HOME=str(tmp_path), PENDULA_PYTHON="/none/python3")
     assert no_python.returncode == 2
     assert "models take a Python with the packages of" in no_python.stderr.splitlines()[-1]
-    no_compiler = pendula("build", "furuta", XDG_CACHE_HOME=str(tmp_path), CXX="/none/c++")
+    no_compiler = pendula("build", "furuta", XDG_CACHE_HOME=str(tmp_path), CC="/none/cc")
     assert no_compiler.returncode == 2
-    assert "models take a C++20 compiler; /none/c++" in no_compiler.stderr.splitlines()[-1]
+    assert "models take a C compiler; /none/cc: " in no_compiler.stderr.splitlines()[-1]
     assert list((tmp_path / "pendula").iterdir()) == []
 
 
@@ -197,6 +197,6 @@ def test_a_kernel_that_is_no_longer_used_goes(pendula, tmp_path):
 
 
 def test_flags_of_the_user_reach_the_compiler(pendula, tmp_path):
-    wrong = pendula("build", "furuta", XDG_CACHE_HOME=str(tmp_path), CXXFLAGS="-O1  -fno-such-flag")
+    wrong = pendula("build", "furuta", XDG_CACHE_HOME=str(tmp_path), CFLAGS="-O1  -fno-such-flag")
     assert wrong.returncode == 2
     assert "-fno-such-flag" in wrong.stderr.splitlines()[-1]

@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from pendula_codegen.entry_points import Function, SystemKernel
-from pendula_codegen.errors import GenerationError
 from pendula_codegen.model import Coordinate, Input, Parameter
 from pendula_codegen.places import Place
-from pendula_codegen.polynomial import Number, in_range, size_of
+from pendula_codegen.polynomial import Number, as_double
 from pendula_codegen.program import Program
 from pendula_codegen.straight_line import UNIT, ZERO, Term
 
@@ -254,15 +253,12 @@ class _Printer:
 
 
 def _number(value: Number) -> str:
-    if not in_range(value):
-        raise GenerationError(
-            f"a kernel holds a number of the size 2**{size_of(value)}, which no double can hold: expected other units"
-        )
+    double = as_double(value)
     if (
         value.denominator & (value.denominator - 1) == 0
         or max(abs(value.numerator), value.denominator) > 2**53
     ):
-        return f"Real({float(value)!r})"
+        return f"Real({double!r})"
     return f"Real({value.numerator}.0 / {value.denominator}.0)"
 
 

@@ -6,6 +6,7 @@
 #include <pendula/lanes/plain_lanes.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/program.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <string_view>
@@ -43,6 +44,8 @@ struct Library {
   /// Makes directions, (rows, count) numbers row by row, an orthonormal basis of what the first of them span, for any
   /// number of them; `lengths`, (count), gets |R_kk| of the QR decomposition, by Householder reflections.
   void (*make_orthonormal)(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
+  /// Functions of kernels that are no code but programs (system/interpreted_kernel.hpp).
+  const ProgramInterpreter* interpreter;
 };
 
 /// The library for the best instruction set that this processor has, or for the lesser one that the environment

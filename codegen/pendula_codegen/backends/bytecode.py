@@ -1,0 +1,157 @@
+"""Kernels as bytecode: steps on numbered registers, a line each, for the interpreter of the runtime.
+
+Of a function, lines say in this order: what it is called and how many registers it takes; what is read, and which
+numbers there are, before it begins; its operations, their results first; and what it gives. Between words are tabs.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pendula_codegen.linear_solve import UNROLLED
+from pendula_codegen.table import TableFunction
+from pendula_codegen.tape import Step, Tape, Value, unknowns
+
+_BEFORE = ("read", "number")
+
+
+def function_lines(function: TableFunction) -> list[str]:
+    tape = function.tape
+    if _has_zeros(tape):
+        tape = tape.written_out(UNROLLED)
+    tape = _fused(tape)
+    before = [step for step in tape.steps if step.operation in _BEFORE]
+    steps = [*before, *_grouped([step for step in tape.steps if step.operation not in _BEFORE])]
+    registers = _Registers(steps, {*tape.outputs.values()})
+    rows = [
+        ("function", function.name, registers.count),
+        *(_words(step, registers.of) for step in steps),
+        *(("write", registers.of[value], *row) for row, value in tape.outputs.items()),
+    ]
+    return ["\t".join(map(str, row)) for row in rows]
+
+
+def _words(step: Step, register: dict[Value, int]) -> tuple[object, ...]:
+    first = register[step.first]
+    operands = [register[value] for value in step.operands]
+    match step.operation:
+        case "read":
+            return ("read", first, *step.row)
+        case "number":
+            return ("number", first, repr(step.number))
+        case "factor":
+            return ("factor", unknowns(step.count), first, *operands)
+        case "solve":
+            return ("solve", step.count, first, operands[0], *operands[-step.count :])
+    return (step.operation, *(register[value] for value in step.results), *operands)
+
+
+def _has_zeros(tape: Tape) -> bool:
+    """Whether linear systems are shorter in products and sums, without what is known to be 0."""
+    zeros = {step.first for step in tape.steps if step.operation == "number" and step.number == 0}
+    return any(step.operation == "factor" and not zeros.isdisjoint(step.operands) for step in tape.steps)
+
+
+def _fused(tape: Tape) -> Tape:
+    """The same tape with products in the sums that alone need them, and exponents as values."""
+    uses = Counter(value for step in tape.steps for value in step.operands)
+    uses.update(tape.outputs.values())
+    products = {
+        step.first: step.operands
+        for step in tape.steps
+        if step.operation == "multiply" and uses[step.first] == 1
+    }
+    fused = Tape()
+    place: dict[Value, Value] = {}
+
+    def product_of(step: Step) -> Value | None:
+        """The product that goes into a sum; that which comes last, of two."""
+        if step.operation not in ("add", "subtract"):
+            return None
+        return max((value for value in step.operands if value in products), default=None)
+
+    taken = {product_of(step) for step in tape.steps}
+    for step in tape.steps:
+        if step.first in taken:
+            continue
+        product = product_of(step)
+        if product is not None:
+            x, y = step.operands
+            subtracted = "subtract_product" if product == y else "multiply_subtract"
+            operation = "multiply_add" if step.operation == "add" else subtracted
+            step = replace(step, operation=operation, operands=(*products[product], x if product == y else y))
+        operands = [place[value] for value in step.operands]
+        if step.operation == "pow":
+            operands.append(fused.number(step.number))
+        first = fused.append(replace(step, operands=(*operands,), first=fused.values))
+        place |= {value: first + k for k, value in enumerate(step.results)}
+    fused.outputs = {row: place[value] for row, value in tape.outputs.items()}
+    return fused
+
+
+def _grouped(steps: list[Step]) -> list[Step]:
+    """The same steps, those of a kind one after the other where they can be: the interpreter looks at kinds of runs."""
+    maker = {value: k for k, step in enumerate(steps) for value in step.results}
+    needs = [{maker[value] for value in step.operands if value in maker} for step in steps]
+    users: list[list[int]] = [[] for _ in steps]
+    for k, makers in enumerate(needs):
+        for made_by in makers:
+            users[made_by].append(k)
+    waiting = [len(makers) for makers in needs]
+    ready: dict[str, list[int]] = defaultdict(list)
+    for k, count in enumerate(waiting):
+        if count == 0:
+            ready[steps[k].operation].append(k)
+    order: list[Step] = []
+    while len(order) < len(steps):
+        kind = max(ready, key=lambda operation: len(ready[operation]))
+        while ready[kind]:
+            done = ready[kind].pop(0)
+            order.append(steps[done])
+            for user in users[done]:
+                waiting[user] -= 1
+                if waiting[user] == 0:
+                    ready[steps[user].operation].append(user)
+    return order
+
+
+class _Registers:
+    """Which register has each value: one that no later step needs is taken again.
+
+    of      of a value
+    count   how many there are
+    """
+
+    def __init__(self, steps: list[Step], kept: set[Value]):
+        self.of: dict[Value, int] = {}
+        self.count = 0
+        self._free: set[int] = set()
+        last = {value: step for step in steps for value in step.operands}
+        for step in steps:
+            over = {value for value in step.operands if last[value] is step} - kept
+            # Linear systems are read bit by bit while they are solved: they have registers of their own, in a row.
+            if step.operation in ("factor", "solve"):
+                self._take(step.results)
+                self._release(over)
+            else:
+                self._release(over)
+                for value in step.results:
+                    self._take([value])
+            self._release({*step.results} - last.keys() - kept)
+
+    def _release(self, values: set[Value]) -> None:
+        self._free.update(self.of[value] for value in values)
+
+    def _take(self, values: Sequence[Value]) -> None:
+        """Registers in a row."""
+        first = self._first_of(len(values))
+        self.of |= {value: first + k for k, value in enumerate(values)}
+        self._free -= {self.of[value] for value in values}
+        self.count = max(self.count, first + len(values))
+
+    def _first_of(self, count: int) -> int:
+        """The first of so many registers in a row."""
+        free = {*self._free, *range(self.count, self.count + count)}
+        return next(k for k in sorted(free) if all(k + j in free for j in range(count)))

@@ -1,0 +1,168 @@
+"""Kernels as C: how the steps of a tape are written there, for as many states as a processor takes at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
+from itertools import accumulate
+
+from pendula_codegen.linear_solve import UNROLLED
+from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
+from pendula_codegen.tape import Row, Step, Tape, Value
+
+INTERFACE = 10  # system_interface of pendula/system/system_table.hpp
+# Functions of one argument that are taken of numbers one by one.
+CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
+# What of so many states nothing asks for within steps: it is compiled for eight, and others go that way.
+SELDOM = {
+    **dict.fromkeys(("acceleration_along", "momentum_form_along"), (1, 2, 4)),
+    **dict.fromkeys(("momentum_from_velocity", "mass_matrix", "energies"), (2, 4)),
+}
+_SIGNS = {"add": "+", "subtract": "-", "multiply": "*"}
+
+
+@dataclass(frozen=True)
+class CFunction:
+    name: str
+    text: str
+
+
+def print_functions(table: KernelTable) -> list[CFunction | None]:
+    """The text of those of many states."""
+    return [
+        function and CFunction(function.name, "\n".join(_of_any_width(table, function, place)))
+        for place, function in enumerate(table.of_many)
+    ]
+
+
+def print_plain(table: KernelTable) -> list[CFunction | None]:
+    return [
+        function and CFunction(function.name, "\n".join(_function(function, table.names)))
+        for function in table.plain
+    ]
+
+
+def _of_any_width(table: KernelTable, function: TableFunction, place: int) -> list[str]:
+    text = _function(function, table.names)
+    seldom = SELDOM.get(function.name)
+    if seldom is None:
+        return text
+    condition = " || ".join(f"WIDTH == {width}" for width in seldom)
+    return [f"#if {condition}", *_by_eight(table, function, place), "#else", *text, "#endif"]
+
+
+def _function(function: TableFunction, names: Mapping[Row, str]) -> list[str]:
+    tape = function.tape.written_out(UNROLLED)
+    read = {step.row[0] for step in tape.steps if step.operation == "read"}
+    lines = _Printer(names).lines(tape)
+    return [_head(function, read), "  EACH_REGISTER {", *(f"    {line}" for line in lines), "  }", "}"]
+
+
+def _head(function: TableFunction, read: Set[str]) -> str:
+    arguments = [("const Conditions", "at", bool(read & {*CONDITIONS}))]
+    arguments += [("const double", name, name in read) for name in function.takes]
+    arguments += [("double", name, True) for name in function.gives]
+    listed = ", ".join(f"{'' if used else 'UNUSED '}{kind} *{name}" for kind, name, used in arguments)
+    return f"static void NAME({function.name})({listed}) {{"
+
+
+def _by_eight(table: KernelTable, function: TableFunction, place: int) -> list[str]:
+    """A function of few states by that of eight, some of them more than once."""
+    taken = {f"at->{array}": table.rows[array] for array in CONDITIONS}
+    taken |= {array: table.rows[array] for array in function.takes}
+    given = {array: [name for name, _ in function.tape.outputs].count(array) for array in function.gives}
+    *starts, rows = accumulate((*taken.values(), *given.values()), initial=0)
+    first = dict(zip((*taken, *given), starts, strict=True))
+    pointers = ", ".join(
+        ["const Conditions *", *["const double *"] * len(function.takes), *["double *"] * len(given)]
+    )
+    places = [f"wide + {8 * first[array]}" for array in (*taken, *given)]
+    conditions = ", ".join(places[: len(CONDITIONS)])
+    arguments = ", ".join(["&there", *places[len(CONDITIONS) :]])
+    return [
+        _head(function, {*CONDITIONS, *function.takes}),
+        f"  ALIGNED double wide[{8 * rows}];",
+        f"  const Conditions there = {{at->context, {conditions}}};",
+        *(f"  NAME(widen)({array}, {count}, wide + {8 * first[array]});" for array, count in taken.items()),
+        f"  ((void (*)({pointers}))functions_8[{place}])({arguments});",
+        *(f"  NAME(narrow)(wide + {8 * first[array]}, {count}, {array});" for array, count in given.items()),
+        "}",
+    ]
+
+
+def quoted(text: str) -> str:
+    """A line as a string."""
+    for special, written in (("\\", "\\\\"), ('"', '\\"'), ("\t", "\\t"), ("?", "\\?")):
+        text = text.replace(special, written)
+    return f'"{text}\\n"'
+
+
+class _Printer:
+    def __init__(self, names: Mapping[Row, str]):
+        self._called = names
+        self._taken: set[str] = set()
+        self._names: dict[Value, str] = {}
+        self._numbers: dict[Value, float] = {}
+
+    def lines(self, tape: Tape) -> list[str]:
+        steps = [line for step in tape.steps for line in self._step(step)]
+        return [*steps, *(f"WRITE({name}, {k}) = {self._pack(v)};" for (name, k), v in tape.outputs.items())]
+
+    def _step(self, step: Step) -> list[str]:
+        if step.operation == "number":
+            self._numbers[step.first] = step.number
+            return []
+        if step.operation == "read":
+            self._names[step.first] = self._name_of(step.row)
+            array, k = step.row
+            array = f"at->{array}" if array in CONDITIONS else array
+            return [f"const V {self._names[step.first]} = READ({array}, {k});"]
+        if step.operation in ("factor", "solve"):
+            return self._array(step)
+        for value in step.results:
+            self._names[value] = f"t{value}"
+        if step.operation == "sincos":
+            sine, cosine = step.results
+            names = f"{self._names[sine]}, {self._names[cosine]}"
+            addresses = f"&{self._names[sine]}, &{self._names[cosine]}"
+            return [f"V {names};", f"NAME(sincos)({self._pack(step.operands[0])}, {addresses});"]
+        return [f"const V {self._names[step.first]} = {self._expression(step)};"]
+
+    def _array(self, step: Step) -> list[str]:
+        """A linear system that is too large to be written out."""
+        name = f"t{step.first}"
+        self._names |= {value: f"{name}[{k}]" for k, value in enumerate(step.results)}
+        given = ", ".join(map(self._pack, step.operands[-step.count :]))
+        factors = (
+            "" if step.operation == "factor" else f"{self._names[step.operands[0]].removesuffix('[0]')}, "
+        )
+        return [f"V {name}[] = {{{given}}};", f"NAME({step.operation})({factors}{name});"]
+
+    def _expression(self, step: Step) -> str:
+        first = step.operands[0]
+        if step.operation in _SIGNS:
+            x, y = map(self._operand, step.operands)
+            return f"{x} {_SIGNS[step.operation]} {y}"
+        if step.operation == "negative":
+            return f"-{self._pack(first)}"
+        if step.operation == "inverse":
+            return f"1.0 / {self._pack(first)}"
+        more = f", {step.number!r}" if step.operation == "pow" else ""
+        return f"NAME({step.operation})({self._pack(first)}{more})"
+
+    def _operand(self, value: Value) -> str:
+        """Of an operation whose other operand is a pack."""
+        return self._names.get(value) or repr(self._numbers[value])
+
+    def _pack(self, value: Value) -> str:
+        return self._names.get(value) or f"SPLAT({self._numbers[value]!r})"
+
+    def _name_of(self, row: Row) -> str:
+        """What is the model's ends in an underscore, and nothing else does."""
+        if row not in self._called:
+            return "_".join(map(str, row))
+        name = f"{self._called[row]}_"
+        while name in self._taken:  # a parameter may be called as a momentum is
+            name += "_"
+        self._taken.add(name)
+        return name

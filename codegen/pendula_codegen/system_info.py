@@ -1,0 +1,55 @@
+"""What a kernel says of itself, as SystemInfo of pendula/system/plain_system.hpp has it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sympy import Symbol, expand, pi
+
+from pendula_codegen.entry_points import SystemKernel
+from pendula_codegen.mechanics import LagrangianSystem
+from pendula_codegen.model import Model
+from pendula_codegen.model_kernel import ModelKernel
+
+
+def info_lines(kernel: ModelKernel) -> list[str]:
+    """One thing in a line, its words with tabs between them: src/pendula/system/info_text.hpp reads it."""
+    model = kernel.model
+    rows: list[tuple[object, ...]] = [
+        ("name", model.name),
+        ("model", Path(model.file).stem),
+        ("links", model.links),
+        ("depends_on_time", depends_on_time(model)),
+        ("constant_masses", has_constant_masses(kernel)),
+    ]
+    for c in model.coordinates:
+        periodic = c.is_angle and is_periodic(model.system, c.symbol)
+        rows.append(("coordinate", c.symbol.name, c.unit, c.is_angle, periodic))
+    for p in model.ordered_parameters:
+        standard = "nan" if p.default is None else repr(p.default)
+        rows.append(("parameter", p.name, p.unit, len(p.symbols), standard, p.positive, p.per_link))
+    rows += [("input", i.symbol.name, i.unit) for i in model.inputs]
+    rows += [("point", p.name, len(p.components)) for p in model.points]
+    rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
+    return [
+        "\t".join(str(int(word)) if isinstance(word, bool) else str(word) for word in row) for row in rows
+    ]
+
+
+def is_periodic(system: LagrangianSystem, coordinate: Symbol) -> bool:
+    """Whether the motion is the same a full turn further: of an angle that nothing winds up."""
+    turned = {coordinate: coordinate + 2 * pi}
+    return all(expression.subs(turned) == expression for expression in (system.lagrangian, *system.forces))
+
+
+def has_constant_masses(kernel: SystemKernel) -> bool:
+    """Whether no entry on the diagonal of the mass matrix depends on the coordinates."""
+    changing = {*kernel.system.coordinates}
+    diagonal = (expand(kernel.mass[k, k]) for k in range(kernel.mass.rows))
+    return not any(entry.free_symbols & changing for entry in diagonal)
+
+
+def depends_on_time(model: Model) -> bool:
+    system = model.system
+    held = [system.lagrangian, *system.forces, *(c for p in model.points for c in p.components)]
+    return any(expression.has(model.time) for expression in held)

@@ -1,0 +1,170 @@
+"""What the runtime knows of a kernel, in the order of pendula/system/system_table.hpp: functions of rows of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import accumulate
+
+from sympy import Matrix
+
+from pendula_codegen.entry_points import Function
+from pendula_codegen.forward import slopes
+from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.places import Place
+from pendula_codegen.program import Program
+from pendula_codegen.tape import Row, Solved, Tape, Value
+
+CONDITIONS = ("parameters", "times", "inputs")  # what functions are taken at, whatever they are taken of
+
+# Of SystemFunctions, what steps of a tape are; and of PlainFunctions.
+OF_MANY = (
+    "hamiltonian_form",
+    "momentum_form",
+    "momentum_form_with_jacobians",
+    "residual_with_jacobians",
+    "momentum_from_velocity",
+    "velocity_from_momentum",
+    "acceleration",
+    "mass_matrix",
+    "energies",
+    "power",
+    "acceleration_along",
+    "momentum_form_along",
+    "call_arguments",
+)
+PLAIN = ("residual", "positions", "velocities")
+
+
+@dataclass(frozen=True)
+class TableFunction:
+    """A function of a table: arrays that it takes besides the conditions, those that it gives, and its steps."""
+
+    name: str
+    takes: tuple[str, ...]
+    gives: tuple[str, ...]
+    tape: Tape
+
+
+@dataclass(frozen=True)
+class KernelTable:
+    """The functions of a model; those that it has not, such as those of points, are none.
+
+    of_many   as OF_MANY has them
+    plain     as PLAIN has them
+    names     what people call what is read
+    rows      how many rows arrays have that functions take
+    """
+
+    of_many: list[TableFunction | None]
+    plain: list[TableFunction | None]
+    names: Mapping[Row, str]
+    rows: Mapping[str, int]
+
+    def operations(self) -> set[str]:
+        """Those that any function takes."""
+        functions = filter(None, (*self.of_many, *self.plain))
+        return {step.operation for function in functions for step in function.tape.steps}
+
+
+def kernel_table(kernel: ModelKernel) -> KernelTable:
+    return _Tables(kernel).table()
+
+
+class _Tables:
+    def __init__(self, kernel: ModelKernel):
+        self._kernel = kernel
+        self._functions = {function.name: function for function in kernel.functions()}
+        sizes = {parameter.name: len(parameter.symbols) for parameter in kernel.model.ordered_parameters}
+        self._programs: dict[str, Program] = {}
+        self._parameters = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
+
+    def table(self) -> KernelTable:
+        composed = {
+            "energies": self._energies,
+            "acceleration_along": self._acceleration_along,
+            "momentum_form_along": self._momentum_form_along,
+        }
+
+        def of(name: str) -> TableFunction | None:
+            if name in composed:
+                return composed[name]()
+            return self._one(self._functions[name]) if name in self._functions else None
+
+        leaves = (*self._kernel.leaves(), *self._kernel.motion())
+        names = {self._row(leaf.place): leaf.symbol.name for leaf in leaves}
+        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], names, self._rows())
+
+    def _rows(self) -> dict[str, int]:
+        system = self._kernel.system
+        sizes = {"parameters": len(system.parameters), "times": 1, "inputs": len(system.inputs)}
+        sizes |= dict.fromkeys(("q", "v", "a", "p", "dq", "dv"), len(system.coordinates))
+        return sizes | {f"d_{array}": sizes[array] for array in ("parameters", "inputs")}
+
+    # --- functions
+
+    def _one(self, function: Function) -> TableFunction:
+        tape = Tape()
+        found = self._record(tape, function)
+        gives = tuple(output.name for output in function.written)
+        return TableFunction(function.name, _taken(function), gives, tape.give(found))
+
+    def _energies(self) -> TableFunction:
+        tape, found = Tape(), {}
+        for name, given in (("kinetic_energy", "kinetic"), ("energy", "total")):
+            (value,) = self._record(tape, self._functions[name]).values()
+            found[given, 0] = value
+        return TableFunction("energies", ("q", "v"), ("kinetic", "total"), tape.give(found))
+
+    def _acceleration_along(self) -> TableFunction:
+        return self._along("acceleration", ("q", "v"), ("dq", "dv"), keep=True)
+
+    def _momentum_form_along(self) -> TableFunction:
+        varied = ("d_parameters", "d_inputs")
+        return self._along("momentum_form", ("parameters", "inputs"), varied, keep=False)
+
+    def _along(self, name: str, moved: tuple[str, ...], by: tuple[str, ...], keep: bool) -> TableFunction:
+        """A function's derivative where some arrays change by others; `keep`: with what it gives itself."""
+        function, tape = self._functions[name], Tape()
+        found = self._record(tape, function)
+        directions = dict(zip(moved, by, strict=True))
+        slope = slopes(tape, lambda row: (directions[row[0]], row[1]) if row[0] in directions else None)
+        changes = {
+            (f"d{array}", k): slope[value] if value in slope else tape.number(0.0)
+            for (array, k), value in found.items()
+        }
+        gives = [output.name for output in function.written]
+        slopes_given = [f"d{array}" for array in gives]
+        taken = _taken(function)
+        takes = (*taken, *by) if {*moved} <= {*taken} else (*by, *taken)
+        return TableFunction(
+            f"{name}_along",
+            takes,
+            (*gives, *slopes_given) if keep else tuple(slopes_given),
+            tape.give(found | changes if keep else changes),
+        )
+
+    def _record(self, tape: Tape, function: Function) -> dict[Row, Value]:
+        solve = function.solve
+        solved = None if solve is None else Solved(solve.solution.name, len(solve.unknowns))
+        columns = {
+            output.name: output.value.cols
+            for output in function.written
+            if isinstance(output.value, Matrix) and output.type == "matrix"
+        }
+        if function.name not in self._programs:
+            self._programs[function.name] = self._kernel.program(function)
+        return tape.record(self._programs[function.name], lambda place: self._row(place, columns), solved)
+
+    def _row(self, place: Place, columns: Mapping[str, int] | None = None) -> Row:
+        """Where the number of a place stands."""
+        if place.field == "time":
+            return "times", 0
+        if place.field:
+            return place.argument, self._parameters[place.field] + sum(place.index)
+        width = (columns or {}).get(place.argument, 1)
+        return place.argument, sum(k * size for k, size in zip(place.index, (width, 1), strict=False))
+
+
+def _taken(function: Function) -> tuple[str, ...]:
+    return tuple(argument.name for argument in function.inputs if argument.type == "vector")

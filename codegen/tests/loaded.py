@@ -1,0 +1,123 @@
+"""Kernels in C, compiled and called: rows of numbers in, rows of numbers out."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+from pendula_codegen.kernel_program import render_c
+from pendula_codegen.model import Model
+from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.table import OF_MANY, PLAIN, KernelTable, TableFunction, kernel_table
+
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+WIDTHS = (1, 2, 4, 8)
+FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=fast", "-fno-math-errno", "-Wall", "-Wextra", "-Werror")
+
+Rows = list[list[float]]  # of a coordinate, a parameter …, a number of each state
+
+
+class _Conditions(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_void_p) for name in ("context", "parameters", "times", "inputs")]
+
+
+class _Kernel(ctypes.Structure):
+    _fields_ = [
+        ("interface", ctypes.c_int),
+        ("description", ctypes.c_char_p),
+        ("functions", ctypes.POINTER(ctypes.c_void_p) * len(WIDTHS)),
+        ("plain", ctypes.POINTER(ctypes.c_void_p)),
+    ]
+
+
+class _StageIteration(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_void_p) for name in ("m", "hb", "start", "weights", "increments")]
+
+
+class _IterationChange(ctypes.Structure):
+    _fields_ = [("change", ctypes.c_double), ("size", ctypes.c_double)]
+
+
+class Numbers:
+    """Numbers at an address that any register may be loaded from."""
+
+    def __init__(self, values: list[float]):
+        self._memory = (ctypes.c_double * (len(values) + 8))()
+        start = ctypes.addressof(self._memory)
+        self._first = (-start % 64) // 8
+        self.address = start + 8 * self._first
+        for k, value in enumerate(values):
+            self._memory[self._first + k] = value
+        self._count = len(values)
+
+    def all(self) -> list[float]:
+        return self._memory[self._first : self._first + self._count]
+
+
+def flat(rows: Rows) -> Numbers:
+    return Numbers([number for row in rows for number in row])
+
+
+class LoadedKernel:
+    """The kernel of a model, by a compiler, with instructions that `march` names."""
+
+    def __init__(self, model: Model, folder: Path, compiler: str, march: str = "native"):
+        self.table: KernelTable = kernel_table(ModelKernel(model))
+        source = folder / f"{model.name}.c"
+        source.write_text(render_c(model, Path(model.file).name, source.name), encoding="utf-8")
+        shared = folder / f"{model.name}-{compiler}-{march}.so"
+        command = [compiler, *FLAGS, f"-march={march}", str(source), "-o", str(shared), "-lm"]
+        ended = subprocess.run(command, capture_output=True, text=True)
+        assert ended.returncode == 0 and ended.stderr == "", f"{' '.join(command)}:\n{ended.stderr}"
+        self._library = ctypes.CDLL(str(shared))
+        self._kernel = _Kernel.in_dll(self._library, "pendula_kernel")
+        self.interface = self._kernel.interface
+        self.description = self._kernel.description.decode()
+
+    def call(self, name: str, width: int, given: dict[str, Rows]) -> dict[str, Rows]:
+        """What a function gives; `given` has rows of all that functions take."""
+        if name in PLAIN:
+            function, address = self.table.plain[PLAIN.index(name)], self._kernel.plain[PLAIN.index(name)]
+        else:
+            place = OF_MANY.index(name)
+            function = self.table.of_many[place]
+            address = self._kernel.functions[WIDTHS.index(width)][place]
+        assert function is not None and address is not None
+        taken = [flat(given[array]) for array in function.takes]
+        found = [Numbers([0.0] * rows * width) for rows in sizes(function).values()]
+        conditions, kept = self._conditions(given)
+        places = [numbers.address for numbers in (*taken, *found)]
+        ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (1 + len(places)))(address)(
+            ctypes.addressof(conditions), *places
+        )
+        del kept
+        return {
+            array: [[*numbers.all()[k : k + width]] for k in range(0, len(numbers.all()), width)]
+            for array, numbers in zip(sizes(function), found, strict=True)
+        }
+
+    def iterate(
+        self, width: int, given: dict[str, Rows], stages: dict[str, list[float]]
+    ) -> tuple[list[float], float, float]:
+        """The new increments, the largest change, and the largest of them."""
+        address = self._kernel.functions[WIDTHS.index(width)][len(OF_MANY)]
+        conditions, kept = self._conditions(given)
+        held = {name: Numbers(values) for name, values in stages.items()}
+        on = _StageIteration(**{name: numbers.address for name, numbers in held.items()})
+        function = ctypes.CFUNCTYPE(_IterationChange, ctypes.c_void_p, ctypes.c_void_p)(address)
+        change = function(ctypes.addressof(conditions), ctypes.addressof(on))
+        del kept
+        return held["increments"].all(), change.change, change.size
+
+    @staticmethod
+    def _conditions(given: dict[str, Rows]) -> tuple[_Conditions, list[Numbers]]:
+        kept = [flat(given[name]) for name in ("parameters", "times", "inputs")]
+        return _Conditions(None, *(numbers.address for numbers in kept)), kept
+
+
+def sizes(function: TableFunction) -> dict[str, int]:
+    """How many rows each array has that it gives."""
+    rows = [array for array, _ in function.tape.outputs]
+    return {array: rows.count(array) for array in function.gives}

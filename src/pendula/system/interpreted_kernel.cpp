@@ -1,0 +1,294 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <optional>
+#include <pendula/system/interpreted_kernel.hpp>
+#include <pendula/system/kernel_text.hpp>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+namespace {
+
+/// How many rows an array has.
+enum class Rows { none, one, coordinates, square, parameters, inputs, components, arguments };
+
+struct Array {
+  std::string_view name;
+  Rows rows = Rows::none;
+};
+
+/// A function as the generator calls it, and its arrays: so many that it takes, then those that it gives.
+struct Signature {
+  std::string_view name;
+  std::size_t taken;
+  std::array<Array, 8> arrays;
+};
+
+constexpr std::array<Array, 3> conditions = {
+    {{"parameters", Rows::parameters}, {"times", Rows::one}, {"inputs", Rows::inputs}}};
+
+constexpr Array q{"q", Rows::coordinates}, v{"v", Rows::coordinates}, a{"a", Rows::coordinates},
+    p{"p", Rows::coordinates}, f{"f", Rows::coordinates}, E{"E", Rows::coordinates};
+
+/// In the order of Program::functions.
+constexpr std::array<Signature, Program::many + Program::plain> signatures = {{
+    {"hamiltonian_form", 2, {q, p, v, f}},
+    {"momentum_form", 2, {q, v, p, f}},
+    {"momentum_form_with_jacobians",
+     2,
+     {q, v, p, f, {"p_D_q", Rows::square}, {"p_D_v", Rows::square}, {"f_D_q", Rows::square}, {"f_D_v", Rows::square}}},
+    {"residual_with_jacobians",
+     3,
+     {q, v, a, E, {"E_D_q", Rows::square}, {"E_D_v", Rows::square}, {"E_D_a", Rows::square}}},
+    {"momentum_from_velocity", 2, {q, v, p}},
+    {"velocity_from_momentum", 2, {q, p, v}},
+    {"acceleration", 2, {q, v, a}},
+    {"mass_matrix", 1, {q, {"M", Rows::square}}},
+    {"energies", 2, {q, v, {"kinetic", Rows::one}, {"total", Rows::one}}},
+    {"power", 2, {q, v, {"P", Rows::one}}},
+    {"acceleration_along",
+     4,
+     {q, v, {"dq", Rows::coordinates}, {"dv", Rows::coordinates}, a, {"da", Rows::coordinates}}},
+    {"momentum_form_along",
+     4,
+     {{{"d_parameters", Rows::parameters},
+       {"d_inputs", Rows::inputs},
+       q,
+       v,
+       {"dp", Rows::coordinates},
+       {"df", Rows::coordinates}}}},
+    {"call_arguments", 2, {q, v, {"found", Rows::arguments}}},
+    {"residual", 3, {q, v, a, E}},
+    {"positions", 1, {q, {"r", Rows::components}}},
+    {"velocities", 2, {q, v, {"r_dot", Rows::components}}},
+}};
+
+struct OperationName {
+  std::string_view name;
+  Operation operation;
+  int registers;  ///< results and operands
+};
+
+/// All but linear systems, which have any number of operands.
+constexpr std::array<OperationName, 21> operations = {{
+    {"add", Operation::add, 3},
+    {"subtract", Operation::subtract, 3},
+    {"multiply", Operation::multiply, 3},
+    {"multiply_add", Operation::multiply_add, 4},
+    {"multiply_subtract", Operation::multiply_subtract, 4},
+    {"subtract_product", Operation::subtract_product, 4},
+    {"negative", Operation::negative, 2},
+    {"inverse", Operation::inverse, 2},
+    {"sincos", Operation::sincos, 3},
+    {"tan", Operation::tan, 2},
+    {"asin", Operation::asin, 2},
+    {"acos", Operation::acos, 2},
+    {"atan", Operation::atan, 2},
+    {"sinh", Operation::sinh, 2},
+    {"cosh", Operation::cosh, 2},
+    {"tanh", Operation::tanh, 2},
+    {"exp", Operation::exp, 2},
+    {"log", Operation::log, 2},
+    {"sqrt", Operation::sqrt, 2},
+    {"cbrt", Operation::cbrt, 2},
+    {"pow", Operation::pow, 3},
+}};
+
+constexpr std::uint16_t most_of_a_kind = 65535;
+constexpr int most_registers = 65535, most_unknowns = 361;  // whose lower triangle registers hold
+
+/// An array of a function: what it is called, and its rows.
+struct Given {
+  std::string_view name;
+  std::size_t rows;
+};
+
+void end_line(KernelText& text) {
+  if (!text.at_end()) text.fail("the end of the line", text.word());
+}
+
+/// A function, and the memory that its steps lie in.
+class OwnedFunction {
+ public:
+  /// Reads from the line that begins it to that which ends it. Arrays that are taken come before those that are given.
+  void read(KernelText& text, const std::vector<Given>& taken, const std::vector<Given>& given) {
+    registers_ = text.whole(1, most_registers);
+    end_line(text);
+    std::vector<std::vector<bool>> missing(given.size());
+    std::ranges::transform(given, missing.begin(),
+                           [](const Given& array) { return std::vector<bool>(array.rows, true); });
+    while (text.next() && text.kind() != "function" && text.kind() != "end") {
+      if (text.kind() == "read") {
+        reads_.push_back(move(text, taken));
+      } else if (text.kind() == "number") {
+        const std::uint16_t to = place(text);
+        numbers_.push_back({to, text.number()});
+      } else if (text.kind() == "write") {
+        ProgramMove found = move(text, given);
+        missing[found.array][found.row] = false;
+        found.array = static_cast<std::uint16_t>(found.array + taken.size());
+        writes_.push_back(found);
+      } else if (text.kind() == "factor" || text.kind() == "solve") {
+        take_system(text);
+      } else {
+        take_operation(text);
+      }
+      end_line(text);
+    }
+    for (const auto& rows : missing) {
+      if (std::ranges::find(rows, true) != rows.end()) text.fail("that all rows are written before", text.kind());
+    }
+    code_.push_back(static_cast<std::uint16_t>(Operation::end));
+  }
+
+  /// Lives as long as this.
+  ProgramFunction function() const { return {static_cast<std::size_t>(registers_), reads_, writes_, numbers_, code_}; }
+
+ private:
+  /// The first of `count` registers in a row.
+  std::uint16_t place(KernelText& text, int count = 1) const {
+    return static_cast<std::uint16_t>(text.whole(0, registers_ - count));
+  }
+
+  ProgramMove move(KernelText& text, const std::vector<Given>& arrays) const {
+    const std::uint16_t at = place(text);
+    const std::string_view name = text.word();
+    const auto array = std::ranges::find(arrays, name, &Given::name);
+    if (array == arrays.end() || array->rows == 0) text.fail("an array of this function", name);
+    const int row = text.whole(0, static_cast<int>(array->rows) - 1);
+    return {at, static_cast<std::uint16_t>(array - arrays.begin()), static_cast<std::uint32_t>(row)};
+  }
+
+  void take_operation(KernelText& text) {
+    const auto* known = std::ranges::find(operations, text.kind(), &OperationName::name);
+    if (known == operations.end()) text.fail("an operation", text.kind());
+    // How many of a kind come one after the other stands behind the kind.
+    const auto operation = static_cast<std::uint16_t>(known->operation);
+    if (!run_ || code_[*run_] != operation || code_[*run_ + 1] == most_of_a_kind) {
+      run_ = code_.size();
+      code_.insert(code_.end(), {operation, 0});
+    }
+    ++code_[*run_ + 1];
+    for (int k = 0; k < known->registers; ++k) code_.push_back(place(text));
+  }
+
+  void take_system(KernelText& text) {
+    const bool factors = text.kind() == "factor";
+    const int size = text.whole(1, most_unknowns), entries = size * (size + 1) / 2;
+    run_.reset();
+    code_.push_back(static_cast<std::uint16_t>(factors ? Operation::factor : Operation::solve));
+    code_.push_back(static_cast<std::uint16_t>(size));
+    code_.push_back(place(text, factors ? entries : size));
+    if (!factors) code_.push_back(place(text, entries));
+    for (int k = 0; k < (factors ? entries : size); ++k) code_.push_back(place(text));
+  }
+
+  int registers_ = 0;
+  std::optional<std::size_t> run_;  // where the last steps of a kind begin, if more may follow
+  std::vector<ProgramMove> reads_, writes_;
+  std::vector<ProgramNumber> numbers_;
+  std::vector<std::uint16_t> code_;
+};
+
+/// A kernel, and the memory that its table points into.
+class OwnedKernel {
+ public:
+  OwnedKernel(std::string text, const ProgramInterpreter& interpreter) : text_(std::move(text)) {
+    KernelText lines(text_);
+    if (!lines.next() || lines.kind() != "program") lines.fail("a program", lines.kind());
+    lines.whole(system_interface, system_interface);
+    end_line(lines);
+    while (lines.next() && description_.take(lines)) {
+    }
+    const SystemInfo info = description_.info();
+    program_.coordinates = info.coordinates.size();
+    while (lines.kind() == "function") read_function(lines, info);
+    if (lines.kind() != "end") lines.fail("a function or the end", lines.kind());
+    if (lines.next()) lines.fail("nothing behind the end", lines.kind());
+    table_ = {
+        info,   &program_, interpreter.of_1, interpreter.of_2, interpreter.of_4, interpreter.of_8, interpreter.plain,
+        nullptr};
+    require_all(lines);
+  }
+
+  const SystemTable& table() const { return table_; }
+
+ private:
+  void read_function(KernelText& lines, const SystemInfo& info) {
+    const std::string_view name = lines.word();
+    const auto* signature = std::ranges::find(signatures, name, &Signature::name);
+    if (signature == signatures.end()) lines.fail("a function that kernels have", name);
+    std::vector<Given> taken, given;
+    for (const Array& array : conditions) taken.push_back({array.name, count(array.rows, info)});
+    for (std::size_t k = 0; k < signature->arrays.size() && signature->arrays[k].rows != Rows::none; ++k) {
+      const Array& array = signature->arrays[k];
+      (k < signature->taken ? taken : given).push_back({array.name, count(array.rows, info)});
+    }
+    const auto which = static_cast<std::size_t>(signature - signatures.begin());
+    if (!program_.functions[which].code.empty()) lines.fail("another function", name);
+    functions_[which].read(lines, taken, given);
+    program_.functions[which] = functions_[which].function();
+  }
+
+  static std::size_t count(Rows rows, const SystemInfo& info) {
+    const auto total = [](std::span<const int> sizes) {
+      return static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0));
+    };
+    const std::size_t n = info.coordinates.size();
+    switch (rows) {
+      case Rows::none:
+        return 0;
+      case Rows::one:
+        return 1;
+      case Rows::coordinates:
+        return n;
+      case Rows::square:
+        return n * n;
+      case Rows::parameters:
+        return total(info.parameter_sizes);
+      case Rows::inputs:
+        return info.inputs.size();
+      case Rows::components:
+        return total(info.point_sizes);
+      case Rows::arguments:
+        return info.argument_is_base.size();
+    }
+    return 0;
+  }
+
+  /// That all functions are there but those of what the model has not, which the table is not to have either.
+  void require_all(const KernelText& lines) {
+    const SystemInfo& info = table_.info;
+    for (std::size_t k = 0; k < signatures.size(); ++k) {
+      const Signature& signature = signatures[k];
+      const bool wanted = count(signature.arrays[signature.taken].rows, info) > 0;
+      const bool there = !program_.functions[k].code.empty();
+      if (wanted != there) lines.fail((wanted ? "" : "no ") + std::string(signature.name), wanted ? "none" : "one");
+    }
+    if (info.argument_is_base.empty()) {
+      for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) of->call_arguments = nullptr;
+    }
+    if (info.points.empty()) table_.plain.positions = nullptr, table_.plain.velocities = nullptr;
+  }
+
+  std::string text_;
+  KernelDescription description_;
+  std::array<OwnedFunction, signatures.size()> functions_;
+  Program program_;
+  SystemTable table_;
+};
+
+}  // namespace
+
+std::shared_ptr<const SystemTable> table_of(std::string text, const ProgramInterpreter& interpreter) {
+  const auto kernel = std::make_shared<const OwnedKernel>(std::move(text), interpreter);
+  return {kernel, &kernel->table()};
+}
+
+}  // namespace pendula

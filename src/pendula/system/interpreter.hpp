@@ -1,0 +1,268 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <pendula/numeric/functions.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/stage_product.hpp>
+#include <pendula/system/program.hpp>
+#include <type_traits>
+
+namespace pendula {
+
+namespace detail {
+
+/// Carries out programs, for W states at once: registers are rows of W numbers.
+template <int W>
+class Interpreter {
+  using Lanes = Pack<W, RegisterFor<W>>;
+  using L = std::conditional_t<W == 1, double, Lanes>;
+  static constexpr auto width = static_cast<std::size_t>(W);
+
+ public:
+  static constexpr SystemFunctions functions() {
+    return {&call<0>, &call<1>, &call<2>, &call<3>,  &call<4>,  &call<5>,  &call<6>,
+            &call<7>, &call<8>, &call<9>, &call<10>, &call<11>, &call<12>, &iterate};
+  }
+  static constexpr PlainFunctions plain_functions() {
+    constexpr std::size_t first = Program::many;
+    return {&call<first>, &call<first + 1>, &call<first + 2>};
+  }
+
+ private:
+  template <std::size_t which, class... Arrays>
+  static void call(const Conditions& at, Arrays... arrays) {
+    const auto& program = *static_cast<const Program*>(at.context);
+    // What is read of is not written to: such places are those of other moves.
+    run(program.functions[which],
+        std::array<double*, 3 + sizeof...(Arrays)>{const_cast<double*>(at.parameters), const_cast<double*>(at.times),
+                                                   const_cast<double*>(at.inputs), const_cast<double*>(arrays)...}
+            .data());
+  }
+
+  static void run(const ProgramFunction& function, double* const* arrays) {
+    static thread_local PackRows<width> registers;
+    if (registers.rows() < function.registers) registers = PackRows<width>(function.registers);
+    double* const to = registers[0];
+    for (const ProgramNumber& number : function.numbers) store(L(number.value), to + number.place * width);
+    for (const ProgramMove& move : function.reads) {
+      store(load(arrays[move.array] + move.row * width), to + move.place * width);
+    }
+    carry_out(function.code.data(), to);
+    for (const ProgramMove& move : function.writes) {
+      store(load(to + move.place * width), arrays[move.array] + move.row * width);
+    }
+  }
+
+  static L load(const double* from) {
+    if constexpr (W == 1) {
+      return *from;
+    } else {
+      return L::load(from);
+    }
+  }
+  static void store(const L& number, double* to) {
+    if constexpr (W == 1) {
+      *to = number;
+    } else {
+      number.store(to);
+    }
+  }
+
+  static void carry_out(const std::uint16_t* code, double* registers) {
+    using std::acos, std::asin, std::atan, std::cbrt, std::cosh, std::exp, std::log, std::pow, std::sinh, std::sqrt,
+        std::tan, std::tanh;
+    const auto at = [&](int k) { return load(registers + code[k] * width); };
+    // As many steps of a kind as come one after the other, of so many registers each, the first of which is the result.
+    const auto each = [&](int places, auto result) {
+      for (int left = (code += 2)[-1]; left > 0; --left, code += places) store(result(), registers + code[0] * width);
+    };
+    for (;;) {
+      switch (static_cast<Operation>(*code)) {
+        case Operation::end:
+          return;
+        case Operation::add:
+          each(3, [&] { return at(1) + at(2); });
+          break;
+        case Operation::subtract:
+          each(3, [&] { return at(1) - at(2); });
+          break;
+        case Operation::multiply:
+          each(3, [&] { return at(1) * at(2); });
+          break;
+        case Operation::multiply_add:
+          each(4, [&] { return sum_of_product(at(1), at(2), at(3)); });
+          break;
+        case Operation::multiply_subtract:
+          each(4, [&] { return sum_of_product(at(1), at(2), -at(3)); });
+          break;
+        case Operation::subtract_product:
+          each(4, [&] { return sum_of_product(-at(1), at(2), at(3)); });
+          break;
+        case Operation::negative:
+          each(2, [&] { return -at(1); });
+          break;
+        case Operation::inverse:
+          each(2, [&] { return L(1.0) / at(1); });
+          break;
+        case Operation::sincos:
+          each(3, [&] {
+            L sine, cosine;
+            sincos(at(2), sine, cosine);
+            store(cosine, registers + code[1] * width);
+            return sine;
+          });
+          break;
+        case Operation::tan:
+          each(2, [&] { return tan(at(1)); });
+          break;
+        case Operation::asin:
+          each(2, [&] { return asin(at(1)); });
+          break;
+        case Operation::acos:
+          each(2, [&] { return acos(at(1)); });
+          break;
+        case Operation::atan:
+          each(2, [&] { return atan(at(1)); });
+          break;
+        case Operation::sinh:
+          each(2, [&] { return sinh(at(1)); });
+          break;
+        case Operation::cosh:
+          each(2, [&] { return cosh(at(1)); });
+          break;
+        case Operation::tanh:
+          each(2, [&] { return tanh(at(1)); });
+          break;
+        case Operation::exp:
+          each(2, [&] { return exp(at(1)); });
+          break;
+        case Operation::log:
+          each(2, [&] { return log(at(1)); });
+          break;
+        case Operation::sqrt:
+          each(2, [&] { return sqrt(at(1)); });
+          break;
+        case Operation::cbrt:
+          each(2, [&] { return cbrt(at(1)); });
+          break;
+        case Operation::pow:
+          each(3, [&] { return pow(at(1), at(2)); });
+          break;
+        case Operation::factor:
+          code = factor(code, registers);
+          break;
+        case Operation::solve:
+          code = solve(code, registers);
+          break;
+      }
+    }
+  }
+
+  static L sum_of_product(const L& x, const L& y, const L& z) {
+    if constexpr (W == 1) {
+      return detail::fused(x, y, z);
+    } else {
+      return fma(x, y, z);
+    }
+  }
+
+  // --- Linear systems ---
+
+  /// Rows of a lower triangle.
+  struct Triangle {
+    double* first;
+    double* operator()(std::size_t i, std::size_t j) const { return first + (i * (i + 1) / 2 + j) * width; }
+  };
+
+  static const std::uint16_t* factor(const std::uint16_t* code, double* registers) {
+    const std::size_t size = code[1];
+    const Triangle a{registers + code[2] * width};
+    code += 3;
+    for (std::size_t k = 0; k < size * (size + 1) / 2; ++k) {
+      store(load(registers + *code++ * width), a.first + k * width);
+    }
+    for (std::size_t k = 0; k < size; ++k) {
+      const L inverse = L(1.0) / load(a(k, k));
+      store(inverse, a(k, k));
+      // From the last row on: the entries above are still those of the column.
+      for (std::size_t i = size - 1; i > k; --i) {
+        const L l = load(a(i, k)) * inverse;
+        for (std::size_t j = k + 1; j <= i; ++j) {
+          store(sum_of_product(-l, load(a(j, k)), load(a(i, j))), a(i, j));
+        }
+        store(l, a(i, k));
+      }
+    }
+    return code;
+  }
+
+  static const std::uint16_t* solve(const std::uint16_t* code, double* registers) {
+    const std::size_t size = code[1];
+    double* const x = registers + code[2] * width;
+    const Triangle a{registers + code[3] * width};
+    code += 4;
+    for (std::size_t i = 0; i < size; ++i) {
+      L sum = load(registers + *code++ * width);
+      for (std::size_t k = 0; k < i; ++k) sum = sum_of_product(-load(a(i, k)), load(x + k * width), sum);
+      store(sum, x + i * width);
+    }
+    for (std::size_t k = size; k-- > 0;) {
+      L sum = load(x + k * width) * load(a(k, k));
+      for (std::size_t i = k + 1; i < size; ++i) sum = sum_of_product(-load(a(i, k)), load(x + i * width), sum);
+      store(sum, x + k * width);
+    }
+    return code;
+  }
+
+  // --- Iterations on the stages of a step ---
+
+  static IterationChange iterate(const Conditions& at, const StageIteration& on) {
+    const std::size_t rows = 2 * static_cast<const Program*>(at.context)->coordinates;
+    static thread_local PackRows<width> numbers;
+    if (numbers.rows() < 2 * rows) numbers = PackRows<width>(2 * rows);
+    double *const reached = numbers[0], *const found = numbers[rows];
+    for (std::size_t k = 0; k < rows; ++k) {
+      const Compensated<double>& start = on.start[k];
+      const Lanes there = Lanes(start.value) + stage_product<Lanes, width, width>(on.m, on.increments + k * width,
+                                                                                  Lanes(start.compensation));
+      there.store(reached + k * width);
+    }
+    functions().hamiltonian_form(at, reached, reached + rows / 2 * width, found, found + rows / 2 * width);
+    const Lanes hb = Lanes::load(on.hb);
+    Lanes largest(0.0), scale(0.0), all(0.0);
+    for (std::size_t k = 0; k < rows; ++k) {
+      double* const increments = on.increments + k * width;
+      const Lanes weight(on.weights[k]), now = hb * Lanes::load(found + k * width);
+      const Lanes change = now - Lanes::load(increments);
+      largest = max(largest, weight * abs(change));
+      scale = max(scale, weight * abs(now));
+      all = all + change;
+      now.store(increments);
+    }
+    // NaN if any change is no number: that reaches their sum, though not always the largest.
+    double total = 0;
+    for (const double sum : each_of(all)) total += sum;
+    const double size = std::ranges::max(each_of(scale));
+    return {std::isfinite(total) ? std::ranges::max(each_of(largest)) : std::numeric_limits<double>::quiet_NaN(), size};
+  }
+
+  static std::array<double, width> each_of(const Lanes& numbers) {
+    std::array<double, width> each;
+    numbers.store_unaligned(each.data());
+    return each;
+  }
+};
+
+}  // namespace detail
+
+inline constexpr ProgramInterpreter program_interpreter = {
+    detail::Interpreter<1>::functions(), detail::Interpreter<2>::functions(), detail::Interpreter<4>::functions(),
+    detail::Interpreter<8>::functions(), detail::Interpreter<1>::plain_functions()};
+
+}  // namespace pendula

@@ -1,0 +1,349 @@
+// Kernels that are interpreted: what they compute, and what is said of programs that are damaged.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/interpreted_kernel.hpp>
+#include <pendula/system/interpreter.hpp>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace pendula::test {
+namespace {
+
+// A mass m on a spring k with a force u, as the generator writes it, with bars in place of tabs.
+constexpr std::string_view spring = R"(program|10
+name|spring
+model|spring
+links|1
+depends_on_time|0
+constant_masses|1
+coordinate|x|m|0|0
+parameter|m|kg|1|1.0|1|0
+parameter|k|N/m|1|1.0|0|0
+input|u|N
+point|bob|2
+function|hamiltonian_form|6
+read|0|parameters|0
+read|1|p|0
+read|2|inputs|0
+read|3|parameters|1
+read|4|q|0
+factor|1|5|0
+subtract_product|0|3|4|2
+solve|1|2|5|1
+write|2|v|0
+write|0|f|0
+function|momentum_form|5
+read|0|parameters|0
+read|1|v|0
+read|2|inputs|0
+read|3|parameters|1
+read|4|q|0
+multiply|0|0|1
+subtract_product|1|3|4|2
+write|0|p|0
+write|1|f|0
+function|momentum_form_with_jacobians|6
+read|0|parameters|0
+read|1|v|0
+read|2|inputs|0
+read|3|parameters|1
+read|4|q|0
+number|5|0.0
+multiply|1|0|1
+subtract_product|2|3|4|2
+negative|3|3
+write|1|p|0
+write|2|f|0
+write|5|p_D_q|0
+write|0|p_D_v|0
+write|3|f_D_q|0
+write|5|f_D_v|0
+function|residual_with_jacobians|6
+read|0|inputs|0
+read|1|parameters|0
+read|2|a|0
+read|3|parameters|1
+read|4|q|0
+number|5|0.0
+multiply|2|1|2
+multiply_add|2|3|4|2
+subtract|0|2|0
+write|0|E|0
+write|3|E_D_q|0
+write|5|E_D_v|0
+write|1|E_D_a|0
+function|momentum_from_velocity|2
+read|0|parameters|0
+read|1|v|0
+multiply|0|0|1
+write|0|p|0
+function|velocity_from_momentum|3
+read|0|parameters|0
+read|1|p|0
+factor|1|2|0
+solve|1|0|2|1
+write|0|v|0
+function|acceleration|4
+read|0|parameters|0
+read|1|inputs|0
+read|2|parameters|1
+read|3|q|0
+subtract_product|1|2|3|1
+factor|1|2|0
+solve|1|0|2|1
+write|0|a|0
+function|mass_matrix|1
+read|0|parameters|0
+write|0|M|0
+function|energies|5
+read|0|parameters|0
+read|1|v|0
+number|2|0.5
+read|3|parameters|1
+read|4|q|0
+multiply|0|0|1
+multiply|3|3|4
+multiply|0|1|0
+multiply|1|0|2
+multiply_add|0|4|3|0
+multiply|0|2|0
+write|1|kinetic|0
+write|0|total|0
+function|power|2
+read|0|inputs|0
+read|1|v|0
+multiply|0|0|1
+write|0|P|0
+function|acceleration_along|5
+read|0|parameters|0
+read|1|inputs|0
+read|2|parameters|1
+read|3|q|0
+read|4|dq|0
+subtract_product|1|2|3|1
+factor|1|3|0
+multiply|0|2|4
+solve|1|2|3|1
+negative|0|0
+solve|1|1|3|0
+write|2|a|0
+write|1|da|0
+function|momentum_form_along|5
+read|0|v|0
+read|1|q|0
+read|2|d_parameters|0
+read|3|d_inputs|0
+read|4|d_parameters|1
+multiply|0|0|2
+subtract_product|1|1|4|3
+write|0|dp|0
+write|1|df|0
+function|residual|5
+read|0|inputs|0
+read|1|parameters|0
+read|2|a|0
+read|3|parameters|1
+read|4|q|0
+multiply|1|1|2
+multiply_add|1|3|4|1
+subtract|0|1|0
+write|0|E|0
+function|positions|2
+read|0|q|0
+number|1|0.0
+write|0|r|0
+write|1|r|1
+function|velocities|2
+read|0|v|0
+number|1|0.0
+write|0|r_dot|0
+write|1|r_dot|1
+end
+)";
+
+std::string with_tabs(std::string_view text) {
+  std::string tabs(text);
+  std::ranges::replace(tabs, '|', '\t');
+  return tabs;
+}
+
+std::shared_ptr<const SystemTable> read(const std::string& text) {
+  return table_of(text, program_interpreter);
+}
+
+/// The program with a text in place of another.
+std::string changed(std::string_view from, std::string_view to) {
+  std::string text(spring);
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("the program has no " + std::string(from));
+  return with_tabs(text.replace(at, from.size(), to));
+}
+
+/// Numbers of W springs side by side.
+template <int W>
+class Springs {
+  static constexpr std::size_t width = W;
+
+ public:
+  explicit Springs(const SystemTable& table) : table_(table), functions_(functions_of<W>(table)) {
+    std::mt19937 draw(W);
+    std::uniform_real_distribution<double> some(0.5, 2.0);
+    for (PackRows<width>* rows : {&parameters_, &inputs_, &given_}) {
+      for (std::size_t k = 0; k < rows->rows(); ++k) std::generate_n((*rows)[k], width, [&] { return some(draw); });
+    }
+  }
+
+  Conditions at() const { return {table_.context, parameters_[0], times_[0], inputs_[0]}; }
+
+  void check() {
+    functions_.hamiltonian_form(at(), given_[0], given_[1], found_[0], found_[1]);
+    functions_.acceleration_along(at(), given_[0], given_[1], given_[2], given_[3], found_[2], found_[3]);
+    functions_.energies(at(), given_[0], given_[1], found_[4], found_[5]);
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const double m = parameters_[0][lane], k = parameters_[1][lane], u = inputs_[0][lane];
+      const double x = given_[0][lane], v = given_[1][lane];
+      EXPECT_DOUBLE_EQ(found_[0][lane], v / m);
+      EXPECT_DOUBLE_EQ(found_[1][lane], u - k * x);
+      EXPECT_DOUBLE_EQ(found_[2][lane], (u - k * x) / m);
+      EXPECT_DOUBLE_EQ(found_[3][lane], -k * given_[2][lane] / m);
+      EXPECT_DOUBLE_EQ(found_[4][lane], m * v * v / 2);
+      EXPECT_DOUBLE_EQ(found_[5][lane], m * v * v / 2 + k * x * x / 2);
+    }
+  }
+
+  /// A step whose stages all are where it begins.
+  void check_iteration() {
+    PackRows<width> m(width), hb(1), increments(2);
+    std::fill_n(hb[0], width, 0.5);
+    const Compensated<double> start[] = {{1.0, 0.0}, {2.0, 0.0}};
+    const double weights[] = {3.0, 1.0};
+    const StageIteration on{m[0], hb[0], start, weights, increments[0]};
+    const IterationChange first = functions_.iterate(at(), on);
+    double largest = 0;
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const double moved = 0.5 * 2.0 / parameters_[0][lane], pushed = 0.5 * (inputs_[0][lane] - parameters_[1][lane]);
+      EXPECT_DOUBLE_EQ(increments[0][lane], moved);
+      EXPECT_DOUBLE_EQ(increments[1][lane], pushed);
+      largest = std::max({largest, 3 * std::abs(moved), std::abs(pushed)});
+    }
+    EXPECT_DOUBLE_EQ(first.change, largest);
+    EXPECT_DOUBLE_EQ(first.size, largest);
+    EXPECT_EQ(functions_.iterate(at(), on).change, 0);
+    increments[1][width - 1] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_TRUE(std::isnan(functions_.iterate(at(), on).change));
+  }
+
+  /// Calls all that the table has.
+  void call_all() {
+    double* o = found_[0];
+    const double* g = given_[0];
+    functions_.hamiltonian_form(at(), g, g, o, o);
+    functions_.momentum_form(at(), g, g, o, o);
+    functions_.momentum_form_with_jacobians(at(), g, g, o, o, o, o, o, o);
+    functions_.residual_with_jacobians(at(), g, g, g, o, o, o, o);
+    functions_.momentum_from_velocity(at(), g, g, o);
+    functions_.velocity_from_momentum(at(), g, g, o);
+    functions_.acceleration(at(), g, g, o);
+    functions_.mass_matrix(at(), g, o);
+    functions_.energies(at(), g, g, o, o);
+    functions_.power(at(), g, g, o);
+    functions_.acceleration_along(at(), g, g, g, g, o, o);
+    functions_.momentum_form_along(at(), g, g, g, g, o, o);
+    if (functions_.call_arguments != nullptr) functions_.call_arguments(at(), g, g, o);
+  }
+
+ private:
+  const SystemTable& table_;
+  SystemFunctions functions_;
+  PackRows<width> parameters_{2}, times_{1}, inputs_{1}, given_{4}, found_{6};
+};
+
+TEST(InterpretedKernel, ComputesWhatItsProgramSays) {
+  const auto table = read(with_tabs(spring));
+  Springs<1>(*table).check();
+  Springs<2>(*table).check();
+  Springs<4>(*table).check();
+  Springs<8>(*table).check();
+}
+
+TEST(InterpretedKernel, IteratesOnStages) {
+  const auto table = read(with_tabs(spring));
+  Springs<1>(*table).check_iteration();
+  Springs<2>(*table).check_iteration();
+  Springs<4>(*table).check_iteration();
+  Springs<8>(*table).check_iteration();
+}
+
+TEST(InterpretedKernel, SaysWhatItsProgramSays) {
+  const auto table = read(with_tabs(spring));
+  const SystemInfo& info = table->info;
+  EXPECT_EQ(info.name, "spring");
+  EXPECT_EQ(info.coordinates.size(), 1U);
+  EXPECT_EQ(info.parameter_units[1], "N/m");
+  EXPECT_TRUE(info.is_positive[0] && !info.is_positive[1] && info.constant_masses && !info.depends_on_time);
+  EXPECT_EQ(info.inputs[0], "u");
+  EXPECT_EQ(info.point_sizes[0], 2);
+  EXPECT_EQ(table->of_8.call_arguments, nullptr);
+}
+
+TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
+  const auto told = [](const std::string& text) -> std::string {
+    try {
+      read(text);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  EXPECT_EQ(told(""), "line 0: expected a program, got ");
+  EXPECT_EQ(told(changed("program|10", "program|9")), "line 1: expected a whole number from 10 to 10, got 9");
+  EXPECT_EQ(told(changed("links|1", "links|one")), "line 4: expected a whole number from 1 to 1000000, got one");
+  EXPECT_EQ(told(changed("kg|1|1.0|1|0", "kg|1|1.0|1")), "line 8: expected another word, got the end of the line");
+  EXPECT_EQ(told(changed("bob|2", "bob|2|3")), "line 11: expected the end of the line, got 3");
+  EXPECT_EQ(told(changed("hamiltonian_form", "hamiltonian")),
+            "line 12: expected a function that kernels have, got hamiltonian");
+  EXPECT_EQ(told(changed("read|1|p|0", "read|1|v|0")), "line 14: expected an array of this function, got v");
+  EXPECT_EQ(told(changed("read|1|p|0", "read|1|p|1")), "line 14: expected a whole number from 0 to 0, got 1");
+  EXPECT_EQ(told(changed("factor|1|5|0", "factor|3|5|0")), "line 18: expected a whole number from 0 to 0, got 5");
+  EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 18: expected an operation, got invert");
+  EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 20: expected a whole number from 0 to 5, got 6");
+  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 22: expected that all rows are written before, got function");
+  EXPECT_EQ(told(changed("point|bob|2\n", "")), "line 141: expected an array of this function, got r");
+  EXPECT_EQ(told(changed("coordinate|x|m|0|0\n", "")),
+            "expected a name, a model, links and coordinates, got none of one of them");
+}
+
+// A program that is cut or changed anywhere is refused, or touches nothing but its own.
+TEST(InterpretedKernel, ADamagedProgramDoesNoHarm) {
+  const std::string whole = with_tabs(spring);
+  for (std::size_t size = 0; size < whole.size() - 1; ++size) {
+    EXPECT_THROW(read(whole.substr(0, size)), std::invalid_argument) << size;
+  }
+  std::mt19937 draw(1);
+  constexpr std::string_view characters = "0123456789\t\n-.ax";
+  int refused = 0;
+  constexpr int trials = 5000;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::string text = whole;
+    text[draw() % text.size()] = characters[draw() % characters.size()];
+    try {
+      const auto table = read(text);
+      if (table->info.coordinates.size() == 1 && table->info.inputs.size() == 1) Springs<2>(*table).call_all();
+    } catch (const std::invalid_argument&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, trials / 2);  // others are other numbers, names and registers
+}
+
+}  // namespace
+}  // namespace pendula::test
