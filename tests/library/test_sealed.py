@@ -22,7 +22,16 @@ ALLOWED = {"sse2": set(), "avx2": {"VEX"}, "avx512": {"VEX", "EVEX"}}
 # What all copies share.
 ONCE = [
     f"{name}.cpp.o"
-    for name in ("explicit_integrator", "kernel_check", "kernel_comparison", "kernel_values", "library")
+    for name in (
+        "c_kernel",
+        "explicit_integrator",
+        "interpreted_kernel",
+        "kernel_check",
+        "kernel_comparison",
+        "kernel_text",
+        "kernel_values",
+        "library",
+    )
 ]
 
 # Of the library itself, what a copy may ask the other objects for.
