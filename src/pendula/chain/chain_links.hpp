@@ -158,16 +158,17 @@ Real largest_across(const std::array<Real, D>& a, const std::array<Real, D>& b) 
   return largest;
 }
 
-/// What the sweeps along a chain need to know of one link.
+/// What the sweeps along a chain need to know of one link, of one motion or of several members. Unused lanes hold a
+/// chain of links like this.
 template <class Real>
 struct LinkConstants {
-  Real mass{0}, length{0};
-  Real inverse_length{0}, inverse_square{0};  ///< 1/l, 1/l²
-  Twofold<Real> inverse_mass;                 ///< 1/m
-  Real inverse_masses{0};                     ///< 1/m_i + 1/m_{i−1}, of the bobs at both ends of the rod; 1/m_0 = 0
-  Real drag{0};                               ///< λ/l²
-  Real weight{0};                             ///< M g, M the mass that the rod carries
-  Real hanging{0};                            ///< M |g|/l, its tension over its length where the chain hangs at rest
+  Real mass{1.0}, length{1.0};
+  Real inverse_length{1.0}, inverse_square{1.0};     ///< 1/l, 1/l²
+  Twofold<Real> inverse_mass{Real(1.0), Real(0.0)};  ///< 1/m
+  Real inverse_masses{1.0};  ///< 1/m_i + 1/m_{i−1}, of the bobs at both ends of the rod; 1/m_0 = 0
+  Real drag{0.0};            ///< λ/l²
+  Real weight{1.0};          ///< M g, M the mass that the rod carries
+  Real hanging{0.0};         ///< M |g|/l, its tension over its length where the chain hangs at rest
 };
 
 /// The constants of a chain link by link.

@@ -61,7 +61,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     run_out(stages);
     Vector G = zero();
     for (int i = stages.links(); i-- > 0;) {
-      G = sum(G, scaled(L(stages.constants(i).mass), stages.kept_freed(i)));
+      G = sum(G, scaled(L(stages.constants(i).mass), stages.kept_gain(i)));
       Terms terms;
       terms.slip[0] = set_directions(stages, i, stages.kept_rod(i), terms);
       find_multiplier(stages, i, G, terms);
@@ -101,9 +101,9 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   PENDULA_IN_REGISTERS void run_out(Stages& stages) {
     Vector w = zero();
     for (int i = 0; i < stages.links(); ++i) {
-      const Vector X = stages.place(i).rod, U = stages.increments(i);
+      const Vector X = stages.place(i), U = stages.increments(i);
       for (std::size_t d = 0; d < D; ++d) w[d] = fma(U[d], inverse_hb_.lanes(), w[d]);
-      stages.keep(i, X, w, {});
+      stages.keep(i, X, w);
     }
   }
 
@@ -125,7 +125,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     Vector G = carried.G;
     Terms terms;
     for (int i = end; i-- > begin;) {
-      G = sum(G, scaled(L(stages.constants(i).mass), stages.kept_freed(i)));
+      G = sum(G, scaled(L(stages.constants(i).mass), stages.kept_gain(i)));
       terms.slip[0] = set_directions(stages, i, stages.kept_rod(i), terms);
       find_multiplier(stages, i, G, terms);
       eliminate(stages, i, terms, carried, gains_[i - begin]);
@@ -210,7 +210,6 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
       }
       outward(stages, begin, end, dw, change, visit);
     }
-    stages.set_turn(change.turn());
     return {change.relative(), -1};
   }
 

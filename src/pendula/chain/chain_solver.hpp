@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <pendula/chain/chain_fixed_point.hpp>
 #include <pendula/chain/chain_newton.hpp>
 #include <pendula/chain/chain_stages.hpp>
 #include <pendula/chain/chain_tangent.hpp>
@@ -69,7 +68,7 @@ class ChainSolver {
     ++count_;
     choice_.count_iteration();
     if (choice_.active() == Iteration::newton) return last_ = newton_.correct(stages_);
-    const Correction correction = fixed_point_.correct(stages_);
+    const Correction correction{stages_.iterate(), -1};
     if (choice_.is_automatic() &&
         diverges(correction.relative, last_.relative, count_, usual_rounding(parts(), epsilon), epsilon)) {
       if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN(), -1};
@@ -89,12 +88,12 @@ class ChainSolver {
 
   /// Iterations take no note of where they change what; one more tells.
   int worst_part() {
-    return choice_.active() == Iteration::newton ? newton_.worst_link(stages_) : fixed_point_.worst_link(stages_);
+    return choice_.active() == Iteration::newton ? newton_.worst_link(stages_) : stages_.worst_link();
   }
 
   int singular_part() const { return -1; }
   static constexpr double largest_turn() { return 3; }
-  double turn() const { return stages_.turn(); }
+  double turn() { return stages_.turn(); }
   static constexpr int turning_part() { return -1; }
   double defect() { return stages_.defect(); }
   double predictor_gain() const { return stages_.predictor_gain(); }
@@ -154,7 +153,6 @@ class ChainSolver {
   Family family_;
   ChainStages<Space, S, N, Real, Arch> stages_;
   ChainNewton<Space, S, N, Real, Arch> newton_;
-  ChainFixedPoint<Space, S, N, Real, Arch> fixed_point_;
   SineTurn turn_;
   IterationChoice choice_;
   Correction last_;

@@ -3,141 +3,128 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/chain_motion.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/chain/rod_state.hpp>
+#include <pendula/chain/stage_change.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/gauss/stage_columns.hpp>
+#include <pendula/gauss/stages_in_lanes.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <utility>
 #include <xsimd/xsimd.hpp>
 
 namespace pendula {
 
-/// What both iterations on the stages of a chain share: the state, the stage values, predictor and update.
-///
-/// The field on rods ξ and free rates z (rod_state.hpp) is
-///   ξ̇_i = z_i + e_i − e_{i−1},           e_i = (τ_i ξ_i − τ_{i+1} ξ_{i+1})/m_i,      e_0 = 0,
-///   ż_i = d_i − d_{i−1} − δ_{i1} g up,    d_i = −(τ_i ξ̇_i − τ_{i+1} ξ̇_{i+1})/m_i,    d_0 = 0,
-/// where damping and torque join τ_i ξ̇_i as (λ_i ξ̇_i − torque_i × ξ_i)/l_i². Every Gauss method keeps |ξ_i|² and the
-/// vertical angular momentum, which are quadratic, and is symplectic: there is no pole and no drift (docs/method.md).
-///
-/// Stages are held as increments U = h b (ξ̇ − z) and W = h b (ż + δ_{i1} g up), so that what is large enters exactly:
-///   X = ξ + h c z + m U,  Z = z − δ_{i1} h c g up + m W,  m_ij = a_ij/b_j.
-///
-/// Multipliers grow through a step as tension does, and where they grow too far the stage equations fold: with two
-/// stages at h ω = √12, ω what the chain swings with. Of a step so long, M |g|/l ξ joins τ ξ̇: that is of H the term
-/// Σ M |g|/l (|ξ|² − l²)/2, which is zero on the motion, and of a chain at rest nothing is left for τ. Then any
-/// swinging goes through any step, as it does in angles.
-///
-/// All stages of one number are a Lanes<S, Real>, everything is done for all of them at once.
+/// Rods and stages of one chain, with its angles, as both iterations on the stages see them: the fixed point of
+/// ChainMotion and Newton's. All stages of one number are a Lanes<S, Real>, everything is done for all of them at once.
 template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
-class ChainStages {
+class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
+  using Base = ChainMotion<Space, StagesInLanes<S, Real>, N>;
+  using Base::columns_, Base::constants_, Base::rods_, Base::stages_, Base::kept_, Base::pasts_, Base::newest_;
+
  public:
   using L = Lanes<S, Real>;
-  static constexpr std::size_t D = Space::dimension, Z = L::size;
+  using Base::D, Base::links;
+  static constexpr std::size_t Z = L::size;
   using Vector = std::array<L, D>;  ///< one vector at all stages
   using Numbers = std::array<Real, D>;
 
   explicit ChainStages(const Chain<Space, N>& chain, Family family = Family::gauss)
-      : chain_(chain),
-        constants_(chain),
-        columns_(family),
+      : Base(chain.links(), family),
+        chain_(chain),
         restoring_interval_(family == Family::gauss ? 16 : 1),
-        state_(constants_),
-        anchors_(chain.links()),
-        stages_(chain.links()),
-        torque_(chain.loaded() ? chain.links() : 0) {}
+        anchors_(chain.links()) {
+    const ChainLinks<Space, N, Real> given(chain);
+    Real length(0);
+    for (int i = 0; i < links(); ++i) {
+      constants_[i] = given[i];
+      rods_.set_mass(i, given[i].inverse_mass);
+      length += given[i].length;
+    }
+    this->gravity_ = Real(chain.gravity());
+    using std::abs;
+    this->slowest_pace_ = Real(0.15) * Real(links()) * Real(links()) * abs(this->gravity_) / length;
+    this->fastest_swing_ = given.fastest_swing_squared();
+    if (chain.loaded()) this->expect_loads();
+  }
 
-  int links() const { return constants_.links(); }
   const Chain<Space, N>& chain() const { return chain_; }
-  const LinkConstants<Real>& constants(int i) const { return constants_[i]; }
-  const detail::StageColumns<S, Real>& columns() const { return columns_; }
-  const RodState<Space, N, Real>& rods() const { return state_; }
-  bool loaded() const { return constants_.loaded(); }
-  Real h() const { return columns_.h(); }
+  bool loaded() const { return this->has_loads(); }
 
   // --- Values of one link at all stages ---
 
-  Vector increments(int i) const { return load_vector(stages_[i]); }
-  void set_increments(int i, const Vector& U) { store_vector(U, stages_[i]); }
-  L multiplier(int i) const { return L::load(stages_[i] + multiplier_at); }
-  void set_multiplier(int i, const L& tau) { tau.store(stages_[i] + multiplier_at); }
+  Vector increments(int i) const {
+    return components<D>([&](std::size_t k) { return stages_[i].U[k][0]; });
+  }
+  void set_increments(int i, const Vector& U) {
+    is_finished_ = false;
+    for (std::size_t k = 0; k < D; ++k) stages_[i].U[k].set(0, U[k]);
+  }
+  L multiplier(int i) const { return stages_[i].tau[0]; }
+  void set_multiplier(int i, const L& tau) {
+    is_finished_ = false;
+    stages_[i].tau.set(0, tau);
+  }
 
-  /// Where a rod is at the stages, and what acts along the chain there.
-  struct Placed {
-    Vector rod;    ///< X
-    Vector moved;  ///< X − ξ
-    Vector pull;   ///< h b times what τ ξ̇, damping and torque add up to
-  };
+  /// Where a rod is at the stages.
+  Vector place(int i) const {
+    const L hc = columns_.hc(), hc_low = columns_.hc_low();
+    return components<D>([&](std::size_t k) {
+      const L z(rods_.free(i)[k]);
+      const L moved = columns_.integral(stages_[i].U[k].numbers(), fma(hc_low, z, L(rods_.along_low(i)[k])));
+      return L(rods_.along(i)[k]) + fma(hc, z, moved);
+    });
+  }
 
-  Placed place(int i) const {
-    const Real *along = state_.along(i), *along_low = state_.along_low(i), *free = state_.free(i);
-    const L hb = columns_.hb(), hc = columns_.hc(), hc_low = columns_.hc_low();
-    const L tau = multiplier(i);
-    Placed placed;
-    for (std::size_t k = 0; k < D; ++k) {
-      const Real* U = stages_[i] + k * Z;
-      const L z(free[k]);
-      placed.moved[k] = fma(hc, z, columns_.integral(U, fma(hc_low, z, L(along_low[k]))));
-      placed.rod[k] = L(along[k]) + placed.moved[k];
-      placed.pull[k] = tau * fma(hb, z, L::load(U));
-    }
-    if (loaded()) add_loads(i, placed);
-    if (hangs_) add_hanging(i, placed);
-    return placed;
+  /// h b times what τ ξ̇, damping and torque add up to, the rod being X.
+  Vector pull(int i, const Vector& X) const {
+    const Vector moved = advance(i), pull = scaled(multiplier(i), moved);
+    return this->pulls_more_ ? sum(pull, this->more_pull(i, 0, columns_.hb(), X, moved)) : pull;
   }
 
   /// h b ξ̇.
-  Vector advance(int i) const {
-    const L hb = columns_.hb();
-    return components<D>([&](std::size_t k) { return fma(hb, L(state_.free(i)[k]), L::load(stages_[i] + k * Z)); });
-  }
+  Vector advance(int i) const { return Base::advance(i, 0); }
 
   /// Σ_j h a_kj f(j) of what acts on a rod but its multiplier, rods at the stages being X.
   Vector impulse_without_multiplier(int i, const Vector& X) const {
-    Vector impulse = zero();
-    if (loaded() || hangs_) {
-      Placed placed{X, {}, impulse};
-      if (loaded()) add_loads(i, placed);
-      if (hangs_) add_hanging(i, placed);
-      for (std::size_t k = 0; k < D; ++k) impulse[k] = -columns_.integral(placed.pull[k]);
+    Vector impulse;
+    impulse.fill(L(Real(0)));
+    if (this->pulls_more_) {
+      const Vector pull = this->more_pull(i, 0, columns_.hb(), X, advance(i));
+      for (std::size_t k = 0; k < D; ++k) impulse[k] = -columns_.integral(pull[k]);
     }
     impulse[D - 1] = impulse[D - 1] - columns_.hc() * L(constants_[i].weight);
     return impulse;
   }
 
-  /// Z − z, from W.
-  Vector freed(int i, const Vector& W) const {
-    Vector freed = components<D>([&](std::size_t k) { return columns_.integral(W[k], L(state_.free_low(i)[k])); });
-    if (i == 0) freed[D - 1] = freed[D - 1] - columns_.hc() * L(Real(chain_.gravity()));
-    return freed;
-  }
-
   /// What the rod pulls beside its multiplier, over its length: of a step that does not resolve how fast the chain can
   /// swing, the tension of a chain at rest; otherwise nothing.
-  Real hanging(int i) const { return hangs_ ? constants_[i].hanging : Real(0); }
+  Real hanging(int i) const { return this->hangs_ * constants_[i].hanging; }
 
   /// Torque on link i, times h b / l².
   auto torque(int i) const {
-    return components<Space::torque_components>([&](std::size_t k) { return L::load(torque_[i] + k * Z); });
+    return components<Space::torque_components>([&](std::size_t k) { return this->torques_[i][k][0]; });
   }
 
-  // --- What the fixed point keeps from its way in to its way out ---
-
-  void keep(int i, const Vector& rod, const Vector& freed, const MultiplierRow<L>& row) {
-    store_vector(rod, stages_[i] + rod_at);
-    store_vector(freed, stages_[i] + freed_at);
-    row.offset.store(stages_[i] + offset_at);
-    row.coupling.store(stages_[i] + coupling_at);
+  /// What Newton keeps from its way in to its way out: rods at the stages, and how much the velocity of the bob has
+  /// gained.
+  void keep(int i, const Vector& rod, const Vector& gained) {
+    for (std::size_t k = 0; k < D; ++k) {
+      stages_[i].rod[k].set(0, rod[k]);
+      kept_[i].freed[0][k].set(0, gained[k]);
+    }
   }
-  Vector kept_rod(int i) const { return load_vector(stages_[i] + rod_at); }
-  Vector kept_freed(int i) const { return load_vector(stages_[i] + freed_at); }
-  MultiplierRow<L> kept_row(int i) const {
-    return {L::load(stages_[i] + offset_at), L::load(stages_[i] + coupling_at)};
+  Vector kept_rod(int i) const { return this->rod(i, 0); }
+  Vector kept_gain(int i) const {
+    return components<D>([&](std::size_t k) { return kept_[i].freed[0][k][0]; });
   }
 
   // --- A step ---
@@ -146,117 +133,112 @@ class ChainStages {
     forget();
     steps_ = 0;
     fastest_ = 0;
+    using Wide = typename Base::Rods::Wide;
     for (int i = 0; i < links(); ++i) {
-      std::array<Real, Space::dof> q, v;
+      std::array<Real, Space::dof> q;
+      std::array<Wide, Space::dof> angles, rates;
       for (std::size_t a = 0; a < q.size(); ++a) {
         q[a] = state.q[entry(i, a)];
-        v[a] = state.v[entry(i, a)];
+        angles[a] = Wide(q[a]);
+        rates[a] = Wide(state.v[entry(i, a)]);
       }
-      state_.start(i, constants_[i].length, q, v);
-      anchors_[i].set(state_.direction(i, constants_[i].inverse_length), q);
+      rods_.start(0, i, Wide(constants_[i].length), Heading<Space, Wide>(angles, rates));
+      anchors_[i].set(direction(i), q);
     }
   }
 
-  /// Predicts the stages of a step of size h: from the last step's, or cold where there was none like it.
+  /// Predicts the stages of a step of size h: from the last steps', or cold where there was none like it.
   void prepare(double time, double h) {
     const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
-    const bool other = Real(h) != columns_.h();
-    columns_.prepare(Real(h), Real(alike ? last_h_ : 0));
-    if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
-    hangs_ = !constants_.resolves(Real(h));
-    is_predicted_ = alike;
-    if (alike) {
-      predict();
-    } else {
-      start_cold();
-    }
+    depth_ = alike && h == last_h_ ? std::min(depth_ + 1, Base::Columns::most_depth) : 0;
+    predict(time, h, alike ? h / last_h_ : 1, {alike, false, !alike, Real(depth_)});
     last_h_ = 0;  // what was predicted from is gone until the step is accepted
-    step_ = h;
   }
 
   /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
   /// one's.
   void prepare_again(double time, double h) {
+    if (!is_finished_) finish();
+    depth_ = 0;
     const double from = last_h_ != 0 ? last_h_ : step_;
-    columns_.predict_at(Real(0), Real(h / from));
-    columns_.prepare(Real(h), Real(0));
-    if (loaded()) set_torques(time);
-    hangs_ = !constants_.resolves(Real(h));
-    is_predicted_ = hangs_ != constants_.resolves(Real(from));
-    if (is_predicted_) {
-      for (int i = 0; i < links(); ++i) {
-        for (std::size_t k = 0; k < D; ++k)
-          columns_.extrapolated_increments(stages_[i] + k * Z).store(stages_[i] + k * Z);
-        columns_.extrapolated(stages_[i] + multiplier_at).store(stages_[i] + multiplier_at);
-      }
-    } else {
-      start_cold();
-    }
-    step_ = h;
+    predict(time, h, h / from, {false, true, false, Real(0)});
   }
 
-  /// Stages of a motion that goes on as at the start of the step: with the multipliers there taken into the free rates,
-  /// they are the rates.
   void start_cold() {
-    state_.for_each_rate(constants_, [&](int i, const Numbers&, const Real& tau) { stages_[i][multiplier_at] = tau; });
-    state_.shift_gauge([&](int i) { return stages_[i][multiplier_at]; },
-                       [&](int i, const Real&, const Real*) {
-                         for (std::size_t k = 0; k <= D; ++k) L(Real(0)).store(stages_[i] + k * Z);
-                       });
-    last_h_ = 0;
+    Base::start_cold(true);
+    depth_ = 0;
   }
 
-  /// The most that a link turns in the step, as the iterations on the stages find it  [rad].
-  double turn() const { return turn_; }
-  void set_turn(double turn) { turn_ = turn; }
+  /// One fixed-point iteration; what it changes, relative to the size of the step. visit(i, change of link i, squared,
+  /// of each stage).
+  template <class Visit>
+  double iterate(Visit visit) {
+    const Real changed = Base::iterate(Everyone{}, visit);
+    if (std::exchange(is_first_, false)) this->scale_ = std::max(this->scale_, changed);  // from rest
+    is_finished_ = false;
+    return changed == 0 ? 0 : std::sqrt(static_cast<double>(changed / this->scale_));
+  }
+
+  double iterate() {
+    return iterate([](int, const L&) {});
+  }
+
+  /// The link where one more iteration changes most.
+  int worst_link() {
+    detail::WorstLink<Real> worst;
+    iterate([&](int i, const L& change) {
+      worst.see(i, detail::StageChange<S, L>::largest_of(change) * constants_[i].inverse_square);
+    });
+    return worst.link();
+  }
+
+  /// The most that a link turns in the step  [rad].
+  double turn() {
+    if (!is_finished_) finish();
+    return turn_;
+  }
 
   /// Energy that the end of the step would have, less that of its start and what loads bring; in units of all that the
   /// chain has, kinetic and Σ M |g| l. Zero but for truncation on the motion.
   double energy_defect() {
-    const Energy start = energy();
-    const double brought = loaded() ? static_cast<double>(work()) : 0;
-    state_.save(trial);
-    move();
-    const Energy end = energy();
-    state_.restore(trial);
+    if (!is_finished_) finish();
+    const Energies start = energies();
+    const double brought = loaded() ? static_cast<double>(this->work()) : 0;
+    trial_ = rods_.place();
+    Base::move(Everyone{});
+    const Energies end = energies();
+    rods_.place() = trial_;
     return static_cast<double>(end.total() - start.total() - brought) / scale_of(start, brought);
   }
 
   /// How far, at the start of the step, the polynomial through the stages' rates is off, of bobs, relative to the
   /// fastest that there was.
   double defect() {
-    using std::sqrt;
     Numbers bob{}, missed{}, last{};
     Real furthest(0);
-    state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+    rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+      const Numbers at_start = rate_at(i, Real(0), columns_.h());
       for (std::size_t k = 0; k < D; ++k) {
-        const Real* U = stages_[i] + k * Z;
-        const Real& z = state_.free(i)[k];
         bob[k] += rate[k];
-        missed[k] += z + columns_.at_start(U) - rate[k];
-        last[k] += z + (columns_.h() == 0 ? Real(0) : Real(U[S - 1] / columns_.hb(S - 1)));
+        missed[k] += at_start[k] - rate[k];
+        last[k] += columns_.h() == 0 ? rods_.free(i)[k] : Real(past(i).advance[k].numbers()[S - 1] / columns_.h());
       }
       furthest = std::max(furthest, dot(missed, missed));
       fastest_ = std::max({fastest_, static_cast<double>(dot(bob, bob)), static_cast<double>(dot(last, last))});
     });
     return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / fastest_) : 0;
   }
-  double predictor_gain() const { return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1; }
+  /// How much larger the error of a prediction is than that defect. Predictions from many steps do not tell it: of
+  /// them, some are looked at (0), and the others are not.
+  double predictor_gain() const {
+    if (depth_ > S) return steps_ % looked_at == 0 ? 0 : std::numeric_limits<double>::infinity();
+    return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1;
+  }
 
-  /// Of the state: R² = κ + (Σ ω_i⁸)^(1/4), ω_i what rod i turns with and κ what gravity moves a long chain by. Loads
-  /// have no part in how R grows: only steps that are symmetric ask for that.
   Tempo tempo() const {
-    Real sum(0), growth(0);
-    state_.for_each_acceleration(constants_, Real(chain_.gravity()),
-                                 [&](int i, const Numbers& rate, const Numbers& acceleration) {
-                                   const Real squared = dot(rate, rate) * constants_[i].inverse_square;
-                                   const Real sixth = squared * squared * squared;
-                                   sum += sixth * squared;
-                                   growth += sixth * dot(rate, acceleration) * constants_[i].inverse_square;
-                                 });
-    const auto total = static_cast<double>(sum);
-    const double squared = slowest_pace() + std::pow(total, 0.25);
-    return {std::sqrt(squared), total > 0 ? std::pow(total, -0.75) * static_cast<double>(growth) / squared : 0};
+    Real pace, quickening;
+    Base::tempo(pace, quickening);
+    return {static_cast<double>(pace), static_cast<double>(quickening)};
   }
 
   /// Of the stages as they were solved.
@@ -284,85 +266,77 @@ class ChainStages {
     return shape;
   }
 
-  /// Energy that torque and damping bring in the step  [J].
-  Real work() const {
-    Real work(0);
-    for (int i = 0; i < links(); ++i) {
-      Placed placed{kept_rod(i), {}, zero()};
-      add_loads(i, placed);
-      const Vector advanced = advance(i);
-      alignas(pack_alignment) Real power[Z];  // times (h b)²
-      dot(placed.pull, advanced).store(power);
-      for (std::size_t j = 0; j < S; ++j) work -= power[j] == 0 ? Real(0) : Real(power[j] / columns_.hb(j));
-    }
-    return work;
-  }
+  using Base::work;
 
   /// Moves the state to the end of the step.
   void accept() {
+    if (!is_finished_) finish();
     follow_turns();
-    move();
+    Base::move(Everyone{});
     ++steps_;
-    if (steps_ % restoring_interval_ == 0) {
-      for (int i = 0; i < links(); ++i) state_.restore_length(i, constants_[i].length);
-    }
-    for (int i = 0; i < links(); ++i) anchors_[i].follow(state_.direction(i, constants_[i].inverse_length));
+    if (steps_ % restoring_interval_ == 0) rods_.restore_lengths(constants_, Everyone{});
+    for (int i = 0; i < links(); ++i) anchors_[i].follow(direction(i));
     last_h_ = step_;
   }
 
-  template <class Numbers>
-  void member(Numbers& numbers) {
-    numbers(state_, last_h_, fastest_, steps_);
+  template <class MemberNumbers>
+  void member(MemberNumbers& numbers) {
+    numbers(rods_, last_h_, fastest_, steps_, depth_, this->newest_, this->hangs_, this->scale_);
     for (int i = 0; i < links(); ++i) {
       numbers(anchors_[i]);
-      numbers.range(stages_[i], (D + 1) * Z);
+      for (auto& past : this->pasts_[i]) {
+        for (auto& row : past.advance) numbers.range(row.numbers(), S);
+        numbers.range(past.tau.numbers(), S);
+      }
     }
   }
 
   /// The next step starts cold.
-  void forget() { last_h_ = 0; }
+  void forget() {
+    last_h_ = 0;
+    depth_ = 0;
+  }
 
   State<Space, N, Real> state(double time) const {
     State<Space, N, Real> state = empty_state(time);
-    state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
-      read_angles(i, state_.heading(i, rate), anchors_[i], state);
+    rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+      read_angles(i, rods_.heading(0, i, rate), anchors_[i], state);
     });
     return state;
   }
 
   /// Remembers the start of the step; goes back there, the stages still known.
   void remember() {
-    state_.remember();
+    if (!remembered_) remembered_.emplace(rods_.place());
+    *remembered_ = rods_.place();
     remembered_anchors_ = anchors_;
   }
   void return_to_start() {
-    state_.return_to_remembered();
+    rods_.place() = *remembered_;
     anchors_ = remembered_anchors_;
   }
 
   /// The state at x of the last step, by the polynomials through its rates.
   State<Space, N, Real> glance(double time, double x) const {
     State<Space, N, Real> state = empty_state(time);
-    const Real h(last_h_);
-    const auto rate_at = columns_.rate_at(Real(x), h), up_to = columns_.up_to(Real(x));
+    const auto up_to = columns_.integrals(Real(x));
     for (int i = 0; i < links(); ++i) {
-      const Real *along = state_.remembered_along(i), *z = state_.remembered_free(i);
-      const Numbers rate = components<D>([&](std::size_t k) { return z[k] + weighed(rate_at, stages_[i] + k * Z); });
-      const Numbers rod = rod_in_step(along, z, i, Real(h * Real(x)), up_to), low{};
+      const Real* along = remembered_->along[i];
+      const Numbers rate = rate_at(i, Real(x), Real(last_h_)), rod = rod_in_step(along, i, up_to), low{};
       AngleAnchor<Space, Real> anchor = remembered_anchors_[i];
-      if (may_leave(anchor, i, along, turn_ * std::abs(x))) follow_turn(anchor, along, z, i, h, Real(x), rod);
-      read_angles(i, RodState<Space, N, Real>::heading_of(rod.data(), low.data(), rate), anchor, state);
+      if (may_leave(anchor, i, along, turn_ * std::abs(x))) follow_turn(anchor, along, i, Real(x), rod);
+      read_angles(i, Base::Rods::heading_of(rod, low, rate), anchor, state);
     }
     return state;
   }
 
   /// Keeps the state, to go back to where a step has to be given up half-way.
   void save() {
-    state_.save(parts);
+    saved_ = rods_.place();
     saved_anchors_ = anchors_;
   }
   void restore() {
-    state_.restore(parts);
+    rods_.place() = saved_;
     anchors_ = saved_anchors_;
     forget();
   }
@@ -370,28 +344,43 @@ class ChainStages {
  private:
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
-  // Where in the block of a link what stands; [number][stage].
-  static constexpr std::size_t multiplier_at = D * Z, rod_at = (D + 1) * Z, freed_at = (2 * D + 1) * Z,
-                               offset_at = (3 * D + 1) * Z, coupling_at = (3 * D + 2) * Z, per_link = (3 * D + 3) * Z;
+  static constexpr std::int64_t looked_at = 8;  // of the steps, one in so many
 
-  // What the state is kept for: RodState::save.
-  static constexpr std::size_t parts = 0, trial = 1;
+  const auto& past(int i) const { return this->pasts_[i][this->newest_]; }
 
-  static Vector zero() {
-    return components<D>([](std::size_t) { return L(Real(0)); });
-  }
-  static Vector load_vector(const Real* from) {
-    return components<D>([&](std::size_t k) { return L::load(from + k * Z); });
-  }
-  static void store_vector(const Vector& x, Real* to) {
-    for (std::size_t k = 0; k < D; ++k) x[k].store(to + k * Z);
+  void predict(double time, double h, double ratio, const StagePrediction<Real>& kind) {
+    const bool other = Real(h) != columns_.h();
+    columns_.prepare(Real(h));
+    if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
+    Base::predict(Real(h), Real(ratio), kind);
+    is_predicted_ = !kind.cold;
+    step_ = h;
+    is_first_ = true;
+    is_finished_ = false;
   }
 
-  using Weights = typename detail::StageColumns<S, Real>::Weights;
+  void finish() {
+    Base::finish();
+    is_finished_ = true;
+    turn_ = std::sqrt(static_cast<double>(this->turn_squared()));
+  }
+
+  using Weights = typename Base::Columns::Weights;
   static Real weighed(const Weights& weights, const Real* x) {
     Real sum(0);
     for (std::size_t j = 0; j < S; ++j) sum += weights[j] * x[j];
     return sum;
+  }
+
+  // Of the step whose stages are known: the rate of a rod at x of it, and the rod from its start on.
+  Numbers rate_at(int i, const Real& x, const Real& h) const {
+    const Weights weights = columns_.values(x);
+    return components<D>([&](std::size_t k) {
+      return h == 0 ? Real(rods_.free(i)[k]) : Real(weighed(weights, past(i).advance[k].numbers()) / h);
+    });
+  }
+  Numbers rod_in_step(const Real* along, int i, const Weights& up_to) const {
+    return components<D>([&](std::size_t k) { return Real(along[k] + weighed(up_to, past(i).advance[k].numbers())); });
   }
 
   State<Space, N, Real> empty_state(double time) const {
@@ -418,25 +407,7 @@ class ChainStages {
   // Where coordinate a of link i stands in the user's vectors.
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
 
-  void add_loads(int i, Placed& placed) const {
-    const L drag(constants_[i].drag);
-    const Vector advanced = advance(i);
-    Vector turning;
-    Space::Link::torque_load(torque(i), placed.rod, turning);
-    for (std::size_t k = 0; k < D; ++k) {
-      placed.pull[k] = placed.pull[k] + (drag * advanced[k] - turning[k]);
-    }
-  }
-
-  void add_hanging(int i, Placed& placed) const {
-    const L tension = columns_.hb() * L(constants_[i].hanging);
-    for (std::size_t k = 0; k < D; ++k) placed.pull[k] = fma(tension, placed.rod[k], placed.pull[k]);
-  }
-
-  double slowest_pace() const {
-    const double length = static_cast<double>(chain_.lengths().sum());
-    return 0.15 * links() * links() * std::abs(chain_.gravity()) / length;
-  }
+  Numbers direction(int i) const { return scaled(constants_[i].inverse_length, Base::Rods::vector(rods_.along(i))); }
 
   StepShape shape_of(const L& quartic, const L& decay) const {
     alignas(pack_alignment) Real paces[Z], squares[Z];
@@ -444,21 +415,22 @@ class ChainStages {
     decay.store(squares);
     StepShape shape;
     for (std::size_t k = 0; k < S; ++k) shape.decay[k] = std::sqrt(static_cast<double>(squares[k]));
-    shape.pace = std::sqrt(slowest_pace() + std::pow(static_cast<double>(paces[S / 2]), 0.25));
+    shape.pace =
+        std::sqrt(static_cast<double>(this->slowest_pace_) + std::pow(static_cast<double>(paces[S / 2]), 0.25));
     return shape;
   }
 
   // By how much the polynomials through the stages' rates are off at the start of the step, times h, relative to the
   // length of the rod.
   double missed_at_start() const {
-    using std::sqrt;
     Real furthest(0);
-    state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
-      const Numbers missed = components<D>(
-          [&](std::size_t k) { return state_.free(i)[k] + columns_.at_start(stages_[i] + k * Z) - rate[k]; });
-      furthest = std::max(furthest, dot(missed, missed) * constants_[i].inverse_square);
+    rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+      const Numbers missed = components<D>([&](std::size_t k) {
+        return Real(rods_.free(i)[k] + columns_.at_start(stages_[i].U[k].numbers()) - rate[k]);
+      });
+      furthest = std::max(furthest, Real(dot(missed, missed) * constants_[i].inverse_square));
     });
-    return std::abs(step_) * static_cast<double>(sqrt(furthest));
+    return std::abs(step_) * std::sqrt(static_cast<double>(furthest));
   }
 
   void set_torques(double time) {
@@ -466,7 +438,7 @@ class ChainStages {
     for (int i = 0; i < links(); ++i) {
       const L scale = columns_.hb() * L(constants_[i].inverse_square);
       for (std::size_t k = 0; k < Space::torque_components; ++k) {
-        (scale * L(Real(chain_.constant_torque()(static_cast<Eigen::Index>(k), i)))).store(torque_[i] + k * Z);
+        this->torques_[i][k].set(0, scale * L(Real(chain_.constant_torque()(static_cast<Eigen::Index>(k), i))));
       }
     }
     for (const Drive<Space>& drive : chain_.drives()) {
@@ -475,119 +447,52 @@ class ChainStages {
         const Real wave = sin(Real(drive.frequency) * at + Real(drive.phase)) * columns_.hb(j) *
                           constants_[drive.link].inverse_square;
         for (std::size_t k = 0; k < Space::torque_components; ++k) {
-          torque_[drive.link][k * Z + j] += wave * Real(drive.amplitude[static_cast<Eigen::Index>(k)]);
+          this->torques_[drive.link][k].numbers()[j] += wave * Real(drive.amplitude[static_cast<Eigen::Index>(k)]);
         }
       }
     }
     torque_is_set_ = true;
   }
 
-  // Multipliers of the middle of the step go into the free rates: what is left of them at the stages is as often
-  // positive as negative, and so is what it is rounded by.
-  PENDULA_IN_REGISTERS void predict() {
-    const L hb = columns_.hb();
-    state_.shift_gauge([&](int i) { return columns_.at_half(stages_[i] + multiplier_at); },
-                       [&](int i, const Real& lambda, const Real* change) {
-                         for (std::size_t k = 0; k < D; ++k) {
-                           Real* U = stages_[i] + k * Z;
-                           (columns_.extrapolated_increments(U) - hb * L(change[k])).store(U);
-                         }
-                         Real* tau = stages_[i] + multiplier_at;
-                         (columns_.extrapolated(tau) - L(lambda)).store(tau);
-                       });
-  }
-
-  // Σ_j of a stored number over the stages.
-  static Real total(const Real* x) {
-    Real sum = x[0];
-    for (std::size_t j = 1; j < S; ++j) sum += x[j];
-    return sum;
-  }
-  static Numbers totals(const Vector& x) {
-    return components<D>([&](std::size_t k) {
-      alignas(pack_alignment) Real stored[Z];
-      x[k].store(stored);
-      return total(stored);
-    });
-  }
-
-  // Placed rods are those that the last iteration used.
-  Numbers total_pull(int i) const {
-    Placed placed;
-    placed.rod = kept_rod(i);
-    const L tau = multiplier(i);
-    const Vector advanced = advance(i);
-    for (std::size_t k = 0; k < D; ++k) placed.pull[k] = tau * advanced[k];
-    if (loaded()) add_loads(i, placed);
-    if (hangs_) add_hanging(i, placed);
-    return totals(placed.pull);
-  }
-
-  void move() {
-    static constexpr int block = RodState<Space, N, Real>::block;
-    alignas(pack_alignment) Real moved[block * D], pushed[block * D];
-    Numbers pull = total_pull(0), before{};
-    for (int begin = 0; begin < links(); begin += block) {
-      std::fill(std::begin(moved), std::end(moved), Real(0));
-      std::fill(std::begin(pushed), std::end(pushed), Real(0));
-      for (int i = begin; i < std::min(begin + block, links()); ++i) {
-        const Numbers next = i + 1 < links() ? total_pull(i + 1) : Numbers{};
-        const Numbers bond = scaled(constants_[i].inverse_mass.value, difference(next, pull));
-        const Numbers gained = difference(bond, before), gone = totals(increments(i));
-        std::copy_n(gone.data(), D, moved + static_cast<std::size_t>(i - begin) * D);
-        std::copy_n(gained.data(), D, pushed + static_cast<std::size_t>(i - begin) * D);
-        before = bond;
-        pull = next;
-      }
-      state_.advance(begin, columns_.h(), moved, pushed);
-    }
-    state_.fall(columns_.h(), Real(chain_.gravity()));
-  }
-
-  struct Energy {
+  struct Energies {
     Real kinetic{0}, potential{0};
     Real total() const { return kinetic + potential; }
   };
 
-  Energy energy() const {
-    Energy energy;
+  Energies energies() const {
+    Energies energy;
     Numbers bob{};
-    state_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+    rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
       bob = sum(bob, rate);
       energy.kinetic += constants_[i].mass * dot(bob, bob) / 2;
-      energy.potential += constants_[i].weight * state_.along(i)[D - 1];
+      energy.potential += constants_[i].weight * rods_.along(i)[D - 1];
     });
     return energy;
   }
 
-  double scale_of(const Energy& start, double brought) const {
+  double scale_of(const Energies& start, double brought) const {
     const double scale = static_cast<double>(start.kinetic) + energy_scale(chain_) + std::abs(brought);
     return scale > 0 ? scale : 1;
-  }
-
-  // Of the step whose stages are known, from a rod on with z: the rod after some of the time, for which `up_to` is.
-  Numbers rod_in_step(const Real* along, const Real* z, int i, const Real& time, const Weights& up_to) const {
-    return components<D>([&](std::size_t k) { return along[k] + (time * z[k] + weighed(up_to, stages_[i] + k * Z)); });
   }
 
   // Whether a link may turn so far from where a step began that its anchor does not hold it.
   bool may_leave(const AngleAnchor<Space, Real>& anchor, int i, const Real* along, double turn) const {
     using std::sqrt;
-    const Numbers off =
-        components<D>([&](std::size_t k) { return along[k] * constants_[i].inverse_length - anchor.direction()[k]; });
+    const Numbers off = components<D>(
+        [&](std::size_t k) { return Real(along[k] * constants_[i].inverse_length - anchor.direction()[k]); });
     const Real farthest = sqrt(dot(off, off)) + Real(1.5 * turn);
     return farthest * farthest > anchor.reach_squared();
   }
 
   // Takes an anchor from a rod on through the stages to x of the step, where it is at `end`; where the stages are too
   // far apart for that, by a pole, along the polynomial through them.
-  void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, const Real* z, int i, const Real& h,
-                   const Real& x, const Numbers& end) const {
+  void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, int i, const Real& x,
+                   const Numbers& end) const {
     const Real& inverse_length = constants_[i].inverse_length;
     alignas(pack_alignment) Real u[D][2 * Z];
     L squared(Real(0));
     for (std::size_t k = 0; k < D; ++k) {
-      const L moved = columns_.integral(stages_[i] + k * Z, L(h * z[k]) * columns_.c());
+      const L moved = columns_.integral(columns_.weight(0) * past(i).advance[k][0]);
       const L direction = L(inverse_length) * (L(along[k]) + moved), off = direction - L(anchor.direction()[k]);
       direction.store(u[k]);
       squared = fma(off, off, squared);
@@ -605,7 +510,7 @@ class ChainStages {
     for (std::size_t j = 0; j < before; ++j) farthest = std::max(farthest, stored[j]);
     if (farthest <= anchor.reach_squared() || anchor.follow_through(u, before + 1)) return;
     const auto direction_at = [&](const Real& at) {
-      return scaled(inverse_length, rod_in_step(along, z, i, h * at, columns_.up_to(at)));
+      return scaled(inverse_length, rod_in_step(along, i, columns_.integrals(at)));
     };
     anchor.follow_path(direction_at, x);
   }
@@ -613,24 +518,22 @@ class ChainStages {
   // Of the step that is solved.
   void follow_turns() {
     for (int i = 0; i < links(); ++i) {
-      const Real *along = state_.along(i), *z = state_.free(i);
+      const Real* along = rods_.along(i);
       if (!may_leave(anchors_[i], i, along, turn_)) continue;
-      Numbers end = totals(increments(i));
-      for (std::size_t k = 0; k < D; ++k) end[k] = along[k] + (columns_.h() * z[k] + end[k]);
-      follow_turn(anchors_[i], along, z, i, columns_.h(), Real(1), end);
+      const Numbers end = components<D>(
+          [&](std::size_t k) { return Real(along[k] + (columns_.h() * rods_.free(i)[k] + this->moved_[i][k])); });
+      follow_turn(anchors_[i], along, i, Real(1), end);
     }
   }
 
   Chain<Space, N> chain_;
-  ChainLinks<Space, N, Real> constants_;
-  detail::StageColumns<S, Real> columns_;
   std::int64_t restoring_interval_;  // steps: Gauss methods keep lengths but for rounding
-  RodState<Space, N, Real> state_;
   detail::PerLink<AngleAnchor<Space, Real>, N> anchors_, saved_anchors_{anchors_}, remembered_anchors_{anchors_};
-  detail::LinkArray<per_link, N, Real> stages_;
-  detail::LinkArray<Space::torque_components * Z, N, Real> torque_;
+  typename Base::Rods::Place saved_{links()}, trial_{links()};
+  std::optional<typename Base::Rods::Place> remembered_;
   double fastest_ = 0;  // bob, squared  [m²/s²]
-  bool torque_is_set_ = false, is_predicted_ = false, hangs_ = false;
+  bool torque_is_set_ = false, is_predicted_ = false, is_finished_ = false, is_first_ = true;
+  int depth_ = 0;    // steps of this size that a step follows
   double step_ = 0;  // of the stages
   double turn_ = 0;
   double last_h_ = 0;  // of the step that the stages belong to; 0: they belong to none

@@ -183,8 +183,8 @@ class ChainTangent : private ChainElimination<Space, S, N, RealType, Arch> {
 
   void find_link(const Stages& stages, int i, const Numbers& y, Link& link) {
     const LinkConstants<Real>& c = stages.constants(i);
-    const auto placed = stages.place(i);
-    link.rod = placed.rod;
+    link.rod = stages.place(i);
+    const Vector pull = stages.pull(i, link.rod);
     this->set_directions(stages, i, link.rod, link.terms);
     link.terms.tau = stages.multiplier(i);
     this->find_inverse(link.terms);
@@ -194,7 +194,7 @@ class ChainTangent : private ChainElimination<Space, S, N, RealType, Arch> {
       along[d] = stages.rods().along(i)[d];
       end[d] = along[d] + total(advance[d]);
       link.direction[d] = along[d] * c.inverse_length;
-      link.momentum_at_end[d] = y[d] - total(placed.pull[d]);
+      link.momentum_at_end[d] = y[d] - total(pull[d]);
     }
     link.momentum_at_end[D - 1] -= stages.h() * c.weight;
     link.gauge = dot(along, y) * c.inverse_square;

@@ -3,80 +3,123 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <cstddef>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/dual.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numeric.hpp>
+#include <pendula/numeric/ordered_sum.hpp>
+#include <pendula/numeric/written_out.hpp>
 #include <type_traits>
 
 namespace pendula {
 
-/// The state of a chain without angles: rods ξ_i = l_i û_i and, in place of momenta y, free rates z = M⁻¹ y.
+/// The rods ξ of a chain and what they move with, of one motion or of several members: Num is a number, a LanePack, or
+/// either with its derivative (Dual).
 ///
-/// With multipliers τ that keep every |ξ_i| (multipliers.hpp),
+/// Free rates z are the rates that rods would have without their multipliers τ:
 ///   ξ̇_i = z_i + e_i − e_{i−1},  e_i = (τ_i ξ_i − τ_{i+1} ξ_{i+1})/m_i,  e_0 = 0.
 /// y_i → y_i + λ_i ξ_i, which is z_i → z_i + ε_i − ε_{i−1} with ε made of λ as e is of τ, changes no motion: τ → τ − λ.
-/// Of a state just started τ = 0, and z is the rate itself. Both are kept in twice the digits of Real.
+/// Of a state just started τ = 0, and z is the rate itself. Both are kept in twice the digits of a number.
 ///
-/// Numbers stand component after component, link after link, and are worked on a block of links at a time, whole
-/// registers of them: behind the last link there are zeros.
-template <class Space, int N = Eigen::Dynamic, class Real = double>
+/// Numbers stand component after component, link after link, and are worked on a block of links at a time, of one
+/// motion whole registers of them: behind the last link there are zeros.
+template <class Space, int N = Eigen::Dynamic, class Num = double>
 class RodState {
  public:
   static constexpr std::size_t D = Space::dimension;
-  using Vector = std::array<Real, D>;
-  using Links = ChainLinks<Space, N, Real>;
+  using C = ConstantOf<Num>;
+  using Vector = std::array<Num, D>;
 
-  explicit RodState(const Links& links)
-      : links_(links.links()),
-        along_(links_),
-        along_low_(links_),
-        free_(links_),
-        free_low_(links_),
-        gained_(links_),
-        inverse_mass_(links_),
-        inverse_mass_low_(links_),
-        product_(links_),
-        rows_(links_),
-        rates_(links_) {
-    for (int i = 0; i < links_; ++i) {
-      for (std::size_t k = 0; k < D; ++k) {
-        inverse_mass_[i][k] = links[i].inverse_mass.value;
-        inverse_mass_low_[i][k] = links[i].inverse_mass.low;
-      }
+  /// What directions are kept in between angles and rods.
+  using Wide =
+      std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, long double, C>;
+
+  static constexpr int block = is_batch<Num> ? 1 : D == 2 ? 4 : 8;  ///< links that are worked on at a time
+  static constexpr std::size_t block_size = static_cast<std::size_t>(block) * D;
+
+  /// One T for each component of each link, and zeros behind the last link to the end of a block and for one more link.
+  template <class T>
+  class Numbers {
+    static constexpr int held(int links) { return (links + block - 1) / block * block + block; }
+
+   public:
+    explicit Numbers(int links) : numbers_(held(links)) {
+      std::fill_n(numbers_.data(), static_cast<std::size_t>(held(links)) * D, T(0.0));
     }
+    T* operator[](int link) { return numbers_[link]; }
+    const T* operator[](int link) const { return numbers_[link]; }
+
+   private:
+    detail::LinkArray<D, N == Eigen::Dynamic ? N : held(N), T> numbers_;
+  };
+
+  /// A state, to be kept and come back to.
+  struct Place {
+    explicit Place(int links) : along(links), along_low(links), free(links), free_low(links) {}
+    Numbers<Num> along, along_low;  ///< ξ  [m], and what it lost to rounding
+    Numbers<Num> free, free_low;    ///< z  [m/s]
+  };
+
+  explicit RodState(int links)
+      : links_(links),
+        at_(links),
+        inverse_mass_(links),
+        inverse_mass_low_(links),
+        product_(links),
+        rows_(links),
+        rates_(links) {}
+
+  /// The mass of bob i, as 1/m.
+  void set_mass(int i, const Twofold<C>& inverse_mass) {
+    std::fill_n(inverse_mass_[i], D, inverse_mass.value);
+    std::fill_n(inverse_mass_low_[i], D, inverse_mass.low);
   }
 
-  const Real* along(int i) const { return along_[i]; }          ///< ξ_i, (dimension)  [m]
-  const Real* along_low(int i) const { return along_low_[i]; }  ///< what it lost to rounding
-  const Real* free(int i) const { return free_[i]; }            ///< z_i  [m/s]
-  const Real* free_low(int i) const { return free_low_[i]; }
-  const Real& product(int i) const { return product_[i]; }  ///< ξ_i·z_i without their low parts, of the last gauge
+  const Place& place() const { return at_; }
+  Place& place() { return at_; }
+  const Num* along(int i) const { return at_.along[i]; }  ///< ξ_i, (dimension)
+  const Num* along_low(int i) const { return at_.along_low[i]; }
+  const Num* free(int i) const { return at_.free[i]; }  ///< z_i, (dimension)
+  const Num* free_low(int i) const { return at_.free_low[i]; }
+  Num* along(int i) { return at_.along[i]; }
+  Num* free(int i) { return at_.free[i]; }
+  const C* inverse_mass(int i) const { return inverse_mass_[i]; }  ///< 1/m_i, (dimension), the same number
+  const Num& product(int i) const { return product_[i]; }  ///< ξ_i·z_i without their low parts, of the last gauge
+  const Num* products() const { return &product_[0]; }
 
-  Vector direction(int i, const Real& inverse_length) const {
-    return components<D>([&](std::size_t k) { return along_[i][k] * inverse_length; });
-  }
-
-  /// Takes over link i, from angles and rates.
-  void start(int i, const Real& length, const std::array<Real, Space::dof>& q, const std::array<Real, Space::dof>& v) {
-    const Heading<Space, Wide> heading(widened(q), widened(v));
+  /// Takes over link i of a member, from angles and rates.
+  void start(int member, int i, const Wide& length, const Heading<Space, Wide>& heading) {
     for (std::size_t k = 0; k < D; ++k) {
-      split(Wide(length) * heading.u[k], along_[i][k], along_low_[i][k]);
-      split(Wide(length) * heading.u_dot[k], free_[i][k], free_low_[i][k]);
-      gained_[i][k] = 0;
+      split(member, length * heading.u[k], at_.along[i][k], at_.along_low[i][k]);
+      split(member, length * heading.u_dot[k], at_.free[i][k], at_.free_low[i][k]);
     }
   }
 
-  /// Direction and rate of link i, in more digits than Real where there is such a type, for angles to be read from.
-  auto heading(int i, const Vector& rate) const { return heading_of(along_[i], along_low_[i], rate); }
+  /// Direction and rate of a member's link, in more digits where there is such a type, for angles to be read from.
+  Heading<Space, Wide> heading(int member, int i, const Vector& rate) const {
+    const auto number = [member](const Num& x) { return get(detail::value_of(x), member); };
+    using Number = std::decay_t<decltype(number(rate[0]))>;
+    std::array<Number, D> rod, low, turning;
+    for (std::size_t k = 0; k < D; ++k) {
+      rod[k] = number(at_.along[i][k]);
+      low[k] = number(at_.along_low[i][k]);
+      turning[k] = number(rate[k]);
+    }
+    return heading_of(rod, low, turning);
+  }
 
   /// The same of any rod, as the sum of two.
-  static auto heading_of(const Real* along, const Real* along_low, const Vector& rate) {
+  template <class Number>
+  static Heading<Space, Wide> heading_of(const std::array<Number, D>& rod, const std::array<Number, D>& low,
+                                         const std::array<Number, D>& rate) {
     Heading<Space, Wide> heading;
     Wide squared(0);
     for (std::size_t k = 0; k < D; ++k) {
-      heading.u[k] = Wide(along[k]) + Wide(along_low[k]);
+      heading.u[k] = Wide(rod[k]) + Wide(low[k]);
       squared += heading.u[k] * heading.u[k];
     }
     using std::sqrt;
@@ -88,266 +131,293 @@ class RodState {
     return heading;
   }
 
-  template <class Numbers>
-  void member(Numbers& numbers) {
-    for (int i = 0; i < links_; ++i) {
-      for (auto* part : {&along_, &along_low_, &free_, &free_low_, &gained_}) numbers.range((*part)[i], D);
+  template <class MemberNumbers>
+  void member(MemberNumbers& numbers) {
+    for (int i = 0; i < links(); ++i) {
+      for (auto* part : {&at_.along, &at_.along_low, &at_.free, &at_.free_low}) numbers.range((*part)[i], D);
     }
   }
 
-  /// The rates ξ̇ of all rods, from the pivot out: visit(i, ξ̇_i, τ_i).
-  template <class Visit>
-  void for_each_rate(const Links& links, Visit visit) const {
-    eliminate(links, [&](int i) { return -exact_product_of(i); });
-    for_each_bond(links,
-                  [&](int i, const Vector& change, const Real& tau) { visit(i, sum(vector(free_[i]), change), tau); });
+  /// The rates ξ̇ of all rods, from the pivot out: visit(i, ξ̇_i, τ_i). constants[i]: LinkConstants.
+  template <class Constants, class Visit>
+  void for_each_rate(const Constants& constants, Visit visit) const {
+    eliminate(constants, [&](int i) { return -exact_product_of(i); });
+    for_each_bond(constants, [&](int i, const Vector& change, const Num& tau) {
+      visit(i, sum(vector(at_.free[i]), change), tau);
+    });
   }
 
   /// The rates and accelerations of all rods where nothing but gravity acts: visit(i, ξ̇_i, ξ̈_i). With multipliers λ
   /// that keep |ξ̇|² + ξ·ξ̈ = 0, ξ̈_i is made of weight and λ as ξ̇_i is of z_i and τ.
-  template <class Visit>
-  void for_each_acceleration(const Links& links, const Real& gravity, Visit visit) const {
-    for_each_rate(links, [&](int i, const Vector& rate, const Real&) { rates_[i] = rate; });
-    const auto fallen = [&](int i) { return i == 0 ? Real(-gravity) : Real(0); };
-    eliminate(links, [&](int i) { return -(dot(rates_[i], rates_[i]) + along_[i][D - 1] * fallen(i)); });
-    for_each_bond(links, [&](int i, Vector change, const Real&) {
-      change[D - 1] += fallen(i);
+  template <class Constants, class Visit>
+  void for_each_acceleration(const Constants& constants, const C& gravity, Visit visit) const {
+    for_each_rate(constants, [&](int i, const Vector& rate, const Num&) { rates_[i] = rate; });
+    const auto fallen = [&](int i) { return i == 0 ? C(-gravity) : C(0.0); };
+    eliminate(constants, [&](int i) { return -(dot(rates_[i], rates_[i]) + at_.along[i][D - 1] * fallen(i)); });
+    for_each_bond(constants, [&](int i, Vector change, const Num&) {
+      change[D - 1] = change[D - 1] + Num(fallen(i));
       visit(i, rates_[i], change);
     });
   }
 
-  /// Takes multipliers λ(i) into the free rates, and keeps every ξ·z; shifted(i, λ_i, change of z_i since the start of
-  /// the last step).
+  /// Takes multipliers λ(i) into the free rates, and finds every ξ·z; then shifted(i).
   template <class Multiplier, class Shifted>
   void shift_gauge(Multiplier multiplier, Shifted shifted) {
-    Gauge gauge{};
-    set_multiplier(gauge.lambda + block_size, multiplier(0));
-    for (int begin = 0; begin < links_; begin += block) {
-      std::copy_n(gauge.lambda + block_size, D, gauge.lambda);
+    Gauge gauge;
+    std::fill_n(gauge.bond + block_size, D, Num(0.0));
+    std::fill_n(gauge.bond_low + block_size, D, Num(0.0));
+    gauge.set_lambda(block, multiplier(0));
+    for_blocks([&](auto begin) PENDULA_WRITTEN_OUT {
+      gauge.set_lambda(0, gauge.lambda_of(block_size));
       for (int i = begin; i < begin + block; ++i) {
-        set_multiplier(gauge.lambda + static_cast<std::size_t>(i - begin + 1) * D,
-                       i + 1 < links_ ? multiplier(i + 1) : Real(0));
+        gauge.set_lambda(i - begin + 1, i + 1 < links() ? multiplier(i + 1) : Num(0.0));
       }
       shift_block(begin, gauge);
-      const int end = std::min(begin + block, links_);
+      const int end = std::min(begin + block, links());
       for (int i = begin; i < end; ++i) {
         const auto at = static_cast<std::size_t>(i - begin) * D;
         product_[i] = total(gauge.product + at, gauge.product_low + at);
-        shifted(i, gauge.lambda[at], gauge.change + at);
+        shifted(i);
       }
+    });
+  }
+
+  /// body(k) of all numbers of a block; of several members written out.
+  template <class Body>
+  [[gnu::always_inline]] static void for_numbers(Body body) {
+    if constexpr (is_batch<Num>) {
+      detail::unrolled<static_cast<int>(block_size)>(
+          [&](auto k) PENDULA_WRITTEN_OUT { body(std::integral_constant<std::size_t, k>()); });
+    } else {
+      for (std::size_t k = 0; k < block_size; ++k) body(k);
     }
   }
 
-  /// Moves a block of rods from `begin` on by h z, z without its low part, and what their stages add to ξ and z.
-  void advance(int begin, const Real& h, const Real* moved, const Real* pushed) {
-    Real* __restrict rod = along_[begin], * __restrict rod_low = along_low_[begin];
-    Real* __restrict free = free_[begin], * __restrict free_low = free_low_[begin];
-    Real* __restrict gained = gained_[begin];
-    for (std::size_t k = 0; k < block_size; ++k) {
-      const Twofold<Real> coasted = exact_product(h, free[k]);
-      const Twofold<Real> near = exact_sum(rod[k], coasted.value);
-      const Real rest = near.low + (rod_low[k] + coasted.low);
-      const Twofold<Real> added = exact_sum(rest, moved[k]);
-      const Twofold<Real> there = exact_sum(near.value, added.value);
-      rod[k] = there.value;
-      rod_low[k] = there.low + added.low;
-      const Twofold<Real> wanted = exact_sum(free_low[k], pushed[k]);
-      const Twofold<Real> z = exact_sum(free[k], wanted.value);
-      free[k] = z.value;
-      free_low[k] = z.low + wanted.low;
-      gained[k] = pushed[k];
+  /// body(begin of a block of links), one after the other.
+  template <class Body>
+  [[gnu::always_inline]] void for_blocks(Body body) const {
+    if constexpr (block == 1) {
+      detail::for_links<N>(links(), body);
+    } else {
+      for (int begin = 0; begin < links(); begin += block) body(begin);
     }
+  }
+
+  /// Every ξ·z as `shift_gauge` finds it, of those that are asked for.
+  template <class Who>
+  void find_products(const Who& which) {
+    for (int i = 0; i < links(); ++i) product_[i] = select(which, exact_product_of_values(i), product_[i]);
+  }
+
+  /// Moves those of a block of rods from `begin` on that are `accepted` by h z, z without its low part, and what their
+  /// stages add to ξ and z. GCC heeds __restrict of parameters only.
+  template <class Who>
+  void advance(int begin, const C& h, const Who& accepted, const Num* moved, const Num* pushed) {
+    advance(h, accepted, moved, pushed, at_.along[begin], at_.along_low[begin], at_.free[begin], at_.free_low[begin]);
   }
 
   /// Weight acts on the first rod's free rate alone: all bobs fall alike.
-  void fall(const Real& h, const Real& gravity) {
-    const Twofold<Real> change = exact_product(h, gravity);
-    const Twofold<Real> free = exact_sum(free_[0][D - 1], Real(-change.value));
-    free_[0][D - 1] = free.value;
-    free_low_[0][D - 1] += free.low - change.low;
-    gained_[0][D - 1] -= change.value;
+  template <class Who>
+  void fall(const C& h, const C& gravity, const Who& accepted) {
+    Num &free = at_.free[0][D - 1], &low = at_.free_low[0][D - 1];
+    const Twofold<C> change = exact_product(h, gravity);
+    const Twofold<Num> fallen = exact_sum(free, Num(-change.value));
+    free = select(accepted, fallen.value, free);
+    low = select(accepted, low + (fallen.low - Num(change.low)), low);
   }
 
-  /// |ξ_i| = l_i again, where rounding has changed it.
-  void restore_length(int i, const Real& length) {
-    Twofold<Real> missing = exact_product(length, length);
-    for (std::size_t k = 0; k < D; ++k) {
-      const Twofold<Real> x{along_[i][k], along_low_[i][k]};
-      missing = missing - x * x;
-    }
-    const Real factor = missing.rounded() / (2 * length * length);
-    for (std::size_t k = 0; k < D; ++k) {
-      const Twofold<Real> x = exact_sum(along_[i][k], along_low_[i][k] + along_[i][k] * factor);
-      along_[i][k] = x.value;
-      along_low_[i][k] = x.low;
-    }
-  }
-
-  /// Keeps the state in one of two places, to go back to it.
-  void save(std::size_t place) {
-    for (std::size_t k = 0; k < 4; ++k) saved_[place][k] = *held()[k];
-  }
-  void restore(std::size_t place) {
-    for (std::size_t k = 0; k < 4; ++k) *held()[k] = saved_[place][k];
-  }
-
-  /// Keeps the state as what glances and looks go back to; the first time allocates.
-  void remember() {
-    if (!remembered_) remembered_.emplace(std::array{along_, along_low_, free_, free_low_});
-    for (std::size_t k = 0; k < 4; ++k) (*remembered_)[k] = *held()[k];
-  }
-  void return_to_remembered() {
-    for (std::size_t k = 0; k < 4; ++k) *held()[k] = (*remembered_)[k];
-    for (int i = 0; i < links_; ++i) {
-      Vector product, low;
+  /// |ξ_i| = l_i again, where rounding has changed it, of those that are asked for.
+  template <class Constants, class Who>
+  void restore_lengths(const Constants& constants, const Who& which) {
+    for (int i = 0; i < links(); ++i) {
+      const C& length = constants[i].length;
+      const Twofold<C> right = exact_product(length, length);
+      Twofold<Num> missing{Num(right.value), Num(right.low)};
       for (std::size_t k = 0; k < D; ++k) {
-        const Twofold<Real> exact = exact_product(along_[i][k], free_[i][k]);
-        product[k] = exact.value;
-        low[k] = exact.low;
+        const Num &x = at_.along[i][k], &low = at_.along_low[i][k];
+        const Twofold<Num> square = exact_product(x, x);
+        const Twofold<Num> less = exact_sum(missing.value, -square.value);
+        missing = {less.value, less.low + ((missing.low - square.low) - C(2.0) * (x * low))};
       }
-      product_[i] = total(product.data(), low.data());
+      const Num factor = C(0.5) * (missing.value + missing.low) * constants[i].inverse_square;
+      for (std::size_t k = 0; k < D; ++k) {
+        Num &x = at_.along[i][k], &low = at_.along_low[i][k];
+        const Twofold<Num> restored = ordered_sum(x, fma(x, factor, low));
+        x = select(which, restored.value, x);
+        low = select(which, restored.low, low);
+      }
     }
   }
-  const Real* remembered_along(int i) const { return (*remembered_)[0][i]; }
-  const Real* remembered_free(int i) const { return (*remembered_)[2][i]; }
 
-  static constexpr int block = D == 2 ? 4 : 8;  ///< links that are worked on at a time
-  static constexpr std::size_t block_size = block * D;
-
- private:
-  using Wide = std::conditional_t<std::is_same_v<Real, double> || std::is_same_v<Real, float>, long double, Real>;
-
-  /// Numbers of all links, and zeros behind them to the end of a block and for one more link.
-  class Numbers {
-    static constexpr int held(int links) { return (links + block - 1) / block * block + block; }
-
-   public:
-    explicit Numbers(int links) : numbers_(held(links)) {
-      std::fill_n(numbers_.data(), static_cast<std::size_t>(held(links)) * D, Real(0));
+  /// Goes to `place`, those that are asked for.
+  template <class Who>
+  void go_to(const Place& place, const Who& which) {
+    for (int i = 0; i < links(); ++i) {
+      for (auto part : {&Place::along, &Place::along_low, &Place::free, &Place::free_low}) {
+        Num* here = (at_.*part)[i];
+        const Num* there = (place.*part)[i];
+        for (std::size_t k = 0; k < D; ++k) here[k] = select(which, there[k], here[k]);
+      }
     }
-    Real* operator[](int link) { return numbers_[link]; }
-    const Real* operator[](int link) const { return numbers_[link]; }
+  }
 
-   private:
-    detail::LinkArray<D, N == Eigen::Dynamic ? N : held(N), Real> numbers_;
-  };
-
-  // A block of a gauge, behind what the link before it left.
-  struct Gauge {
-    alignas(pack_alignment) Real lambda[block_size + D];
-    alignas(pack_alignment) Real bond[block_size + D], bond_low[block_size + D];  // from the link before on
-    alignas(pack_alignment) Real change[block_size], product[block_size], product_low[block_size];
-  };
-
-  static Vector vector(const Real* from) {
+  static Vector vector(const Num* from) {
     return components<D>([&](std::size_t k) { return from[k]; });
   }
 
-  static void set_multiplier(Real* to, const Real& multiplier) { std::fill_n(to, D, multiplier); }
+  int links() const {
+    if constexpr (N == Eigen::Dynamic) return links_;
+    return N;
+  }
+
+ private:
+  // A block of a gauge, behind what the link before it left.
+  struct Gauge {
+    static constexpr std::size_t copies = is_batch<Num> ? 1 : D;  // of one motion, one for each component
+    alignas(pack_alignment) Num lambda[(block + 1) * copies];
+    alignas(pack_alignment) Num bond[block_size + D], bond_low[block_size + D];  // from the link before on
+    alignas(pack_alignment) Num product[block_size], product_low[block_size];
+
+    void set_lambda(int link, const Num& value) {
+      std::fill_n(lambda + static_cast<std::size_t>(link) * copies, copies, value);
+    }
+    const Num& lambda_of(std::size_t component) const { return lambda[copies == D ? component : component / D]; }
+  };
 
   void shift_block(int begin, Gauge& __restrict gauge) {
     std::copy_n(gauge.bond + block_size, D, gauge.bond);
     std::copy_n(gauge.bond_low + block_size, D, gauge.bond_low);
-    const Real* __restrict along = along_[begin], * __restrict along_low = along_low_[begin];
-    const Real* __restrict inverse = inverse_mass_[begin], * __restrict inverse_low = inverse_mass_low_[begin];
-    for (std::size_t k = 0; k < block_size; ++k) {
-      const Twofold<Real> pull = exact_product(gauge.lambda[k], along[k]);
-      const Twofold<Real> next = exact_product(gauge.lambda[k + D], along[k + D]);
-      const Twofold<Real> both = exact_sum(pull.value, Real(-next.value));
-      const Real low = both.low + ((pull.low + gauge.lambda[k] * along_low[k]) -
-                                   (next.low + gauge.lambda[k + D] * along_low[k + D]));
-      const Twofold<Real> bond = exact_product(inverse[k], both.value);
+    const Num* __restrict along = at_.along[begin], * __restrict along_low = at_.along_low[begin];
+    const C* __restrict inverse = inverse_mass_[begin], * __restrict inverse_low = inverse_mass_low_[begin];
+    for_numbers([&](auto at) PENDULA_WRITTEN_OUT {
+      const std::size_t k = at;
+      const Twofold<Num> pull = exact_product(gauge.lambda_of(k), along[k]);
+      const Twofold<Num> next = exact_product(gauge.lambda_of(k + D), along[k + D]);
+      const Twofold<Num> both = exact_sum(pull.value, Num(-next.value));
+      const Num low = both.low + ((pull.low + gauge.lambda_of(k) * along_low[k]) -
+                                  (next.low + gauge.lambda_of(k + D) * along_low[k + D]));
+      const Twofold<Num> bond = exact_product(inverse[k], both.value);
       gauge.bond[k + D] = bond.value;
       gauge.bond_low[k + D] = bond.low + (inverse[k] * low + inverse_low[k] * both.value);
-    }
-    Real* __restrict free = free_[begin], * __restrict free_low = free_low_[begin];
-    const Real* __restrict gained = gained_[begin];
-    for (std::size_t k = 0; k < block_size; ++k) {
-      const Twofold<Real> shift = exact_sum(gauge.bond[k + D], Real(-gauge.bond[k]));
-      const Real shift_low = shift.low + (gauge.bond_low[k + D] - gauge.bond_low[k]);
-      const Twofold<Real> raw = exact_sum(free[k], shift.value);
-      const Twofold<Real> z = exact_sum(raw.value, raw.low + (free_low[k] + shift_low));
+    });
+    Num* __restrict free = at_.free[begin], * __restrict free_low = at_.free_low[begin];
+    for_numbers([&](auto at) PENDULA_WRITTEN_OUT {
+      const std::size_t k = at;
+      const Twofold<Num> shift = exact_sum(gauge.bond[k + D], Num(-gauge.bond[k]));
+      const Num shift_low = shift.low + (gauge.bond_low[k + D] - gauge.bond_low[k]);
+      const Twofold<Num> raw = exact_sum(free[k], shift.value);
+      const Twofold<Num> z = ordered_sum(raw.value, raw.low + (free_low[k] + shift_low));
       free[k] = z.value;
       free_low[k] = z.low;
-      gauge.change[k] = gained[k] + shift.value;
-      const Twofold<Real> product = exact_product(along[k], z.value);
+      const Twofold<Num> product = exact_product(along[k], z.value);
       gauge.product[k] = product.value;
       gauge.product_low[k] = product.low;
-    }
+    });
+  }
+
+  template <class Who>
+  static void advance(const C& h, const Who& accepted, const Num* __restrict moved, const Num* __restrict pushed,
+                      Num* __restrict rod, Num* __restrict rod_low, Num* __restrict free, Num* __restrict free_low) {
+    for_numbers([&](auto at) PENDULA_WRITTEN_OUT {
+      const std::size_t k = at;
+      const Twofold<Num> coasted = exact_product(h, free[k]);
+      const Twofold<Num> near = exact_sum(rod[k], coasted.value);
+      const Twofold<Num> added = exact_sum(near.low + (rod_low[k] + coasted.low), moved[k]);
+      const Twofold<Num> there = exact_sum(near.value, added.value);
+      const Twofold<Num> wanted = ordered_sum(pushed[k], free_low[k]);
+      const Twofold<Num> z = exact_sum(free[k], wanted.value);
+      rod[k] = select(accepted, there.value, rod[k]);
+      rod_low[k] = select(accepted, there.low + added.low, rod_low[k]);
+      free[k] = select(accepted, z.value, free[k]);
+      free_low[k] = select(accepted, z.low + wanted.low, free_low[k]);
+    });
   }
 
   // Of one link, from the parts of its components.
-  static Real total(const Real* product, const Real* low) {
-    Twofold<Real> sum = exact_sum(product[0], product[1]);
-    Real rest = sum.low + (low[0] + low[1]);
+  static Num total(const Num* product, const Num* low) {
+    Twofold<Num> sum = exact_sum(product[0], product[1]);
+    Num rest = sum.low + (low[0] + low[1]);
     if constexpr (D == 3) {
       sum = exact_sum(sum.value, product[2]);
-      rest += sum.low + low[2];
+      rest = rest + (sum.low + low[2]);
     }
     return sum.value + rest;
   }
 
-  static std::array<Wide, Space::dof> widened(const std::array<Real, Space::dof>& x) {
-    std::array<Wide, Space::dof> wide;
-    for (std::size_t a = 0; a < x.size(); ++a) wide[a] = Wide(x[a]);
-    return wide;
+  static void split(int member, const Wide& x, Num& value, Num& low) {
+    if constexpr (!is_batch<Num>) {
+      value = Num(x);
+      low = Num(x - Wide(value));
+    } else {
+      const auto rounded = static_cast<double>(x);
+      set(value_in(value), member, rounded);
+      set(value_in(low), member, static_cast<double>(x - Wide(rounded)));
+    }
+  }
+  static C& value_in(Num& x) {
+    if constexpr (std::is_same_v<Num, C>) {
+      return x;
+    } else {
+      return x.value;
+    }
   }
 
-  static void split(const Wide& x, Real& value, Real& low) {
-    value = Real(x);
-    low = Real(x - Wide(value));
-  }
-
-  Real exact_product_of(int i) const {
+  Num exact_product_of_values(int i) const {
     Vector product, low;
     for (std::size_t k = 0; k < D; ++k) {
-      const Twofold<Real> exact = exact_product(along_[i][k], free_[i][k]);
+      const Twofold<Num> exact = exact_product(at_.along[i][k], at_.free[i][k]);
       product[k] = exact.value;
-      low[k] = exact.low + (along_[i][k] * free_low_[i][k] + along_low_[i][k] * free_[i][k]);
+      low[k] = exact.low;
+    }
+    return total(product.data(), low.data());
+  }
+
+  Num exact_product_of(int i) const {
+    Vector product, low;
+    for (std::size_t k = 0; k < D; ++k) {
+      const Twofold<Num> exact = exact_product(at_.along[i][k], at_.free[i][k]);
+      product[k] = exact.value;
+      low[k] = exact.low + (at_.along[i][k] * at_.free_low[i][k] + at_.along_low[i][k] * at_.free[i][k]);
     }
     return total(product.data(), low.data());
   }
 
   // The rows of the multipliers, right(i) being what their equations have on the right (multipliers.hpp).
-  template <class Right>
-  void eliminate(const Links& links, Right right) const {
-    MultiplierRow<Real> row;
-    Real beyond(0);
-    for (int i = links_; i-- > 0;) {
-      const Vector rod = vector(along_[i]);
-      const Real before = i == 0 ? Real(0) : Real(-links[i - 1].inverse_mass.value * dot(vector(along_[i - 1]), rod));
-      rows_[i] = row = row.next(links[i].inverse_masses * dot(rod, rod), beyond, before, right(i));
+  template <class Constants, class Right>
+  void eliminate(const Constants& constants, Right right) const {
+    MultiplierRow<Num> row;
+    Num beyond(0.0);
+    for (int i = links(); i-- > 0;) {
+      const Vector rod = vector(at_.along[i]);
+      const Num before =
+          i == 0 ? Num(0.0) : Num(-constants[i - 1].inverse_mass.value * dot(vector(at_.along[i - 1]), rod));
+      rows_[i] = row = row.next(constants[i].inverse_masses * dot(rod, rod), beyond, before, right(i));
       beyond = before;
     }
   }
 
   // What multipliers move the rods by, from the pivot out: visit(i, e_i − e_{i−1}, multiplier of rod i).
-  template <class Visit>
-  void for_each_bond(const Links& links, Visit visit) const {
-    Real multiplier = rows_[0].offset;
-    Vector before{};
-    for (int i = 0; i < links_; ++i) {
-      const bool last = i + 1 == links_;
-      const Real next = last ? Real(0) : rows_[i + 1].offset - rows_[i + 1].coupling * multiplier;
-      Vector pull = scaled(multiplier, vector(along_[i]));
-      if (!last) pull = difference(pull, scaled(next, vector(along_[i + 1])));
-      const Vector bond = scaled(links[i].inverse_mass.value, pull);
+  template <class Constants, class Visit>
+  void for_each_bond(const Constants& constants, Visit visit) const {
+    Num multiplier = rows_[0].offset;
+    Vector before = components<D>([](std::size_t) { return Num(0.0); });
+    for (int i = 0; i < links(); ++i) {
+      const bool last = i + 1 == links();
+      const Num next = last ? Num(0.0) : Num(rows_[i + 1].offset - rows_[i + 1].coupling * multiplier);
+      Vector pull = scaled(multiplier, vector(at_.along[i]));
+      if (!last) pull = difference(pull, scaled(next, vector(at_.along[i + 1])));
+      const Vector bond = scaled(constants[i].inverse_mass.value, pull);
       visit(i, difference(bond, before), multiplier);
       before = bond;
       multiplier = next;
     }
   }
 
-  std::array<Numbers*, 4> held() { return {&along_, &along_low_, &free_, &free_low_}; }
-
   int links_;
-  Numbers along_, along_low_, free_, free_low_;
-  Numbers gained_;  // by z in the last step, all gauges apart
-  Numbers inverse_mass_, inverse_mass_low_;
-  std::array<std::array<Numbers, 4>, 2> saved_{{{along_, along_, along_, along_}, {along_, along_, along_, along_}}};
-  std::optional<std::array<Numbers, 4>> remembered_;
-  detail::PerLink<Real, N> product_;
-  mutable detail::PerLink<MultiplierRow<Real>, N> rows_;
+  Place at_;
+  Numbers<C> inverse_mass_, inverse_mass_low_;
+  detail::PerLink<Num, N> product_;
+  mutable detail::PerLink<MultiplierRow<Num>, N> rows_;
   mutable detail::PerLink<Vector, N> rates_;
 };
 

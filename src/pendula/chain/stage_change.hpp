@@ -35,9 +35,6 @@ class StageChange {
     return change > 0 ? static_cast<double>(change / largest_of(scale_)) : 0;
   }
 
-  /// The most that a rod turns in the step  [rad].
-  double turn() const { return static_cast<double>(over_stages(scale_, plus)); }
-
   /// The largest of all stages.
   static Real largest_of(const L& lanes) {
     return over_stages(lanes, [](const Real& x, const Real& y) { return x > y ? x : y; });

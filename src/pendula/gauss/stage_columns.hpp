@@ -50,6 +50,7 @@ class StageColumns {
   }
 
   Real h() const { return h_; }
+  Real b(std::size_t j) const { return b_[j]; }
   Real c(std::size_t i) const { return c_[i]; }
   Real m(std::size_t i, std::size_t j) const { return m_[j][i]; }
   Real hb(std::size_t j) const { return hb_[j]; }
@@ -62,6 +63,9 @@ class StageColumns {
   L hb() const { return L::load(hb_); }          ///< h b
   L hc() const { return L::load(hc_); }          ///< h c
   L hc_low() const { return L::load(hc_low_); }  ///< what hc lost to rounding
+
+  /// m_ij of all i.
+  L column(std::size_t j) const { return L::load(m_[j]); }
 
   /// h a_ij of all i.
   L ha(std::size_t j) const { return L(hb_[j]) * L::load(m_[j]); }
@@ -108,6 +112,10 @@ class StageColumns {
   }
 
   using Weights = typename NodePolynomials<S, Real>::Values;
+
+  /// Of stage values: the polynomial through them at x, and its integral from the start of their step to x.
+  Weights values(const Real& x) const { return polynomials_.lagrange(x); }
+  Weights integrals(const Real& x) const { return polynomials_.integrals(x); }
 
   /// Of stage values that hold the factor h b: what they add up to from the start of their step to x.
   Weights up_to(const Real& x) const {

@@ -56,7 +56,7 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
 
   // The most that a coordinate turns in the step [rad], and beyond what its stage equations have other solutions than
   // the motion; false where the stages cannot be those of the motion.
-  { fixed.turn() } -> std::convertible_to<double>;
+  { solver.turn() } -> std::convertible_to<double>;
   { fixed.turning_part() } -> std::convertible_to<int>;  // which does, −1 where that is not known
   { fixed.largest_turn() } -> std::convertible_to<double>;
   { fixed.continues() } -> std::convertible_to<bool>;

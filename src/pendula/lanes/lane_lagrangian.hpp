@@ -11,7 +11,7 @@
 #include <pendula/lanes/lane_inertia.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_prediction.hpp>
+#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/lanes/lane_stage_tangent.hpp>
 #include <pendula/lanes/lane_stop.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
@@ -148,7 +148,7 @@ class LaneLagrangian {
   // --- A step ---
 
   /// Predicts the stages of a step of `h` from `time`, `ratio` times as long as the one that they are known from.
-  void prepare(const L& time, const L& h, const L& ratio, const LanePrediction<L>& from) {
+  void prepare(const L& time, const L& h, const L& ratio, const StagePrediction<L>& from) {
     columns_.prepare(h);
     columns_.predict_at(select(from.again, L(0.0), L(1.0)), ratio, from.depth);
     now_ = time;

@@ -30,4 +30,19 @@ struct LaneLink {
   }
 };
 
+/// Takes over a link of the member in a lane.
+template <class L>
+void set_link(LinkConstants<L>& link, int lane, const LinkConstants<double>& given) {
+  link.mass.set(lane, given.mass);
+  link.length.set(lane, given.length);
+  link.inverse_length.set(lane, given.inverse_length);
+  link.inverse_square.set(lane, given.inverse_square);
+  link.inverse_mass.value.set(lane, given.inverse_mass.value);
+  link.inverse_mass.low.set(lane, given.inverse_mass.low);
+  link.inverse_masses.set(lane, given.inverse_masses);
+  link.drag.set(lane, given.drag);
+  link.weight.set(lane, given.weight);
+  link.hanging.set(lane, given.hanging);
+}
+
 }  // namespace pendula

@@ -43,7 +43,8 @@ class LaneLoads {
   L fastest_drive() const { return inputs_.fastest(); }
 
   /// Torque on a link at the time that was set, over l_i².
-  auto torque(int i, const LaneLink<L>& link) const {
+  template <class Link>
+  auto torque(int i, const Link& link) const {
     typename Space::Link::template Torque<L> torque;
     for (std::size_t k = 0; k < components; ++k) {
       torque[k] = link.inverse_square * L::load(torques_[static_cast<std::size_t>(i) * components + k]);

@@ -3,12 +3,10 @@
 #include <cstddef>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/ordered_sum.hpp>
 #include <pendula/numeric/sincos.hpp>
-#include <utility>
+#include <pendula/numeric/written_out.hpp>
 #include <xsimd/xsimd.hpp>
-
-/// Behind the parameters of a lambda that is only a part of the function it stands in.
-#define PENDULA_WRITTEN_OUT __attribute__((always_inline))
 
 namespace pendula {
 
@@ -131,39 +129,5 @@ Twofold<LanePack<Register>> exact_product(const LanePack<Register>& a, const Lan
     return {product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low};
   }
 }
-
-/// a + b without loss where |a| ≥ |b|; else within a last bit of b (Dekker).
-template <class Number>
-Twofold<Number> ordered_sum(const Number& a, const Number& b) {
-  const Number sum = a + b;
-  return {sum, b - (sum - a)};
-}
-
-namespace detail {
-
-/// body(0), body(1), … written out, the numbers being constants.
-template <int Count, class Body>
-[[gnu::always_inline]] inline void unrolled(Body body) {
-  [&]<int... k>(std::integer_sequence<int, k...>) PENDULA_WRITTEN_OUT {
-    (body(std::integral_constant<int, k>()), ...);
-  }
-  (std::make_integer_sequence<int, Count>());
-}
-
-/// Chains so short that loops along them are written out.
-template <int N>
-inline constexpr bool is_short_chain = N > 0 && N <= 3;  // Eigen::Dynamic is negative
-
-/// body(0), body(1), … of all links, from the pivot on; written out where they are few.
-template <int N, class Body>
-[[gnu::always_inline]] inline void for_links(int links, Body body) {
-  if constexpr (is_short_chain<N>) {
-    unrolled<N>(body);
-  } else {
-    for (int i = 0; i < links; ++i) body(i);
-  }
-}
-
-}  // namespace detail
 
 }  // namespace pendula

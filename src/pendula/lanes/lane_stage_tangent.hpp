@@ -5,7 +5,7 @@
 #include <pendula/lanes/lane_columns.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_prediction.hpp>
+#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/lanes/lane_system_tangent.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <vector>
@@ -43,7 +43,7 @@ class LaneStageTangent {
   }
 
   /// Predicts the stages of the step that `columns` are prepared for; those that start cold, from (q, q̇) at `times`.
-  void prepare(const LanePrediction<L>& from, const double* times, const double* q, const double* v) {
+  void prepare(const StagePrediction<L>& from, const double* times, const double* q, const double* v) {
     for (Part& part : parts_) {
       typename Columns::History history;
       for (std::size_t d = 0; d < pasts; ++d) history[d] = &part.past[(newest_ + d) % pasts].sped;

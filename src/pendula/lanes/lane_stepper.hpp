@@ -61,7 +61,7 @@ class LaneStepper {
     const L ratio = h / last_;
     const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
-    depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(1.0));
+    depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(0.0));
     chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
     Mask found = iterate(wanted, stop_, chain_.scale(), [&](const Mask& active) { return chain_.iterate(active); });
     if constexpr (solves_tangents_after) {
@@ -129,7 +129,7 @@ class LaneStepper {
   typename Chain::Stop stop_;
   LaneStop<L> tangent_stop_;  // of stages of tangents that are solved after the motion's
   L known_{cold}, last_{0.0},
-      depth_{0.0};  // of the stages: what they are of, the size of their step, how many were alike
+      depth_{0.0};  // of the stages: what they are of, the size of their step, how many such steps it follows
   std::int64_t iterations_ = 0;
 };
 

@@ -50,25 +50,6 @@ Twofold<Dual<L>> exact_product(const L& a, const Dual<L>& b) {
 
 namespace detail {
 
-/// What the numbers of a vector are without their derivatives.
-template <class L, std::size_t D>
-const std::array<L, D>& values_of(const std::array<L, D>& x) {
-  return x;
-}
-template <class L, std::size_t D>
-std::array<L, D> values_of(const std::array<Dual<L>, D>& x) {
-  std::array<L, D> values;
-  for (std::size_t k = 0; k < D; ++k) values[k] = x[k].value;
-  return values;
-}
-
-template <class L, std::size_t D>
-std::array<L, D> slopes_of(const std::array<Dual<L>, D>& x) {
-  std::array<L, D> slopes;
-  for (std::size_t k = 0; k < D; ++k) slopes[k] = x[k].slope;
-  return slopes;
-}
-
 /// Sets a member's, and leaves its derivative.
 template <class L>
 void set_value(int lane, double value, L& x) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <pendula/numeric/lanes.hpp>
 #include <type_traits>
 
@@ -65,6 +67,25 @@ const L& value_of(const L& x) {
 template <class L>
 const L& value_of(const Dual<L>& x) {
   return x.value;
+}
+
+/// What the numbers of a vector are without their derivatives.
+template <class L, std::size_t D>
+const std::array<L, D>& values_of(const std::array<L, D>& x) {
+  return x;
+}
+template <class L, std::size_t D>
+std::array<L, D> values_of(const std::array<Dual<L>, D>& x) {
+  std::array<L, D> values;
+  for (std::size_t k = 0; k < D; ++k) values[k] = x[k].value;
+  return values;
+}
+
+template <class L, std::size_t D>
+std::array<L, D> slopes_of(const std::array<Dual<L>, D>& x) {
+  std::array<L, D> slopes;
+  for (std::size_t k = 0; k < D; ++k) slopes[k] = x[k].slope;
+  return slopes;
 }
 
 }  // namespace detail

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <pendula/numeric/numeric.hpp>
+
+namespace pendula {
+
+/// What the stages of a step are predicted from: whether the last step was accepted, was solved only, or there is none.
+template <class C>
+struct StagePrediction {
+  MaskOf<C> follows, again, cold;
+  C depth;  ///< how many steps of this size a step follows
+};
+
+}  // namespace pendula

@@ -1,0 +1,150 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <pendula/gauss/stage_columns.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numeric.hpp>
+#include <pendula/numeric/written_out.hpp>
+
+namespace pendula {
+
+/// How the stages of a number lie where one motion is solved: all of them in one pack. MembersInLanes says the same of
+/// several motions. A Row is one number at all stages; it is made of cells, which are worked on one by one.
+template <int S, class Real>
+struct StagesInLanes {
+  using Num = Real;
+  using L = Lanes<S, Real>;
+  using Cell = L;
+  using Sum = L;  ///< of what the cells of a row add up to
+  static constexpr int stages = S, cells = 1;
+  static constexpr int together = 1;  ///< cells that a sweep goes through at a time
+  static constexpr auto Z = static_cast<std::size_t>(L::size);
+
+  class Row {
+    static constexpr std::size_t alignment =
+        std::min(pack_alignment, std::max(alignof(Real), std::bit_floor(Z * sizeof(Real))));
+
+   public:
+    L operator[](int /*cell*/) const { return L::load(x_); }
+    void set(int /*cell*/, const L& value) { value.store(x_); }
+    const Real* numbers() const { return x_; }
+    Real* numbers() { return x_; }
+
+   private:
+    alignas(alignment) Real x_[Z]{};
+  };
+  using Slot = Row;  ///< room for one cell
+
+  static L spread(const Real& x) { return L(x); }  ///< the same number at all stages
+
+  /// Σ of what is stored at the stages.
+  static Real total(const Real* x) {
+    Real total = x[0];
+    for (std::size_t j = 1; j < S; ++j) total += x[j];
+    return total;
+  }
+  static Real total(const L& sum) {
+    alignas(pack_alignment) Real x[Z];
+    sum.store(x);
+    return total(x);
+  }
+
+  class Columns : public detail::StageColumns<S, Real> {
+    using Base = detail::StageColumns<S, Real>;
+
+   public:
+    /// Steps that a prediction is made of at most: few stages make small steps, and many large ones.
+    static constexpr int most_depth = S <= 3 && sizeof(Real) >= sizeof(double) ? 8 : 1;
+
+    explicit Columns(Family family = Family::gauss) : Base(family) {
+      for (std::size_t j = 0; j < S; ++j) weights_[j] = Base::b(j);
+      for (std::size_t j = 0; j < S; ++j) inverse_weights_[j] = 1 / weights_[j];
+    }
+
+    void prepare(const Real& h) { Base::prepare(h, Real(0)); }
+
+    /// Predictions are for a step that begins at `from`, in steps from the start of the last one, and is `ratio` times
+    /// as long. Where the last `depth` steps had one size, they are made stage by stage: values of one stage follow
+    /// each other smoothly, which those of one step do not, by their errors of order S + 1.
+    void predict_at(const Real& from, const Real& ratio, const Real& depth) {
+      ratio_ = ratio;
+      depth_ = static_cast<int>(depth);
+      if (most_depth > 1 && depth_ > S) {
+        Real weight(-1);  // of a polynomial of degree depth − 1: ±binomial coefficients
+        for (int d = 0; d < depth_; ++d) {
+          weight = weight * Real(d - depth_) / Real(d + 1);
+          across_[static_cast<std::size_t>(d)] = L(weight);
+        }
+      } else if (from != from_ || ratio != made_for_) {
+        Base::predict_at(from_ = from, made_for_ = ratio);
+      }
+    }
+
+    /// What sweeps ask for at every link, in registers: stores to stages might be stores to the columns.
+    class AtHand {
+     public:
+      explicit AtHand(const Columns& columns)
+          : hb_(columns.Base::hb()), hc_(columns.Base::hc()), hc_low_(columns.Base::hc_low()) {
+        for (std::size_t j = 0; j < S; ++j) m_[j] = columns.Base::column(j);
+      }
+      const L& hb(int /*cell*/) const { return hb_; }
+      const L& hc(int /*cell*/) const { return hc_; }
+      const L& hc_low(int /*cell*/) const { return hc_low_; }
+      /// start + Σ_j m_ij x_j for all i, x times h b.
+      [[gnu::always_inline]] void integrate(const Row& x, const Real& start, Row& integral) const {
+        integral.set(0, this->integral(x.numbers(), L(start)));
+      }
+      [[gnu::always_inline]] L integral(const Real* x, const L& start) const {
+        L even = fma(L(x[0]), m_[0], start);
+        if constexpr (S > 1) {
+          L odd = L(x[1]) * m_[1];
+          detail::unrolled<S - 2>([&](auto j) PENDULA_WRITTEN_OUT {
+            L& sum = j % 2 == 0 ? even : odd;
+            constexpr std::size_t column = static_cast<std::size_t>(j) + 2;
+            sum = fma(L(x[column]), m_[column], sum);
+          });
+          even = even + odd;
+        }
+        return even;
+      }
+
+     private:
+      std::array<L, static_cast<std::size_t>(S)> m_;
+      L hb_, hc_, hc_low_;
+    };
+    AtHand at_hand() const { return AtHand(*this); }
+
+    /// b, and 1/b.
+    L weight(int /*cell*/) const { return L::load(weights_); }
+    L inverse_weight(int /*cell*/) const { return L::load(inverse_weights_); }
+
+    /// Stage values of the last steps, the newest first, all of them times h or none, continued at this step's stages.
+    using History = std::array<const Row*, static_cast<std::size_t>(most_depth)>;
+    [[gnu::always_inline]] void extrapolate(const History& last, Row& next, bool times_h) const {
+      if (most_depth > 1 && depth_ > S) {
+        L sum = across_[0] * (*last[0])[0];
+        for (std::size_t d = 1; d < static_cast<std::size_t>(depth_); ++d) sum = fma(across_[d], (*last[d])[0], sum);
+        next.set(0, sum);
+        return;
+      }
+      const L value = Base::extrapolated(last[0]->numbers());
+      next.set(0, times_h ? L(ratio_) * value : value);
+    }
+
+    /// The mean over a step of what the stage values are of.
+    Real mean(const Row& x) const { return StagesInLanes::total(weight(0) * x[0]); }
+    static Real total(const Row& x) { return StagesInLanes::total(x.numbers()); }
+
+   private:
+    Real from_{1}, made_for_{1}, ratio_{1};
+    int depth_ = 1;
+    std::array<L, static_cast<std::size_t>(most_depth)> across_;
+    alignas(pack_alignment) Real weights_[Z]{};
+    alignas(pack_alignment) Real inverse_weights_[Z]{};
+  };
+};
+
+}  // namespace pendula

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <pendula/lanes/lane_columns.hpp>
+#include <pendula/numeric/numeric.hpp>
+
+namespace pendula {
+
+/// How the stages of a number lie where several motions are solved, one in each lane: one after the other, each of them
+/// of all members. As StagesInLanes is of one motion.
+template <int S, class Number>
+struct MembersInLanes {
+  using Num = Number;
+  using L = ConstantOf<Num>;
+  using Cell = Num;
+  using Sum = L;
+  static constexpr int stages = S, cells = S;
+  static constexpr int together = S == 1 ? 1 : 2;  ///< so that one does not wait for itself
+
+  template <int Count>
+  struct Cells : std::array<Num, static_cast<std::size_t>(Count)> {
+    const Num& operator[](int j) const { return this->data()[j]; }
+    void set(int j, const Num& value) { this->data()[j] = value; }
+  };
+  using Row = Cells<S>;
+  using Slot = Cells<1>;
+
+  template <class T>
+  static const T& spread(const T& x) {
+    return x;
+  }
+  static const L& total(const L& sum) { return sum; }
+
+  class Columns : public LaneColumns<S, L> {
+    using Base = LaneColumns<S, L>;
+
+   public:
+    explicit Columns(Family /*gauss*/ = Family::gauss) {}
+
+    const Columns& at_hand() const { return *this; }  // more than registers hold
+    L weight(int j) const { return L(Base::b(j)); }
+    L inverse_weight(int j) const { return L(Base::inverse_b(j)); }
+
+    using History = std::array<const Row*, static_cast<std::size_t>(Base::most_depth)>;
+    [[gnu::always_inline]] void extrapolate(const History& last, Row& next, bool times_h) const {
+      typename Base::template HistoryOf<Num> bases;
+      for (std::size_t d = 0; d < bases.size(); ++d) bases[d] = last[d];
+      Base::template extrapolate<Num>(bases, next, times_h);
+    }
+  };
+};
+
+}  // namespace pendula
