@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <utility>
 
 namespace pendula {
@@ -14,7 +14,8 @@ enum class Steering {
   greedy      ///< by the error of the last step alone: for motion that takes or gives energy anyway
 };
 
-/// Chooses the steps of a method of even or odd order, so that each errs by no more than a tolerance.
+/// Chooses the steps of a method of even or odd order, of one motion or of several, so that each errs by no more than a
+/// tolerance. Errors are compared by their logarithms.
 ///
 /// Symmetric steps are h = c/ρ, where the density ρ follows the pace R of the motion,
 ///   ρ₊ = ρ₋ + c d ln R/dt,
@@ -22,55 +23,72 @@ enum class Steering {
 /// SIAM J. Sci. Comput. 26 (2005) 1838). Backwards that is the same recursion. What a tolerance asks for is c, which
 /// changes seldom, the rarer the longer the run: where a step errs by more, and where all of the last 2^k erred by
 /// less.
+template <class Num>
 class StepController {
  public:
-  StepController(int stages, int order, double tolerance, Steering steering)
-      : stages_(stages), order_(order), tolerance_(tolerance), steering_(steering) {}
+  using Mask = MaskOf<Num>;
+
+  StepController(int stages, int order, double tolerance, Steering steering = Steering::symmetric)
+      : stages_(stages),
+        order_(order),
+        tolerance_(tolerance),
+        log_tolerance_(std::log(tolerance)),
+        first_scale_(std::min(1.0, std::exp(log_tolerance_ / order))),
+        greedy_(steering == Steering::greedy) {}
 
   bool chooses() const { return tolerance_ > 0; }
 
-  /// A run starts, at this tempo.
-  void start(const Tempo& tempo) {
-    scale_ = first_scale();
-    last_step_ = 0;
-    start_density(tempo.pace > 0 ? tempo : Tempo{1, 0});
-    window_ = {};
+  /// From now on these motions are steered by the error of the last step, or not.
+  void steer(const Mask& which, const Mask& greedily) { greedy_ = (which & greedily) | (greedy_ & !which); }
+
+  /// Motions that start, at this tempo.
+  void start(const Mask& which, const TempoOf<Num>& tempo) {
+    const Mask moves = tempo.pace > Num(0.0);
+    scale_ = select(which, Num(first_scale_), scale_);
+    last_step_ = select(which, Num(0.0), last_step_);
+    start_density(which, {select(moves, tempo.pace, Num(1.0)), select(moves, tempo.quickening, Num(0.0))});
+    forget_errors(which);
+    window_.length = select(which, Num(1.0), window_.length);
   }
 
   /// Of the next step, unless the run ends before.
-  double step() const {
-    const double step = scale_ / density_;
-    return last_step_ == 0 ? step : std::min(step, most_growth * last_step_);
+  Num step() const {
+    const Num step = scale_ / density_;
+    return select(last_step_ > Num(0.0), min(step, Num(most_growth) * last_step_), step);
   }
 
-  /// Whether a step of size h that was solved is good enough; if not, the next one is smaller.
-  bool accepts(const StepShape& shape, double h) {
-    const double time = std::max(h * shape.pace, shortest);
-    error_ = shape.pace > 0 ? safety * shape.error(h, stages_, order_) / time : 0;
-    const double off = shape.imbalance / std::max(most_imbalance * tolerance_ * time, energy_rounding);
-    const double excess = std::max(error_ / tolerance_, off);
-    if (excess <= 1) return true;
-    shrink(h, std::max(0.2, 0.9 * root(1 / excess)));
-    return false;
-  }
-
-  /// The next step is to be `factor` of one that failed.
-  void shrink(double h, double factor) {
-    scale_ = factor * h * density_;
-    window_.largest_error = 0;
-    window_.steps = 0;
-  }
-
-  /// A step of size h that the controller chose was taken. tempo() is that of the state where it ended.
-  template <class TempoOf>
-  void move_on(double h, TempoOf tempo) {
-    last_step_ = h;
-    if (steering_ == Steering::greedy) {
-      scale_ = h * density_ * std::clamp(root(greedy_aim * tolerance_ / error_), 0.3, greedy_growth);
-      return;
+  /// Which of the steps of size h that were solved are good enough; of the others the next one is smaller.
+  Mask accepts(const Mask& which, const StepDecay<Num>& decay, const Num& h) {
+    log_error_ = decay.log_error(stages_, order_) + Num(std::log(safety));
+    Num log_excess = log_error_ - Num(log_tolerance_);
+    if (!all(decay.imbalance == Num(0.0))) {
+      const Num most = max(Num(most_imbalance * tolerance_) * decay.time(), Num(energy_rounding));
+      log_excess = max(log_excess, log(max(decay.imbalance, Num(tiny)) / most));
     }
-    follow(tempo());
-    watch();
+    const Mask good = log_excess <= Num(0.0);
+    const Mask bad = which & !good;
+    if (any(bad)) {
+      const Num factor = Num(0.9) * exp(log_excess * Num(-1.0 / order_));
+      shrink(bad, h, select(factor > Num(0.2), factor, Num(0.2)));
+    }
+    return which & good;
+  }
+
+  /// The next steps of these are to be `factor` of those that failed.
+  void shrink(const Mask& which, const Num& h, const Num& factor) {
+    scale_ = select(which, factor * h * density_, scale_);
+    forget_errors(which);
+  }
+
+  /// Steps of size h that the controller chose were taken. tempo() is that of the state where they ended.
+  template <class FindTempo>
+  void move_on(const Mask& which, const Num& h, FindTempo tempo) {
+    last_step_ = select(which, h, last_step_);
+    const Mask greedy = which & greedy_, symmetric = which & !greedy_;
+    if (any(greedy)) follow_error(greedy, h);
+    if (!any(symmetric)) return;
+    follow(symmetric, tempo());
+    watch(symmetric);
   }
 
   /// The motion is reversed where it is: what is remembered of the density goes the other way.
@@ -82,56 +100,72 @@ class StepController {
   }
 
  private:
-  // The errors of the steps since c was last looked at.
+  static constexpr double never = StepDecay<Num>::never;
+
+  // The errors of the steps since c was last looked at, their number, and how many are looked at together.
   struct Window {
-    double largest_error = 0;
-    std::int64_t steps = 0, length = 1;
+    Num largest_error{never}, steps{0.0}, length{1.0};
   };
 
-  double root(double ratio) const { return std::pow(ratio, 1.0 / order_); }
+  // What a step is to be multiplied by, so that an error becomes so much of the tolerance; at most e².
+  Num growth(double wanted, const Num& log_error) const {
+    return exp(min((Num(std::log(wanted) + log_tolerance_) - log_error) * Num(1.0 / order_), Num(2.0)));
+  }
 
-  double first_scale() const { return std::min(1.0, root(tolerance_)); }
+  void follow_error(const Mask& which, const Num& h) {
+    const Num factor = min(max(growth(greedy_aim, log_error_), Num(least_growth)), Num(greedy_growth));
+    scale_ = select(which, h * density_ * factor, scale_);
+  }
 
   // The density is brought back where it has lost the pace: that a run does not retrace, and is rare.
-  void follow(const Tempo& tempo) {
-    const double next = density_ + scale_ * tempo.quickening;
-    if (!(next < farthest * tempo.pace) || !(next * farthest > tempo.pace)) return start_density(tempo);
-    density_before_ = density_;
-    density_ = next;
+  void follow(const Mask& which, const TempoOf<Num>& tempo) {
+    const Num next = fma(scale_, tempo.quickening, density_);
+    const Mask near = (next < Num(farthest) * tempo.pace) & (Num(farthest) * next > tempo.pace);
+    density_before_ = select(which, density_, density_before_);
+    density_ = select(which, next, density_);
+    if (any(which & !near)) start_density(which & !near, tempo);
   }
 
   // Half a step on from the state.
-  void start_density(const Tempo& tempo) {
-    const double change = std::clamp(scale_ * tempo.quickening / 2, -tempo.pace / 2, tempo.pace);
-    density_before_ = tempo.pace - change;
-    density_ = tempo.pace + change;
+  void start_density(const Mask& which, const TempoOf<Num>& tempo) {
+    const Num change = Num(0.5) * (scale_ * tempo.quickening);
+    const Num within = max(Num(-0.5) * tempo.pace, min(change, tempo.pace));
+    density_before_ = select(which, tempo.pace - within, density_before_);
+    density_ = select(which, tempo.pace + within, density_);
   }
 
-  void watch() {
-    window_.largest_error = std::max(window_.largest_error, error_);
-    if (++window_.steps < window_.length) return;
-    const double growth = window_.largest_error == 0 ? most_growth : root(aim * tolerance_ / window_.largest_error);
-    if (growth > worthwhile) scale_ *= std::min(growth, most_growth);
-    window_ = {0, 0, 2 * window_.length};
+  void watch(const Mask& which) {
+    window_.largest_error = select(which, max(window_.largest_error, log_error_), window_.largest_error);
+    window_.steps = select(which, window_.steps + Num(1.0), window_.steps);
+    const Mask seen = which & (window_.steps >= window_.length);
+    if (!any(seen)) return;
+    const Num larger = growth(aim, window_.largest_error);
+    scale_ = select(seen & (larger > Num(worthwhile)), scale_ * min(larger, Num(most_growth)), scale_);
+    forget_errors(seen);
+    window_.length = select(seen, Num(2.0) * window_.length, window_.length);
+  }
+
+  void forget_errors(const Mask& which) {
+    window_.largest_error = select(which, Num(never), window_.largest_error);
+    window_.steps = select(which, Num(0.0), window_.steps);
   }
 
   // What errors grow by on their way to the end of a run, as measured on random chains.
   static constexpr double safety = 4;
-  // Of a step, in the time in which motion changes: where it only begins, nothing says how fast it will be.
-  static constexpr double shortest = 1e-3;
   static constexpr double aim = 0.2;  // of the tolerance, where c is set
   // Of energy, in tolerances, as long as stages say that all is well: what they stand beside they do not see.
   static constexpr double most_imbalance = 5, energy_rounding = 1e-13;
-  static constexpr double greedy_aim = 0.03, greedy_growth = 1.5;
+  static constexpr double greedy_aim = 0.03, greedy_growth = 1.5, least_growth = 0.3;
   static constexpr double most_growth = 4, worthwhile = 1.05;
-  static constexpr double farthest = 2;  // of the density from the pace
+  static constexpr double farthest = 2;   // of the density from the pace
+  static constexpr double tiny = 1e-300;  // in place of zero
 
   int stages_, order_;
-  double tolerance_;
-  Steering steering_;
-  double scale_ = 1, density_ = 1, density_before_ = 0;
-  double last_step_ = 0;  // of the controller's choice; 0: there was none
-  double error_ = 0;      // of the last step that was solved
+  double tolerance_, log_tolerance_, first_scale_;
+  Mask greedy_;
+  Num scale_{1.0}, density_{1.0}, density_before_{0.0};
+  Num last_step_{0.0};    // of the controller's choice; 0: there was none
+  Num log_error_{never};  // of the last step that was solved
   Window window_;
 };
 

@@ -6,13 +6,81 @@
 #include <cstddef>
 #include <limits>
 #include <pendula/gauss/tableau.hpp>
+#include <pendula/numeric/numeric.hpp>
 
 namespace pendula {
 
 /// How fast the motion goes on.
-struct Tempo {
-  double pace = 0;        ///< R: 1/R is the time in which the motion changes  [1/s]
-  double quickening = 0;  ///< d ln R/dt; of the motion backwards its opposite  [1/s]
+template <class Num>
+struct TempoOf {
+  Num pace{0.0};        ///< R: 1/R is the time in which the motion changes  [1/s]
+  Num quickening{0.0};  ///< d ln R/dt; of the motion backwards its opposite  [1/s]
+};
+using Tempo = TempoOf<double>;
+
+/// How what a step shows of the motion decays from degree to degree, all squared: from that follows its error.
+template <class Num>
+struct StepDecay {
+  /// The Legendre coefficients of the rates on the step, times h, relative to the size of the motion, squared  [rad²].
+  std::array<Num, max_stages> squares;
+  Num beyond{0.0};     ///< that of degree s, the first that s stages cannot show; 0 where nobody looks
+  Num moved{0.0};      ///< (h R)², R in the middle
+  Num imbalance{0.0};  ///< of energy, relative to what there is, not squared; 0 where nobody looks
+
+  /// Whether the error of a step of so many stages depends on a coefficient.
+  static constexpr bool needs(int degree, int stages) { return degree < 2 || degree + 4 >= stages; }
+
+  /// The time in which the motion changes, in which the step goes on; where motion only begins, nothing says how fast
+  /// it will be.
+  Num time() const { return max(sqrt(moved), Num(shortest)); }
+
+  /// The logarithm of the error of a step by a method of this order and so many stages, relative to the size of the
+  /// motion and `time`.
+  ///
+  /// Coefficients of analytic motion decay geometrically, and the quadrature misses those from a degree of `order` on:
+  /// the last ones go on as they have come from h R, or, of swings that are small beside a radian, from what the
+  /// coefficients begin with, also where the swing turns; or, where that is worse, as from those before them.
+  Num log_error(int stages, int order) const {
+    const Num log_moved = log_root(moved);
+    return log_of_step(log_moved, stages, order) - max(log_moved, Num(std::log(shortest)));
+  }
+
+  static constexpr double never = -700;  ///< a logarithm below those of all errors
+
+ private:
+  static constexpr double shortest = 1e-3;
+  static constexpr double small = 10;     // h R over the largest coefficient
+  static constexpr double tiny = 1e-300;  // in place of zero
+  // Coefficients that are smaller, relative to h R, may be rounding; what follows from them would not show.
+  static constexpr double rounding = 1e-13;
+
+  static Num log_root(const Num& square) { return Num(0.5) * log(max(square, Num(tiny))); }
+  const Num& at(int k) const { return squares[static_cast<std::size_t>(k)]; }
+
+  Num log_of_step(const Num& log_moved, int stages, int order) const {
+    if (stages == 1) return Num(3.0) * log_moved;
+    const Num noise = log_moved + Num(std::log(rounding));
+    const Num largest = max(at(0), at(1) / min(moved, Num(1.0)));
+    const Num size = min(log_moved, log_root(largest) + Num(std::log(small)));
+    // The coefficient that quadrature begins to miss, where they decay from `size` to that of degree k as they go on to
+    // do.
+    const auto extended = [&](const Num& coefficient, int k) {
+      const Num error = fma(coefficient - size, Num((order - k) / double(k)), coefficient);
+      return select(coefficient > noise, error, Num(never));
+    };
+    const Num last = log_root(at(stages - 1));
+    Num error = extended(last, stages - 1);
+    if (any(beyond > Num(0.0))) error = max(error, extended(log_root(beyond), stages));
+    if (stages == 2) return error;
+    const Num next = log_root(at(stages - 2));
+    error = max(error, extended(next, stages - 2));
+    if (stages == 3) return error;
+    const Num later = max(at(stages - 1), Num(tiny)) + max(at(stages - 2), Num(tiny));
+    const Num before = max(at(stages - 3), Num(tiny)) + at(stages - 4);
+    const Num ratio = min(Num(0.0), Num(0.25) * log(later / before));  // from degree to degree
+    const Num goes_on = fma(ratio, Num(double(order - stages + 1)), max(last, ratio + next));
+    return select(error > Num(never), max(error, goes_on), error);
+  }
 };
 
 /// What a step that was solved shows of its own error.
@@ -28,41 +96,19 @@ struct StepShape {
   /// A coefficient that is smaller, relative to its coordinate, may be what that is rounded by.
   static constexpr double visible = 8 * std::numeric_limits<double>::epsilon();
 
-  /// The error of a step h by a method of this order and so many stages, relative to the size of the motion.
-  /// Coefficients of analytic motion decay geometrically, and the quadrature misses those from a degree of `order` on:
-  /// the last ones go on as they have come from h R, or, of swings that are small beside a radian, from what the
-  /// coefficients begin with, also where the swing turns; or, where that is worse, as from those before them.
-  double error(double h, int stages, int order) const {
-    const double moved = std::abs(h) * pace;
-    if (stages == 1) return moved * moved * moved;
-    const double size = std::min(moved, small * std::max(at(0), at(1) / std::min(moved, 1.0)));
-    double error = 0;
-    for (int k = std::max(1, stages - 2); k < stages; ++k) {
-      if (at(k) > rounding * moved) error = std::max(error, extended(at(k), k, size, order));
-    }
-    if (beyond > rounding * moved) error = std::max(error, extended(beyond, stages, size, order));
-    if (stages < 4 || error == 0) return error;
-    const double last = std::hypot(at(stages - 1), at(stages - 2)), before = std::hypot(at(stages - 3), at(stages - 4));
-    const double ratio = std::sqrt(std::min(1.0, last / before));  // from degree to degree
-    return std::max(error, std::max(at(stages - 1), ratio * at(stages - 2)) * std::pow(ratio, order - stages + 1));
-  }
-
   /// With so few stages all rests on one coefficient, which vanishes where loads balance gravity: that of degree s is
   /// worth its time where there are any.
   static constexpr int few_stages = 2;
 
- private:
-  static constexpr double small = 10;  // h R over the largest coefficient
-  // Coefficients that are smaller, relative to h R, may be rounding; what follows from them would not show.
-  static constexpr double rounding = 1e-13;
-
-  // The coefficient that quadrature begins to miss, where they decay from `size` to that of degree k as they go on to
-  // do.
-  static double extended(double coefficient, int k, double size, int order) {
-    return coefficient * std::pow(coefficient / size, (order - k) / double(k));
+  /// Of a step h.
+  StepDecay<double> of(double h) const {
+    StepDecay<double> squared;
+    std::ranges::transform(decay, squared.squares.begin(), [](double size) { return size * size; });
+    squared.beyond = beyond * beyond;
+    squared.moved = (h * pace) * (h * pace);
+    squared.imbalance = imbalance;
+    return squared;
   }
-
-  double at(int k) const { return decay[static_cast<std::size_t>(k)]; }
 };
 
 }  // namespace pendula

@@ -50,7 +50,7 @@ class GaussStepper {
     before_.step = 0;
     forget_linearization();
     const Status status = solver_.start(state);
-    if (status == Status::ok && controller_.chooses()) controller_.start(solver_.tempo());
+    if (status == Status::ok && controller_.chooses()) controller_.start(true, solver_.tempo());
     return {.status = status, .time = time(), .part = status == Status::ok ? -1 : solver_.singular_part()};
   }
 
@@ -211,7 +211,7 @@ class GaussStepper {
 
   /// Tries steps; one that errs too much is taken again, shorter, from what it has found.
   Outcome find_step(double longest, double most, int tries = most_attempts) {
-    const StepController before = controller_;
+    const StepController<double> before = controller_;
     int shorter = fixed_point_worth;
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
@@ -224,8 +224,8 @@ class GaussStepper {
       solver_.allow_newton(true);
       is_found = bool(outcome);
       if (is_found) {
-        const StepController wide = controller_;  // of what is narrow the steps elsewhere do not know
-        const bool is_good = controller_.accepts(solver_.shape(), h);
+        const StepController<double> wide = controller_;  // of what is narrow the steps elsewhere do not know
+        const bool is_good = controller_.accepts(true, solver_.shape().of(h), h);
         const bool sees_all = sees(longest, h);
         if (!sees_all) controller_ = wide;
         if (is_good && sees_all) {
@@ -234,13 +234,13 @@ class GaussStepper {
           ++statistics_.steps;
           if (is_cut) return outcome;
           statistics_.count_chosen(h);
-          controller_.move_on(h, [&] { return solver_.tempo(); });
+          controller_.move_on(true, h, [&] { return solver_.tempo(); });
           return outcome;
         }
         ++statistics_.rejected_steps;
         outcome.status = Status::tolerance_not_met;
       } else {
-        controller_.shrink(h, 0.5);
+        controller_.shrink(true, h, 0.5);
         solver_.forget();
         if (shorter > 0 && --shorter == 0) controller_ = before;
       }
@@ -432,7 +432,7 @@ class GaussStepper {
   Solver solver_;
   StepperOptions options_;
   RoundoffStop at_roundoff_;
-  StepController controller_;
+  StepController<double> controller_;
   Compensated<double> time_{};
   double defect_ = 0;  // of the last solution
   Unseen unseen_;

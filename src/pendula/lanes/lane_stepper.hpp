@@ -1,8 +1,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
-#include <pendula/lanes/lane_controller.hpp>
+#include <limits>
+#include <pendula/gauss/step_controller.hpp>
+#include <pendula/gauss/step_shape.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_stop.hpp>
 
@@ -31,7 +34,32 @@ class LaneStepper {
   using SpaceType = typename Chain::SpaceType;
   static constexpr int lanes = L::size, stages = Chain::stages, links_known = Chain::links_known;
   static constexpr bool is_implicit = true, can_choose = true, has_tangent = Chain::has_tangent;
-  using Controller = LaneController<L, stages>;
+
+  /// Chooses the steps of every member by a tolerance.
+  class Controller {
+   public:
+    explicit Controller(double tolerance) : tolerance_(tolerance), steps_(stages, 2 * stages, tolerance) {}
+
+    /// Members that start. Loads take or bring energy anyway.
+    void start(const Mask& which, LaneStepper& stepper) {
+      steps_.steer(which, stepper.chain().loaded());
+      steps_.start(which, stepper.tempo());
+      longest_ = select(which, stepper.chain().longest_step(tolerance_), longest_);
+    }
+    L step(const LaneStepper& /*stepper*/) const { return min(longest_, steps_.step()); }
+    Mask accepts(const Mask& which, const L& h, LaneStepper& stepper) {
+      return steps_.accepts(which, stepper.decay(), h);
+    }
+    void shrink(const Mask& which, const L& h, const L& factor) { steps_.shrink(which, h, factor); }
+    void move_on(const Mask& which, const L& h, LaneStepper& stepper) {
+      steps_.move_on(which, h, [&] { return stepper.tempo(); });
+    }
+
+   private:
+    double tolerance_;
+    StepController<L> steps_;
+    L longest_{std::numeric_limits<double>::infinity()};  // that shows what depends on time
+  };
 
   explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
       : chain_(subject),
@@ -109,6 +137,23 @@ class LaneStepper {
   static constexpr double cold = 0, solved = 1, accepted = 2;
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
   static L farthest_extrapolation() { return L(1.5); }
+
+  TempoOf<L> tempo() {
+    TempoOf<L> tempo;
+    chain_.tempo(tempo.pace, tempo.quickening);
+    return tempo;
+  }
+
+  // Of the step that was solved.
+  StepDecay<L> decay() {
+    StepDecay<L> decay;
+    for (int k = 0; k < stages; ++k) {
+      if (decay.needs(k, stages)) decay.squares[static_cast<std::size_t>(k)] = chain_.decay(k);
+    }
+    decay.moved = chain_.pace_squared();
+    if constexpr (requires { chain_.imbalance(); }) decay.imbalance = chain_.imbalance();
+    return decay;
+  }
 
   // Until all have arrived or never will; gives who has. once(active): one iteration.
   template <class Stop, class Once>
