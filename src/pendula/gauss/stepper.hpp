@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <pendula/gauss/fixed_point_stop.hpp>
 #include <pendula/gauss/linearization.hpp>
+#include <pendula/gauss/newton_stop.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/step_controller.hpp>
@@ -38,7 +40,8 @@ class GaussStepper {
   GaussStepper(const Model& model, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
       : solver_(model, stages, solver_options...),
         options_(options),
-        at_roundoff_(solver_.parts(), epsilon()),
+        fixed_point_stop_(correction_limits(solver_.parts())),
+        newton_stop_(solver_.parts(), epsilon()),
         controller_(stages, order_of(solver_.dissipates() ? Family::radau : Family::gauss, stages), options.tolerance,
                     options.steering.value_or(solver_.loaded() || solver_.dissipates() ? Steering::greedy
                                                                                        : Steering::symmetric)) {}
@@ -147,7 +150,7 @@ class GaussStepper {
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, statistics_, at_roundoff_, controller_, solver_);
+    numbers(time_, statistics_, fixed_point_stop_, newton_stop_, controller_, solver_);
   }
 
   const Solver& solver() const { return solver_; }
@@ -269,7 +272,8 @@ class GaussStepper {
 
   /// Iterates on the stages, which are predicted.
   Outcome solve(double h) {
-    at_roundoff_.restart();
+    newton_stop_.restart();
+    fixed_point_stop_.restart(1);
     Correction correction;
     double first = 0;
     for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
@@ -278,13 +282,28 @@ class GaussStepper {
       if (stop_()) return failure(Status::interrupted, h, iteration, {});
       if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
       if (iteration == 1) first = correction.relative;
-      if (!at_roundoff_.reached(correction.relative, solver_.convergence())) continue;
+      if (!is_at_roundoff(correction.relative)) continue;
       const Status status = status_of_solution(first);
       if (status != Status::ok) return failure(status, h, iteration, correction);
       return {
           .status = Status::ok, .time = time(), .step = h, .iterations = iteration, .residual = correction.relative};
     }
     return failure(Status::not_converged, h, options_.max_iterations, correction);
+  }
+
+  // A fixed point that is lost the solver itself leaves to Newton.
+  bool is_at_roundoff(double correction) {
+    if (solver_.convergence() == Convergence::quadratic) return newton_stop_.reached(correction);
+    return fixed_point_stop_.judge(correction * correction, true).done;
+  }
+
+  // Of what is left out, a thousandth of a last bit: of ten times that energy drifts, by 1e-21 a step (8 stages).
+  static CorrectionLimits correction_limits(int parts) {
+    return {.enough = 1e-19 * coarseness(epsilon()),
+            .last_bit = epsilon(),
+            .usual = usual_rounding(parts, epsilon()),
+            .small = most_rounding(parts, epsilon()),
+            .certainly = 8};
   }
 
   // Whether the stages are the solution that continues from a step of no length. Methods that
@@ -431,7 +450,8 @@ class GaussStepper {
 
   Solver solver_;
   StepperOptions options_;
-  RoundoffStop at_roundoff_;
+  FixedPointStop<double, sequences_of<Solver>()> fixed_point_stop_;
+  NewtonStop newton_stop_;
   StepController<double> controller_;
   Compensated<double> time_{};
   double defect_ = 0;  // of the last solution

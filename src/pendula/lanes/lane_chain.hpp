@@ -10,7 +10,6 @@
 #include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_loads.hpp>
 #include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_stop.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/lanes/members_in_lanes.hpp>
 #include <pendula/system/forcing_look.hpp>
@@ -34,7 +33,6 @@ class LaneChain
   using Motion = ChainMotion<Space, MembersInLanes<S, Number>, N>;
   using SpaceType = Space;
   using Subject = int;
-  using Stop = LaneStop<L>;
   using Columns = typename Motion::Columns;
   using Vector = std::array<L, static_cast<std::size_t>(Space::dimension)>;
   static constexpr bool has_tangent = with_tangent;

@@ -13,7 +13,6 @@
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/lanes/lane_stage_tangent.hpp>
-#include <pendula/lanes/lane_stop.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/lanes/lane_turned.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -33,9 +32,9 @@ class LaneLagrangian {
   using Mask = typename L::Mask;
   using SpaceType = CoordinateSpace;
   using Subject = LaneDynamics<L>&;
-  using Stop = LaneStop<L, 2>;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
+  static constexpr int sequences = 2;         ///< of corrections of its fixed point, as LagrangianSolver's
   static constexpr int most_iterations = 25;  ///< of a step whose size is chosen
   static constexpr std::size_t D = 1;
   using Vector = std::array<L, D>;

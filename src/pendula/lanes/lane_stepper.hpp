@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <pendula/gauss/fixed_point_stop.hpp>
 #include <pendula/gauss/step_controller.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_stop.hpp>
 
 namespace pendula {
 
@@ -64,8 +64,8 @@ class LaneStepper {
   explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
       : chain_(subject),
         options_(options),
-        stop_(options.enough),
-        tangent_stop_(std::max(options.enough, tangent_enough)) {}
+        stop_({.enough = options.enough}),
+        tangent_stop_({.enough = std::max(options.enough, tangent_enough)}) {}
 
   Chain& chain() { return chain_; }
   const Chain& chain() const { return chain_; }
@@ -171,8 +171,8 @@ class LaneStepper {
 
   Chain chain_;
   LaneStepperOptions options_;
-  typename Chain::Stop stop_;
-  LaneStop<L> tangent_stop_;  // of stages of tangents that are solved after the motion's
+  FixedPointStop<L, sequences_of<Chain>()> stop_;
+  FixedPointStop<L> tangent_stop_;  // of stages of tangents that are solved after the motion's
   L known_{cold}, last_{0.0},
       depth_{0.0};  // of the stages: what they are of, the size of their step, how many such steps it follows
   std::int64_t iterations_ = 0;
