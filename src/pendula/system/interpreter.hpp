@@ -8,10 +8,10 @@
 #include <limits>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numbers_of_states.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/stage_product.hpp>
 #include <pendula/system/program.hpp>
-#include <type_traits>
 
 namespace pendula {
 
@@ -19,9 +19,10 @@ namespace detail {
 
 /// Carries out programs, for W states at once: registers are rows of W numbers.
 template <int W>
-class Interpreter {
+class Interpreter : NumbersOfStates<W> {
+  using typename NumbersOfStates<W>::L;
+  using NumbersOfStates<W>::load, NumbersOfStates<W>::store;
   using Lanes = Pack<W, RegisterFor<W>>;
-  using L = std::conditional_t<W == 1, double, Lanes>;
   static constexpr auto width = static_cast<std::size_t>(W);
 
  public:
@@ -56,21 +57,6 @@ class Interpreter {
     carry_out(function.code.data(), to);
     for (const ProgramMove& move : function.writes) {
       store(load(to + move.place * width), arrays[move.array] + move.row * width);
-    }
-  }
-
-  static L load(const double* from) {
-    if constexpr (W == 1) {
-      return *from;
-    } else {
-      return L::load(from);
-    }
-  }
-  static void store(const L& number, double* to) {
-    if constexpr (W == 1) {
-      *to = number;
-    } else {
-      number.store(to);
     }
   }
 

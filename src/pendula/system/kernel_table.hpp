@@ -8,11 +8,11 @@
 #include <pendula/numeric/dual_functions.hpp>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numbers_of_states.hpp>
 #include <pendula/numeric/stage_product.hpp>
 #include <pendula/system/system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
-#include <type_traits>
 
 namespace pendula {
 
@@ -20,8 +20,9 @@ namespace detail {
 
 /// The functions of the generated kernel S, of W states at once.
 template <System S, int W>
-class KernelFunctions {
-  using L = std::conditional_t<W == 1, double, Pack<W, RegisterFor<W>>>;
+class KernelFunctions : NumbersOfStates<W> {
+  using typename NumbersOfStates<W>::L;
+  using NumbersOfStates<W>::load, NumbersOfStates<W>::store;
   static constexpr auto width = static_cast<std::size_t>(W);
   template <class Number>
   using Vector = typename S::template Vector<Number>;
@@ -79,21 +80,6 @@ class KernelFunctions {
 
  private:
   // --- Numbers as they cross ---
-
-  static L load(const double* from) {
-    if constexpr (W == 1) {
-      return *from;
-    } else {
-      return L::load(from);
-    }
-  }
-  static void store(const L& number, double* to) {
-    if constexpr (W == 1) {
-      *to = number;
-    } else {
-      number.store(to);
-    }
-  }
 
   // Rows of W numbers, and with their derivatives.
   struct Rows {
