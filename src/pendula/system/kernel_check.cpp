@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 #include <pendula/system/kernel_check.hpp>
+#include <pendula/system/kernel_widths.hpp>
 #include <random>
 #include <tuple>
 #include <utility>
@@ -106,6 +107,9 @@ class ChainDraw {
     }
     for (std::size_t k = 0; k < info.inputs.size(); ++k) inputs_.push_back(uniform(-1, 1));
   }
+
+  /// Lives as long as this.
+  KernelPoint point() const { return {0, parameters_, inputs_, q_, v_, a_}; }
 
   /// ∂E/∂q, ∂E/∂v, ∂E/∂a.
   double residual_jacobians() const {
@@ -271,13 +275,17 @@ constexpr std::array<CheckItem, 10> items{{
 KernelCheck check_chain_kernel(const SystemTable& table, unsigned seed) {
   constexpr int draws = 5;
   KernelCheck check;
-  check.count = static_cast<int>(items.size());
   for (std::size_t k = 0; k < items.size(); ++k) check.lines[k] = items[k].line;
   std::mt19937 random(seed);
-  for (int i = 0; i < draws; ++i) {
-    const ChainDraw draw(table, random);
+  std::vector<ChainDraw> drawn;
+  std::vector<KernelPoint> points;
+  for (int i = 0; i < draws; ++i) drawn.emplace_back(table, random);
+  for (const ChainDraw& draw : drawn) {
+    points.push_back(draw.point());
     for (std::size_t k = 0; k < items.size(); ++k) check.lines[k].keep((draw.*items[k].measure)());
   }
+  check.lines[items.size()] = {width_line, width_error(table, points), 1e-13};  // 5.5e-16
+  check.count = static_cast<int>(items.size()) + 1;
   return check;
 }
 

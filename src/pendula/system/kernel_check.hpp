@@ -21,12 +21,13 @@ struct KernelCheck {
     }
   };
 
-  std::array<Line, 10> lines;
+  std::array<Line, 11> lines;
   int count = 0;
 };
 
 /// Checks the generated kernel of a chain against itself with seeded random parameters in random states: each Jacobian
-/// against differences of the function it belongs to, each pair of entry points that must agree.
+/// against differences of the function it belongs to, each pair of entry points that must agree, functions of several
+/// states against those of one.
 KernelCheck check_chain_kernel(const SystemTable& table, unsigned seed);
 
 }  // namespace pendula

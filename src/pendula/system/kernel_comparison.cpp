@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 #include <pendula/system/kernel_comparison.hpp>
+#include <pendula/system/kernel_widths.hpp>
 #include <stdexcept>
 #include <string_view>
 
@@ -78,6 +79,8 @@ void KernelComparison::compare_solved(std::size_t point, const std::vector<doubl
 
 KernelCheck KernelComparison::check() const {
   constexpr double limit = 8;
+  // Between functions that are told from what the model says above: one that is wrong is off by more.
+  constexpr double width_limit = 1e-6;
   KernelCheck check;
   const auto add = [&](std::string_view what) {
     check.lines[static_cast<std::size_t>(check.count++)] = {what, 0, limit};
@@ -118,7 +121,9 @@ KernelCheck KernelComparison::check() const {
         return residuals;
     }
   };
-  std::array<int, 10> compared{};
+  const std::size_t lanes = add(width_line);
+  std::vector<KernelPoint> all;
+  std::array<int, 11> compared{};
   const auto keep = [&](std::size_t line, double error) {
     check.lines[line].keep(error);
     ++compared[line];
@@ -127,6 +132,9 @@ KernelCheck KernelComparison::check() const {
   for (std::size_t point = 0; point < count_; ++point) {
     const double* at = arguments(point);
     const PlainSystem system{at + 1 + 3 * n_, at + 1 + 3 * n_ + parameters_, {}};
+    const auto numbers = [](const double* from, int count) { return std::span(from, static_cast<std::size_t>(count)); };
+    all.push_back({at[0], numbers(system.parameters, parameters_), numbers(system.inputs, inputs_), numbers(at + 1, n_),
+                   numbers(at + 1 + n_, n_), numbers(at + 1 + 2 * n_, n_)});
     evaluate_kernel(table_, system, at[0], at + 1, at + 1 + n_, at + 1 + 2 * n_, values.data());
     const double* value = values.data();
     for (const Written what : kernel_outputs) {
@@ -137,6 +145,8 @@ KernelCheck KernelComparison::check() const {
     }
     compare_solved(point, values, [&](double error) { keep(solutions, error); });
   }
+  check.lines[lanes].limit = width_limit;
+  if (!all.empty()) keep(lanes, width_error(table_, all));
   for (int k = 0; k < check.count; ++k) {
     if (compared[static_cast<std::size_t>(k)] == 0) {
       check.lines[static_cast<std::size_t>(k)].error = std::numeric_limits<double>::quiet_NaN();

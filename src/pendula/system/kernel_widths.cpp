@@ -1,0 +1,201 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <initializer_list>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/kernel_check.hpp>
+#include <pendula/system/kernel_widths.hpp>
+#include <tuple>
+#include <vector>
+
+namespace pendula {
+namespace {
+
+using Numbers = std::vector<double>;
+/// An array of each point.
+using Arrays = std::vector<Numbers>;
+/// Rows of as many numbers as there are lanes.
+using Wide = std::vector<double, detail::PackAllocator<double>>;
+
+constexpr std::array<std::size_t, 3> widths{2, 4, 8};
+
+const SystemFunctions& functions(const SystemTable& table, std::size_t width) {
+  return width == 1 ? table.of_1 : width == 2 ? table.of_2 : width == 4 ? table.of_4 : table.of_8;
+}
+
+/// Differences from numbers that are right, of any size.
+class Difference {
+ public:
+  void take(double found, double right) {
+    if (std::isfinite(right)) largest_ = std::max(largest_, std::abs(right));
+    if (found == right || (std::isnan(found) && std::isnan(right))) return;
+    worst_.keep(std::abs(found - right));
+  }
+  double relative() const { return worst_.error == 0 ? 0 : worst_.error / (largest_ > 0 ? largest_ : 1); }
+
+ private:
+  KernelCheck::Line worst_;
+  double largest_ = 0;
+};
+
+class Widths {
+ public:
+  Widths(const SystemTable& table, std::span<const KernelPoint> points)
+      : table_(table), points_(points), n_(table.info.coordinates.size()) {
+    for (const KernelPoint& point : points) {
+      const auto add = [](Arrays& arrays, std::span<const double> numbers) {
+        arrays.emplace_back(numbers.begin(), numbers.end());
+      };
+      times_.push_back({point.time});
+      add(parameters_, point.parameters);
+      add(inputs_, point.inputs);
+      add(q_, point.q);
+      add(v_, point.v);
+      add(a_, point.a);
+    }
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Wide p = call(&SystemFunctions::momentum_from_velocity, 1, k, {&q_, &v_}, {n_})[0];
+      p_.emplace_back(p.begin(), p.end());
+    }
+  }
+
+  double error() {
+    using Of = SystemFunctions;
+    const std::size_t square = n_ * n_;
+    compare(&Of::hamiltonian_form, {&q_, &p_}, {n_, n_});
+    compare(&Of::momentum_form, {&q_, &v_}, {n_, n_});
+    compare(&Of::momentum_form_with_jacobians, {&q_, &v_}, {n_, n_, square, square, square, square});
+    compare(&Of::residual_with_jacobians, {&q_, &v_, &a_}, {n_, square, square, square});
+    compare(&Of::momentum_from_velocity, {&q_, &v_}, {n_});
+    compare(&Of::velocity_from_momentum, {&q_, &p_}, {n_});
+    compare(&Of::acceleration, {&q_, &v_}, {n_});
+    compare(&Of::mass_matrix, {&q_}, {square});
+    compare(&Of::energies, {&q_, &v_}, {1, 1});
+    compare(&Of::power, {&q_, &v_}, {1});
+    compare(&Of::acceleration_along, {&q_, &v_, &v_, &a_}, {n_, n_});
+    compare(&Of::momentum_form_along, {&parameters_, &inputs_, &q_, &v_}, {n_, n_});
+    if (table_.of_1.call_arguments != nullptr) {
+      compare(&Of::call_arguments, {&q_, &v_}, {table_.info.argument_is_base.size()});
+    }
+    compare_iteration(1);
+    for (const std::size_t width : widths) compare_iteration(width);
+    return worst_.error;
+  }
+
+ private:
+  std::size_t point_of(std::size_t first, std::size_t lane) const { return (first + lane) % points_.size(); }
+
+  // Of points side by side. No numbers have an address, too.
+  Wide wide(const Arrays& arrays, std::size_t width, std::size_t first) const {
+    const std::size_t rows = arrays[0].size();
+    Wide numbers((rows + 1) * width);
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const Numbers& from = arrays[point_of(first, lane)];
+      for (std::size_t k = 0; k < rows; ++k) numbers[k * width + lane] = from[k];
+    }
+    return numbers;
+  }
+
+  /// What a function of so many states finds at the points from the first on, outputs of so many rows.
+  template <class... Places>
+  std::vector<Wide> call(void (*SystemFunctions::*function)(const Conditions&, Places...), std::size_t width,
+                         std::size_t first, std::initializer_list<const Arrays*> given,
+                         std::initializer_list<std::size_t> rows) const {
+    const Wide parameters = wide(parameters_, width, first), times = wide(times_, width, first),
+               inputs = wide(inputs_, width, first);
+    std::vector<Wide> taken, found;
+    std::array<double*, sizeof...(Places)> places{};
+    for (const Arrays* arrays : given) taken.push_back(wide(*arrays, width, first));
+    for (const std::size_t count : rows) found.emplace_back(count * width);
+    auto* place = places.begin();
+    for (std::vector<Wide>* wides : {&taken, &found}) {
+      for (Wide& numbers : *wides) *place++ = numbers.data();
+    }
+    const Conditions at{table_.context, parameters.data(), times.data(), inputs.data()};
+    std::apply([&](auto... to) { (functions(table_, width).*function)(at, to...); }, places);
+    return found;
+  }
+
+  template <class... Places>
+  void compare(void (*SystemFunctions::*function)(const Conditions&, Places...),
+               std::initializer_list<const Arrays*> given, std::initializer_list<std::size_t> rows) {
+    std::vector<std::vector<Wide>> right;
+    for (std::size_t k = 0; k < points_.size(); ++k) right.push_back(call(function, 1, k, given, rows));
+    std::vector<Difference> differences(rows.size());
+    for (const std::size_t width : widths) {
+      for (std::size_t first = 0; first < points_.size(); ++first) {
+        const std::vector<Wide> found = call(function, width, first, given, rows);
+        for (std::size_t output = 0; output < found.size(); ++output) {
+          for (std::size_t k = 0; k < found[output].size(); ++k) {
+            differences[output].take(found[output][k], right[point_of(first, k % width)][output][k / width]);
+          }
+        }
+      }
+    }
+    for (const Difference& difference : differences) worst_.keep(difference.relative());
+  }
+
+  /// One iteration on stages that are not those of any method, against hamiltonian_form of each.
+  void compare_iteration(std::size_t width) {
+    Difference increments, changes;
+    for (std::size_t first = 0; first < points_.size(); ++first) {
+      // Stages differ in time and inputs; parameters are those of one system.
+      const Wide parameters = wide(Arrays(points_.size(), parameters_[first]), width, 0),
+                 times = wide(times_, width, first), inputs = wide(inputs_, width, first);
+      Wide m(width * width), hb(width), before(2 * n_ * width);
+      for (std::size_t k = 0; k < m.size(); ++k) m[k] = 0.2 + 0.1 * std::sin(static_cast<double>(k));
+      for (std::size_t k = 0; k < width; ++k) hb[k] = 1e-3 / static_cast<double>(k + 1);
+      std::vector<Compensated<double>> start(2 * n_);
+      Numbers weights(2 * n_);
+      for (std::size_t k = 0; k < 2 * n_; ++k) {
+        start[k] = {(k < n_ ? q_ : p_)[first][k % n_], 0};
+        weights[k] = 1 + static_cast<double>(k);
+        for (std::size_t lane = 0; lane < width; ++lane) {
+          before[k * width + lane] = 1e-3 * std::cos(static_cast<double>(k + 5 * lane));
+        }
+      }
+      Wide after = before;
+      const IterationChange said = functions(table_, width)
+                                       .iterate({table_.context, parameters.data(), times.data(), inputs.data()},
+                                                {m.data(), hb.data(), start.data(), weights.data(), after.data()});
+      IterationChange right{0, 0};
+      for (std::size_t lane = 0; lane < width; ++lane) {
+        const std::size_t stage = point_of(first, lane);
+        Numbers reached(2 * n_), rates(2 * n_);
+        for (std::size_t k = 0; k < 2 * n_; ++k) {
+          reached[k] = start[k].value;
+          for (std::size_t j = 0; j < width; ++j) reached[k] += m[j * width + lane] * before[k * width + j];
+        }
+        const Conditions at{table_.context, parameters_[first].data(), times_[stage].data(), inputs_[stage].data()};
+        table_.of_1.hamiltonian_form(at, reached.data(), reached.data() + n_, rates.data(), rates.data() + n_);
+        for (std::size_t k = 0; k < 2 * n_; ++k) {
+          const double now = hb[lane] * rates[k], was = before[k * width + lane];
+          increments.take(after[k * width + lane], now);
+          right.size = std::max(right.size, weights[k] * std::abs(now));
+          right.change = std::max(right.change, weights[k] * std::abs(now - was));
+        }
+      }
+      if (!std::isfinite(right.size)) continue;
+      changes.take(said.size, right.size);
+      changes.take(said.change, right.change);
+    }
+    worst_.keep(increments.relative());
+    worst_.keep(changes.relative());
+  }
+
+  const SystemTable& table_;
+  std::span<const KernelPoint> points_;
+  std::size_t n_;
+  Arrays times_, parameters_, inputs_, q_, v_, a_, p_;
+  KernelCheck::Line worst_;
+};
+
+}  // namespace
+
+double width_error(const SystemTable& table, std::span<const KernelPoint> points) {
+  return points.empty() ? 0 : Widths(table, points).error();
+}
+
+}  // namespace pendula
