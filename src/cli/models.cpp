@@ -83,7 +83,8 @@ ExitStatus build(const BuildOptions& options) {
     if (kernel.file.empty()) {
       std::cout << "part of this program\n";
     } else {
-      std::cout << (kernel.was_there ? "kept in " : "made as ") << kernel.file.string() << '\n';
+      std::cout << (kernel.by() == "compiler" ? "compiled, " : "interpreted, ")
+                << (kernel.was_there ? "kept in " : "made as ") << kernel.file.string() << '\n';
     }
     return done;
   } catch (const io::ModelError& error) {

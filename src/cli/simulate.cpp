@@ -358,18 +358,18 @@ ExitStatus simulate(const SimulateOptions& options) {
     spare_scenario(*options.video, "film", options);
     if (check_film(*options.video) != done) return wrong_input;
   }
-  std::string model;
+  std::string model, kernel_by = "build";
   const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
                                   const std::filesystem::path& beside) {
     const io::Toolchain toolchain = io::Toolchain::of_this_program();
     const std::filesystem::path folder = options.resume ? model_folder(*options.resume, name, beside) : beside;
     model = io::model_source(name, links, folder, toolchain);
     require_same_model(source, model);
-    return io::find_kernel(name, links, folder, toolchain,
-                           [&](const std::string& what) {
-                             if (!options.quiet) std::cerr << "pendula: " << what << '\n';
-                           })
-        .table;
+    const io::ModelKernel kernel = io::find_kernel(name, links, folder, toolchain, [&](const std::string& what) {
+      if (!options.quiet) std::cerr << "pendula: " << what << '\n';
+    });
+    kernel_by = kernel.by();
+    return kernel.table;
   };
   const io::AnyScenario any = io::parse_scenario(source.text.text, source.text.name, source.overrides, find);
   return std::visit(
@@ -388,6 +388,7 @@ ExitStatus simulate(const SimulateOptions& options) {
         check_events(options, setup);
         Session session(setup, scene_of(scenario, source), scenario, source, model, options);
         io::Summary summary = session.run();
+        summary.kernel_by = kernel_by;
         describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);
         session.conclude(summary);
         std::ostream& out = options.output == "-" ? std::cerr : std::cout;

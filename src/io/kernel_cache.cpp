@@ -464,6 +464,11 @@ std::string model_source(const std::string& model, std::optional<int> links, con
   return built_in_table(model, links) ? "" : read_model(find_model(model, folder, toolchain));
 }
 
+std::string_view ModelKernel::by() const {
+  if (file.empty()) return "build";
+  return file.extension() == compiled ? "compiler" : "interpreter";
+}
+
 ModelKernel find_kernel(const std::string& model, std::optional<int> links, const fs::path& folder,
                         const Toolchain& toolchain, const std::function<void(const std::string&)>& tell) {
   if (const SystemTable* table = built_in_table(model, links)) return {{}, {table, [](const SystemTable*) {}}};

@@ -8,6 +8,7 @@
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/input_error.hpp"
@@ -42,6 +43,9 @@ struct ModelKernel {
   std::filesystem::path file;  ///< empty where it is part of this program
   std::shared_ptr<const SystemTable> table;
   bool was_there = true;  ///< not made just now
+
+  /// What its functions come from: "build" where it is part of this program, else "compiler" or "interpreter".
+  std::string_view by() const;
 };
 
 /// Finds the kernel of a model: one of this build, one kept, or one derived now, and compiled or not. `model` is a file

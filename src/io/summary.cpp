@@ -199,6 +199,7 @@ std::string settings(const Summary& summary) {
   const Description& description = summary.description;
   std::string solver = description.solver.empty() ? "" : description.solver + ", " + description.iteration;
   if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
+  if (!description.kernel.empty() && summary.kernel_by == "interpreter") solver += ", interpreted";
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
   if (summary.aimed) text += line("accuracy", shortest(summary.accuracy));
@@ -342,6 +343,7 @@ Json json_of(const Summary& summary) {
                    {"solver", or_null(summary.description.solver)},
                    {"iteration", or_null(summary.description.iteration)},
                    {"kernel", or_null(summary.description.kernel)},
+                   {"kernel_by", where(!summary.description.kernel.empty(), summary.kernel_by)},
                    {"step", where(!adaptive, summary.options.step)},
                    {"tolerance", where(adaptive, summary.options.tolerance)},
                    {"accuracy", where(summary.aimed.has_value(), summary.accuracy)},

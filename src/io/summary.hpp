@@ -67,7 +67,8 @@ struct Summary : RunReport {
   double accuracy = 0;  ///< as asked for
   double duration = 0;  ///< as asked for
   std::int64_t every = 0;
-  RowTimes at;  ///< rows are there, where there are any
+  std::string kernel_by = "build";  ///< ModelKernel::by, where there is a kernel
+  RowTimes at;                      ///< rows are there, where there are any
   Ending ending;
   std::vector<std::string> shown;         ///< columns of the table
   Snapshot final;                         ///< the last state reached, of a chain

@@ -98,7 +98,7 @@ def test_summary_has_the_keys_of_the_interface(pendula, double):
     assert summary["method"] == "gauss"
     assert summary["solver"] == "dense"
     assert summary["iteration"] == "fixed-point"
-    assert summary["kernel"] == "planar_2"
+    assert (summary["kernel"], summary["kernel_by"]) == ("planar_2", "build")
     assert summary["steps"] == 200
     assert summary["newton_iterations"] >= summary["steps"]
     assert summary["outcome"] == {"status": "ok"}
@@ -128,6 +128,7 @@ def test_chains_without_a_kernel_run(pendula, double):
     given = settings("chain.masses=1", "chain.lengths=0.01", "chain.links=97", "run.duration=0.05")
     summary = pendula("simulate", double, "--json", *given).json
     assert (summary["links"], summary["kernel"], summary["outcome"]) == (97, None, {"status": "ok"})
+    assert summary["kernel_by"] is None
     assert len(summary["final"]["bobs"]) == 97
 
 

@@ -1,6 +1,7 @@
 """Models without a compiler: their kernels are interpreted, and move as compiled ones do."""
 
 import json
+import re
 from pathlib import Path
 
 import h5py
@@ -69,6 +70,23 @@ METHODS = {
     "newton": 'iteration = "newton"',
     "dopri5": 'method = "dopri5"',
 }
+
+
+def test_the_summary_says_what_ran(pendula, tmp_path, moved):
+    for by in ("compiler", "interpreter"):
+        assert moved(SCENARIO, by)["kernel_by"] == by
+    scenario = tmp_path / "run.toml"
+    solvers = {
+        by: re.search("solver .*", pendula("simulate", scenario, PENDULA_KERNELS_BY=by).stdout)[0]
+        for by in ("compiler", "interpreter")
+    }
+    assert solvers["compiler"].endswith(", kernel furuta")
+    assert solvers["interpreter"] == solvers["compiler"] + ", interpreted"
+
+
+def test_a_build_says_it(pendula):
+    for by, said in (("compiler", "compiled, "), ("interpreter", "interpreted, ")):
+        assert pendula("build", "furuta", PENDULA_KERNELS_BY=by).stdout.splitlines()[1].startswith(said)
 
 
 @pytest.mark.parametrize("method", METHODS)
