@@ -2,6 +2,7 @@
 
 import json
 import random
+import sys
 
 import pytest
 from conftest import EXAMPLES
@@ -71,3 +72,27 @@ def test_models_pass_with_any_numbers(model, links, pendula, tmp_path):
         scenario.write_text(drawn(about, draw))
         ended = pendula("check", scenario)
         assert ended.returncode == 0, ended.stdout + ended.stderr + scenario.read_text()
+
+
+# A compiler that takes momenta for the accelerations of four states.
+WRONG_COMPILER = f"""#!{sys.executable}
+import os, sys
+from pathlib import Path
+right = "  (Function)NAME(acceleration),"
+wrong = f"#if WIDTH == 4\\n  (Function)NAME(momentum_from_velocity),\\n#else\\n{{right}}\\n#endif"
+for text in [Path(word) for word in sys.argv if word.endswith(".c")]:
+    own = text.with_suffix(f".{{os.getpid()}}")  # it runs beside others
+    own.write_text(text.read_text().replace(f"\\n{{right}}\\n  (", f"\\n{{wrong}}\\n  ("))
+    own.rename(text)
+os.execvp("cc", ["cc", *sys.argv[1:]])
+"""
+
+
+def test_a_function_of_four_states_that_is_wrong_is_found(pendula, tmp_path):
+    compiler = tmp_path / "wrong"
+    compiler.write_text(WRONG_COMPILER)
+    compiler.chmod(0o755)
+    ended = pendula("check", EXAMPLES / "furuta.toml", CC=str(compiler), XDG_CACHE_HOME=str(tmp_path))
+    failed = [line for line in ended.stdout.splitlines() if line.endswith("FAILED")]
+    assert ended.returncode == 1 and len(failed) == 1, ended.stdout + ended.stderr
+    assert "functions of 2, 4 and 8 states, as of one" in failed[0]

@@ -279,6 +279,7 @@ KernelCheck check_chain_kernel(const SystemTable& table, unsigned seed) {
   std::mt19937 random(seed);
   std::vector<ChainDraw> drawn;
   std::vector<KernelPoint> points;
+  drawn.reserve(draws);
   for (int i = 0; i < draws; ++i) drawn.emplace_back(table, random);
   for (const ChainDraw& draw : drawn) {
     points.push_back(draw.point());

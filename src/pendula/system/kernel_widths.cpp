@@ -122,6 +122,7 @@ class Widths {
   void compare(void (*SystemFunctions::*function)(const Conditions&, Places...),
                std::initializer_list<const Arrays*> given, std::initializer_list<std::size_t> rows) {
     std::vector<std::vector<Wide>> right;
+    right.reserve(points_.size());
     for (std::size_t k = 0; k < points_.size(); ++k) right.push_back(call(function, 1, k, given, rows));
     std::vector<Difference> differences(rows.size());
     for (const std::size_t width : widths) {
