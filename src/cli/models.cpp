@@ -83,7 +83,7 @@ ExitStatus build(const BuildOptions& options) {
     if (kernel.file.empty()) {
       std::cout << "part of this program\n";
     } else {
-      std::cout << (kernel.by() == "compiler" ? "compiled, " : "interpreted, ")
+      std::cout << (kernel.by() == "compiler" ? "compiled\n" : "interpreted\n")
                 << (kernel.was_there ? "kept in " : "made as ") << kernel.file.string() << '\n';
     }
     return done;
