@@ -298,7 +298,7 @@ TEST(EnsembleLanesTest, WidthsAgree) {
 }
 
 template <class Space>
-using WithTangent = LaneRods<Space, 3, MemberRegister, true>;
+using WithTangent = LaneRods<Space, 3, LanePack<MemberRegister>, true>;
 
 // Rods of members that have started, moved along their tangents.
 template <class Space>

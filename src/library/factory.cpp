@@ -1,14 +1,13 @@
 #include "library/factory.hpp"
 
-#include <pendula/chain/chain_forward_dynamics.hpp>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/explicit/explicit_integrator.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/run/integrator.hpp>
 #include <stdexcept>
 #include <string>
 
 #include "library/chain_integrator.hpp"
+#include "library/explicit_methods.hpp"
 #include "library/system_integrator.hpp"
 #include "library/taylor_integrator.hpp"
 
@@ -51,9 +50,7 @@ std::unique_ptr<PlainIntegrator> make_over(const SystemTable& kernel, const Plai
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
   if (options.method == Method::taylor) return make_taylor_integrator(chain_of<Space>(chain), options);
-  if (const SystemTable* kernel = find_kernel<Space>(chain.links)) return make_over<Space>(*kernel, chain, options);
-  return make_explicit_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain_of<Space>(chain)),
-                                  Space::dof * chain.links, chain.links, options, "");
+  return make_explicit_chain(chain_of<Space>(chain), options);
 }
 
 // On few links in the plane fixed points over the generated kernel take less, whatever the registers are (table "few

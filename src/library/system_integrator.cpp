@@ -1,10 +1,10 @@
 #include "library/system_integrator.hpp"
 
-#include <pendula/explicit/explicit_integrator.hpp>
-#include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/gauss/gauss_integrator.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/velocity_newton.hpp>
+
+#include "library/explicit_methods.hpp"
 
 namespace pendula {
 namespace {
@@ -24,13 +24,10 @@ std::unique_ptr<PlainIntegrator> make_gauss(const SystemModel& model, const RunO
 
 std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table, const PlainSystem& plain,
                                                         const RunOptions& options, int parts) {
+  if (is_explicit(options.method)) return make_explicit_system(table, plain, options);
   const SystemModel model(table, plain);
   const auto coordinates = static_cast<int>(model.coordinates());
   if (parts == 0) parts = coordinates;
-  if (is_explicit(options.method)) {
-    return make_explicit_integrator(std::make_unique<SystemForwardDynamics>(model), coordinates, parts, options,
-                                    table.info.name);
-  }
   const GaussDescription described{"dense", table.info.name, parts};
   const Family family = family_of(options.method);
   require_stages(options.stages);

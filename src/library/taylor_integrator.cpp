@@ -19,7 +19,7 @@ namespace {
 /// One chain in the first lane of the least register: steps are those of an ensemble's member.
 template <class Space>
 class TaylorIntegrator : public PlainIntegrator {
-  using Rods = LaneRods<Space, Eigen::Dynamic, RegisterFor<2>>;
+  using Rods = LaneRods<Space, Eigen::Dynamic, LanePack<RegisterFor<2>>>;
   using Stepper = LaneTaylor<Rods>;
   using L = typename Stepper::L;
   using Direction = typename Space::Link::template Cartesian<double>;

@@ -5,6 +5,7 @@
 #include <pendula/gauss/pace.hpp>
 #include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/width.hpp>
 #include <pendula/system/mass_scale.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
@@ -27,7 +28,7 @@ class LaneDynamics {
   /// `table` must outlive it.
   explicit LaneDynamics(const SystemTable& table)
       : table_(table),
-        functions_(functions_of<L::size>(table)),
+        functions_(functions_of<static_cast<int>(width_of<L>)>(table)),
         parameters_(1 + parameter_count(table.info)),  // none has an address, too
         inputs_now_(1 + table.info.inputs.size()),
         inputs_(table.info.inputs.size()) {}
@@ -100,13 +101,13 @@ class LaneDynamics {
   const SystemInfo& info() const { return table_.info; }
 
   Conditions at(const double* times) {
-    inputs_.at(L::load(times), inputs_now_);
+    inputs_.at(from_row<L>(times), inputs_now_);
     return {table_.context, parameters_[0], times, inputs_now_[0]};
   }
 
   const SystemTable& table_;
   SystemFunctions functions_;
-  PackRows<L::width> parameters_, inputs_now_;
+  PackRows<width_of<L>> parameters_, inputs_now_;
   LaneInputs<L> inputs_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/numeric.hpp>
 
 namespace pendula {
 
@@ -11,7 +12,7 @@ namespace pendula {
 template <class L, int Order>
 class LaneErrorController {
  public:
-  using Mask = typename L::Mask;
+  using Mask = MaskOf<L>;
 
   explicit LaneErrorController(double tolerance)
       : tolerance_(tolerance),
@@ -50,6 +51,11 @@ class LaneErrorController {
   template <class Stepper>
   void move_on(const Mask& which, const L& /*h*/, Stepper& /*stepper*/) {
     next_ = select(which, grown_, next_);
+  }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(next_, grown_, longest_);
   }
 
  private:

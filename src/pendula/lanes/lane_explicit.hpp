@@ -4,83 +4,106 @@
 #include <cmath>
 #include <pendula/lanes/explicit_tableau.hpp>
 #include <pendula/lanes/lane_error_controller.hpp>
+#include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_rods.hpp>
 #include <pendula/lanes/lane_state.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <utility>
 #include <vector>
 
 namespace pendula {
 
-/// An explicit Runge–Kutta method on several chains at once, one in each lane, for few digits and short times: as a
-/// stepper of LaneQueue. After each step rods have their lengths again, and rates go across. `Dynamics` is LaneRods,
-/// with a tangent of each member or without.
+/// An explicit Runge–Kutta method, of one motion or on several members at once, one in each lane: for few digits and
+/// short times. After each step rods have their lengths again, and rates go across. `Dynamics` is LaneRods or
+/// LaneSystem, with a tangent of each member or without.
 template <class Dynamics, class Method>
 class LaneExplicit : public LaneState<Dynamics> {
   using State = LaneState<Dynamics>;
+  using typename State::LowParts;
+  using typename State::Number;
+  using typename State::Part;
+  using typename State::Parts;
 
  public:
   static constexpr int stages = static_cast<int>(Method::stages);
   static constexpr bool can_choose = Method::error_order > 0;
+  /// Of the quadrature that is as good.
+  static constexpr int nodes = (Method::error_order + 2) / 2;
   using Chain = LaneExplicit;
   using typename State::L;
   using typename State::Mask;
   using typename State::Vector;
   static constexpr std::size_t D = State::D;
-  static constexpr bool has_tangent = State::has_tangent;
+  static constexpr bool has_tangent = State::has_tangent, is_twofold = State::is_twofold;
   using State::links;
   using Controller = LaneErrorController<L, Method::error_order>;
 
   struct Options {};
   explicit LaneExplicit(typename Dynamics::Subject subject, Options = {})
       : State(subject),
-        trial_(parts_),
-        before_(parts_),
+        slopes_(parts_),
+        trial_(parts_, low_),
+        before_(trial_),
         stages_(parts_),
-        slopes_(Method::stages + 1, parts_),
-        before_slopes_(parts_),
+        inner_slopes_(Method::stages - 1, parts_),
         errors_(dynamics_.parts()) {
     for (int i = 0; i < dynamics_.parts(); ++i) {
-      for (Parts& slopes : slopes_) slopes[i] = Part::zero();
+      for (Parts& slopes : inner_slopes_) slopes[i] = Part::zero();
+      for (Parts* slopes : {&slopes_, &trial_.slopes, &before_.slopes}) (*slopes)[i] = Part::zero();
     }
   }
 
   LaneExplicit& chain() { return *this; }
   const LaneExplicit& chain() const { return *this; }
 
+  /// Where the members are, with all that their next steps depend on.
+  struct Place {
+    Place(const Parts& where, const LowParts& rest) : parts(where), slopes(where), low(rest) {}
+
+    Parts parts, slopes;
+    [[no_unique_address]] LowParts low;
+  };
+  Place place() const {
+    Place here(parts_, low_);
+    here.slopes = slopes_;
+    return here;
+  }
+  void go_to(const Place& place) {
+    parts_ = place.parts;
+    slopes_ = place.slopes;
+    low_ = place.low;
+  }
+
   /// A member comes into a lane: LaneRods::start.
   template <class... Start>
   void start(int lane, double time, const Start&... start) {
     State::seat(lane, time, start...);
-    fresh_.set(lane, 1);
+    set(fresh_, lane, 1);
   }
 
-  /// Parts and rates of the members whose step was accepted when `share` of it was done, by the polynomial of degree
-  /// five through both ends with rates and accelerations; visit(i, ξ, ξ̇).
+  /// The numbers of one motion, as MemberNumbers goes through them.
+  template <class Numbers>
+  void member(Numbers& numbers) requires is_twofold {
+    numbers(fresh_);
+    for (int i = 0; i < links(); ++i) {
+      for (Parts* parts : {&parts_, &low_, &slopes_}) numbers((*parts)[i].place, (*parts)[i].rate);
+    }
+  }
+
+  /// A part and its rate, of the members whose step was accepted, when `share` of it was done: by the polynomial of
+  /// degree five through both ends with rates and accelerations.
+  LanePart<L, D> glance(int i, double share) const { return Quintic(share).at(*this, i); }
+
+  /// Of all parts; visit(i, ξ, ξ̇).
   template <class Visit>
   void for_each_glance(double share, Visit visit) const {
-    const double u = share, w = u - 1;
-    const L rise(u * u * u * (10 - 15 * u + 6 * u * u)), turn_on(u * w * w * w * (-1 - 3 * u)),
-        turn_off(u * u * u * w * (4 - 3 * u)), bend_on(-0.5 * u * u * w * w * w), bend_off(0.5 * u * u * u * w * w);
-    const L rise_rate(30 * u * u * w * w), turn_on_rate(w * w * (1 - 3 * u) * (1 + 5 * u)),
-        turn_off_rate(u * u * (-12 + 28 * u - 15 * u * u)), bend_on_rate(-0.5 * u * w * w * (5 * u - 2)),
-        bend_off_rate(0.5 * u * u * w * (5 * u - 3));
-    const L inverse_h = L(1.0) / step_;
+    const Quintic path(share);
     for (int i = 0; i < links(); ++i) {
-      const Part &from = before_[i], &to = parts_[i];
-      const auto &bend = before_slopes_[i].rate, &bend_after = slopes_[0][i].rate;
-      Vector rod, rate;
-      for (std::size_t k = 0; k < D; ++k) {
-        const L moved = value(to.place[k]) - value(from.place[k]);
-        const L turning = step_ * value(from.rate[k]), turned = step_ * value(to.rate[k]);
-        const L bending = step_ * (step_ * value(bend[k])), bent = step_ * (step_ * value(bend_after[k]));
-        rod[k] = value(from.place[k]) +
-                 (((rise * moved + turn_on * turning) + turn_off * turned) + (bend_on * bending + bend_off * bent));
-        rate[k] = inverse_h * (((rise_rate * moved + turn_on_rate * turning) + turn_off_rate * turned) +
-                               (bend_on_rate * bending + bend_off_rate * bent));
-      }
-      visit(i, rod, rate);
+      const LanePart<L, D> there = path.at(*this, i);
+      visit(i, there.place, there.rate);
     }
   }
 
@@ -89,7 +112,9 @@ class LaneExplicit : public LaneState<Dynamics> {
   void for_each_look(double share, Visit visit) {
     go_back();
     solve(begin_, L(share) * step_, step_ > L(0.0));
-    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(trial_[i].place), detail::values_of(trial_[i].rate));
+    for (int i = 0; i < links(); ++i) {
+      visit(i, detail::values_of(trial_.parts[i].place), detail::values_of(trial_.parts[i].rate));
+    }
     go_back();
   }
 
@@ -106,18 +131,18 @@ class LaneExplicit : public LaneState<Dynamics> {
   /// finite, and who turn by less than half a turn. The state stays what it was.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
     refresh(time);
-    detail::unrolled<static_cast<int>(Method::stages) - 1>([&](auto s) PENDULA_WRITTEN_OUT {
+    detail::unrolled<stages - 1>([&](auto s) PENDULA_WRITTEN_OUT {
       constexpr auto stage = static_cast<std::size_t>(s) + 1;
       weigh<stage>(h, Method::a[stage], stages_);
-      dynamics_.slopes(fma(h, L(detail::node_of(Method::a[stage])), time), stages_, slopes_[stage]);
+      dynamics_.slopes(fma(h, L(detail::node_of(Method::a[stage])), time), stages_, inner_slopes_[stage - 1]);
     });
-    weigh<Method::stages>(h, Method::b, trial_);
-    dynamics_.restore(trial_);
-    dynamics_.slopes(time + h, trial_, slopes_[Method::stages]);
-    const L pace = dynamics_.pace_squared(trial_);
+    arrive(h);
+    dynamics_.slopes(time + h, trial_.parts, trial_.slopes);
+    const L pace = dynamics_.pace_squared(trial_.parts);
     if constexpr (can_choose) find_error(time, h, pace);
     tried_ = h;
     tried_from_ = time;
+    if constexpr (!Dynamics::limits_turns) return wanted & (pace == pace);
     const L turned = max(pace, State::pace_squared()) * (h * h);
     return wanted & (turned < L(largest_turn * largest_turn));
   }
@@ -125,18 +150,44 @@ class LaneExplicit : public LaneState<Dynamics> {
   /// What the step errs by, relative to the size of the motion, squared.
   const L& error_squared() const { return error_; }
 
+  /// Where the step that was tried ends.
+  const Parts& tried() const { return trial_.parts; }
+
+  /// Of the step that was tried the first part that is not finite; −1: all are.
+  int part_not_finite() const requires is_twofold {
+    for (int i = 0; i < links(); ++i) {
+      for (std::size_t k = 0; k < D; ++k) {
+        if (!std::isfinite(trial_.parts[i].place[k]) || !std::isfinite(trial_.parts[i].rate[k])) return i;
+      }
+    }
+    return -1;
+  }
+
   /// Moves the members to the end of the step that was tried.
   void accept(const Mask& which) {
     step_ = select(which, tried_, step_);
     begin_ = select(which, tried_from_, begin_);
     now_ = select(which, tried_from_ + tried_, now_);
-    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      State::assign(which, State::at(parts_, i), State::at(before_, i));
-      State::assign(which, State::at(slopes_[0], i), State::at(before_slopes_, i));
-      State::assign(which, State::at(trial_, i), State::at(parts_, i));
-      State::assign(which, State::at(slopes_[Method::stages], i), State::at(slopes_[0], i));
-    });
+    if constexpr (is_twofold) {
+      change_place(before_);
+      change_place(trial_);
+    } else {
+      dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+        State::assign(which, State::at(parts_, i), State::at(before_.parts, i));
+        State::assign(which, State::at(slopes_, i), State::at(before_.slopes, i));
+        State::assign(which, State::at(trial_.parts, i), State::at(parts_, i));
+        State::assign(which, State::at(trial_.slopes, i), State::at(slopes_, i));
+      });
+    }
   }
+
+  /// Where it is, it has come to by a step from `begin`.
+  void set_step(const Place& begin, double time, double h) requires is_twofold {
+    before_ = begin;
+    begin_ = time;
+    step_ = h;
+  }
+  const Place& begin() const { return before_; }
 
   /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
   /// again after this.
@@ -144,7 +195,7 @@ class LaneExplicit : public LaneState<Dynamics> {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
     for (int i = 0; i < links(); ++i) {
       State::scale_tangent(factor, parts_[i]);
-      State::scale_tangent(factor, slopes_[0][i]);
+      State::scale_tangent(factor, slopes_[i]);
     }
     return 0.5 * log(squared);
   }
@@ -152,75 +203,144 @@ class LaneExplicit : public LaneState<Dynamics> {
  private:
   using State::dynamics_;
   using State::largest_turn;
+  using State::low_;
   using State::now_;
   using State::parts_;
-  using typename State::Number;
-  using typename State::Part;
-  using typename State::Parts;
-
-  static constexpr int nodes = (Method::error_order + 2) / 2;  // of the quadrature that is as good
 
   static const L& value(const Number& number) { return detail::value_of(number); }
 
-  // To where the last step began, and from there.
-  void go_back() {
-    std::swap(parts_, before_);
-    std::swap(slopes_[0], before_slopes_);
+  class Quintic {
+   public:
+    explicit Quintic(double u)
+        : rise_(u * u * u * (10 - 15 * u + 6 * u * u)),
+          turn_on_(u * cubed(u - 1) * (-1 - 3 * u)),
+          turn_off_(u * u * u * (u - 1) * (4 - 3 * u)),
+          bend_on_(-0.5 * u * u * cubed(u - 1)),
+          bend_off_(0.5 * u * u * u * squared(u - 1)),
+          rise_rate_(30 * u * u * squared(u - 1)),
+          turn_on_rate_(squared(u - 1) * (1 - 3 * u) * (1 + 5 * u)),
+          turn_off_rate_(u * u * (-12 + 28 * u - 15 * u * u)),
+          bend_on_rate_(-0.5 * u * squared(u - 1) * (5 * u - 2)),
+          bend_off_rate_(0.5 * u * u * (u - 1) * (5 * u - 3)) {}
+
+    LanePart<L, D> at(const LaneExplicit& steps, int i) const {
+      const Part &from = steps.before_.parts[i], &to = steps.parts_[i];
+      const auto &bend = steps.before_.slopes[i].rate, &bend_after = steps.slopes_[i].rate;
+      const L &h = steps.step_, inverse_h = L(1.0) / h;
+      LanePart<L, D> there;
+      for (std::size_t k = 0; k < D; ++k) {
+        const L moved = value(to.place[k]) - value(from.place[k]);
+        const L turning = h * value(from.rate[k]), turned = h * value(to.rate[k]);
+        const L bending = h * (h * value(bend[k])), bent = h * (h * value(bend_after[k]));
+        there.place[k] = value(from.place[k]) + (((rise_ * moved + turn_on_ * turning) + turn_off_ * turned) +
+                                                 (bend_on_ * bending + bend_off_ * bent));
+        there.rate[k] = inverse_h * (((rise_rate_ * moved + turn_on_rate_ * turning) + turn_off_rate_ * turned) +
+                                     (bend_on_rate_ * bending + bend_off_rate_ * bent));
+      }
+      return there;
+    }
+
+   private:
+    static double squared(double x) { return x * x; }
+    static double cubed(double x) { return x * x * x; }
+
+    L rise_, turn_on_, turn_off_, bend_on_, bend_off_;
+    L rise_rate_, turn_on_rate_, turn_off_rate_, bend_on_rate_, bend_off_rate_;
+  };
+
+  void change_place(Place& with) {
+    std::swap(parts_, with.parts);
+    std::swap(slopes_, with.slopes);
+    std::swap(low_, with.low);
   }
+  // To where the last step began, and from there.
+  void go_back() { change_place(before_); }
 
   // The first slopes of members that have come into lanes; of others they are those of the last step's end.
   void refresh(const L& time) {
     const Mask fresh = fresh_ > L(0.0);
-    if (!xsimd::any(fresh)) return;
+    if (!any(fresh)) return;
     fresh_ = L(0.0);
     Parts& found = stages_;  // slopes are as large
     dynamics_.slopes(time, parts_, found);
-    dynamics_.for_parts(
-        [&](auto i) PENDULA_WRITTEN_OUT { State::assign(fresh, State::at(found, i), State::at(slopes_[0], i)); });
+    dynamics_.for_parts([&](auto i)
+                            PENDULA_WRITTEN_OUT { State::assign(fresh, State::at(found, i), State::at(slopes_, i)); });
+  }
+
+  template <std::size_t j>
+  const Parts& slopes_of() const {
+    if constexpr (j == 0) {
+      return slopes_;
+    } else if constexpr (j == Method::stages) {
+      return trial_.slopes;
+    } else {
+      return inner_slopes_[j - 1];
+    }
+  }
+
+  // Σ weight_j k_j of part i, of the first `Count` slopes.
+  template <std::size_t Count, class Weights, class Index>
+  [[gnu::always_inline]] Part weighed(const Weights& weights, Index i) const {
+    Part sum = Part::zero();
+    detail::unrolled<static_cast<int>(Count)>([&](auto j) PENDULA_WRITTEN_OUT {
+      constexpr auto at = static_cast<std::size_t>(j);
+      if (weights[at] == 0) return;
+      const L weight(weights[at]);
+      const Part& slope = State::at(slopes_of<at>(), i);
+      for (std::size_t k = 0; k < D; ++k) {
+        sum.place[k] = fma(weight, slope.place[k], sum.place[k]);
+        sum.rate[k] = fma(weight, slope.rate[k], sum.rate[k]);
+      }
+    });
+    return sum;
   }
 
   // Where the first `Count` slopes lead to, weighed.
   template <std::size_t Count, class Weights>
   [[gnu::always_inline]] void weigh(const L& h, const Weights& weights, Parts& to) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      Part moved = Part::zero();
-      detail::unrolled<static_cast<int>(Count)>([&](auto j) PENDULA_WRITTEN_OUT {
-        const double weight = weights[static_cast<std::size_t>(j)];
-        if (weight == 0) return;
-        add(L(weight), State::at(slopes_[static_cast<std::size_t>(j)], i), moved);
-      });
-      const Part& from = State::at(parts_, i);
+      const Part moved = weighed<Count>(weights, i), &from = State::at(parts_, i);
       Part& there = State::at(to, i);
       for (std::size_t k = 0; k < D; ++k) {
-        there.place[k] = fma(h, moved.place[k], from.place[k]);
-        there.rate[k] = fma(h, moved.rate[k], from.rate[k]);
+        if constexpr (is_twofold) {
+          const Part& rest = State::at(low_, i);
+          there.place[k] = from.place[k] + fma(h, moved.place[k], rest.place[k]);
+          there.rate[k] = from.rate[k] + fma(h, moved.rate[k], rest.rate[k]);
+        } else {
+          there.place[k] = fma(h, moved.place[k], from.place[k]);
+          there.rate[k] = fma(h, moved.rate[k], from.rate[k]);
+        }
       }
     });
   }
-  static void add(const L& weight, const Part& slope, Part& sum) {
-    for (std::size_t k = 0; k < D; ++k) {
-      sum.place[k] = fma(weight, slope.place[k], sum.place[k]);
-      sum.rate[k] = fma(weight, slope.rate[k], sum.rate[k]);
+
+  // The end of the step.
+  [[gnu::always_inline]] void arrive(const L& h) {
+    if constexpr (is_twofold) {
+      for (int i = 0; i < links(); ++i) {
+        const Part moved = weighed<Method::stages>(Method::b, i), &from = parts_[i], &rest = low_[i];
+        for (std::size_t k = 0; k < D; ++k) {
+          const Twofold<L> place = exact_sum(from.place[k], fma(h, moved.place[k], rest.place[k]));
+          const Twofold<L> rate = exact_sum(from.rate[k], fma(h, moved.rate[k], rest.rate[k]));
+          trial_.parts[i].place[k] = place.value;
+          trial_.parts[i].rate[k] = rate.value;
+          trial_.low[i].place[k] = place.low;
+          trial_.low[i].rate[k] = rate.low;
+        }
+      }
+      dynamics_.restore(trial_.parts, trial_.low);
+    } else {
+      weigh<Method::stages>(h, Method::b, trial_.parts);
+      dynamics_.restore(trial_.parts);
     }
   }
 
   [[gnu::always_inline]] void find_error(const L& time, const L& h, const L& pace_squared) {
-    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      Part error = Part::zero();
-      detail::unrolled<static_cast<int>(Method::stages) + 1>([&](auto j) PENDULA_WRITTEN_OUT {
-        constexpr double weight = Method::e[static_cast<std::size_t>(j)];
-        if constexpr (weight != 0) {
-          const Part& slope = State::at(slopes_[static_cast<std::size_t>(j)], i);
-          for (std::size_t k = 0; k < D; ++k) {
-            error.place[k] = fma(L(weight), slope.place[k], error.place[k]);
-            error.rate[k] = fma(L(weight), slope.rate[k], error.rate[k]);
-          }
-        }
-      });
-      State::at(errors_, i) = error;
-    });
-    error_ = dynamics_.error_squared(h, errors_, parts_, slopes_[0], trial_, pace_squared);
-    if constexpr (requires { dynamics_.depends_on_time(); }) {
+    dynamics_.for_parts([&](auto i)
+                            PENDULA_WRITTEN_OUT { State::at(errors_, i) = weighed<Method::stages + 1>(Method::e, i); });
+    error_ = dynamics_.error_squared(h, errors_, parts_, slopes_, trial_.parts, pace_squared);
+    // Of one motion forces are looked at before (ForcedSteps).
+    if constexpr (is_batch<L> && requires { dynamics_.depends_on_time(); }) {
       if (dynamics_.depends_on_time()) {
         error_ = max(error_, dynamics_.template unseen_forcing_squared<nodes>(time, h, parts_));
       }
@@ -235,10 +355,11 @@ class LaneExplicit : public LaneState<Dynamics> {
   L fresh_{0.0}, error_{0.0};
   L tried_{0.0}, step_{1.0};        // the steps that were tried, and those that were taken last
   L tried_from_{0.0}, begin_{0.0};  // when they began
-  Parts trial_, before_, stages_;   // before_: where the last step began
-  std::vector<Parts> slopes_;       // of the stages, and of the end
-  Parts before_slopes_;
-  Parts errors_;  // of the step, over its size
+  Parts slopes_;                    // where the members are
+  Place trial_, before_;            // the end of a step that is tried, and where the last one began
+  Parts stages_;
+  std::vector<Parts> inner_slopes_;  // of all stages but the first
+  Parts errors_;                     // of the step, over its size
 };
 
 }  // namespace pendula

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/width.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <span>
 #include <vector>
@@ -17,8 +20,8 @@ class LaneInputs {
 
   /// A member's come into a lane; `constant`: (count).
   void take(int lane, const double* constant, std::span<const InputSine> sines) {
-    for (L& input : constant_) input.set(lane, *constant++);
-    for (Sine& sine : sines_) sine.amplitude.set(lane, 0);
+    for (L& input : constant_) set(input, lane, *constant++);
+    for (Sine& sine : sines_) set(sine.amplitude, lane, 0);
     std::vector<bool> taken(sines_.size());
     for (const InputSine& from : sines) {
       std::size_t k = 0;
@@ -28,9 +31,9 @@ class LaneInputs {
         taken.push_back(false);
       }
       taken[k] = true;
-      sines_[k].amplitude.set(lane, from.amplitude);
-      sines_[k].frequency.set(lane, from.frequency);
-      sines_[k].phase.set(lane, from.phase);
+      set(sines_[k].amplitude, lane, from.amplitude);
+      set(sines_[k].frequency, lane, from.frequency);
+      set(sines_[k].phase, lane, from.phase);
     }
   }
 
@@ -44,11 +47,12 @@ class LaneInputs {
   }
 
   /// What they are at `time`, each a row of `inputs`.
-  void at(const L& time, PackRows<L::width>& inputs) const {
-    for (std::size_t k = 0; k < constant_.size(); ++k) constant_[k].store(inputs[k]);
+  void at(const L& time, PackRows<width_of<L>>& inputs) const {
+    using std::sin;
+    for (std::size_t k = 0; k < constant_.size(); ++k) to_row(constant_[k], inputs[k]);
     for (const Sine& sine : sines_) {
       double* const input = inputs[static_cast<std::size_t>(sine.input)];
-      fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), L::load(input)).store(input);
+      to_row(fma(sine.amplitude, sin(fma(sine.frequency, time, sine.phase)), from_row<L>(input)), input);
     }
   }
 

@@ -4,6 +4,7 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/numeric.hpp>
 
 namespace pendula {
 
@@ -19,14 +20,14 @@ struct LaneLink {
   L hanging{0.0};                           ///< M |g|/l
 
   void set(int lane, const LinkConstants<double>& link) {
-    mass.set(lane, link.mass);
-    length.set(lane, link.length);
-    inverse_square.set(lane, link.inverse_square);
-    inverse_mass.value.set(lane, link.inverse_mass.value);
-    inverse_mass.low.set(lane, link.inverse_mass.low);
-    inverse_masses.set(lane, link.inverse_masses);
-    weight.set(lane, link.weight);
-    hanging.set(lane, link.hanging);
+    pendula::set(mass, lane, link.mass);
+    pendula::set(length, lane, link.length);
+    pendula::set(inverse_square, lane, link.inverse_square);
+    pendula::set(inverse_mass.value, lane, link.inverse_mass.value);
+    pendula::set(inverse_mass.low, lane, link.inverse_mass.low);
+    pendula::set(inverse_masses, lane, link.inverse_masses);
+    pendula::set(weight, lane, link.weight);
+    pendula::set(hanging, lane, link.hanging);
   }
 };
 

@@ -7,7 +7,9 @@
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/lanes/lane_links.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/width.hpp>
 #include <vector>
 
 namespace pendula {
@@ -27,14 +29,14 @@ class LaneLoads {
   auto loaded() const { return loaded_ > L(0.0); }
 
   void take(int lane, const Chain<Space, N>& chain, const ChainLinks<Space, N, double>& links) {
-    loaded_.set(lane, chain.loaded() ? 1 : 0);
+    set(loaded_, lane, chain.loaded() ? 1 : 0);
     if (!chain.loaded() && !any_) return;
     if (!any_) drag_.assign(static_cast<std::size_t>(links_), L(0.0));
     any_ = true;
     const std::vector<PlainChain::Drive> drives = plain_drives(chain);
     const ChainSystem system(plain(chain, drives), Space::torque_components);
     inputs_.take(lane, system.plain().inputs, system.plain().sines);
-    for (int i = 0; i < links_; ++i) drag_[static_cast<std::size_t>(i)].set(lane, links[i].drag);
+    for (int i = 0; i < links_; ++i) set(drag_[static_cast<std::size_t>(i)], lane, links[i].drag);
   }
 
   void set_time(const L& time) { inputs_.at(time, torques_); }
@@ -47,7 +49,7 @@ class LaneLoads {
   auto torque(int i, const Link& link) const {
     typename Space::Link::template Torque<L> torque;
     for (std::size_t k = 0; k < components; ++k) {
-      torque[k] = link.inverse_square * L::load(torques_[static_cast<std::size_t>(i) * components + k]);
+      torque[k] = link.inverse_square * from_row<L>(torques_[static_cast<std::size_t>(i) * components + k]);
     }
     return torque;
   }
@@ -69,9 +71,9 @@ class LaneLoads {
   int links_;
   bool any_ = false;
   L loaded_{0.0};
-  PackRows<L::width> torques_;  // now
-  LaneInputs<L> inputs_;        // the same at any time
-  std::vector<L> drag_;         // λ_i/l_i²
+  PackRows<width_of<L>> torques_;  // now
+  LaneInputs<L> inputs_;           // the same at any time
+  std::vector<L> drag_;            // λ_i/l_i²
 };
 
 }  // namespace pendula

@@ -299,24 +299,24 @@ using GaussTangentLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register,
 
 /// By explicit steps.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
-using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register>, Method>>;
+using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, LanePack<Register>>, Method>>;
 
 /// By explicit steps with a tangent of each member.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
-using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, Register, true>, Method>>;
+using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, LanePack<Register>, true>, Method>>;
 
 /// By Taylor series, of chains without loads.
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
-using TaylorLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, Register>>>;
+using TaylorLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, LanePack<Register>>>>;
 
 /// The same with a tangent of each member.
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
-using TaylorTangentLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, Register, true>>>;
+using TaylorTangentLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, LanePack<Register>, true>>>;
 
 /// By explicit steps, of systems of one kernel (LaneDynamics).
 template <class Method, class Register = MemberRegister>
-using SystemLanes =
-    LaneQueue<LaneExplicit<LaneSystem<Register>, Method>, LaneSystemSeats<LaneExplicit<LaneSystem<Register>, Method>>>;
+using SystemLanes = LaneQueue<LaneExplicit<LaneSystem<LanePack<Register>>, Method>,
+                              LaneSystemSeats<LaneExplicit<LaneSystem<LanePack<Register>>, Method>>>;
 
 /// The same by Gauss steps of S stages.
 template <int S, class Register = MemberRegister>
@@ -330,7 +330,7 @@ using GaussSystemTangentLanes = LaneQueue<LaneStepper<LaneLagrangian<S, Register
 
 /// By explicit steps with a tangent of each member.
 template <class Method, class Register = MemberRegister>
-using SystemTangentLanes = LaneQueue<LaneExplicit<LaneSystem<Register, true>, Method>,
-                                     LaneSystemSeats<LaneExplicit<LaneSystem<Register, true>, Method>>>;
+using SystemTangentLanes = LaneQueue<LaneExplicit<LaneSystem<LanePack<Register>, true>, Method>,
+                                     LaneSystemSeats<LaneExplicit<LaneSystem<LanePack<Register>, true>, Method>>>;
 
 }  // namespace pendula

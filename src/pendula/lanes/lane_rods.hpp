@@ -13,6 +13,7 @@
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <type_traits>
 
 namespace pendula {
@@ -21,15 +22,16 @@ namespace pendula {
 /// of weight, loads and multipliers that keep |ξ̇|² + ξ·ξ̈ = 0 (ChainForwardDynamics).
 ///
 /// With a tangent, every number has its derivative along one tangent of each member's motion.
-template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister, bool with_tangent = false>
+template <class Space, int N = Eigen::Dynamic, class Num = LanePack<MemberRegister>, bool with_tangent = false>
 class LaneRods {
  public:
   using SpaceType = Space;
-  using L = LanePack<Register>;
-  using Mask = typename L::Mask;
+  using L = Num;
+  using Mask = MaskOf<L>;
   using Number = std::conditional_t<with_tangent, Dual<L>, L>;
   static constexpr int links_known = N;
   static constexpr bool has_tangent = with_tangent, is_short = detail::is_short_chain<N>;
+  static constexpr bool limits_turns = true;  ///< whether steps turn rods by less than half a turn
   static constexpr std::size_t D = Space::dimension;
 
   using Part = LanePart<Number, D>;  ///< ξ, ξ̇
@@ -81,28 +83,32 @@ class LaneRods {
     return rod;
   }
 
-  /// A member comes into a lane, with its chain, at q and v  [rad, rad/s].
+  /// A member comes into a lane, with its chain, at q and v  [rad, rad/s]; `low`, where there is one, is what rods lose
+  /// to rounding.
+  template <class... Low>
   void start(int lane, double /*time*/, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain,
-             const double* q, const double* v, Parts& rods) {
+             const double* q, const double* v, Parts& rods, Low&... low) {
+    using Wide = std::conditional_t<sizeof...(low) == 0, double, long double>;
     const double gravity = given.gravity();
-    gravity_.set(lane, gravity);
+    set(gravity_, lane, gravity);
     loads_.take(lane, given, chain);
     double length = 0;
     for (int i = 0; i < links(); ++i) {
       constants_[i].set(lane, chain[i]);
       length += chain[i].length;
-      std::array<double, Space::dof> angles, rates;
+      std::array<Wide, Space::dof> angles, rates;
       for (std::size_t a = 0; a < angles.size(); ++a) {
         angles[a] = q[static_cast<Eigen::Index>(a) * links() + i];
         rates[a] = v[static_cast<Eigen::Index>(a) * links() + i];
       }
-      const Heading<Space> heading(angles, rates);
+      const Heading<Space, Wide> heading(angles, rates);
       for (std::size_t k = 0; k < D; ++k) {
-        detail::set_value(lane, chain[i].length * heading.u[k], rods[i].place[k]);
-        detail::set_value(lane, chain[i].length * heading.u_dot[k], rods[i].rate[k]);
+        put(lane, Wide(chain[i].length) * heading.u[k], rods[i].place[k], low[i].place[k]...);
+        put(lane, Wide(chain[i].length) * heading.u_dot[k], rods[i].rate[k], low[i].rate[k]...);
       }
     }
-    slowest_pace_.set(lane, 0.15 * links() * links() * std::abs(gravity) / length);
+    set(swing_squared_, lane, std::abs(gravity) / length);
+    set(slowest_pace_, lane, 0.15 * links() * links() * std::abs(gravity) / length);
     if constexpr (has_tangent) start_tangent(lane, rods);
   }
 
@@ -110,8 +116,8 @@ class LaneRods {
   auto heading(int lane, int i, const Parts& rods) const {
     Heading<Space, long double> heading;
     for (std::size_t k = 0; k < D; ++k) {
-      heading.u[k] = detail::value_of(rods[i].place[k])[lane] / constants_[i].length[lane];
-      heading.u_dot[k] = detail::value_of(rods[i].rate[k])[lane] / constants_[i].length[lane];
+      heading.u[k] = get(detail::value_of(rods[i].place[k]), lane) / get(constants_[i].length, lane);
+      heading.u_dot[k] = get(detail::value_of(rods[i].rate[k]), lane) / get(constants_[i].length, lane);
     }
     return heading;
   }
@@ -139,19 +145,44 @@ class LaneRods {
     return largest;
   }
 
-  /// What a step of `h` errs by, squared, from the errors of rods and rates that it is made of: of rods relative to
-  /// their lengths, of rates to those and the pace after it.
-  [[gnu::always_inline]] L error_squared(const L& h, const Parts& errors, const Parts& /*before*/,
-                                         const Parts& /*slopes*/, const Parts& /*after*/, const L& pace_squared) const {
+  /// The largest of rods and rates, squared: of rods relative to their lengths, of rates to those and the pace.
+  [[gnu::always_inline]] L size_squared(const Parts& parts, const L& pace_squared) const {
     L largest(0.0);
     const L inverse_pace = L(1.0) / pace_squared;
     for_parts([&](auto i) PENDULA_WRITTEN_OUT {
-      const auto& error = at(errors, i);
-      const auto &place = detail::values_of(error.place), &rate = detail::values_of(error.rate);
+      const auto& part = at(parts, i);
+      const auto &place = detail::values_of(part.place), &rate = detail::values_of(part.rate);
       const L squared = fma(dot(rate, rate), inverse_pace, dot(place, place));
-      largest = max(largest, (h * h) * (squared * at(constants_, i).inverse_square));
+      largest = max(largest, squared * at(constants_, i).inverse_square);
     });
     return largest;
+  }
+
+  /// What a step of `h` errs by, squared, from the errors of rods and rates that it is made of, across the rods: what
+  /// goes along them `restore` takes away. Relative to the size of the motion after it, which swings is how far they go
+  /// from where they hang, at most 1: so that swings of 1e-9 rad are followed as others are.
+  [[gnu::always_inline]] L error_squared(const L& h, const Parts& errors, const Parts& /*before*/,
+                                         const Parts& /*slopes*/, const Parts& after, const L& pace_squared) const {
+    L largest(0.0), swing(0.0);
+    const L inverse_pace = L(1.0) / select(pace_squared > L(0.0), pace_squared, L(1.0));
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      const L& inverse_square = at(constants_, i).inverse_square;
+      const auto &error = at(errors, i), &rod = at(after, i);
+      const auto &along = detail::values_of(rod.place), &rate = detail::values_of(rod.rate);
+      const L place_off = across_squared(detail::values_of(error.place), along);
+      const L rate_off = across_squared(detail::values_of(error.rate), along);
+      L inverse_speed = inverse_pace;
+      if constexpr (!is_batch<L>) {
+        const L own = fma(dot(rate, rate), inverse_square, L(swing_squared_));
+        inverse_speed = L(1.0) / select(own > L(0.0), own, L(1.0));
+      }
+      largest = max(largest, fma(rate_off, inverse_speed, place_off) * (inverse_square * inverse_square));
+      L aside = along[0] * along[0];
+      if constexpr (D == 3) aside = fma(along[1], along[1], aside);
+      const L swung = fma(dot(rate, rate), inverse_pace, aside) * inverse_square;
+      swing = max(swing, select(along[D - 1] * gravity_ < L(0.0), swung, L(1.0)));
+    });
+    return (h * h) * (largest / max(min(swing, L(1.0)), L(smallest_swing)));
   }
 
   /// ξ̇ and ξ̈ of rods.
@@ -206,6 +237,18 @@ class LaneRods {
     });
   }
 
+  /// The same of rods that are kept in twice the digits: how long they are does not round where they point.
+  [[gnu::always_inline]] void restore(Parts& rods, Parts& low) const {
+    for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      const LaneLink<L>& link = at(constants_, i);
+      Part &rod = at(rods, i), &rest = at(low, i);
+      const Number missing = fma(-0.5 * link.inverse_square, dot(rod.place, rod.place), Number(0.5));
+      for (std::size_t k = 0; k < D; ++k) add(missing * rod.place[k], rod.place[k], rest.place[k]);
+      const Number along = dot(rod.place, rod.rate) * link.inverse_square;
+      for (std::size_t k = 0; k < D; ++k) add(-along * rod.place[k], rod.rate[k], rest.rate[k]);
+    });
+  }
+
   /// |δξ|²/l² + |δξ̇|²/(l ω)², of all rods, ω being how fast the member swung when it began.
   L tangent_squared(const Parts& rods) const requires with_tangent {
     L squared(0.0);
@@ -221,6 +264,32 @@ class LaneRods {
   }
 
  private:
+  static constexpr double smallest_swing = 1e-32;  // squared
+
+  // |a × b|².
+  static L across_squared(const std::array<L, D>& a, const std::array<L, D>& b) {
+    const L z = fma(a[0], b[1], -(a[1] * b[0]));
+    if constexpr (D == 2) {
+      return z * z;
+    } else {
+      const L x = fma(a[1], b[2], -(a[2] * b[1])), y = fma(a[2], b[0], -(a[0] * b[2]));
+      return fma(x, x, fma(y, y, z * z));
+    }
+  }
+
+  static void put(int lane, double number, Number& value) { detail::set_value(lane, number, value); }
+  static void put(int lane, long double number, Number& value, Number& low) {
+    const auto rounded = static_cast<double>(number);
+    detail::set_value(lane, rounded, value);
+    detail::set_value(lane, static_cast<double>(number - rounded), low);
+  }
+
+  static void add(const Number& by, Number& value, Number& low) {
+    const Twofold<Number> there = exact_sum(value, low + by);
+    value = there.value;
+    low = there.low;
+  }
+
   // What loads accelerate rods by, were there no tensions.
   [[gnu::noinline]] void find_freed(const L& time, const Parts& rods) {
     loads_.set_time(time);
@@ -242,23 +311,23 @@ class LaneRods {
 
   void start_tangent(int lane, Parts& rods) {
     const auto numbers = [&](const std::array<Number, D>& of) {
-      return components<D>([&](std::size_t k) { return of[k].value[lane]; });
+      return components<D>([&](std::size_t k) { return get(of[k].value, lane); });
     };
     const auto rod_of = [&](int i) {
-      return MovingRod<D>{numbers(rods[i].place), numbers(rods[i].rate), constants_[i].inverse_square[lane]};
+      return MovingRod<D>{numbers(rods[i].place), numbers(rods[i].rate), get(constants_[i].inverse_square, lane)};
     };
-    const LaneChainTangent<Space> tangent(links(), slowest_pace_[lane], rod_of);
-    inverse_pace_squared_.set(lane, tangent.inverse_pace_squared());
+    const LaneChainTangent<Space> tangent(links(), get(slowest_pace_, lane), rod_of);
+    set(inverse_pace_squared_, lane, tangent.inverse_pace_squared());
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
-        rods[i].place[k].slope.set(lane, tangent.place(i)[k]);
-        rods[i].rate[k].slope.set(lane, tangent.rate(i)[k]);
+        set(rods[i].place[k].slope, lane, tangent.place(i)[k]);
+        set(rods[i].rate[k].slope, lane, tangent.rate(i)[k]);
       }
     }
   }
 
   int links_;
-  L gravity_{0.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0};
+  L gravity_{0.0}, swing_squared_{1.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0};
   detail::PerLink<LaneLink<L>, N> constants_;
   detail::PerLink<MultiplierRow<Number>, N> rows_;
   LaneLoads<Space, N, L> loads_;

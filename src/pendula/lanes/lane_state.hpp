@@ -3,19 +3,22 @@
 #include <array>
 #include <cstddef>
 #include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/numeric/numeric.hpp>
+#include <type_traits>
 
 namespace pendula {
 
-/// What moves of several members, one in each lane, as explicit methods keep it: parts and their rates at a time, with
-/// a tangent of each member or without. `Dynamics` is LaneRods or LaneSystem.
+/// What moves, of one motion or of several members, one in each lane, as explicit methods keep it: parts and their
+/// rates at a time, with a tangent of each member or without; of one motion in twice the digits, so that what many
+/// small steps add to it is not lost to rounding. `Dynamics` is LaneRods or LaneSystem.
 template <class Dynamics>
 class LaneState {
  public:
   using SpaceType = typename Dynamics::SpaceType;
   using L = typename Dynamics::L;
-  using Mask = typename L::Mask;
-  static constexpr int links_known = Dynamics::links_known, lanes = L::size;
-  static constexpr bool is_implicit = false, has_tangent = Dynamics::has_tangent;
+  using Mask = MaskOf<L>;
+  static constexpr int links_known = Dynamics::links_known;
+  static constexpr bool is_implicit = false, has_tangent = Dynamics::has_tangent, is_twofold = !is_batch<L>;
   static constexpr std::size_t D = Dynamics::D;
   using Vector = std::array<L, D>;
 
@@ -23,6 +26,9 @@ class LaneState {
   const auto& parts() const { return parts_; }
 
   auto heading(int lane, int i) const { return dynamics_.heading(lane, i, parts_); }
+  /// Where a part is and its rate, with what they lost to rounding.
+  auto exact_place(int i) const requires is_twofold { return exact(parts_[i].place, low_[i].place); }
+  auto exact_rate(int i) const requires is_twofold { return exact(parts_[i].rate, low_[i].rate); }
   void find_rates() const {}
   decltype(auto) along(int i) const { return detail::values_of(parts_[i].place); }
 
@@ -38,9 +44,9 @@ class LaneState {
     for (int i = 0; i < links(); ++i) {
       for (auto* vector : {&parts_[i].place, &parts_[i].rate}) {
         for (L& x : *vector) {
-          double number = x[lane];
+          double number = get(x, lane);
           numbers(number);
-          x.set(lane, number);
+          set(x, lane, number);
         }
       }
     }
@@ -58,15 +64,22 @@ class LaneState {
 
   static constexpr double largest_turn = 3;  // in a step  [rad]
 
-  explicit LaneState(typename Dynamics::Subject subject) : dynamics_(subject), parts_(dynamics_.parts()) {
+  explicit LaneState(typename Dynamics::Subject subject) : dynamics_(subject), parts_(dynamics_.parts()), low_(parts_) {
     for (int i = 0; i < links(); ++i) parts_[i] = Dynamics::resting();
+    if constexpr (is_twofold) {
+      for (int i = 0; i < links(); ++i) low_[i] = Part::zero();
+    }
   }
 
   /// A member comes into a lane: LaneRods::start.
   template <class... Start>
   void seat(int lane, double time, const Start&... start) {
-    dynamics_.start(lane, time, start..., parts_);
-    now_.set(lane, time);
+    if constexpr (is_twofold) {
+      dynamics_.start(lane, time, start..., parts_, low_);
+    } else {
+      dynamics_.start(lane, time, start..., parts_);
+    }
+    set(now_, lane, time);
   }
 
   template <class Links>
@@ -90,9 +103,23 @@ class LaneState {
     }
   }
 
+  /// Of one motion; nothing of members.
+  struct NoParts {
+    explicit NoParts(const Parts& /*parts*/) {}
+  };
+  using LowParts = std::conditional_t<is_twofold, Parts, NoParts>;
+
   Dynamics dynamics_;
   L now_{0.0};
   Parts parts_;
+  [[no_unique_address]] LowParts low_;  // what parts lost to rounding
+
+ private:
+  static auto exact(const Vector& value, const Vector& low) {
+    std::array<long double, D> sum;
+    for (std::size_t k = 0; k < D; ++k) sum[k] = static_cast<long double>(value[k]) + low[k];
+    return sum;
+  }
 };
 
 }  // namespace pendula

@@ -11,26 +11,29 @@
 #include <pendula/lanes/lane_system_tangent.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/width.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <type_traits>
 #include <vector>
 
 namespace pendula {
 
-/// The forward dynamics of several systems at once, one in each lane, by their accelerations.
+/// The forward dynamics of a system, or of several at once, one in each lane, by their accelerations.
 ///
 /// With a tangent, every number has its derivative along one tangent of each member's motion.
-template <class Register = MemberRegister, bool with_tangent = false>
+template <class Num = LanePack<MemberRegister>, bool with_tangent = false>
 class LaneSystem {
  public:
   using SpaceType = CoordinateSpace;
-  using L = LanePack<Register>;
-  using Mask = typename L::Mask;
+  using L = Num;
+  using Mask = MaskOf<L>;
   using Number = std::conditional_t<with_tangent, Dual<L>, L>;
   using Subject = LaneDynamics<L>&;
   static constexpr int links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
+  static constexpr bool limits_turns = is_batch<L>;  ///< whether steps turn angles by less than half a turn
   static constexpr std::size_t D = 1;
   using Part = LanePart<Number, D>;  ///< q, q̇ of a coordinate
   using Parts = detail::PerLink<Part, links_known>;
@@ -52,8 +55,11 @@ class LaneSystem {
   }
   static Part resting() { return Part::zero(); }
 
-  /// A member comes into a lane, with its numbers, at q and v at `time`.
-  void start(int lane, double time, const PlainSystem& system, const double* q, const double* v, Parts& parts) {
+  /// A member comes into a lane, with its numbers, at q and v at `time`, of which nothing is `low`.
+  template <class... Low>
+  void start(int lane, double time, const PlainSystem& system, const double* q, const double* v, Parts& parts,
+             Low&... low) {
+    for (int i = 0; i < this->parts(); ++i) ((low[i] = Part::zero()), ...);
     dynamics_.take(lane, system);
     for (int i = 0; i < this->parts(); ++i) {
       detail::set_value(lane, q[i], parts[i].place[0]);
@@ -66,16 +72,16 @@ class LaneSystem {
       const double fast = v[i] / size, push = std::abs(numbers(2, i)[lane]) / size;
       squared = std::max(squared, fast * fast + push);
     }
-    pace_squared_.set(lane, squared);
+    set(pace_squared_, lane, squared);
     if constexpr (has_tangent) start_tangent(lane, time, q, v, parts);
   }
 
   /// T + U  [J].
   L energy(const L& time, const Parts& parts) {
     write(time, parts);
-    alignas(pack_alignment) double kinetic[L::width], total[L::width];
+    alignas(pack_alignment) double kinetic[width_of<L>], total[width_of<L>];
     dynamics_.energies(times(), numbers(0, 0), numbers(1, 0), kinetic, total);
-    const L T = L::load(kinetic), energy = L::load(total);
+    const L T = from_row<L>(kinetic), energy = from_row<L>(total);
     energy_sum_ = abs(T) + abs(energy - T);
     return energy;
   }
@@ -99,6 +105,7 @@ class LaneSystem {
   /// they come to where they fall that far.
   L error_squared(const L& h, const Parts& errors, const Parts& before, const Parts& slopes, const Parts& after,
                   const L& /*pace_squared*/) const {
+    if constexpr (!is_batch<L>) return error_squared_of_one(h, errors, before, slopes, after);
     L largest(0.0);
     const L size = abs(h);
     for_parts([&](int i) {
@@ -126,14 +133,15 @@ class LaneSystem {
     for_parts([&](int i) { found[i] = {parts[i].rate, {acceleration(i)}}; });
   }
 
-  void restore(Parts& /*parts*/) const {}
+  template <class... Low>
+  void restore(Parts& /*parts*/, Low&... /*low*/) const {}
 
   /// The longest step in which drives turn by no more than `turn`  [rad], and in which unseen_forcing_squared looks as
   /// closely as ForcingLook does, for a method that is as good as a quadrature of so many nodes.
   template <int nodes>
   L longest_step(double turn) const {
     const L longest = L(turn) / dynamics_.fastest_drives();
-    if (!depends_on_time()) return longest;
+    if (!is_batch<L> || !depends_on_time()) return longest;
     const double looks = ForcingLook::least_parts * nodes / ForcingLook::looks;
     return min(longest, L(looks) / natural_pace());
   }
@@ -185,11 +193,11 @@ class LaneSystem {
     const L part = L(1.0 / count) * h;
     for (int p = 0; p < count; ++p) {
       for (std::size_t i = 0; i < nodes; ++i) {
-        fma(L(p + Gauss::c[i]), part, time).store(times());
+        to_row(fma(L(p + Gauss::c[i]), part, time), times());
         dynamics_.accelerations(times(), numbers(0, 0), numbers(1, 0), numbers(2, 0));
         const L weight = L(Gauss::b[i]) * part;
         for (std::size_t k = 0; k < sums.push.size(); ++k) {
-          const L a = L::load(numbers(2, static_cast<int>(k)));
+          const L a = from_row<L>(numbers(2, static_cast<int>(k)));
           sums.push[k] = fma(weight, a, sums.push[k]);
           sums.size[k] = fma(abs(weight), abs(a), sums.size[k]);
           if (p > 0 || i > 0) sums.change[k] = sums.change[k] + abs(a - sums.last[k]);
@@ -201,6 +209,30 @@ class LaneSystem {
 
   // 1/s where nothing moves or pushes yet.
   L natural_pace() const { return sqrt(select(pace_squared_ > L(0.0), pace_squared_, L(1.0))); }
+
+  // Of one motion: relative to coordinates and rates themselves, and beside them to a radian and one a second, or the
+  // whole motion where that is smaller, so that swings of 1e-9 rad are followed as others are. The end of the step
+  // counts, too: forces may begin at nothing.
+  double error_squared_of_one(double h, const Parts& errors, const Parts& before, const Parts& slopes,
+                              const Parts& after) const {
+    const auto larger = [](const auto& a, const auto& b) { return std::max(std::abs(a[0]), std::abs(b[0])); };
+    double q = 0, v = 0, a = 0;
+    for_parts([&](int i) {
+      q = std::max(q, larger(before[i].place, after[i].place));
+      v = std::max(v, larger(before[i].rate, after[i].rate));
+      a = std::max(a, std::abs(slopes[i].rate[0]));
+    });
+    const double place = std::clamp(std::max(q, h * v), 1e-16, 1.0), rate = std::clamp(std::max(v, h * a), 1e-16, 1.0);
+    const double rounding = 1e-14 * q / h;  // what is left of rates at rest
+    double largest = 0;
+    for_parts([&](int i) {
+      const double speed = std::abs(before[i].rate[0]), push = std::abs(slopes[i].rate[0]);
+      const double off = std::max(0.0, h * std::abs(errors[i].rate[0]) - rounding) / (rate + speed + h * push);
+      const double moved = h * std::abs(errors[i].place[0]) / (place + std::abs(before[i].place[0]) + h * speed);
+      largest = std::max({largest, moved, off});
+    });
+    return largest * largest;
+  }
 
   // What has no size errs by nothing: it rests.
   static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
@@ -216,13 +248,13 @@ class LaneSystem {
   double* times() { return numbers(kinds, 0); }
 
   void write(const L& time, const Parts& parts) {
-    time.store(times());
+    to_row(time, times());
     for_parts([&](int i) {
-      value(parts[i].place[0]).store(numbers(0, i));
-      value(parts[i].rate[0]).store(numbers(1, i));
+      to_row(value(parts[i].place[0]), numbers(0, i));
+      to_row(value(parts[i].rate[0]), numbers(1, i));
       if constexpr (with_tangent) {
-        parts[i].place[0].slope.store(numbers(3, i));
-        parts[i].rate[0].slope.store(numbers(4, i));
+        to_row(parts[i].place[0].slope, numbers(3, i));
+        to_row(parts[i].rate[0].slope, numbers(4, i));
       }
     });
   }
@@ -238,17 +270,17 @@ class LaneSystem {
   }
   Number acceleration(int i) {
     if constexpr (with_tangent) {
-      return {L::load(numbers(2, i)), L::load(numbers(5, i))};
+      return {from_row<L>(numbers(2, i)), from_row<L>(numbers(5, i))};
     } else {
-      return L::load(numbers(2, i));
+      return from_row<L>(numbers(2, i));
     }
   }
 
   void start_tangent(int lane, double time, const double* q, const double* v, Parts& parts) {
     const auto tangent = tangent_.start(lane, time, q, v);
     for (int i = 0; i < this->parts(); ++i) {
-      parts[i].place[0].slope.set(lane, tangent.place[static_cast<std::size_t>(i)]);
-      parts[i].rate[0].slope.set(lane, tangent.rate[static_cast<std::size_t>(i)]);
+      set(parts[i].place[0].slope, lane, tangent.place[static_cast<std::size_t>(i)]);
+      set(parts[i].rate[0].slope, lane, tangent.rate[static_cast<std::size_t>(i)]);
     }
   }
 
@@ -257,7 +289,7 @@ class LaneSystem {
   };
 
   LaneDynamics<L>& dynamics_;
-  PackRows<L::width> rows_;
+  PackRows<width_of<L>> rows_;
   L pace_squared_{1.0}, energy_sum_{0.0};
   Sums coarse_, fine_;
   [[no_unique_address]] std::conditional_t<with_tangent, LaneSystemTangent<L>, NoTangent> tangent_;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/numeric/dual.hpp>
+#include <pendula/numeric/numeric.hpp>
 
 namespace pendula {
 
@@ -53,11 +54,11 @@ namespace detail {
 /// Sets a member's, and leaves its derivative.
 template <class L>
 void set_value(int lane, double value, L& x) {
-  x.set(lane, value);
+  set(x, lane, value);
 }
 template <class L>
 void set_value(int lane, double value, Dual<L>& x) {
-  x.value.set(lane, value);
+  set(x.value, lane, value);
 }
 
 }  // namespace detail

@@ -180,7 +180,7 @@ class LaneTaylor : public LaneState<Rods> {
   // Of the coefficient of t^k in all rods and rates, relative to lengths and the pace.
   L term_squared(int k, const L& pace) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { State::at(terms_, i) = series_.term(i, k); });
-    return dynamics_.error_squared(L(1.0), terms_, parts_, terms_, parts_, pace);
+    return dynamics_.size_squared(terms_, pace);
   }
 
   LaneSeries<Rods> series_;

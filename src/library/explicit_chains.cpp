@@ -1,0 +1,40 @@
+#include <pendula/chain/chain_forward_dynamics.hpp>
+#include <pendula/explicit/explicit_chain.hpp>
+#include <pendula/explicit/extrapolation_integrator.hpp>
+#include <pendula/explicit/single_integrator.hpp>
+#include <pendula/lanes/lane_explicit.hpp>
+#include <pendula/lanes/lane_rods.hpp>
+
+#include "library/explicit_methods.hpp"
+
+namespace pendula {
+namespace {
+
+template <class Space>
+struct Make {
+  const Chain<Space>& chain;
+  const RunOptions& options;
+
+  template <class Method>
+  std::unique_ptr<PlainIntegrator> of() const {
+    using Steps = LaneExplicit<LaneRods<Space, Eigen::Dynamic, double>, Method>;
+    return std::make_unique<SingleIntegrator<Steps, ExplicitChain<Space>>>(ExplicitChain<Space>(chain),
+                                                                           options.tolerance);
+  }
+  std::unique_ptr<PlainIntegrator> by_extrapolation() const {
+    return make_extrapolation_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain),
+                                         Space::dof * chain.links(), chain.links(), options.tolerance, "");
+  }
+};
+
+}  // namespace
+
+template <class Space>
+std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Space>& chain, const RunOptions& options) {
+  return detail::make_explicit(options, Make<Space>{chain, options});
+}
+
+template std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Planar>&, const RunOptions&);
+template std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Spatial>&, const RunOptions&);
+
+}  // namespace pendula

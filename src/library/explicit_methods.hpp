@@ -1,0 +1,56 @@
+#pragma once
+
+#include <memory>
+#include <pendula/chain/chain.hpp>
+#include <pendula/lanes/explicit_tableau.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_table.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace pendula {
+
+/// Explicit methods on rods, for any number of links: poles are no obstacle, but to bulirsch-stoer, which moves angles.
+/// Throws std::invalid_argument on taylor, and on a tolerance ≤ 0.
+template <class Space>
+std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Space>& chain, const RunOptions& options);
+
+extern template std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Planar>&, const RunOptions&);
+extern template std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Spatial>&, const RunOptions&);
+
+/// The same on the coordinates of a generated kernel.
+std::unique_ptr<PlainIntegrator> make_explicit_system(const SystemTable& table, const PlainSystem& plain,
+                                                      const RunOptions& options);
+
+namespace detail {
+
+/// make.of<Method>() for a method of explicit_tableau.hpp, or make.by_extrapolation().
+template <class Make>
+std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const Make& make) {
+  if (is_adaptive(options.method) && !(options.tolerance > 0)) {
+    throw std::invalid_argument("tolerance: expected a positive number, got " + std::to_string(options.tolerance));
+  }
+  switch (options.method) {
+    case Method::rk4:
+      return make.template of<ClassicalRungeKutta>();
+    case Method::dopri5:
+      return make.template of<DormandPrince5>();
+    case Method::fehlberg78:
+      return make.template of<Fehlberg8>();
+    case Method::bulirsch_stoer:
+      return make.by_extrapolation();
+    case Method::gauss:
+    case Method::radau:
+    case Method::taylor:
+      break;
+  }
+  throw std::invalid_argument("method: expected one that needs nothing but accelerations, got " +
+                              std::string(name_of(options.method)) +
+                              (options.method == Method::taylor ? ", which moves chains alone" : ""));
+}
+
+}  // namespace detail
+
+}  // namespace pendula

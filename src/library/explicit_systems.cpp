@@ -1,0 +1,41 @@
+#include <pendula/explicit/explicit_system.hpp>
+#include <pendula/explicit/extrapolation_integrator.hpp>
+#include <pendula/explicit/single_integrator.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
+#include <pendula/lanes/lane_dynamics.hpp>
+#include <pendula/lanes/lane_explicit.hpp>
+#include <pendula/lanes/lane_system.hpp>
+
+#include "library/explicit_methods.hpp"
+
+namespace pendula {
+namespace {
+
+struct Make {
+  const SystemTable& table;
+  const PlainSystem& plain;
+  const RunOptions& options;
+
+  template <class Method>
+  std::unique_ptr<PlainIntegrator> of() const {
+    using Steps = LaneExplicit<LaneSystem<double>, Method>;
+    using Subject = ExplicitSystem<LaneDynamics<double>, Method>;
+    return std::make_unique<SingleIntegrator<Steps, Subject>>(Subject(table, plain, options.tolerance),
+                                                              options.tolerance);
+  }
+  std::unique_ptr<PlainIntegrator> by_extrapolation() const {
+    const SystemModel model(table, plain);
+    const auto coordinates = static_cast<int>(model.coordinates());
+    return make_extrapolation_integrator(std::make_unique<SystemForwardDynamics>(model), coordinates, coordinates,
+                                         options.tolerance, table.info.name);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<PlainIntegrator> make_explicit_system(const SystemTable& table, const PlainSystem& plain,
+                                                      const RunOptions& options) {
+  return detail::make_explicit(options, Make{table, plain, options});
+}
+
+}  // namespace pendula

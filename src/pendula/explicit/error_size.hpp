@@ -1,0 +1,41 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace pendula {
+
+/// What the errors of a step are compared with: coordinates and rates themselves, and beside them a radian and one a
+/// second, or the whole motion where that is smaller, so that swings of 1e-9 rad are followed as others are. The end of
+/// the step counts, too: forces may begin at nothing.
+class ErrorSize {
+ public:
+  /// Of a step that has moved x so far, with `rate` as its derivative.
+  ErrorSize(const std::vector<double>& x, const std::vector<double>& rate, const std::vector<double>& moved, double h,
+            double tolerance)
+      : x_(x), half_(x.size() / 2) {
+    double q = 0, v = 0, a = 0;
+    for (std::size_t i = 0; i < half_; ++i) {
+      const std::size_t k = half_ + i;
+      q = std::max({q, std::abs(x[i]), std::abs(x[i] + moved[i])});
+      v = std::max({v, std::abs(x[k]), std::abs(x[k] + moved[k])});
+      a = std::max(a, std::abs(rate[k]));
+    }
+    const double rounding = rounded * q / (tolerance * h);  // what is left of rates at rest
+    place_ = std::clamp(std::max(q, h * v), nothing, 1.0);
+    turn_ = std::clamp(std::max({v, h * a, rounding}), nothing, 1.0);
+  }
+
+  double operator[](std::size_t i) const { return (i < half_ ? place_ : turn_) + std::abs(x_[i]); }
+
+ private:
+  static constexpr double rounded = 1e-14, nothing = 1e-16;
+
+  const std::vector<double>& x_;
+  std::size_t half_;
+  double place_, turn_;
+};
+
+}  // namespace pendula

@@ -1,0 +1,156 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <pendula/explicit/error_size.hpp>
+#include <pendula/explicit/field_steps.hpp>
+#include <pendula/explicit/forced_steps.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
+#include <pendula/kernels/gauss_tableaux.hpp>
+#include <pendula/system/outcome.hpp>
+#include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_model.hpp>
+#include <pendula/system/system_table.hpp>
+#include <string_view>
+#include <vector>
+
+namespace pendula {
+
+/// A system of a generated kernel as SingleIntegrator moves it by a Method of explicit_tableau.hpp. `Dynamics` is
+/// LaneDynamics of plain numbers.
+template <class Dynamics, class Method>
+class ExplicitSystem {
+  static constexpr bool can_choose = Method::error_order > 0;
+  static constexpr int nodes = can_choose ? (Method::error_order + 2) / 2 : 2;  // of the quadrature that is as good
+  static constexpr bool is_blind = [] {
+    if constexpr (can_choose) return Method::is_blind;
+    return false;
+  }();
+
+ public:
+  /// `table` must outlive it.
+  ExplicitSystem(const SystemTable& table, const PlainSystem& plain, double tolerance)
+      : model_(table, plain),
+        numbers_{{model_.parameters().begin(), model_.parameters().end()},
+                 {plain.inputs, plain.inputs + model_.inputs()},
+                 {plain.sines.begin(), plain.sines.end()}},
+        dynamics_(std::make_unique<Dynamics>(table)),
+        forward_(std::make_unique<SystemForwardDynamics>(model_)),
+        forcing_(kernels::GaussTableau<nodes>(), model_.coordinates(), tolerance, is_blind),
+        field_(nodes, *forward_, model_.coordinates(), is_blind),
+        fastest_(model_.coordinates()),
+        x_(2 * model_.coordinates()),
+        end_(x_),
+        moved_(x_) {}
+
+  static constexpr double tolerance_share = 1;
+
+  Dynamics& subject() { return *dynamics_; }
+  std::string_view kernel() const { return model_.info().name; }
+
+  template <class Steps>
+  Outcome start(double time, const double* q, const double* v, Steps& steps) {
+    steps.start(0, time, numbers_.plain(), q, v);
+    std::fill(fastest_.begin(), fastest_.end(), 0.0);
+    field_.forget();
+    const std::size_t part = first_not_finite(time, q, v);
+    if (part < count()) {
+      return {.status = Status::singular_mass_matrix, .time = time, .part = static_cast<int>(part)};
+    }
+    if (can_choose) forcing_.start(*forward_, time, q, v);
+    return {.status = Status::ok, .time = time};
+  }
+
+  template <class Steps>
+  void follow(const Steps& /*steps*/) const {}
+
+  template <class Steps>
+  void read(const Steps& steps, double* q, double* v) const {
+    for (int i = 0; i < steps.links(); ++i) read_near(i, steps.exact_place(i), steps.exact_rate(i), q, v);
+  }
+  template <class Steps>
+  void read_within(const Steps& steps, double share, double* q, double* v) const {
+    for (int i = 0; i < steps.links(); ++i) {
+      const auto there = steps.glance(i, share);
+      read_near(i, there.place, there.rate, q, v);
+    }
+  }
+  template <class Vector>
+  void read_near(int i, const Vector& place, const Vector& rate, double* q, double* v) const {
+    q[i] = static_cast<double>(place[0]);
+    v[i] = static_cast<double>(rate[0]);
+  }
+
+  template <class Steps>
+  double followed(const Steps& steps, double time, double h) {
+    write(steps.parts(), x_);
+    return forcing_.followed(*forward_, time, x_.data(), x_.data() + count(), h);
+  }
+
+  bool has_to_look() const { return field_.has_to_look(); }
+
+  /// Relative to what errors are compared with; without a tolerance to the fastest that a coordinate was, or others
+  /// were, nearly.
+  template <class Steps>
+  Unseen unseen(const Steps& steps, double time, double h, double tolerance) {
+    write(steps.parts(), x_);
+    write(steps.tried(), end_);
+    if (tolerance > 0) {
+      for (std::size_t k = 0; k < x_.size(); ++k) moved_[k] = end_[k] - x_[k];
+      return field_.unseen(*forward_, time, h, x_, end_, [&](const std::vector<double>& rate) {
+        return [this, sizes = ErrorSize(x_, rate, moved_, h, tolerance)](std::size_t k) { return sizes[count() + k]; };
+      });
+    }
+    for (std::size_t k = 0; k < count(); ++k) fastest_[k] = std::max(fastest_[k], std::abs(end_[count() + k]));
+    const double least = std::max(beside * *std::max_element(fastest_.begin(), fastest_.end()), nothing);
+    return field_.unseen(*forward_, time, h, x_, end_, [&](const std::vector<double>&) {
+      return [this, least](std::size_t k) { return std::max(fastest_[k], least); };
+    });
+  }
+
+  void move_on() { field_.move_on(); }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    field_.forget();
+    numbers(forcing_, fastest_);
+  }
+
+ private:
+  static constexpr double nothing = 1e-280, beside = 1e-3;
+
+  std::size_t count() const { return model_.coordinates(); }
+
+  template <class Parts>
+  void write(const Parts& parts, std::vector<double>& to) const {
+    for (std::size_t k = 0; k < count(); ++k) {
+      to[k] = parts[static_cast<int>(k)].place[0];
+      to[count() + k] = parts[static_cast<int>(k)].rate[0];
+    }
+  }
+
+  // Of rates and accelerations: at a pole these are infinite, and it is better to say so than to start.
+  std::size_t first_not_finite(double time, const double* q, const double* v) {
+    std::vector<double> found(count());
+    forward_->acceleration(time, q, v, found.data());
+    for (const double* numbers : {v, static_cast<const double*>(found.data())}) {
+      for (std::size_t k = 0; k < count(); ++k) {
+        if (!std::isfinite(numbers[k])) return k;
+      }
+    }
+    return count();
+  }
+
+  SystemModel model_;
+  SystemNumbers numbers_;
+  std::unique_ptr<Dynamics> dynamics_;  // of which others know where it is
+  std::unique_ptr<SystemForwardDynamics> forward_;
+  ForcedSteps forcing_;
+  FieldSteps field_;
+  std::vector<double> fastest_;          // that each coordinate was
+  std::vector<double> x_, end_, moved_;  // (q, q̇), at the ends of a step and from one to the other
+};
+
+}  // namespace pendula
