@@ -1,4 +1,4 @@
-#include <pendula/chain/chain_forward_dynamics.hpp>
+#include <pendula/explicit/chain_forward_dynamics.hpp>
 #include <pendula/explicit/explicit_chain.hpp>
 #include <pendula/explicit/extrapolation_integrator.hpp>
 #include <pendula/explicit/single_integrator.hpp>

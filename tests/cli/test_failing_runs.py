@@ -49,7 +49,7 @@ def test_a_failing_step_ends_the_run_and_the_rows_stay(pendula, tmp_path, form):
     assert trajectory.rows[-1][1] == run.json["final"]["theta"][0]
 
 
-@pytest.mark.parametrize("method", ["gauss", "rk4", "dopri5"])
+@pytest.mark.parametrize("method", ["gauss", "bulirsch-stoer"])
 def test_a_start_at_the_pole_is_refused(pendula, tmp_path, method):
     (tmp_path / "run.toml").write_text(EVER_FASTER)
     run = pendula(

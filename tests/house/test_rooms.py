@@ -12,8 +12,8 @@ KNOWS = {
     "pendula/numeric": set(),
     "pendula/system": {"pendula/numeric"},
     "pendula/gauss": {"pendula/system", "pendula/numeric"},
-    "pendula/explicit": {"pendula/system", "pendula/numeric"},
-    "pendula/chain": {"pendula/explicit", "pendula/gauss", "pendula/system", "pendula/numeric"},
+    "pendula/chain": {"pendula/gauss", "pendula/system", "pendula/numeric"},
+    "pendula/explicit": {"pendula/chain", "pendula/system", "pendula/numeric"},
     "pendula/lanes": {"pendula/chain", "pendula/gauss", "pendula/system", "pendula/numeric"},
     "pendula/run": {
         "pendula/lanes",

@@ -24,7 +24,7 @@ ONCE = [
     f"{name}.cpp.o"
     for name in (
         "c_kernel",
-        "explicit_integrator",
+        "extrapolation_integrator",
         "interpreted_kernel",
         "kernel_check",
         "kernel_comparison",
@@ -35,7 +35,7 @@ ONCE = [
 ]
 
 # Of the library itself, what a copy may ask the other objects for.
-SHARED = re.compile(r"pendula::(library\(\)|make_explicit_integrator\(.*\))$")
+SHARED = re.compile(r"pendula::(library\(\)|make_extrapolation_integrator\(.*\))$")
 
 
 def read(tool: str, *options: str) -> dict[str, str]:
