@@ -62,8 +62,8 @@ class ExplicitChain {
     return h;
   }
   bool has_to_look() const { return false; }
-  template <class Steps>
-  Unseen unseen(const Steps& /*steps*/, double /*time*/, double /*h*/, double /*tolerance*/) const {
+  template <class Parts>
+  Unseen unseen(const Parts& /*from*/, const Parts& /*to*/, double /*time*/, double /*h*/, double /*tolerance*/) const {
     return {};
   }
   void move_on() const {}

@@ -93,10 +93,10 @@ class ExplicitSystem {
 
   /// Relative to what errors are compared with; without a tolerance to the fastest that a coordinate was, or others
   /// were, nearly.
-  template <class Steps>
-  Unseen unseen(const Steps& steps, double time, double h, double tolerance) {
-    write(steps.parts(), x_);
-    write(steps.tried(), end_);
+  template <class Parts>
+  Unseen unseen(const Parts& from, const Parts& to, double time, double h, double tolerance) {
+    write(from, x_);
+    write(to, end_);
     if (tolerance > 0) {
       for (std::size_t k = 0; k < x_.size(); ++k) moved_[k] = end_[k] - x_[k];
       return field_.unseen(*forward_, time, h, x_, end_, [&](const std::vector<double>& rate) {

@@ -17,7 +17,7 @@ namespace pendula {
 ///   void read(steps, q, v);  void read_within(steps, share, q, v): when a share of the last step was done
 ///   void read_near(i, place, rate, q, v): of a part, whose q is known nearly
 ///   double followed(steps, time, h): the longest step up to h in which it sees what depends on time
-///   bool has_to_look();  Unseen unseen(steps, time, h, tolerance): what the step that was tried does not see
+///   bool has_to_look();  Unseen unseen(from, to, time, h, tolerance): what a step does not see
 ///   tolerance_share: of the user's tolerance, what the steps are given
 ///   void move_on();  void member(numbers);  kernel()
 template <class Steps, class Subject>
@@ -117,10 +117,7 @@ class SingleIntegrator : public PlainIntegrator {
       const bool is_good = parts == 1 ? steps_.solve(time(), h, true) : goes_in(parts, time(), h);
       if (is_stopped()) return interrupted(h);
       if (is_good) {
-        if (subject_.has_to_look()) {
-          statistics_.step_over(time(), subject_.unseen(steps_, time(), h, 0).effect, 0);
-          subject_.move_on();
-        }
+        if (subject_.has_to_look()) count_unseen(parts, h);
         parts_of_last_ = parts;
         parts == 1 ? steps_.accept(true) : steps_.set_step(kept_, time(), h);
         return accept(h);
@@ -129,6 +126,13 @@ class SingleIntegrator : public PlainIntegrator {
     }
     --statistics_.rejected_steps;
     return failure(Status::not_finite, h / most_parts);
+  }
+
+  void count_unseen(int parts, double h) {
+    const Unseen unseen = parts == 1 ? subject_.unseen(steps_.parts(), steps_.tried(), time(), h, 0)
+                                     : subject_.unseen(kept_.parts, steps_.parts(), time(), h, 0);
+    statistics_.step_over(time(), unseen.effect, 0);
+    subject_.move_on();
   }
 
   // From where it is, which is kept; where that fails it is there again.
@@ -219,7 +223,7 @@ class SingleIntegrator : public PlainIntegrator {
     }
     if (!controller_.accepts(true, h, steps_)) return false;
     if (!subject_.has_to_look()) return true;
-    trial.unseen = subject_.unseen(steps_, time(), h, tolerance_).impulse;
+    trial.unseen = subject_.unseen(steps_.parts(), steps_.tried(), time(), h, tolerance_).impulse;
     if (!statistics_.has_to_see(trial.unseen, h, tolerance_)) return true;
     controller_.shrink(true, h, 0.5);
     return false;
