@@ -240,7 +240,8 @@ TEST(ExplicitMethods, PassThePole) {
     RunOptions options;
     options.method = method;
     const double h = method == Method::rk4 ? 1e-3 : std::numeric_limits<double>::infinity();
-    EXPECT_LT(distance(final_state(chain, hanging, options, h, 2), reference), 1e-8) << method;  // measured 1.7e-10, 3.7e-10, 1.3e-9
+    EXPECT_LT(distance(final_state(chain, hanging, options, h, 2), reference), 1e-8)
+        << method;  // measured 1.7e-10, 3.7e-10, 1.3e-9
   }
 }
 
