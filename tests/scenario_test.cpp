@@ -9,8 +9,12 @@
 #include <numbers>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/momenta.hpp>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "io/scenario_keys.hpp"
 
 namespace pendula::io {
 namespace {
@@ -151,6 +155,51 @@ TEST(Scenario, NamesOfSettingsMeanTheirEnumerators) {
   EXPECT_EQ(run("iteration=fixed-point").iteration, Iteration::fixed_point);
 }
 
+TEST(Scenario, DefaultsAreThoseOfTheTableOfKeys) {
+  const auto without = parsed<Spatial>(edited(planar_text, "planar", "spatial"));
+  int tried = 0;
+  for (const ScenarioTable& table : scenario_tables()) {
+    if (!std::set<std::string_view>{"chain", "start", "run", "output"}.contains(table.name)) continue;
+    for (const ScenarioKey& key : table.keys) {
+      if (key.otherwise.index() < 2 || key.name == "tolerance") continue;  // no value; which asks for no accuracy
+      const std::string change = std::string(table.name) + "." + std::string(key.name) + "=" + default_text(key);
+      const auto with = parsed<Spatial>(edited(planar_text, "planar", "spatial"), {change});
+      EXPECT_EQ(with.chain.gravity(), without.chain.gravity()) << change;
+      EXPECT_EQ(with.chain.damping(), without.chain.damping()) << change;
+      EXPECT_EQ(with.chain.constant_torque(), without.chain.constant_torque()) << change;
+      EXPECT_EQ(with.natural.has_value(), without.natural.has_value()) << change;
+      EXPECT_EQ(with.start.q, without.start.q) << change;
+      EXPECT_EQ(with.start.v, without.start.v) << change;
+      EXPECT_EQ(with.run.method, without.run.method) << change;
+      EXPECT_EQ(with.run.form, without.run.form) << change;
+      EXPECT_EQ(with.run.solver, without.run.solver) << change;
+      EXPECT_EQ(with.run.iteration, without.run.iteration) << change;
+      EXPECT_EQ(with.duration, without.duration) << change;
+      EXPECT_EQ(with.estimate, without.estimate) << change;
+      EXPECT_EQ(with.checkpoint, without.checkpoint) << change;
+      ++tried;
+    }
+  }
+  EXPECT_EQ(tried, 14);
+  EXPECT_EQ(without.chain.gravity(), ChainParameters<Planar>{}.gravity);
+  EXPECT_EQ(without.run.tolerance, std::get<double>(find_key("run.tolerance")->otherwise));
+}
+
+TEST(Scenario, KeysAreFoundByTheirNames) {
+  std::set<std::string_view> names;
+  for (const std::string_view name : all_keys()) {
+    EXPECT_TRUE(names.insert(name).second) << name;
+    ASSERT_NE(find_key(name), nullptr) << name;
+    EXPECT_TRUE(name.ends_with(find_key(name)->name)) << name;
+    EXPECT_FALSE(find_key(name)->hint.empty()) << name;
+  }
+  EXPECT_EQ(find_key("chain.drive[2].amplitude"), find_key("chain.drive.amplitude"));
+  EXPECT_EQ(find_key("chain.torque[2][3]")->unit, "N m");
+  for (const std::string_view none : {"chain.", "chain.mass", "chain.masses.first", "drive.link", "", "."}) {
+    EXPECT_EQ(find_key(none), nullptr) << none;
+  }
+}
+
 TEST(Scenario, AnyArrayTellsTheNumberOfLinks) {
   const std::string text = "[chain]\nspace = \"spatial\"\nmasses = 1\nlengths = 1\n[start]\ntheta = 1\n";
   for (const std::string key : {"chain.masses", "chain.lengths", "chain.damping", "start.theta", "start.phi",
@@ -161,7 +210,7 @@ TEST(Scenario, AnyArrayTellsTheNumberOfLinks) {
   EXPECT_EQ(parsed<Spatial>(text, {"chain.links=5"}).chain.links(), 5);
   EXPECT_EQ(parsed<Planar>(text, {"chain.space=planar", "chain.torque=[1, 2, 3]"}).chain.links(), 3);
   EXPECT_EQ(error_of(text),
-            "file.toml:1: chain.links: expected a number of links, which no array tells, got no such key");
+            "file.toml:1: chain.links: expected the number of links, where no array tells it, got no such key");
 }
 
 TEST(Scenario, TorquesAreOneALinkOrOneForAll) {
@@ -233,8 +282,9 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       {"masses  = [1.0, 0.5, 2.0]", "", "file.toml:1: chain.masses: expected the masses of the bobs, got no such key"},
       {"lengths = 1.5", "", "file.toml:1: chain.lengths: expected the lengths of the rods, got no such key"},
       {"theta     = [1.0, 0.5, 0.2]", "",
-       "file.toml:17: start.theta: expected the angles at the start, got no such key"},
-      {"link = 2", "", "file.toml:11: chain.drive[1].link: expected a link from 1 to 3, got no such key"},
+       "file.toml:17: start.theta: expected the angles at the start, from the downward vertical, got no such key"},
+      {"link = 2", "",
+       "file.toml:11: chain.drive[1].link: expected the link that it acts on, 1 at the pivot, got no such key"},
       {"frequency = 3", "", "file.toml:11: chain.drive[1].frequency: expected an angular frequency, got no such key"},
       // wrong types
       {"lengths = 1.5", "lengths = \"long\"",
@@ -292,7 +342,8 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       {"step      = 1e-2", "step = 1e-300",
        "file.toml:29: run.step: expected a step of at least 5.555555555555556e-16 for "
        "this duration, got 1e-300"},
-      {"step      = 1e-2", "tolerance = 0.0", "file.toml:29: run.tolerance: expected a finite number > 0, got 0.0"},
+      {"step      = 1e-2", "tolerance = 0.0",
+       "file.toml:29: run.tolerance: expected a finite number >= 1e-16, got 0.0"},
       {"duration  = 5", "duration = -5", "file.toml:30: run.duration: expected a finite number >= 0, got -5"},
       {"every = 3", "every = 0",
        "file.toml:33: output.every: expected an integer from 1 to 9223372036854775807, got 0"},

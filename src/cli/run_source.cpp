@@ -1,7 +1,6 @@
 #include "cli/run_source.hpp"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
@@ -11,24 +10,29 @@
 
 #include "io/input_error.hpp"
 #include "io/provenance.hpp"
+#include "io/scenario_keys.hpp"
 
 namespace pendula::cli {
 namespace {
-
-/// What may be another than it was: everything else decides how the run has come to where it is.
-constexpr std::array<std::string_view, 2> free_keys = {"run.duration", "output.checkpoint"};
 
 std::string key_of(const std::string& change) {
   return change.substr(0, change.find_first_of("= "));
 }
 
+/// Throws io::InputError where what decides how the run has come to where it is would be another.
 void require_free(const std::vector<std::string>& overrides) {
+  const auto may_change = [](std::string_view key) {
+    const io::ScenarioKey* const known = io::find_key(key);
+    return known != nullptr && known->may_change;
+  };
+  std::string free;
+  for (const std::string_view key : io::all_keys()) {
+    if (may_change(key)) free.append(free.empty() ? "" : " or ").append(key);
+  }
   for (const std::string& change : overrides) {
-    const std::string key = key_of(change);
-    if (std::ranges::find(free_keys, key) != free_keys.end()) continue;
-    std::string message = "--set " + change;
-    message += ": expected run.duration or output.checkpoint, which a run that goes on may have anew, got " + key;
-    throw io::InputError(message);
+    if (may_change(key_of(change))) continue;
+    throw io::InputError("--set " + change + ": expected " + free + ", which a run that goes on may have anew, got " +
+                         key_of(change));
   }
 }
 

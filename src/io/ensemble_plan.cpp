@@ -2,29 +2,24 @@
 
 #include <Random123/philox.h>
 
-#include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <pendula/numeric/number_text.hpp>
 #include <string_view>
 
+#include "io/input_error.hpp"
+#include "io/section.hpp"
+#include "io/toml_reader.hpp"
+
 namespace pendula::io {
 namespace {
 
-constexpr std::array<std::string_view, 6> ensemble_keys = {"axis", "random", "count", "seed", "method", "keep"};
-constexpr std::array<std::string_view, 2> methods = {"run", "auto"};
-constexpr std::array<std::string_view, 4> axis_keys = {"key", "from", "to", "count"};
-constexpr std::array<std::string_view, 5> random_keys = {"key", "from", "to", "mean", "deviation"};
-
-/// Beyond 2⁵³ a double no longer tells one from the next.
-constexpr std::int64_t most_members = std::int64_t{1} << 53;
-
 std::string read_key(const Section& section) {
-  const Entry entry = section.require("key", "a key of the scenario, such as \"start.theta[1]\"");
+  const Entry entry = section.require("key");
   const std::string key = entry.text();
-  if (key.find('.') == std::string::npos || key.starts_with("ensemble.")) {
-    entry.fail("a key of the scenario, such as \"start.theta[1]\"");
+  const ScenarioKey* const known = find_key(key);
+  if (key.find('.') == std::string::npos || key.starts_with("ensemble.") || (known && !takes_numbers(*known))) {
+    entry.fail(std::string(find_key("ensemble.axis.key")->hint));
   }
   return key;
 }
@@ -32,9 +27,9 @@ std::string read_key(const Section& section) {
 EnsembleAxis read_axis(const Section& section) {
   EnsembleAxis axis;
   axis.key = read_key(section);
-  axis.from = section.require("from", "a finite number").number();
-  axis.to = section.require("to", "a finite number").number();
-  axis.count = section.require("count", "an integer >= 1").integer(1, most_members);
+  axis.from = section.require("from").number();
+  axis.to = section.require("to").number();
+  axis.count = section.require("count").integer();
   return axis;
 }
 
@@ -43,27 +38,16 @@ EnsembleDraw read_draw(const Section& section) {
   draw.key = read_key(section);
   draw.normal = section.find("mean") || section.find("deviation");
   if (!draw.normal) {
-    draw.first = section.require("from", "a finite number, or mean and deviation").number();
-    draw.second = section.require("to", "a finite number").number();
+    draw.first = section.require("from").number();
+    draw.second = section.require("to").number();
     return draw;
   }
   for (const std::string_view other : {"from", "to"}) {
     if (const auto entry = section.find(other)) entry->fail("nothing beside mean and deviation");
   }
-  draw.first = section.require("mean", "a finite number").number();
-  draw.second = section.require("deviation", "a finite number >= 0").number(Sign::not_negative);
+  draw.first = section.require("mean").number();
+  draw.second = section.require("deviation").number();
   return draw;
-}
-
-/// Elements of an array of tables.
-template <class Read>
-auto read_all(const Section& ensemble, const std::string& name, std::span<const std::string_view> known, Read read) {
-  std::vector<decltype(read(ensemble))> all;
-  const std::optional<Entry> entry = ensemble.find(name);
-  if (!entry) return all;
-  if (!entry->is_array()) entry->fail("tables [[ensemble." + name + "]]");
-  for (std::size_t k = 0; k < entry->size(); ++k) all.push_back(read(Section(entry->element(k), known)));
-  return all;
 }
 
 void require_different(const Section& ensemble, const std::string& name, const std::vector<std::string>& keys) {
@@ -141,65 +125,36 @@ std::vector<std::string> EnsemblePlan::overrides(std::int64_t member) const {
 }
 
 std::string unit_of_key(std::string_view key) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 18> units = {{
-      {"start.theta_dot", "rad/s"},
-      {"start.phi_dot", "rad/s"},
-      {"start.theta", "rad"},
-      {"start.phi", "rad"},
-      {"chain.masses", "kg"},
-      {"chain.lengths", "m"},
-      {"chain.gravity", "m/s^2"},
-      {"chain.damping", "N m s/rad"},
-      {"chain.torque", "N m"},
-      {"chain.drive.amplitude", "N m"},
-      {"chain.drive.frequency", "rad/s"},
-      {"chain.drive.phase", "rad"},
-      {"system.drive.frequency", "rad/s"},
-      {"system.drive.phase", "rad"},
-      {"run.step", "s"},
-      {"run.duration", "s"},
-      {"run.tolerance", "1"},
-      {"run.accuracy", "1"},
-  }};
-  std::string name;
-  int depth = 0;  // of brackets
-  for (const char c : key) {
-    depth += c == '[' ? 1 : 0;
-    if (depth == 0) name += c;
-    depth -= c == ']' ? 1 : 0;
-  }
-  for (const auto& [known, unit] : units) {
-    if (known == name) return std::string(unit);
-  }
-  return {};
+  const ScenarioKey* const known = find_key(key);
+  return known == nullptr ? std::string() : std::string(known->unit);
 }
 
 EnsemblePlan parse_ensemble(std::string_view text, const std::string& name, std::span<const std::string> overrides) {
   const toml::table document = parse_toml(text, name, overrides);
-  const toml::node* const node = document.get("ensemble");
-  if (node == nullptr) {
+  const Section root(document);
+  if (!root.find("ensemble")) {
     throw InputError(name + ": expected [[ensemble.axis]] or [[ensemble.random]], got a scenario without [ensemble]");
   }
-  const Section ensemble(Entry(*node, "ensemble"), ensemble_keys);
+  const Section ensemble(root, "ensemble");
   EnsemblePlan plan;
-  plan.axes = read_all(ensemble, "axis", axis_keys, read_axis);
-  plan.draws = read_all(ensemble, "random", random_keys, read_draw);
+  for (const Section& table : ensemble.each("axis")) plan.axes.push_back(read_axis(table));
+  for (const Section& table : ensemble.each("random")) plan.draws.push_back(read_draw(table));
   if (plan.axes.empty() == plan.draws.empty()) {
     throw InputError(ensemble.where(), "ensemble", "either [[ensemble.axis]] or [[ensemble.random]]",
                      plan.axes.empty() ? "neither" : "both");
   }
   require_different(ensemble, plan.axes.empty() ? "random" : "axis", plan.keys());
-  const std::optional<Entry> count = ensemble.find("count"), seed = ensemble.find("seed"), keep = ensemble.find("keep");
+  const std::optional<Entry> count = ensemble.find("count"), keep = ensemble.find("keep");
   if (plan.axes.empty()) {
-    plan.count = ensemble.require("count", "how many members, an integer >= 1").integer(1, most_members);
+    plan.count = ensemble.require("count").integer();
   } else {
     if (count) count->fail("a count of each axis, and none of the ensemble");
     plan.count = product(ensemble, plan.axes);
   }
-  if (seed) plan.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<std::int64_t>::max()));
-  if (const auto method = ensemble.find("method")) plan.chooses_method = method->choice(methods) == 1;
+  plan.seed = static_cast<std::uint64_t>(ensemble.integer("seed"));
+  plan.chooses_method = ensemble.choice("method") == 1;
   if (!keep) return plan;
-  if (!keep->is_array()) keep->fail("a list of what to keep, such as [\"final\", \"energy_error\"]");
+  if (!keep->is_array()) keep->fail(std::string(find_key("ensemble.keep")->hint));
   plan.keep_place = keep->place();
   for (std::size_t k = 0; k < keep->size(); ++k) plan.keep.push_back(keep->element(k).text());
   return plan;

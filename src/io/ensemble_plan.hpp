@@ -1,11 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
-
-#include "io/toml_reader.hpp"
 
 namespace pendula::io {
 
@@ -30,7 +29,7 @@ struct EnsemblePlan {
   std::vector<EnsembleAxis> axes;   ///< either these, the first one slowest,
   std::vector<EnsembleDraw> draws;  ///< or these
   std::int64_t count = 0;           ///< of members
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 0;
   bool chooses_method = false;    ///< by what takes least, in place of that of [run]
   std::vector<std::string> keep;  ///< as in the scenario; empty for what is usual
   std::string keep_place;         ///< `where: key`

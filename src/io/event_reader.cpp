@@ -1,7 +1,6 @@
 #include "io/event_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <pendula/numeric/number_text.hpp>
@@ -13,9 +12,6 @@
 namespace pendula::io {
 namespace {
 
-constexpr std::array<std::string_view, 4> event_keys = {"name", "when", "direction", "stop"};
-constexpr std::array<std::string_view, 3> direction_names = {"up", "down", "both"};
-
 /// What can be a cell of a table and a part of a key.
 bool is_name(std::string_view text) {
   return std::ranges::all_of(text, [](char c) {
@@ -25,16 +21,14 @@ bool is_name(std::string_view text) {
 
 EventPlan read_event(const Section& table) {
   EventPlan plan;
-  const Entry name = table.require("name", "a name of letters, digits, _ and -");
+  const Entry name = table.require("name");
   plan.name = name.text();
-  if (!is_name(plan.name)) name.fail("a name of letters, digits, _ and -");
-  const Entry when = table.require("when", "an expression that crosses zero where the event is, as \"x_1 - 0.5\"");
+  if (!is_name(plan.name)) name.fail(std::string(find_key("event.name")->hint));
+  const Entry when = table.require("when");
   plan.when = when.text();
   plan.place = when.place();
-  if (const auto direction = table.find("direction")) {
-    plan.direction = static_cast<Direction>(direction->choice(direction_names));
-  }
-  if (const auto stop = table.find("stop")) plan.stop = stop->truth();
+  plan.direction = table.option<Direction>("direction");
+  plan.stop = table.truth("stop");
   return plan;
 }
 
@@ -104,11 +98,7 @@ class RowFunction : public Formula {
 
 std::vector<EventPlan> read_events(const Section& root) {
   std::vector<EventPlan> plans;
-  const std::optional<Entry> entry = root.find("event");
-  if (!entry) return plans;
-  if (!entry->is_array()) entry->fail("[[event]] tables");
-  for (std::size_t i = 0; i < entry->size(); ++i) {
-    const Section table(entry->element(i), event_keys);
+  for (const Section& table : root.each("event")) {
     EventPlan plan = read_event(table);
     const auto same = [&](const EventPlan& other) { return other.name == plan.name; };
     if (std::ranges::any_of(plans, same)) table.find("name")->fail("a name that no event before it has");

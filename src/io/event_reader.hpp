@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/toml_reader.hpp"
+#include "io/section.hpp"
 
 namespace pendula::io {
 

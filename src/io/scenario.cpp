@@ -3,13 +3,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <pendula/chain/momenta.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "io/input_file.hpp"
+#include "io/section.hpp"
 #include "io/system_reader.hpp"
 #include "io/toml_reader.hpp"
 
@@ -18,108 +18,28 @@ namespace {
 
 using Names = std::span<const std::string_view>;
 
-constexpr std::array<std::string_view, 7> section_names = {"chain",  "system", "start",   "run",
-                                                           "output", "event",  "ensemble"};
-constexpr std::array<std::string_view, 9> chain_keys = {"space",   "links",  "masses", "lengths", "gravity",
-                                                        "damping", "torque", "units",  "drive"};
-constexpr std::array<std::string_view, 4> drive_keys = {"link", "amplitude", "frequency", "phase"};
 constexpr std::array<std::string_view, 2> angle_keys = {"theta", "phi"};
 constexpr std::array<std::string_view, 2> rate_keys = {"theta_dot", "phi_dot"};
 constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
-constexpr std::array<std::string_view, 6> start_keys = {"theta", "phi", "theta_dot", "phi_dot", "p_theta", "p_phi"};
-constexpr std::array<std::string_view, 10> run_keys = {"method", "stages",    "form",     "solver",   "iteration",
-                                                       "step",   "tolerance", "accuracy", "duration", "estimate"};
-constexpr std::array<std::string_view, 4> output_keys = {"every", "interval", "times", "checkpoint"};
 
-/// Where each key belongs, to tell those who put it elsewhere.
-constexpr std::array<std::string_view, 50> all_keys = {"chain.space",
-                                                       "chain.links",
-                                                       "chain.masses",
-                                                       "chain.lengths",
-                                                       "chain.gravity",
-                                                       "chain.damping",
-                                                       "chain.torque",
-                                                       "chain.units",
-                                                       "chain.drive",
-                                                       "chain.drive.link",
-                                                       "chain.drive.amplitude",
-                                                       "chain.drive.frequency",
-                                                       "chain.drive.phase",
-                                                       "system.model",
-                                                       "system.links",
-                                                       "system.parameters",
-                                                       "system.drive",
-                                                       "system.drive.input",
-                                                       "system.drive.constant",
-                                                       "system.drive.amplitude",
-                                                       "system.drive.frequency",
-                                                       "start.theta",
-                                                       "start.phi",
-                                                       "start.theta_dot",
-                                                       "start.phi_dot",
-                                                       "start.p_theta",
-                                                       "start.p_phi",
-                                                       "run.method",
-                                                       "run.stages",
-                                                       "run.form",
-                                                       "run.solver",
-                                                       "run.iteration",
-                                                       "run.step",
-                                                       "run.tolerance",
-                                                       "run.accuracy",
-                                                       "run.duration",
-                                                       "run.estimate",
-                                                       "output.every",
-                                                       "output.interval",
-                                                       "output.times",
-                                                       "output.checkpoint",
-                                                       "event.name",
-                                                       "event.when",
-                                                       "event.direction",
-                                                       "event.stop",
-                                                       "ensemble.axis",
-                                                       "ensemble.random",
-                                                       "ensemble.count",
-                                                       "ensemble.seed",
-                                                       "ensemble.keep"};
-
-constexpr std::array<std::string_view, 2> space_names = {Planar::name, Spatial::name};
-constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
-
-/// The sections of a document that every scenario has, each with known keys only.
+/// The sections of a document that every scenario has.
 struct RunSections {
-  explicit RunSections(const toml::table& document)
-      : root(Entry(document, ""), section_names, all_keys),
-        run(root, "run", run_keys, all_keys),
-        output(root, "output", output_keys, all_keys) {}
+  explicit RunSections(const toml::table& document) : root(document), run(root, "run"), output(root, "output") {}
 
   Section root, run, output;
 };
 
 /// The same of a chain.
 struct Sections : RunSections {
-  explicit Sections(const toml::table& document)
-      : RunSections(document), chain(root, "chain", chain_keys, all_keys), start(root, "start", start_keys, all_keys) {}
+  explicit Sections(const toml::table& document) : RunSections(document), chain(root, "chain"), start(root, "start") {}
 
   Section chain, start;
 };
 
-double number(const Section& section, std::string_view key, double otherwise, Sign sign = Sign::any) {
-  const std::optional<Entry> entry = section.find(key);
-  return entry ? entry->number(sign) : otherwise;
-}
-
-/// An option's value by its name.
-template <class Option>
-Option choice(const Section& section, std::string_view key, Option otherwise) {
-  const std::optional<Entry> entry = section.find(key);
-  return entry ? static_cast<Option>(entry->choice(names_of<Option>)) : otherwise;
-}
-
 /// Whether an array has one element a link; in space a torque [x, y, z] is one vector for all.
 template <class Space>
 bool tells_links(const Entry& entry) {
-  if (Space::torque_components == 1 || entry.key() != "chain.torque") return entry.is_array();
+  if (Space::torque_components == 1 || entry.name() != "chain.torque") return entry.is_array();
   return entry.is_array() && (entry.size() == 0 || entry.element(0).is_array());
 }
 
@@ -127,7 +47,7 @@ bool tells_links(const Entry& entry) {
 template <class Space>
 LinkCount link_count(const Sections& sections) {
   if (const auto entry = sections.chain.find("links")) {
-    return {static_cast<int>(entry->integer(1, max_links)), entry->key(), entry->place()};
+    return {static_cast<int>(entry->integer()), entry->name(), entry->place()};
   }
   const std::array<std::pair<const Section*, std::string_view>, 10> arrays = {{
       {&sections.chain, "masses"},
@@ -146,24 +66,17 @@ LinkCount link_count(const Sections& sections) {
     if (!entry || !tells_links<Space>(*entry)) continue;
     if (entry->size() == 0) entry->fail("at least one link");
     if (entry->size() > max_links) entry->fail("at most " + std::to_string(max_links) + " links");
-    return {static_cast<int>(entry->size()), entry->key(), entry->place()};
+    return {static_cast<int>(entry->size()), entry->name(), entry->place()};
   }
-  sections.chain.require("links", "a number of links, which no array tells");
+  sections.chain.require("links");
   return {};
 }
 
 /// Keys without a default come first, so that a file that lacks one is not told about the number of links.
 void require_keys(const Sections& sections) {
-  sections.chain.require("masses", "the masses of the bobs");
-  sections.chain.require("lengths", "the lengths of the rods");
-  sections.start.require("theta", "the angles at the start");
-}
-
-/// One number a link, or `otherwise` for all where the key is not there.
-Eigen::VectorXd per_link(const Section& section, std::string_view key, const LinkCount& count, double otherwise,
-                         Sign sign = Sign::any, Units units = {}) {
-  const std::optional<Entry> entry = section.find(key);
-  return entry ? entry->per_link(count, sign, units) : Eigen::VectorXd::Constant(count.links, otherwise);
+  sections.chain.require("masses");
+  sections.chain.require("lengths");
+  sections.start.require("theta");
 }
 
 /// Constant torque on each link: in the plane a number, in space a vector, or one of them for all links.
@@ -172,7 +85,7 @@ Torque<Space, Eigen::Dynamic> constant_torque(const Section& chain, const LinkCo
   Torque<Space, Eigen::Dynamic> torque(Space::torque_components, count.links);
   const std::optional<Entry> entry = chain.find("torque");
   if constexpr (Space::torque_components == 1) {
-    torque = per_link(chain, "torque", count, 0).transpose();
+    torque = chain.per_link("torque", count).transpose();
   } else if (!entry || (entry->is_number() && entry->number() == 0)) {
     torque.setZero();
   } else if (entry->is_array() && !tells_links<Space>(*entry)) {
@@ -190,46 +103,32 @@ Torque<Space, Eigen::Dynamic> constant_torque(const Section& chain, const LinkCo
 template <class Space>
 Drive<Space> read_drive(const Section& table, const LinkCount& count) {
   Drive<Space> drive;
-  drive.link = static_cast<int>(
-                   table.require("link", "a link from 1 to " + std::to_string(count.links)).integer(1, count.links)) -
-               1;
+  drive.link = static_cast<int>(table.require("link").integer(1, count.links)) - 1;
+  const Entry amplitude = table.require("amplitude");
   if constexpr (Space::torque_components == 1) {
-    drive.amplitude[0] = table.require("amplitude", "a torque").number();
+    drive.amplitude[0] = amplitude.number();
   } else {
-    drive.amplitude = table.require("amplitude", "a torque [x, y, z]").vector(3);
+    drive.amplitude = amplitude.vector(3);
   }
-  drive.frequency = table.require("frequency", "an angular frequency").number();
-  drive.phase = number(table, "phase", drive.phase);
+  drive.frequency = table.require("frequency").number();
+  drive.phase = table.number("phase");
   return drive;
-}
-
-template <class Space>
-std::vector<Drive<Space>> read_drives(const Section& chain, const LinkCount& count) {
-  std::vector<Drive<Space>> drives;
-  const std::optional<Entry> entry = chain.find("drive");
-  if (!entry) return drives;
-  if (!entry->is_array()) entry->fail("[[chain.drive]] tables");
-  for (std::size_t i = 0; i < entry->size(); ++i) {
-    drives.push_back(read_drive<Space>(Section(entry->element(i), drive_keys), count));
-  }
-  return drives;
 }
 
 template <class Space>
 ChainParameters<Space> read_chain(const Section& chain, const LinkCount& count) {
   ChainParameters<Space> parameters;
-  parameters.masses = chain.find("masses")->per_link(count, Sign::positive);
-  parameters.lengths = chain.find("lengths")->per_link(count, Sign::positive);
-  parameters.gravity = number(chain, "gravity", parameters.gravity);
-  parameters.damping = per_link(chain, "damping", count, 0, Sign::not_negative);
+  parameters.masses = chain.per_link("masses", count);
+  parameters.lengths = chain.per_link("lengths", count);
+  parameters.gravity = chain.number("gravity");
+  parameters.damping = chain.per_link("damping", count);
   parameters.torque = constant_torque<Space>(chain, count);
-  parameters.drives = read_drives<Space>(chain, count);
+  for (const Section& table : chain.each("drive")) parameters.drives.push_back(read_drive<Space>(table, count));
   return parameters;
 }
 
 std::optional<Entry> natural_requested(const Section& chain) {
-  const std::optional<Entry> units = chain.find("units");
-  return units && units->choice(unit_systems) == 1 ? units : std::nullopt;
+  return chain.choice("units") == 1 ? chain.find("units") : std::nullopt;
 }
 
 /// Passes to natural units where the scenario asks for them.
@@ -255,8 +154,7 @@ Coordinates<Space, Eigen::Dynamic> read_coordinates(const Section& start, Names 
                                                     Units units) {
   Coordinates<Space, Eigen::Dynamic> values(Space::dof * count.links);
   for (int a = 0; a < Space::dof; ++a) {
-    values.segment(a * count.links, count.links) =
-        per_link(start, keys[static_cast<std::size_t>(a)], count, 0, Sign::any, units);
+    values.segment(a * count.links, count.links) = start.per_link(keys[static_cast<std::size_t>(a)], count, units);
   }
   return values;
 }
@@ -275,7 +173,7 @@ Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Section& start, cons
                                                       const Chain<Space>& chain,
                                                       const Coordinates<Space, Eigen::Dynamic>& q) {
   const Entry given = *first_of(start, momentum_keys);
-  if (const auto rate = first_of(start, rate_keys)) rate->fail("no rates beside the momenta " + given.key());
+  if (const auto rate = first_of(start, rate_keys)) rate->fail("no rates beside the momenta " + given.name());
   const auto p = read_coordinates<Space>(start, momentum_keys, count, {});
   try {
     return pendula::rates_from_momenta(chain, q, p);
@@ -309,27 +207,19 @@ std::vector<std::string> degree_warnings(const Section& start) {
   return warnings;
 }
 
-/// An error that something is asked for: no method tells smaller ones from rounding.
-double error_number(const Section& run, std::string_view key, double otherwise) {
-  constexpr double finest = 1e-16;
-  const double error = number(run, key, otherwise, Sign::positive);
-  if (error < finest && error != otherwise) run.find(key)->fail("a number of at least " + shortest(finest));
-  return error;
-}
-
 RunOptions read_run(const Section& run) {
   RunOptions options;
-  options.method = choice(run, "method", options.method);
-  const auto stages = run.find("stages");
+  options.method = run.option<Method>("method");
+  const auto stages = run.find("stages"), step = run.find("step");
   if (stages) {
-    options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer(1, 8));
+    options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer());
   }
-  options.form = choice(run, "form", options.form);
-  options.solver = choice(run, "solver", options.solver);
-  options.iteration = choice(run, "iteration", options.iteration);
-  options.step = number(run, "step", options.step, Sign::positive);
-  options.tolerance = error_number(run, "tolerance", options.tolerance);
-  if (!is_explicit(options.method) && !run.find("step")) {
+  options.form = run.option<Form>("form");
+  options.solver = run.option<Solver>("solver");
+  options.iteration = run.option<Iteration>("iteration");
+  options.tolerance = run.number("tolerance");
+  if (step) options.step = step->number();
+  if (!is_explicit(options.method) && !step) {
     options.step = 0;
     if (!stages) options.stages = stages_for(options.method, options.tolerance);
   }
@@ -342,11 +232,12 @@ Accuracy read_accuracy(const Section& run, const RunOptions& options) {
   const auto accuracy = run.find("accuracy");
   if (accuracy && run.find("tolerance")) accuracy->fail("nothing beside run.tolerance, which follows from it");
   const bool is_asked = !is_explicit(options.method) && !run.find("step") && !run.find("tolerance");
-  return {error_number(run, "accuracy", is_asked ? options.tolerance : 0), !run.find("stages").has_value()};
+  const double otherwise = is_asked ? options.tolerance : 0;
+  return {accuracy ? accuracy->number() : otherwise, !run.find("stages").has_value()};
 }
 
 double read_duration(const Section& run, const RunOptions& options) {
-  const double duration = number(run, "duration", 10, Sign::not_negative);
+  const double duration = run.number("duration");
   if (is_adaptive(options) || duration / options.step <= max_steps) return duration;
   const std::string expected = "a step of at least " + shortest(duration / max_steps) + " for this duration";
   const std::optional<Entry> step = run.find("step");
@@ -386,7 +277,7 @@ RowTimes read_row_times(const Section& section, double duration) {
   const auto interval = section.find("interval"), listed = section.find("times");
   if (interval && listed) listed->fail("nothing beside output.interval");
   RowTimes rows;
-  rows.interval = number(section, "interval", 0, Sign::positive);
+  if (interval) rows.interval = interval->number();
   if (rows.interval > 0 && duration / rows.interval > max_steps) {
     interval->fail("an interval that time can tell, at least " + shortest(duration / max_steps));
   }
@@ -408,18 +299,17 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
   plan.accuracy = read_accuracy(sections.run, plan.run);
   plan.duration = read_duration(sections.run, plan.run);
-  if (const auto estimate = sections.run.find("estimate")) plan.estimate = estimate->truth();
+  plan.estimate = sections.run.truth("estimate");
   const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
   const auto every = sections.output.find("every");
-  if (is_adaptive(plan.run)) plan.every = 1;
-  if (every) plan.every = every->integer(1, std::numeric_limits<std::int64_t>::max());
+  plan.every = every ? every->integer() : is_adaptive(plan.run) ? 1 : 10;
   plan.rows = read_row_times(sections.output, plan.duration);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
   plan.events = read_events(sections.root);
-  plan.checkpoint = number(sections.output, "checkpoint", plan.checkpoint, Sign::positive);
-  for (const std::string_view key : run_keys) {
-    if (const auto entry = sections.run.find(key)) plan.places[std::string(key)] = entry->place();
+  plan.checkpoint = sections.output.number("checkpoint");
+  for (const ScenarioKey& key : table_named("run").keys) {
+    if (const auto entry = sections.run.find(key.name)) plan.places[std::string(key.name)] = entry->place();
   }
 }
 
@@ -459,8 +349,8 @@ AnyScenario read_document(const toml::table& document, std::string_view name, co
     return scenario;
   }
   const Sections sections(document);
-  const Entry space = sections.chain.require("space", "\"planar\" or \"spatial\"");
-  if (space.choice(space_names) == 0) return read<Planar>(sections);
+  const Entry space = sections.chain.require("space");
+  if (space.choice() == 0) return read<Planar>(sections);
   return read<Spatial>(sections);
 }
 

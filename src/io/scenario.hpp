@@ -27,9 +27,6 @@
 
 namespace pendula::io {
 
-/// Most links that a scenario may ask for: a slip of the keyboard should not eat the memory.
-inline constexpr int max_links = 1'000'000;
-
 /// Most steps that a run may have: beyond 2⁵³ a step no longer changes the time.
 inline constexpr double max_steps = 9e15;
 
@@ -38,11 +35,11 @@ struct RunPlan {
   RunOptions run;
   Accuracy accuracy;
   bool estimate = true;  ///< whether to look how far the rows can be trusted
-  double duration = 10;
-  std::int64_t every = 10;  ///< steps from row to row
+  double duration = 0;
+  std::int64_t every = 1;  ///< steps from row to row
   std::vector<EventPlan> events;
   RowTimes rows;                        ///< where there are any, in place of that
-  double checkpoint = 60;               ///< of wall time from one checkpoint to the next  [s]
+  double checkpoint = 0;                ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
   std::vector<std::string> warnings;    ///< what is odd but no error, one sentence each
   /// `where: key` of what [run] sets, by key, and of what tells the number of links, by "links": for errors yet to

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/library.hpp>
 #include <set>
@@ -13,15 +14,6 @@
 namespace pendula::io {
 namespace {
 
-constexpr std::array<std::string_view, 4> system_keys = {"model", "links", "parameters", "drive"};
-constexpr std::array<std::string_view, 5> drive_keys = {"input", "constant", "amplitude", "frequency", "phase"};
-constexpr int most_links = 64;  // as the generator's
-
-double number(const Section& section, std::string_view key, double otherwise) {
-  const std::optional<Entry> entry = section.find(key);
-  return entry ? entry->number() : otherwise;
-}
-
 /// Names as a message lists them.
 std::string listed(std::span<const std::string_view> names) {
   std::string text;
@@ -29,30 +21,31 @@ std::string listed(std::span<const std::string_view> names) {
   return text.empty() ? "none" : text;
 }
 
+/// The keys of system.parameters.
+std::vector<ScenarioKey> parameter_keys(const SystemInfo& info) {
+  std::vector<ScenarioKey> keys(info.parameters.size());
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    keys[k].name = info.parameters[k];
+    keys[k].unit = info.parameter_units[k];
+    if (info.is_positive[k]) keys[k].bound = positive;
+    if (std::isfinite(info.parameter_defaults[k])) keys[k].otherwise = info.parameter_defaults[k];
+  }
+  return keys;
+}
+
 /// Parameters by name, from the table or from what the model says.
 std::vector<double> read_parameters(const Section& system, const SystemInfo& info) {
-  const std::optional<Entry> entry = system.find("parameters");
-  const std::optional<Section> given =
-      entry ? std::optional<Section>(std::in_place, *entry, info.parameters) : std::nullopt;
+  const std::vector<ScenarioKey> keys = parameter_keys(info);
+  const Section given(system, "parameters", keys);
   std::vector<double> numbers;
-  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
-    const std::string name(info.parameters[k]);
+  for (std::size_t k = 0; k < keys.size(); ++k) {
     const int size = info.parameter_sizes[k];
-    const Sign sign = info.is_positive[k] ? Sign::positive : Sign::any;
-    const std::optional<Entry> value = given ? given->find(name) : std::nullopt;
-    if (!value && !std::isfinite(info.parameter_defaults[k])) {
-      const std::string what =
-          "a number [" + std::string(info.parameter_units[k]) + "], which the model has no default for";
-      if (given) given->require(name, what);
-      throw InputError(system.where(), "system.parameters." + name, what, "no such key");
+    if (std::holds_alternative<Required>(keys[k].otherwise)) {
+      given.require(keys[k].name, "a number [" + std::string(keys[k].unit) + "], which the model has no default for");
     }
-    if (value && info.is_per_link[k]) {
-      const Eigen::VectorXd each = value->per_link({size, "the model", system.where()}, sign);
-      numbers.insert(numbers.end(), each.begin(), each.end());
-    } else {
-      numbers.insert(numbers.end(), static_cast<std::size_t>(size),
-                     value ? value->number(sign) : info.parameter_defaults[k]);
-    }
+    const Eigen::VectorXd each = info.is_per_link[k] ? given.per_link(keys[k].name, {size, "the model", system.where()})
+                                                     : Eigen::VectorXd::Constant(size, given.number(keys[k].name));
+    numbers.insert(numbers.end(), each.begin(), each.end());
   }
   return numbers;
 }
@@ -61,21 +54,16 @@ void read_drive(const Section& table, const SystemInfo& info, SystemNumbers& num
   const Entry entry = table.require("input", "the name of an input of the model: " + listed(info.inputs));
   if (info.inputs.empty()) entry.fail("no drive, since the model has no inputs");
   const std::size_t input = entry.choice(info.inputs);
-  numbers.inputs[input] += number(table, "constant", 0);
-  const double amplitude = number(table, "amplitude", 0);
+  numbers.inputs[input] += table.number("constant");
+  const double amplitude = table.number("amplitude");
   if (amplitude == 0) return;
-  numbers.sines.push_back({static_cast<int>(input), amplitude,
-                           table.require("frequency", "an angular frequency").number(), number(table, "phase", 0)});
+  numbers.sines.push_back(
+      {static_cast<int>(input), amplitude, table.require("frequency").number(), table.number("phase")});
 }
 
 SystemNumbers read_numbers(const Section& system, const SystemInfo& info) {
   SystemNumbers numbers{read_parameters(system, info), std::vector<double>(info.inputs.size(), 0.0), {}};
-  if (const std::optional<Entry> drives = system.find("drive")) {
-    if (!drives->is_array()) drives->fail("[[system.drive]] tables");
-    for (std::size_t i = 0; i < drives->size(); ++i) {
-      read_drive(Section(drives->element(i), drive_keys), info, numbers);
-    }
-  }
+  for (const Section& table : system.each("drive")) read_drive(table, info, numbers);
   return numbers;
 }
 
@@ -97,8 +85,9 @@ class StartTable {
       }
     }
     names_.assign(known.begin(), known.end());
-    const std::vector<std::string_view> views(names_.begin(), names_.end());
-    table_.emplace(root, "start", views, std::span<const std::string_view>());
+    keys_.resize(names_.size());
+    for (std::size_t k = 0; k < keys_.size(); ++k) keys_[k].name = names_[k];
+    table_.emplace(root, "start", keys_);
   }
 
   /// The coordinates; what is not there is 0.
@@ -129,7 +118,7 @@ class StartTable {
     std::optional<Entry> entry = table_->find(key);
     if (key == old || key != present_name(old)) return entry;
     const std::optional<Entry> before = table_->find(old);
-    if (entry && before) before->fail("nothing beside " + entry->key() + ", which is the same");
+    if (entry && before) before->fail("nothing beside " + entry->name() + ", which is the same");
     return entry ? entry : before;
   }
 
@@ -153,10 +142,10 @@ class StartTable {
       const Units units = info_.is_angle[k] ? Units(angles) : Units();
       const std::string own(info_.coordinates[k]), stem(family(own));
       if (const auto entry = find(name, own)) {
-        values[static_cast<Eigen::Index>(k)] = entry->number(Sign::any, units);
+        values[static_cast<Eigen::Index>(k)] = entry->number(units);
       } else if (const auto all = stem.empty() ? std::nullopt : find(name, stem)) {
         const int count = members(stem);
-        const Eigen::VectorXd each = all->per_link({count, "the model", all->where()}, Sign::any, units);
+        const Eigen::VectorXd each = all->per_link({count, "the model", all->where()}, units);
         values[static_cast<Eigen::Index>(k)] = each[number_of(k, stem)];
       }
     }
@@ -173,6 +162,7 @@ class StartTable {
 
   const SystemInfo& info_;
   std::vector<std::string> names_;
+  std::vector<ScenarioKey> keys_;
   std::optional<Section> table_;
 };
 
@@ -195,7 +185,7 @@ Motion read_start(const Section& root, const SystemSubject& system) {
   Motion start(0, table.positions(), table.rates());
   require_inertia(table, system, start.q);
   if (const std::optional<Entry> momentum = table.first_momentum()) {
-    if (const auto rate = table.first_rate()) rate->fail("no rates beside the momenta " + momentum->key());
+    if (const auto rate = table.first_rate()) rate->fail("no rates beside the momenta " + momentum->name());
     start.v = system.rates(0, start.q, table.momenta());
   }
   return start;
@@ -233,10 +223,10 @@ std::optional<std::string> warning_of_degrees(const Entry& entry) {
 
 SystemScenario read_system(const Section& root, const std::filesystem::path& folder, const FindSystem& find) {
   if (const auto chain = root.find("chain")) chain->fail("no [chain] beside [system]");
-  const Section table(root, "system", system_keys, {});
-  const Entry model = table.require("model", "a model file, or the name of a built-in model");
+  const Section table(root, "system");
+  const Entry model = table.require("model");
   std::optional<int> links;
-  if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer(1, most_links));
+  if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer());
   SystemScenario scenario;
   try {
     const auto kernel = find(model.text(), links, folder);

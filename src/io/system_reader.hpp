@@ -1,14 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <numbers>
+#include <optional>
+#include <string>
 
 #include "io/scenario.hpp"
-#include "io/toml_reader.hpp"
+#include "io/section.hpp"
 
 namespace pendula::io {
-
-inline constexpr double degree = std::numbers::pi / 180;
 
 /// What to say of an angle of [start], or of an array of them, that is given as a plain number of few digits and beyond
 /// a turn: degrees, most likely.

@@ -4,49 +4,26 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <pendula/numeric/number_text.hpp>
-#include <pendula/run/quantity.hpp>
 #include <system_error>
+#include <utility>
+#include <vector>
 
+#include "io/input_error.hpp"
 #include "io/nearest_name.hpp"
+#include "io/quantity_text.hpp"
+#include "io/scenario_keys.hpp"
+#include "io/shown.hpp"
 #include "io/toml_nesting.hpp"
 
 namespace pendula::io {
 namespace {
 
-constexpr std::string_view override_prefix = "--set ";
-
-constexpr std::size_t longest_shown = 60;
-
-/// The beginning of a text that is too long for a message, and never half a character of it.
-std::string cut(std::string_view text) {
-  if (text.size() <= longest_shown) return std::string(text);
-  std::size_t end = longest_shown;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
-  return std::string(text.substr(0, end)) + "...";
-}
-
-/// A text on one line, cut where it is long.
-std::string printable(std::string_view text) {
-  std::string shown = cut(text);
-  for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';  // nothing that steers a terminal
-  }
-  return shown;
-}
-
-std::string quoted(std::string_view text) {
-  return '"' + printable(text) + '"';
-}
-
 bool is_key_character(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-}
-
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
 /// A part of a key between dots, `torque[2][3]`: its name, and elements from 1 on.
@@ -83,11 +60,6 @@ std::vector<KeyPart> key_path(std::string_view key) {
     begin = end + 1;
   }
   return path;
-}
-
-/// Where a line of `name` is, as messages begin: `file:line`, or `--set key=value`.
-std::string line_place(const std::string& name, std::int64_t line) {
-  return name.starts_with(override_prefix) ? name : name + ":" + std::to_string(line);
 }
 
 /// What is wrong with a number that C++ has no room for; empty where nothing is.
@@ -150,24 +122,6 @@ bool is_bare_word(std::string_view text) {
   return !text.empty() && is_letter(text.front()) &&
          std::ranges::all_of(text, [](char c) { return is_key_character(c) || c == '.'; });
 }
-
-/// A number and whatever stands behind it, as in "90 deg".
-struct TextWithUnit {
-  double value = 0;
-  std::string_view unit;
-};
-
-std::optional<TextWithUnit> read_quantity(std::string_view text) {
-  text = trimmed(text);
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  TextWithUnit quantity;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), quantity.value);
-  if (error != std::errc()) return std::nullopt;
-  quantity.unit = trimmed(text.substr(static_cast<std::size_t>(end - text.data())));
-  return quantity;
-}
-
-constexpr std::string_view degree_sign = "\u00b0";
 
 /// What a shell user types for a string: a word, or a number with a unit, whose quotes the shell takes.
 bool is_bare_string(std::string_view text) {
@@ -264,7 +218,9 @@ void take_out(toml::table& root, std::string_view key, const std::string& where)
     toml::array& array = last_array(table, path.back(), place);
     array.erase(array.cbegin() + static_cast<std::ptrdiff_t>(elements.back() - 1));
   } else if (table.erase(name) == 0) {
-    throw InputError(where, printable(key), "a key of the scenario, to take it out", "none");
+    const std::string known =
+        find_key(key) == nullptr ? did_you_mean(nearest_name(without_elements(key), all_keys())) : "";
+    throw InputError(where, printable(key), "a key of the scenario, to take it out", "none" + known);
   }
 }
 
@@ -287,61 +243,6 @@ void apply_override(toml::table& root, const std::string& text) {
   put(root, key, *value.get("value"), where);
 }
 
-std::string expected_number(Sign sign, Units units) {
-  std::string expected = "a finite number";
-  if (sign == Sign::not_negative) expected += " >= 0";
-  if (sign == Sign::positive) expected += " > 0";
-  for (std::size_t i = 0; i < units.size(); ++i) {
-    expected += (i == 0 ? " or a string in " : " or ") + std::string(units[i].name);
-  }
-  return expected;
-}
-
-/// The number in a text such as "90 deg" or "90°".
-std::optional<double> with_unit(std::string_view text, Units units) {
-  const std::optional<TextWithUnit> quantity = read_quantity(text);
-  if (!quantity) return std::nullopt;
-  std::string name(quantity->unit);
-  if (name.starts_with(degree_sign)) name.replace(0, degree_sign.size(), "deg");
-  const auto unit = std::ranges::find(units, name, &Unit::name);
-  return unit == units.end() ? std::nullopt : std::optional(quantity->value * unit->size);
-}
-
-bool fits(double value, Sign sign) {
-  if (!std::isfinite(value)) return false;
-  return sign == Sign::any || value > 0 || (sign == Sign::not_negative && value == 0);
-}
-
-/// A float always looks like one, so that `expected an integer, got 3.0` makes sense.
-std::string shown_float(double value) {
-  const std::string text = shortest(value);
-  return text.find_first_not_of("-0123456789") == std::string::npos ? text + ".0" : text;
-}
-
-std::string shown_array(const toml::array& array) {
-  std::string text = "[";
-  for (const toml::node& element : array) {
-    if (text.size() > 1) text += ", ";
-    if (text.size() > longest_shown) return text + "...] (" + std::to_string(array.size()) + " values)";
-    text += shown(element);
-  }
-  return text + "]";
-}
-
-std::string joined(std::span<const std::string_view> names, std::string_view separator) {
-  std::string text;
-  for (const std::string_view name : names) text += std::string(text.empty() ? "" : separator) + std::string(name);
-  return text;
-}
-
-/// The key of this table that may have been meant, or the table that has this key.
-std::string hint_at_key(std::string_view key, std::span<const std::string_view> known,
-                        std::span<const std::string_view> elsewhere) {
-  const auto ends_in_key = [&](std::string_view name) { return name.ends_with("." + std::string(key)); };
-  const auto found = std::ranges::find_if(elsewhere, ends_in_key);
-  return found == elsewhere.end() ? did_you_mean(nearest_name(key, known)) : did_you_mean(*found);
-}
-
 }  // namespace
 
 toml::table parse_toml(std::string_view text, std::string_view name, std::span<const std::string> overrides) {
@@ -357,128 +258,6 @@ void set_number(toml::table& root, std::string_view key, double number) {
   toml::value<std::int64_t> integer(is_integer ? static_cast<std::int64_t>(number) : 0);
   toml::value<double> real(number);
   put(root, key, is_integer ? static_cast<toml::node&>(integer) : real, where);
-}
-
-std::string location(const toml::source_region& source) {
-  return line_place(source.path ? *source.path : std::string("scenario"), source.begin.line);
-}
-
-std::string shown(const toml::node& node) {
-  if (const auto* array = node.as_array()) return shown_array(*array);
-  if (node.is_table()) return "a table";
-  if (const auto* value = node.as_string()) return quoted(value->get());
-  if (const auto* value = node.as_floating_point()) return shown_float(value->get());
-  if (const auto* value = node.as_integer()) return std::to_string(value->get());
-  if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";
-  return "a date or time";
-}
-
-Entry Entry::element(std::size_t index) const {
-  return {*node_->as_array()->get(index), key_ + "[" + std::to_string(index + 1) + "]"};
-}
-
-void Entry::fail(const std::string& expected) const {
-  throw InputError(where(), key_, expected, shown(*node_));
-}
-
-double Entry::number(Sign sign, Units units) const {
-  const auto* text = node_->as_string();
-  const std::optional<double> value = is_number() ? node_->value<double>()
-                                      : text      ? with_unit(text->get(), units)
-                                                  : std::nullopt;
-  if (!value || !fits(*value, sign)) fail(expected_number(sign, units));
-  return *value;
-}
-
-bool Entry::truth() const {
-  const auto* value = node_->as_boolean();
-  if (value == nullptr) fail("true or false");
-  return value->get();
-}
-
-std::int64_t Entry::integer(std::int64_t least, std::int64_t most) const {
-  const auto* value = node_->as_integer();
-  if (value == nullptr || value->get() < least || value->get() > most) {
-    fail("an integer from " + std::to_string(least) + " to " + std::to_string(most));
-  }
-  return value->get();
-}
-
-std::string Entry::text() const {
-  const auto* value = node_->as_string();
-  if (value == nullptr || value->get().empty()) fail("a text");
-  return value->get();
-}
-
-std::size_t Entry::choice(std::span<const std::string_view> choices) const {
-  const auto* value = node_->as_string();
-  const auto found = value == nullptr ? choices.end() : std::ranges::find(choices, std::string_view(value->get()));
-  if (found != choices.end()) return static_cast<std::size_t>(found - choices.begin());
-  const std::string expected = '"' + joined(choices, "\" or \"") + '"';
-  if (value == nullptr) fail(expected);
-  throw InputError(where(), key_, expected, shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
-}
-
-Eigen::VectorXd Entry::per_link(const LinkCount& count, Sign sign, Units units) const {
-  if (is_number() || (node_->is_string() && !units.empty())) {
-    return Eigen::VectorXd::Constant(count.links, number(sign, units));
-  }
-  if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
-    fail(expected_number(sign, units) + " for all links, or an array of " + std::to_string(count.links) +
-         (key_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
-  }
-  Eigen::VectorXd values(count.links);
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(sign, units);
-  return values;
-}
-
-Eigen::VectorXd Entry::vector(Eigen::Index components) const {
-  if (!is_array() || size() != static_cast<std::size_t>(components)) {
-    fail(components == 3 ? "a vector [x, y, z]" : "a vector of " + std::to_string(components) + " numbers");
-  }
-  Eigen::VectorXd values(components);
-  for (Eigen::Index i = 0; i < components; ++i) values[i] = element(static_cast<std::size_t>(i)).number();
-  return values;
-}
-
-Section::Section(const Entry& entry, std::span<const std::string_view> known,
-                 std::span<const std::string_view> elsewhere)
-    : name_(entry.key()) {
-  read(entry, known, elsewhere);
-}
-
-Section::Section(const Section& parent, std::string name, std::span<const std::string_view> known,
-                 std::span<const std::string_view> elsewhere)
-    : name_(std::move(name)), where_(parent.where_) {
-  if (const std::optional<Entry> entry = parent.find(name_)) read(*entry, known, elsewhere);
-}
-
-void Section::read(const Entry& entry, std::span<const std::string_view> known,
-                   std::span<const std::string_view> elsewhere) {
-  table_ = entry.table();
-  where_ = entry.where();
-  if (table_ == nullptr) entry.fail("a table");
-  for (const auto& [key, node] : *table_) {
-    if (std::ranges::find(known, key.str()) != known.end()) continue;
-    if (std::ranges::find(known, present_name(key.str())) != known.end()) continue;
-    throw InputError(location(node.source()), dotted(printable(key.str())), "one of " + joined(known, ", "),
-                     "the unknown key " + quoted(key.str()) + hint_at_key(key.str(), known, elsewhere));
-  }
-}
-
-std::string Section::dotted(std::string_view key) const {
-  return (name_.empty() ? "" : name_ + ".") + std::string(key);
-}
-
-std::optional<Entry> Section::find(std::string_view key) const {
-  const toml::node* node = table_ == nullptr ? nullptr : table_->get(key);
-  if (node == nullptr) return std::nullopt;
-  return Entry(*node, dotted(key));
-}
-
-Entry Section::require(std::string_view key, const std::string& expected) const {
-  if (std::optional<Entry> entry = find(key)) return *entry;
-  throw InputError(where_, dotted(key), expected, "no such key");
 }
 
 }  // namespace pendula::io

@@ -82,7 +82,7 @@ def test_a_key_may_be_taken_out(pendula, double):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ("run.stpe=", "run.stpe: expected a key of the scenario, to take it out, got none"),
+        ("run.stpe=", "expected a key of the scenario, to take it out, got none (did you mean run.step?)"),
         ("run.method=", "run.method: expected a key of the scenario, to take it out, got none"),
         ("chain.masses[3]=", "chain.masses[3]: expected an array of at least 3 elements, got [1.0, 1.0]"),
         ("chain.masses=", "chain.masses: expected the masses of the bobs, got no such key"),

@@ -1,0 +1,215 @@
+#include "io/section.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/quantity.hpp>
+
+#include "io/nearest_name.hpp"
+
+namespace pendula::io {
+namespace {
+
+using Names = std::span<const std::string_view>;
+
+std::string expected_number(Bound bound, Units units) {
+  std::string expected = "a finite number";
+  if (bound.least > any_number.least) expected += (bound.is_excluded ? " > " : " >= ") + shortest(bound.least);
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    expected += (i == 0 ? " or a string in " : " or ") + std::string(units[i].name);
+  }
+  return expected;
+}
+
+std::string joined(Names names, std::string_view separator) {
+  std::string text;
+  for (const std::string_view name : names) text += std::string(text.empty() ? "" : separator) + std::string(name);
+  return text;
+}
+
+std::string expected_choice(Names choices) {
+  return '"' + joined(choices, "\" or \"") + '"';
+}
+
+bool is_known(std::span<const ScenarioKey> keys, std::string_view key) {
+  return std::ranges::find(keys, key, &ScenarioKey::name) != keys.end();
+}
+
+/// The key of this table that may have been meant, or the table that has this key.
+std::string hint_at_key(std::string_view key, Names known, Names elsewhere) {
+  const auto ends_in_key = [&](std::string_view name) { return name.ends_with("." + std::string(key)); };
+  const auto found = std::ranges::find_if(elsewhere, ends_in_key);
+  return found == elsewhere.end() ? did_you_mean(nearest_name(key, known)) : did_you_mean(*found);
+}
+
+}  // namespace
+
+Entry Entry::element(std::size_t index) const {
+  return {*node_->as_array()->get(index), name_ + "[" + std::to_string(index + 1) + "]", *key_};
+}
+
+void Entry::fail(const std::string& expected) const {
+  throw InputError(where(), name_, expected, shown(*node_));
+}
+
+double Entry::number(Units units) const {
+  const auto* text = node_->as_string();
+  const std::optional<double> value = is_number() ? node_->value<double>()
+                                      : text      ? with_unit(text->get(), units)
+                                                  : std::nullopt;
+  if (!value || !std::isfinite(*value) || !key_->bound.allows(*value)) fail(expected_number(key_->bound, units));
+  return *value;
+}
+
+bool Entry::truth() const {
+  const auto* value = node_->as_boolean();
+  if (value == nullptr) fail("true or false");
+  return value->get();
+}
+
+std::int64_t Entry::integer(std::int64_t least, std::int64_t most) const {
+  const auto* value = node_->as_integer();
+  if (value == nullptr || value->get() < least || value->get() > most) {
+    fail("an integer from " + std::to_string(least) + " to " + std::to_string(most));
+  }
+  return value->get();
+}
+
+std::string Entry::text() const {
+  const auto* value = node_->as_string();
+  if (value == nullptr || value->get().empty()) fail("a text");
+  return value->get();
+}
+
+std::size_t Entry::choice(Names choices) const {
+  const auto* value = node_->as_string();
+  const auto found = value == nullptr ? choices.end() : std::ranges::find(choices, std::string_view(value->get()));
+  if (found != choices.end()) return static_cast<std::size_t>(found - choices.begin());
+  if (value == nullptr) fail(expected_choice(choices));
+  throw InputError(where(), name_, expected_choice(choices),
+                   shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
+}
+
+Eigen::VectorXd Entry::per_link(const LinkCount& count, Units units) const {
+  if (is_number() || (node_->is_string() && !units.empty())) {
+    return Eigen::VectorXd::Constant(count.links, number(units));
+  }
+  if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
+    fail(expected_number(key_->bound, units) + " for all links, or an array of " + std::to_string(count.links) +
+         (name_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
+  }
+  Eigen::VectorXd values(count.links);
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(units);
+  return values;
+}
+
+Eigen::VectorXd Entry::vector(Eigen::Index components) const {
+  if (!is_array() || size() != static_cast<std::size_t>(components)) {
+    fail(components == 3 ? "a vector [x, y, z]" : "a vector of " + std::to_string(components) + " numbers");
+  }
+  Eigen::VectorXd values(components);
+  for (Eigen::Index i = 0; i < components; ++i) values[i] = element(static_cast<std::size_t>(i)).number();
+  return values;
+}
+
+Section::Section(const toml::table& document)
+    : table_(&document), where_(location(document.source())), keys_(table_named("").keys) {
+  require_known(all_keys());
+}
+
+Section::Section(const Section& parent, std::string_view key)
+    : name_(parent.dotted(key)), where_(parent.where_), keys_(table_named(name_).keys) {
+  if (const std::optional<Entry> entry = parent.find(key)) read(*entry, all_keys());
+}
+
+Section::Section(const Entry& entry, std::span<const ScenarioKey> keys)
+    : name_(entry.name()), where_(entry.where()), keys_(keys) {
+  read(entry, {});
+}
+
+Section::Section(const Section& parent, std::string_view key, std::span<const ScenarioKey> keys)
+    : name_(parent.dotted(key)), where_(parent.where_), keys_(keys) {
+  if (const std::optional<Entry> entry = parent.find(key)) read(*entry, {});
+}
+
+std::vector<Section> Section::each(std::string_view key) const {
+  std::vector<Section> sections;
+  const std::optional<Entry> entry = find(key);
+  if (!entry) return sections;
+  if (!entry->is_array()) entry->fail("[[" + dotted(key) + "]] tables");
+  const std::span<const ScenarioKey> keys = table_named(dotted(key)).keys;
+  for (std::size_t i = 0; i < entry->size(); ++i) sections.push_back(Section(entry->element(i), keys));
+  return sections;
+}
+
+void Section::read(const Entry& entry, Names elsewhere) {
+  table_ = entry.table();
+  where_ = entry.where();
+  if (table_ == nullptr) entry.fail("a table");
+  require_known(elsewhere);
+}
+
+void Section::require_known(Names elsewhere) const {
+  for (const auto& [key, node] : *table_) {
+    if (is_known(keys_, key.str()) || is_known(keys_, present_name(key.str()))) continue;
+    std::vector<std::string_view> known(keys_.size());
+    std::ranges::transform(keys_, known.begin(), &ScenarioKey::name);
+    throw InputError(location(node.source()), dotted(printable(key.str())), "one of " + joined(known, ", "),
+                     "the unknown key " + quoted(key.str()) + hint_at_key(key.str(), known, elsewhere));
+  }
+}
+
+const ScenarioKey& Section::key_named(std::string_view key) const {
+  const auto found = std::ranges::find(keys_, key, &ScenarioKey::name);
+  return found == keys_.end() ? *std::ranges::find(keys_, present_name(key), &ScenarioKey::name) : *found;
+}
+
+std::string Section::dotted(std::string_view key) const {
+  return (name_.empty() ? "" : name_ + ".") + std::string(key);
+}
+
+std::optional<Entry> Section::find(std::string_view key) const {
+  const toml::node* node = table_ == nullptr ? nullptr : table_->get(key);
+  if (node == nullptr) return std::nullopt;
+  return Entry(*node, dotted(key), key_named(key));
+}
+
+Entry Section::require(std::string_view key) const {
+  const ScenarioKey& known = key_named(key);
+  return require(key, known.choices.empty() ? std::string(known.hint) : expected_choice(known.choices));
+}
+
+Entry Section::require(std::string_view key, const std::string& expected) const {
+  if (std::optional<Entry> entry = find(key)) return *entry;
+  throw InputError(where_, dotted(key), expected, "no such key");
+}
+
+double Section::number(std::string_view key) const {
+  const std::optional<Entry> entry = find(key);
+  return entry ? entry->number() : std::get<double>(key_named(key).otherwise);
+}
+
+std::int64_t Section::integer(std::string_view key) const {
+  const std::optional<Entry> entry = find(key);
+  return entry ? entry->integer() : std::get<std::int64_t>(key_named(key).otherwise);
+}
+
+bool Section::truth(std::string_view key) const {
+  const std::optional<Entry> entry = find(key);
+  return entry ? entry->truth() : std::get<bool>(key_named(key).otherwise);
+}
+
+std::size_t Section::choice(std::string_view key) const {
+  if (const std::optional<Entry> entry = find(key)) return entry->choice();
+  const ScenarioKey& known = key_named(key);
+  const auto otherwise = std::ranges::find(known.choices, std::get<std::string_view>(known.otherwise));
+  return static_cast<std::size_t>(otherwise - known.choices.begin());
+}
+
+Eigen::VectorXd Section::per_link(std::string_view key, const LinkCount& count, Units units) const {
+  if (const std::optional<Entry> entry = find(key)) return entry->per_link(count, units);
+  const double* const otherwise = std::get_if<double>(&key_named(key).otherwise);
+  return Eigen::VectorXd::Constant(count.links, otherwise == nullptr ? 0 : *otherwise);
+}
+
+}  // namespace pendula::io

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <toml++/toml.h>
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "io/input_error.hpp"
+#include "io/quantity_text.hpp"
+#include "io/scenario_keys.hpp"
+#include "io/shown.hpp"
+
+namespace pendula::io {
+
+/// Number of links, and what told it.
+struct LinkCount {
+  int links = 0;
+  std::string told_by;  ///< key
+  std::string place;    ///< `where: key`
+};
+
+/// One value of the scenario: converts to what its key takes, or throws InputError with place, key, expected and got.
+class Entry {
+ public:
+  Entry(const toml::node& node, std::string name, const ScenarioKey& key)
+      : node_(&node), name_(std::move(name)), key_(&key) {}
+
+  /// Its key with all tables and elements before it.
+  const std::string& name() const { return name_; }
+  bool is_array() const { return node_->is_array(); }
+  bool is_number() const { return node_->is_number(); }
+  const toml::table* table() const { return node_->as_table(); }
+  std::string where() const { return location(node_->source()); }
+  std::string place() const { return where() + ": " + name_; }
+
+  std::size_t size() const { return node_->is_array() ? node_->as_array()->size() : 0; }
+  /// Element of an array, counted from 0 here and from 1 in messages, as links are.
+  Entry element(std::size_t index) const;
+
+  /// A number; where there are `units`, also a string of a number and one of them.
+  double number(Units units = {}) const;
+  bool truth() const;
+  std::int64_t integer() const { return integer(key_->least, key_->most); }
+  std::int64_t integer(std::int64_t least, std::int64_t most) const;
+  /// Any string but an empty one.
+  std::string text() const;
+  /// A string out of those of the key, or out of `choices`, as its index there.
+  std::size_t choice() const { return choice(key_->choices); }
+  std::size_t choice(std::span<const std::string_view> choices) const;
+  /// One number a link; a single number stands for every link.  (n)
+  Eigen::VectorXd per_link(const LinkCount& count, Units units = {}) const;
+  /// A vector of `components` numbers.  (components)
+  Eigen::VectorXd vector(Eigen::Index components) const;
+
+  [[noreturn]] void fail(const std::string& expected) const;
+
+ private:
+  const toml::node* node_;
+  std::string name_;
+  const ScenarioKey* key_;
+};
+
+/// A table of the scenario whose keys are all known; without a table it has no keys at all.
+class Section {
+ public:
+  /// A whole document.
+  explicit Section(const toml::table& document);
+  /// The table of this key of `parent`, which need not be there.
+  Section(const Section& parent, std::string_view key);
+  /// A table with keys of its own, as those of a model. Throws InputError, as all do, where `entry` is no table, or has
+  /// a key that is not among them.
+  Section(const Entry& entry, std::span<const ScenarioKey> keys);
+  Section(const Section& parent, std::string_view key, std::span<const ScenarioKey> keys);
+
+  /// The tables of an array of them, [[name.key]].
+  std::vector<Section> each(std::string_view key) const;
+
+  std::optional<Entry> find(std::string_view key) const;
+  /// The value of a key, which has to be there.
+  Entry require(std::string_view key) const;
+  Entry require(std::string_view key, const std::string& expected) const;
+
+  /// The value of a key, or its default.
+  double number(std::string_view key) const;
+  std::int64_t integer(std::string_view key) const;
+  bool truth(std::string_view key) const;
+  std::size_t choice(std::string_view key) const;
+  /// The default is for all links.
+  Eigen::VectorXd per_link(std::string_view key, const LinkCount& count, Units units = {}) const;
+
+  /// An option by its name.
+  template <class Option>
+  Option option(std::string_view key) const {
+    return static_cast<Option>(choice(key));
+  }
+
+  const std::string& where() const { return where_; }
+
+ private:
+  /// `elsewhere` are the dotted names of all keys, to hint at those that were put into the wrong table.
+  void read(const Entry& entry, std::span<const std::string_view> elsewhere);
+  void require_known(std::span<const std::string_view> elsewhere) const;
+  const ScenarioKey& key_named(std::string_view key) const;
+  std::string dotted(std::string_view key) const;
+
+  const toml::table* table_ = nullptr;
+  std::string name_;
+  std::string where_;  // of the table, or of its parent where there is none
+  std::span<const ScenarioKey> keys_;
+};
+
+}  // namespace pendula::io
