@@ -1,5 +1,6 @@
 # What an install holds: the library, its headers with the kernels of this build, the generator for more of them, the
-# program with its pictures and scenarios, the script that installs what these take, and the CMake package.
+# program with its pictures, scenarios, manual page and completion for shells, the script that installs what these take,
+# and the CMake package.
 include(CMakePackageConfigHelpers)
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pendula")
@@ -12,6 +13,7 @@ if(PENDULA_BUILD_PROGRAM)
   install(TARGETS pendula_cli)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/plotting" DESTINATION "${data_dir}" PATTERN "__pycache__" EXCLUDE)
   install(PROGRAMS "${PROJECT_SOURCE_DIR}/cmake/installed_setup" DESTINATION "${data_dir}" RENAME setup)
+  install(DIRECTORY "${PROJECT_BINARY_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}")  # by describe_program.cmake
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/examples" DESTINATION "${data_dir}" FILES_MATCHING PATTERN "*.toml")
 endif()
 

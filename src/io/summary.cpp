@@ -5,124 +5,17 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/version.hpp>
 #include <string_view>
 
 #include "io/output_error.hpp"
-#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 bool has_stages(const Summary& summary) {
   return !is_explicit(summary.options.method);
-}
-
-/// null for an empty name.
-Json or_null(const std::string& name) {
-  return name.empty() ? Json() : Json(name);
-}
-
-/// null where a value does not apply.
-template <class Value>
-Json where(bool applies, const Value& value) {
-  return applies ? Json(value) : Json();
-}
-
-Json to_array(const Eigen::VectorXd& values) {
-  return std::vector<double>(values.begin(), values.end());
-}
-
-/// One array a column.
-Json columns(const Eigen::MatrixXd& matrix) {
-  Json array = Json::array();
-  for (Eigen::Index j = 0; j < matrix.cols(); ++j) array.push_back(to_array(matrix.col(j)));
-  return array;
-}
-
-/// Adds the numbers of all links by name, theta_1, theta_2, …
-void add_named(Json& json, const std::string& name, const Eigen::VectorXd& values) {
-  for (Eigen::Index i = 0; i < values.size(); ++i) json[name + "_" + std::to_string(i + 1)] = values[i];
-}
-
-/// As every system has it, and the same in arrays of one element a link.
-Json to_json(const Snapshot& snapshot) {
-  const bool planar = snapshot.phi.size() == 0;
-  Json q = Json::object(), v = Json::object(), points = Json::object();
-  add_named(q, "theta", snapshot.theta);
-  add_named(q, "phi", snapshot.phi);
-  add_named(v, "theta", snapshot.theta_dot);
-  add_named(v, "phi", snapshot.phi_dot);
-  for (Eigen::Index i = 0; i < snapshot.bobs.cols(); ++i) {
-    points["bob_" + std::to_string(i + 1)] = to_array(snapshot.bobs.col(i));
-  }
-  Json json{{"t", snapshot.time}, {"q", q}, {"v", v}, {"points", points}, {"theta", to_array(snapshot.theta)}};
-  if (!planar) json["phi"] = to_array(snapshot.phi);
-  json["theta_dot"] = to_array(snapshot.theta_dot);
-  if (!planar) json["phi_dot"] = to_array(snapshot.phi_dot);
-  json["bobs"] = columns(snapshot.bobs);
-  json["velocities"] = columns(snapshot.velocities);
-  return json;
-}
-
-Json to_json(const std::optional<NaturalUnits>& natural) {
-  if (!natural) return nullptr;
-  return {{"length", natural->length}, {"mass", natural->mass}, {"time", natural->time}};
-}
-
-/// An object of named values.
-template <class Value>
-Json named(const std::vector<std::pair<std::string, Value>>& values) {
-  Json json = Json::object();
-  for (const auto& [name, value] : values) json[name] = value;
-  return json;
-}
-
-Json to_json(const SystemSnapshot& snapshot) {
-  return {{"t", snapshot.time}, {"q", named(snapshot.q)}, {"v", named(snapshot.v)}, {"points", named(snapshot.points)}};
-}
-
-/// What was moved, as the first keys of a summary.
-Json to_json(const ModelSummary& model) {
-  if (model.space.empty()) {
-    return {{"model", model.model}, {"links", model.links}, {"parameters", named(model.parameters)}};
-  }
-  return {{"space", model.space},
-          {"links", model.links},
-          {"units", model.natural ? "natural" : "SI"},
-          {"natural_units", to_json(model.natural)}};
-}
-
-Json to_json(const Ending& ending) {
-  Json json{{"status", ending.status}};
-  if (!ending.event.empty()) json["event"] = ending.event;
-  if (!ending.ok()) json["message"] = ending.message;
-  if (ending.step) return json;
-  json["t"] = ending.step.time;
-  json["step"] = ending.step.step;
-  json["iterations"] = ending.step.iterations;
-  json["residual"] = ending.step.residual;
-  if (ending.coordinate.empty()) {
-    json["link"] = where(ending.step.part >= 0, ending.step.part + 1);
-  } else {
-    json["coordinate"] = ending.coordinate;
-  }
-  return json;
-}
-
-/// NaN, of what never happened, becomes null.
-Json events_json(const Summary& summary) {
-  Json json = Json::array();
-  for (std::size_t k = 0; k < summary.events.size(); ++k) {
-    const EventTally& tally = summary.events[k];
-    json.push_back(
-        {{"name", summary.event_names[k]}, {"count", tally.count}, {"first", tally.first}, {"last", tally.last}});
-  }
-  return json;
 }
 
 // The text: labels in one column, values in the next.
@@ -331,50 +224,6 @@ Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coord
   return {status, message(outcome, coordinates), outcome, is_named ? std::string(coordinates[part]) : ""};
 }
 
-/// Everything but the last state.
-Json json_of(const Summary& summary) {
-  const bool staged = has_stages(summary);
-  const bool adaptive = is_adaptive(summary.options);
-  Json json{{"pendula", version}, {"scenario", summary.model.scenario}};
-  json.update(to_json(summary.model));
-  json.update(Json{{"method", name_of(summary.options.method)},
-                   {"stages", where(staged, summary.options.stages)},
-                   {"form", where(staged, name_of(summary.options.form))},
-                   {"solver", or_null(summary.description.solver)},
-                   {"iteration", or_null(summary.description.iteration)},
-                   {"kernel", or_null(summary.description.kernel)},
-                   {"kernel_by", where(!summary.description.kernel.empty(), summary.kernel_by)},
-                   {"step", where(!adaptive, summary.options.step)},
-                   {"tolerance", where(adaptive, summary.options.tolerance)},
-                   {"accuracy", where(summary.aimed.has_value(), summary.accuracy)},
-                   {"expected_error", summary.trust.expected_error},
-                   {"trusted_until", summary.trust.until},
-                   {"duration", summary.duration},
-                   {"every", where(!summary.at.any(), summary.every)},
-                   {"interval", where(summary.at.interval > 0, summary.at.interval)},
-                   {"steps", summary.statistics.steps},
-                   {"smallest_step", where(adaptive, summary.statistics.smallest_step)},
-                   {"largest_step", where(adaptive, summary.statistics.largest_step)},
-                   {"rejected_steps", summary.statistics.rejected_steps},
-                   {"newton_iterations", summary.statistics.newton_iterations},
-                   {"rows", summary.trajectory ? summary.rows_written : summary.rows},
-                   {"trajectory", or_null(summary.trajectory.value_or(""))},
-                   {"view", or_null(summary.view.value_or(""))},
-                   {"energy_initial", summary.energy_error.initial},
-                   {"energy_final", summary.energy_final},
-                   {"energy_error_max", summary.energy_error.largest},
-                   {"wall_seconds", summary.stepping_seconds},
-                   {"outcome", to_json(summary.ending)},
-                   {"events", events_json(summary)},
-                   {"warnings", summary.warnings}});
-  return json;
-}
-
-std::string one_line(const Json& json) {
-  constexpr int without_indent = -1;
-  return json.dump(without_indent, ' ', false, Json::error_handler_t::replace);
-}
-
 }  // namespace
 
 Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates,
@@ -432,21 +281,6 @@ SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion) {
     next = end;
   }
   return snapshot;
-}
-
-std::string to_json(const Summary& summary) {
-  Json json = json_of(summary);
-  json["final"] = summary.model.space.empty() ? to_json(summary.system) : to_json(summary.final);
-  return one_line(json) + "\n";
-}
-
-std::string to_json_of_file(const Summary& summary) {
-  std::string text = one_line(json_of(summary));
-  for (const std::optional<std::string>& file :
-       {std::optional(summary.model.scenario), summary.trajectory, summary.view, summary.event_file}) {
-    if (file) text = with_public_name(std::move(text), *file);
-  }
-  return text;
 }
 
 std::string to_text(const Summary& summary) {

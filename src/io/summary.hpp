@@ -123,6 +123,24 @@ std::string to_json(const Summary& summary);
 /// The same for the run file, on one line: without the last state, which it has, and with public names of files.
 std::string to_json_of_file(const Summary& summary);
 
+/// Which summaries have a key.
+enum class Moved { anything, chains, systems };
+
+/// A key of the JSON object, and what is said of it.
+struct SummaryKey {
+  std::string_view name;
+  std::string_view type;  ///< of JSON, several with blanks between, or a JSON Schema
+  std::string_view hint;
+  std::string_view unit = {};  ///< in natural units that of their kind
+  Moved of = Moved::anything;
+  std::span<const std::string_view> choices = {};
+};
+
+std::vector<SummaryKey> summary_keys();
+
+/// What every such object is, as a JSON Schema.
+std::string summary_schema();
+
 /// The summary for people.
 std::string to_text(const Summary& summary);
 

@@ -8,9 +8,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
@@ -65,7 +67,10 @@ class Result:
         def reject(text: str) -> None:
             raise ValueError(f"{text} is no JSON number")
 
-        return json.loads(self.out, parse_constant=reject)
+        found = json.loads(self.out, parse_constant=reject)
+        if "newton_iterations" in found:  # the summary of a run
+            summary_validator().validate(found)
+        return found
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,15 @@ def program() -> str:
     path = os.environ.get("PENDULA_PROGRAM")
     assert path, "PENDULA_PROGRAM must name the program to test"
     return path
+
+
+@cache
+def summary_validator() -> Draft202012Validator:
+    """Of what the program says that its summaries are."""
+    said = subprocess.run(
+        [program(), "help", "summary", "--json"], capture_output=True, text=True, check=True
+    )
+    return Draft202012Validator(json.loads(said.stdout))
 
 
 def settings(*overrides: str) -> list[str]:

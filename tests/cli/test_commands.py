@@ -25,7 +25,7 @@ def test_every_command_has_help(pendula):
 
 def test_help_of_simulate_names_its_options(pendula):
     text = pendula("simulate", "--help").out
-    for option in ("SCENARIO", "--set", "-o,--output", "--json", "--quiet"):
+    for option in ("SCENARIO", "--set", "-o, --output FILE", "--json", "--quiet"):
         assert option in text
 
 

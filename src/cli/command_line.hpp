@@ -1,0 +1,89 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cli/commands.hpp"
+
+namespace pendula::cli {
+
+/// What a word of the command line may be, for completion: a file of some endings, where there are any, one of some
+/// words, or a key of the scenario.
+struct Expected {
+  std::vector<std::string_view> endings = {};
+  std::vector<std::string_view> words = {};
+  bool is_file = false;
+  bool is_key = false;
+};
+
+/// What else can be asked for help on, beside commands.
+inline constexpr std::string_view scenario_topic = "scenario", summary_topic = "summary";
+
+struct HelpOptions {
+  std::string topic;  ///< a command, or one of the topics; empty for the program
+  bool json = false;  ///< the topic as a JSON Schema
+  bool man = false;   ///< all of it as a manual page
+};
+
+/// The command line: what can be asked for, and what was.
+struct CommandLine {
+  CommandLine();
+  CommandLine(const CommandLine&) = delete;  // options know where their values are
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  CLI::App app;
+  CLI::App* simulate;
+  CLI::App* ensemble;
+  CLI::App* lyapunov;
+  CLI::App* plot;
+  CLI::App* map;
+  CLI::App* gallery;
+  CLI::App* models;
+  CLI::App* describe;
+  CLI::App* new_model;
+  CLI::App* check;
+  CLI::App* build;
+  CLI::App* kernels;
+  CLI::App* help;
+  CLI::App* completion;
+  SimulateOptions simulate_options;
+  EnsembleOptions ensemble_options;
+  LyapunovOptions lyapunov_options;
+  PlotOptions plot_options;
+  MapOptions map_options;
+  std::string gallery_folder;
+  bool models_as_json = false;
+  DescribeOptions describe_options;
+  std::string model_name;
+  CheckOptions check_options;
+  BuildOptions build_options;
+  HelpOptions help_options;
+  std::string shell;
+  std::map<const CLI::Option*, Expected> expected;
+
+ private:
+  void add_simulate();
+  void add_ensemble();
+  void add_lyapunov();
+  void add_pictures();
+  void add_models();
+  void add_help();
+  CLI::Option* takes(CLI::Option* option, const char* type, Expected what);
+  CLI::Option* takes_file(CLI::Option* option, std::vector<std::string_view> endings);
+  CLI::Option* takes_words(CLI::Option* option, const char* type, std::vector<std::string_view> words);
+  void add_scenario(CLI::App* command, std::string& scenario);
+  void add_set(CLI::App* command, std::vector<std::string>& overrides);
+  void add_links(CLI::App* command, std::optional<int>& links);
+};
+
+/// What an unknown word may have been meant for, ` (did you mean …?)`: an option of `app`, or a command.
+std::string likely_meant(const CLI::App& app, const std::string& word);
+
+/// Throws io::InputError on `--set KEY VALUE`, which is one word, KEY=VALUE.
+void require_one_word(const std::vector<std::string>& words);
+
+}  // namespace pendula::cli
