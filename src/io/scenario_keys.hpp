@@ -49,8 +49,8 @@ struct InWords {
 };
 using Otherwise = std::variant<Required, InWords, double, std::int64_t, bool, std::string_view>;
 
-/// A key of a scenario, and all that is said of it: what reads scenarios, the command line, its help, completion and
-/// manual, axes of ensembles and the tests of docs/scenario.md go by this.
+/// All that is said of a key: readers, errors, help, completion, axes of ensembles and tests of documents go by this.
+// NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct ScenarioKey {
   std::string_view name;
   KeyType type = KeyType::number;
@@ -62,7 +62,7 @@ struct ScenarioKey {
   std::int64_t most = 0;   ///< of integers
   std::span<const std::string_view> choices = {};
   bool may_change = false;  ///< where a run goes on; everything else decides how it came to where it is
-};
+};                          // NOLINTEND(readability-redundant-member-init)
 
 /// The keys of a table, and which commands look at it; those of the document, whose name is empty, are the tables.
 struct ScenarioTable {

@@ -138,7 +138,7 @@ std::vector<Section> Section::each(std::string_view key) const {
   if (!entry) return sections;
   if (!entry->is_array()) entry->fail("[[" + dotted(key) + "]] tables");
   const std::span<const ScenarioKey> keys = table_named(dotted(key)).keys;
-  for (std::size_t i = 0; i < entry->size(); ++i) sections.push_back(Section(entry->element(i), keys));
+  for (std::size_t i = 0; i < entry->size(); ++i) sections.emplace_back(entry->element(i), keys);
   return sections;
 }
 

@@ -126,7 +126,7 @@ std::string to_json_of_file(const Summary& summary);
 /// Which summaries have a key.
 enum class Moved { anything, chains, systems };
 
-/// A key of the JSON object, and what is said of it.
+// A key of the JSON object. NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct SummaryKey {
   std::string_view name;
   std::string_view type;  ///< of JSON, several with blanks between, or a JSON Schema
@@ -134,7 +134,7 @@ struct SummaryKey {
   std::string_view unit = {};  ///< in natural units that of their kind
   Moved of = Moved::anything;
   std::span<const std::string_view> choices = {};
-};
+};  // NOLINTEND(readability-redundant-member-init)
 
 std::vector<SummaryKey> summary_keys();
 

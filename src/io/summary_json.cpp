@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <nlohmann/json.hpp>
@@ -264,8 +265,8 @@ std::string one_line(const Json& json) {
 }  // namespace
 
 std::vector<SummaryKey> summary_keys() {
-  std::vector<SummaryKey> keys;
-  for (const Row& row : rows) keys.push_back(row.key);
+  std::vector<SummaryKey> keys(rows.size());
+  std::ranges::transform(rows, keys.begin(), &Row::key);
   return keys;
 }
 
