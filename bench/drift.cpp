@@ -6,7 +6,10 @@
 #include <cstdlib>
 #include <iostream>
 #include <limits>
-#include <pendula/pendula.hpp>
+#include <pendula/chain/chain_solver.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/gauss/stepper.hpp>
+#include <pendula/run/integrator.hpp>
 #include <string>
 #include <vector>
 

@@ -3,7 +3,9 @@
 
 #include <cstdlib>
 #include <iostream>
-#include <pendula/pendula.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/run/integrator.hpp>
 
 namespace {
 

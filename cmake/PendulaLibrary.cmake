@@ -164,7 +164,8 @@ function(_pendula_compile_copy copy arch)
   endif()
 endfunction()
 
-function(_pendula_seal target copy symbol)
+# Links the objects of COPY into one, of which nothing is seen but SYMBOLS, a pattern; adds it to TARGET.
+function(_pendula_seal target copy symbols)
   set(objects "$<FILTER:$<TARGET_OBJECTS:${copy}>,EXCLUDE,cmake_pch>")  # CMake counts precompiled headers among them
   if(NOT PENDULA_ELF)
     target_sources(${target} PRIVATE ${objects})
@@ -178,13 +179,27 @@ function(_pendula_seal target copy symbol)
             ${objects}
     COMMAND "${CMAKE_COMMAND}" -D "OBJECT=${sealed}.open" -D "OBJDUMP=${CMAKE_OBJDUMP}" -D "COPY=${copy}"
             -P "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
-    COMMAND "${CMAKE_OBJCOPY}" --keep-global-symbol=${symbol} "${sealed}.open" "${sealed}"
+    COMMAND "${CMAKE_OBJCOPY}" --wildcard "--keep-global-symbol=${symbols}" "${sealed}.open" "${sealed}"
     COMMAND "${CMAKE_COMMAND}" -E rm "${sealed}.open"
     DEPENDS ${objects} "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
     COMMENT "Sealing ${copy}.o" COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties("${sealed}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
   target_sources(${target} PRIVATE "${sealed}")
   add_dependencies(${target} ${copy})
+endfunction()
+
+# Compiles SOURCES of what is behind pendula.h and adds them to TARGET, for any processor: Eigen is in there, so nothing
+# of them is seen but the functions of pendula.h.
+function(pendula_add_front target)
+  list(GET _pendula_archs 0 least)
+  add_library(pendula_front OBJECT ${ARGN})
+  pendula_own_target(pendula_front)
+  target_compile_options(pendula_front PRIVATE ${_pendula_flags_${least}} -fno-lto
+                                               $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+  target_include_directories(pendula_front PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
+  target_link_libraries(pendula_front PRIVATE pendula_kernels pendula::xsimd)
+  set_target_properties(pendula_front PROPERTIES POSITION_INDEPENDENT_CODE ON INTERPROCEDURAL_OPTIMIZATION OFF)
+  _pendula_seal(${target} pendula_front "pendula_*")
 endfunction()
 
 _pendula_check_seal()

@@ -1,5 +1,4 @@
-// A double pendulum released from the horizontal, moved by two-stage Gauss–Legendre for ten seconds.
-#include <pendula/kernels/planar_2.hpp>
+// The commonest tasks on a double pendulum that is let go from the horizontal.
 #include <pendula/pendula.hpp>
 
 #include <iostream>
@@ -7,17 +6,30 @@
 
 int main() {
   using namespace pendula;
-  ChainParameters<Planar> parameters;
-  parameters.masses = parameters.lengths = Eigen::Vector2d(1, 1);
-  const Chain<Planar> chain(parameters);
+  const Chain<Planar> chain({.masses = Eigen::Vector2d(1, 1), .lengths = Eigen::Vector2d(1, 1), .drives = {}});
+  const auto start = State<Planar>::from_angles(Eigen::Vector2d::Constant(std::numbers::pi / 2));
 
-  using Kernel = kernels::Planar2;
-  GaussStepper<LagrangianSolver<>> stepper(system_of<Kernel>(chain), 2);
-  Outcome outcome = stepper.start(State<Planar>::from_angles(Eigen::Vector2d::Constant(std::numbers::pi / 2)));
-  for (int step = 0; outcome && step < 20000; ++step) outcome = stepper.step(5e-4);
-  if (!outcome) {
-    std::cerr << outcome << '\n';
-    return 1;
-  }
-  std::cout << "last bob at " << bob_positions(chain, stepper.state()).col(1).transpose() << " m\n";
+  // A motion, by steps of its own choice, and its rows.
+  Simulation run(chain, start, {.tolerance = 1e-12});
+  run.write_csv("double_pendulum.csv", every(0.01));
+  run.advance_to(10);
+  std::cout << "last bob at " << run["x_2"] << ", " << run["y_2"] << " m; at 9.5 s theta_2 was " << run.at(9.5).q[1]
+            << '\n';
+
+  // Events: how often the second link turns over. A copy goes on as the first does, to the bit.
+  int turns = 0;
+  Simulation copy = run;
+  copy.on({.value = [](const Motion& m) { return std::cos(m.q[1] / 2); }}, [&](const Motion&) { ++turns; });
+  copy.advance_to(30);
+  std::cout << "it turns over " << turns << " times from 10 to 30 s\n";
+
+  // Many at once: a row of angles, or of angles and rates, is a start.
+  const Eigen::MatrixXd starts = Eigen::MatrixXd::Random(1000, 2);
+  const Ends ends = propagate(chain, starts, {.duration = 2});
+  std::cout << "on average theta_2 is " << ends.q.col(1).mean() << " after 2 s\n";
+
+  // Beside the motion: d(q, v)/dt = A (q, v) + B torques.
+  Simulation hanging(chain, State<Planar>::from_angles(Eigen::Vector2d::Zero()));
+  const auto [A, B] = hanging.linearize();
+  std::cout << "at rest A is\n" << A << '\n';
 }

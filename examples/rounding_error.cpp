@@ -1,6 +1,8 @@
 // How far can a run be trusted? A falling chain of fifty links in double, and once more in long double, whose rounding
 // is 2000 times finer: they differ by the rounding error of the first.
-#include <pendula/pendula.hpp>
+#include <pendula/chain/chain_solver.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/gauss/stepper.hpp>
 
 #include <iostream>
 

@@ -88,6 +88,46 @@ TEST(Factory, FixedSizeSteppersAgreeWithIt) {
   EXPECT_LT(distance(stepper.state(), integrator->state()), 3e-15);  // measured 2e-16
 }
 
+// Push is the derivative of a step by its start and its parameters, and pull its transpose, whatever the solver is.
+TEST(Integrator, PushesAndPullsParameters) {
+  Random random(5);
+  const Chain<Planar> chain = equal_chain<Planar>(2);
+  for (const Solver solver : {Solver::chain, Solver::dense}) {
+    RunOptions options = gauss(3);
+    options.solver = solver;
+    const auto integrator = make_integrator(chain, options);
+    const int rows = integrator->linearize();
+    ASSERT_TRUE(integrator->start(swinging(2)));
+    ASSERT_TRUE(integrator->step(0.1));
+    const int parameters = integrator->parameters();
+    ASSERT_GE(parameters, 7) << solver;  // masses, lengths, damping, gravity
+    const Directions<> start = random.matrix<Directions<>>(rows, 3, -1, 1);
+    const Directions<> varied = random.matrix<Directions<>>(parameters, 3, -1, 1);
+    const Directions<> weights = random.matrix<Directions<>>(rows, 3, -1, 1);
+    Directions<> pushed = start, alone = start, pulled = weights, by_start = weights;
+    Directions<> by_parameters = Directions<>::Zero(parameters, 3);
+    integrator->push(pushed, varied);
+    integrator->push(alone);
+    integrator->pull(pulled, by_parameters);
+    integrator->pull(by_start);
+    EXPECT_EQ(pulled, by_start) << solver;
+    EXPECT_GT((pushed - alone).norm(), 1e-3) << solver;
+    const double forward = weights.cwiseProduct(pushed).sum();
+    const double backward = pulled.cwiseProduct(start).sum() + by_parameters.cwiseProduct(varied).sum();
+    EXPECT_NEAR(forward, backward, 1e-13) << solver;  // measured
+    Directions<> wrong = Directions<>::Zero(rows + 1, 3);
+    EXPECT_THROW(integrator->push(wrong), std::invalid_argument);
+    EXPECT_THROW(integrator->push(pushed, wrong), std::invalid_argument);
+    EXPECT_THROW(integrator->pull(wrong), std::invalid_argument);
+  }
+}
+
+TEST(Options, HaveNamesBothWays) {
+  for (const std::string_view name : names_of<Method>) EXPECT_EQ(name_of(*option_of<Method>(name)), name);
+  EXPECT_EQ(option_of<Iteration>("fixed-point"), Iteration::fixed_point);
+  EXPECT_EQ(option_of<Solver>("newton"), std::nullopt);
+}
+
 TEST(ExplicitMethods, MeetGaussLegendre) {
   const Chain<Planar> chain = equal_chain<Planar>(2);
   const State<Planar> reference = final_state(chain, swinging(2), gauss(8), 0.01, 1);

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <pendula/pendula.hpp>
+#include <pendula/chain/chain_solver.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/gauss/stepper.hpp>
+#include <pendula/run/chain_subject.hpp>
 #include <string>
 #include <type_traits>
 #include <vector>

@@ -15,7 +15,7 @@
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/run/integrator.hpp>
-#include <pendula/run/simulation.hpp>
+#include <pendula/run/schedule.hpp>
 #include <pendula/system/kernel_table.hpp>
 #include <type_traits>
 #include <vector>

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <contestant.hpp>
-#include <pendula/pendula.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/schedule.hpp>
 
 namespace bench {
 

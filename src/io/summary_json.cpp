@@ -153,7 +153,7 @@ constexpr std::string_view final_schema = R"({"type": "object", "required": ["t"
 constexpr std::array<std::string_view, 2> spaces = {Planar::name, Spatial::name}, unit_systems = {"SI", "natural"};
 constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
 
-constexpr std::array<Row, 38> rows = {{
+constexpr std::array<Row, 39> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, spaces},

@@ -41,6 +41,15 @@ KNOWS = {
         "pendula/numeric",
     },
     "io": {"pendula/ensemble", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
+    "front": {
+        "io",
+        "pendula/ensemble",
+        "pendula/run",
+        "pendula/chain",
+        "pendula/gauss",
+        "pendula/system",
+        "pendula/numeric",
+    },
     "view": {"io", "pendula/run", "pendula/chain", "pendula/system"},
     "cli": {
         "view",
@@ -57,7 +66,7 @@ GENERATED = {"pendula/kernels"}
 
 def included(file: Path) -> set[str]:
     """Folders of this project's headers that a file includes."""
-    names = re.findall(r'#include [<"]((?:pendula|io|view|cli|library)/[\w/]+\.hpp)[>"]', file.read_text())
+    names = re.findall(r'#include [<"]((?:pendula|io|view|cli|front|library)/[\w/]+\.hpp)[>"]', file.read_text())
     return {name.rsplit("/", 1)[0] for name in names}
 
 

@@ -46,9 +46,13 @@ def read(tool: str, *options: str) -> dict[str, str]:
     return {a or b: body for a, b, body in zip(pieces[1::3], pieces[2::3], pieces[3::3], strict=True)}
 
 
+# What is behind pendula.h.
+FRONT = "pendula_front.o"
+
+
 def copies() -> dict[str, str]:
     """Instruction set to object."""
-    found = {name: re.fullmatch(r"pendula_(\w+)\.o", name) for name in read("NM")}
+    found = {name: re.fullmatch(r"pendula_(\w+)\.o", name) for name in read("NM") if name != FRONT}
     return {match[1]: name for name, match in found.items() if match}
 
 
@@ -76,7 +80,24 @@ def code_of(name: str, folder: Path) -> str:
 
 def test_the_library_has_copies_and_what_they_share():
     assert list(copies()) == os.environ["PENDULA_ARCHS"].split()
-    assert {*ONCE} == set(read("NM")) - set(copies().values())
+    assert {*ONCE, FRONT} == set(read("NM")) - set(copies().values())
+
+
+def test_of_the_front_the_functions_of_its_header_are_seen():
+    header = (Path(__file__).parents[2] / "src/pendula/pendula.h").read_text()
+    declared = set(re.findall(r"^[^\s/].*?\b(pendula_\w+)\(", header, re.MULTILINE))
+    symbols = read("NM", "--extern-only", "--defined-only")[FRONT].split("\n")
+    assert {line.split()[-1] for line in symbols if line} == declared
+
+
+def test_the_front_needs_what_copies_share_and_nothing_of_eigen():
+    names = [
+        line.split(maxsplit=1)[1]
+        for line in read("NM", "--undefined-only", "--demangle")[FRONT].split("\n")
+        if line.strip()
+    ]
+    assert "pendula::library()" in names
+    assert [name for name in names if re.search("Eigen|xsimd", name)] == []
 
 
 @pytest.mark.parametrize("instruction_set", copies())
@@ -87,9 +108,9 @@ def test_nothing_but_its_entry_can_be_seen_of_a_copy(instruction_set):
     ]
 
 
-@pytest.mark.parametrize("instruction_set", copies())
-def test_a_linker_finds_no_section_in_a_copy_that_it_could_replace(instruction_set):
-    groups = read("READELF", "--section-groups")[copies()[instruction_set]].strip()
+@pytest.mark.parametrize("sealed", [*copies().values(), FRONT])
+def test_a_linker_finds_no_section_in_a_copy_that_it_could_replace(sealed):
+    groups = read("READELF", "--section-groups")[sealed].strip()
     assert groups == "There are no section groups in this file."
 
 

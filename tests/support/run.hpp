@@ -6,7 +6,7 @@
 #include <limits>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/run/integrator.hpp>
-#include <pendula/run/simulation.hpp>
+#include <pendula/run/schedule.hpp>
 #include <vector>
 
 namespace pendula::test {

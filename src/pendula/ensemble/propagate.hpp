@@ -36,6 +36,8 @@ struct EnsembleSchedule {
   MemberMethod method = MemberMethod::asked;  ///< by what members move: options', or the quickest that serves
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
+  /// Asked on the way, by several threads at once: true stops all, who then say so.
+  std::function<bool()> stop = [] { return false; };
 };
 
 /// Moves every member, and calls observe(number, report) with its number from 0 on and all that is known of its run:
@@ -64,8 +66,7 @@ inline void propagate(std::span<const EnsembleMember> members, const EnsembleSch
                         .doubted = false,
                         .events = schedule.events});
     }
-    const std::vector<RunReport> reports = run_members(
-        setups, [] { return false; }, schedule.method);
+    const std::vector<RunReport> reports = run_members(setups, schedule.stop, schedule.method);
     for (std::size_t k = 0; k < reports.size(); ++k) observe(first + k, reports[k]);
   });
 }

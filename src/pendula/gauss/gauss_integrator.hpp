@@ -76,8 +76,17 @@ class GaussIntegrator : public PlainIntegrator {
     const Solver& solver = stepper_.solver();
     return pendula::resolved_decay(solver.dissipates() ? Family::radau : Family::gauss, solver.stages(), error);
   }
-  void push([[maybe_unused]] double* tangents, [[maybe_unused]] int count) override {
-    if constexpr (LinearizingSolver<Solver>) stepper_.linearization().push(tangents, count);
+  int parameters() override {
+    if constexpr (LinearizingSolver<Solver>) return stepper_.linearization().parameters();
+    return 0;
+  }
+  void push([[maybe_unused]] double* tangents, [[maybe_unused]] int count,
+            [[maybe_unused]] const double* parameters) override {
+    if constexpr (LinearizingSolver<Solver>) stepper_.linearization().push(tangents, count, parameters);
+  }
+  void pull([[maybe_unused]] double* gradients, [[maybe_unused]] int count,
+            [[maybe_unused]] double* parameters) override {
+    if constexpr (LinearizingSolver<Solver>) stepper_.linearization().pull(gradients, count, parameters);
   }
   Description describe() const override {
     return {described_.solver, name_of(stepper_.solver().iteration()), described_.kernel};

@@ -37,31 +37,42 @@ class Linearization {
   /// another number of rows.
   void push(Directions<Real>& tangents) {
     require_rows("tangents", tangents.rows(), size());
-    push(tangents.data(), columns(tangents));
-  }
-  void push(Real* tangents, int count) {
-    for (std::size_t k = 0; k < used_; ++k) parts_[k].push(tangents, count);
+    push(tangents.data(), columns(tangents), nullptr);
   }
 
   /// The same where parameters vary, too, (parameters x as many).
   void push(Directions<Real>& tangents, const Directions<Real>& parameters) {
     require_rows("tangents", tangents.rows(), size());
     require_alike(parameters, tangents.cols());
-    for (std::size_t k = 0; k < used_; ++k) parts_[k].push(tangents.data(), columns(tangents), parameters.data());
+    push(tangents.data(), columns(tangents), parameters.data());
+  }
+
+  /// The same of plain numbers, row by row, whose sizes are the caller's to know; where parameters do not vary, null.
+  void push(Real* tangents, int count, const Real* parameters) {
+    for (std::size_t k = 0; k < used_; ++k) {
+      parameters == nullptr ? parts_[k].push(tangents, count) : parts_[k].push(tangents, count, parameters);
+    }
   }
 
   /// The transpose: replaces gradients with respect to the end of the step, (size x any), by those with respect to its
   /// start.
   void pull(Directions<Real>& gradients) {
     require_rows("gradients", gradients.rows(), size());
-    for (std::size_t k = used_; k-- > 0;) parts_[k].pull(gradients.data(), columns(gradients));
+    pull(gradients.data(), columns(gradients), nullptr);
   }
 
   /// Adds the gradients with respect to the parameters to `parameters`, (parameters x as many).
   void pull(Directions<Real>& gradients, Directions<Real>& parameters) {
     require_rows("gradients", gradients.rows(), size());
     require_alike(parameters, gradients.cols());
-    for (std::size_t k = used_; k-- > 0;) parts_[k].pull(gradients.data(), columns(gradients), parameters.data());
+    pull(gradients.data(), columns(gradients), parameters.data());
+  }
+
+  /// The same of plain numbers; where nothing is asked of parameters, null.
+  void pull(Real* gradients, int count, Real* parameters) {
+    for (std::size_t k = used_; k-- > 0;) {
+      parameters == nullptr ? parts_[k].pull(gradients, count) : parts_[k].pull(gradients, count, parameters);
+    }
   }
 
   /// The whole matrix, (size x size).

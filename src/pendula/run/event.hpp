@@ -39,7 +39,7 @@ class Formula {
 /// A zero that is touched is none, nor is one that the motion starts or ends at; a jump over zero is one. Where the
 /// function is not finite nothing is looked for.
 struct Event {
-  std::string name;
+  std::string name = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   std::function<double(const Motion&)> value;
   Direction direction = Direction::both;
   bool stop = false;  ///< whether the run ends there

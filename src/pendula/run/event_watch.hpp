@@ -10,6 +10,7 @@
 #include <pendula/run/formula_search.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/sign_search.hpp>
+#include <pendula/system/options.hpp>
 #include <span>
 #include <utility>
 #include <vector>
@@ -17,6 +18,12 @@
 namespace pendula {
 
 namespace detail {
+
+/// Of the polynomial that shows a step: through the stages of an implicit method, the series itself, else a cubic.
+inline int glance_degree(const RunOptions& options) {
+  if (options.method == Method::taylor) return 8;
+  return is_explicit(options.method) ? 3 : options.stages;
+}
 
 /// The last step of an integrator, as events are looked for in it: by the share of it that is done, 0 to 1, which is at
 /// `time`.
@@ -175,10 +182,24 @@ class EventWatch {
   /// Begins where the motion does: what is zero there has not happened.
   void start(const Motion& motion) {
     motion_ = motion;
-    for (std::size_t k = 0; k < events_.size(); ++k) {
-      const double value = events_[k].value(motion);
-      sides_[k] = {value, std::isfinite(value) ? sign_of(value) : 0};
-    }
+    for (std::size_t k = 0; k < events_.size(); ++k) sides_[k] = side_at(events_[k], motion);
+  }
+
+  /// Begins where something has happened, and does not once more.
+  void start_after(const Occurrence& happened) {
+    start(happened.motion);
+    sides_[happened.event] = {0, happened.up ? 1 : -1};
+  }
+
+  /// Others in their place, of the same functions.
+  void replace(std::vector<Event> events) { events_ = std::move(events); }
+
+  /// One more, where the motion has come to.
+  void add(Event event, const Motion& motion) {
+    motion_ = motion;
+    sides_.push_back(side_at(event, motion));
+    tallies_.emplace_back();
+    events_.push_back(std::move(event));
   }
 
   /// Goes on at `motion`, with a member of what had come there.
@@ -216,6 +237,11 @@ class EventWatch {
     double value = 0;
     int sign = 0;  // the last that was not 0; 0 where it is not known
   };
+
+  static Side side_at(const Event& event, const Motion& motion) {
+    const double value = event.value(motion);
+    return {value, std::isfinite(value) ? sign_of(value) : 0};
+  }
 
   template <class Step>
   void look_for(std::size_t k, detail::StepStates<Step>& states, std::vector<Occurrence>& found) {

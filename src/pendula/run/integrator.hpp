@@ -8,6 +8,7 @@
 #include <pendula/chain/plain_chain.hpp>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/run/no_kernel.hpp>
 #include <pendula/system/member.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
@@ -101,8 +102,8 @@ class Integrator {
   /// From now on every step leaves its derivative behind, for `push`; gives how many rows a tangent has. Throws
   /// std::invalid_argument for methods that have none: explicit ones, and the velocity form.
   int linearize() {
-    const int rows = integrator_->linearize();
-    if (rows > 0) return rows;
+    rows_ = integrator_->linearize();
+    if (rows_ > 0) return rows_;
     throw std::invalid_argument("tangents: expected method = gauss or radau in momentum form, other steps have none");
   }
 
@@ -112,7 +113,35 @@ class Integrator {
 
   /// Replaces tangents at the start of the last step, (rows x any), by those at its end: by the exact derivative of the
   /// step. Coordinates are the integrator's own: of a chain those of chain_tangent.hpp, of a generated kernel (δq, δp).
-  void push(Directions<>& tangents) { integrator_->push(tangents.data(), static_cast<int>(tangents.cols())); }
+  void push(Directions<>& tangents) {
+    require("tangents", tangents, rows_, tangents.cols());
+    integrator_->push(tangents.data(), static_cast<int>(tangents.cols()), nullptr);
+  }
+
+  /// Rows of a variation of the parameters, once `linearize` has asked for derivatives: masses, lengths … of a chain as
+  /// chain_tangent.hpp numbers them, of a generated kernel its parameters, then its inputs.
+  int parameters() { return integrator_->parameters(); }
+
+  /// The same where parameters vary, too, by (parameters x as many).
+  void push(Directions<>& tangents, const Directions<>& parameters) {
+    require("tangents", tangents, rows_, tangents.cols());
+    require("parameters", parameters, this->parameters(), tangents.cols());
+    integrator_->push(tangents.data(), static_cast<int>(tangents.cols()), parameters.data());
+  }
+
+  /// The transpose: replaces gradients with respect to the end of the last step, (rows x any), by those with respect to
+  /// its start.
+  void pull(Directions<>& gradients) {
+    require("gradients", gradients, rows_, gradients.cols());
+    integrator_->pull(gradients.data(), static_cast<int>(gradients.cols()), nullptr);
+  }
+
+  /// And adds those with respect to the parameters to (parameters x as many).
+  void pull(Directions<>& gradients, Directions<>& parameters) {
+    require("gradients", gradients, rows_, gradients.cols());
+    require("parameters", parameters, this->parameters(), gradients.cols());
+    integrator_->pull(gradients.data(), static_cast<int>(gradients.cols()), parameters.data());
+  }
 
   Description describe() const {
     const auto [solver, iteration, kernel] = integrator_->describe();
@@ -126,8 +155,16 @@ class Integrator {
                                 " numbers for this " + system_ + ", got " + std::to_string(got));
   }
 
+  static void require(const char* what, const Directions<>& got, Eigen::Index rows, Eigen::Index columns) {
+    if (got.rows() == rows && got.cols() == columns) return;
+    const auto size = [](Eigen::Index of, Eigen::Index by) { return std::to_string(of) + " x " + std::to_string(by); };
+    throw std::invalid_argument(std::string(what) + ": expected " + size(rows, columns) + " numbers, got " +
+                                size(got.rows(), got.cols()));
+  }
+
   std::unique_ptr<PlainIntegrator> integrator_;
   Eigen::Index coordinates_;
+  int rows_ = 0;  // of tangents; 0: nobody has asked for derivatives
   std::string system_;
   StopSign stop_;
 };
@@ -143,12 +180,6 @@ class Heeding {
  private:
   Integrator& integrator_;
   StopSign before_;
-};
-
-/// Thrown where a run needs a fixed-n kernel that this build does not have.
-class NoKernel : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
 };
 
 /// The integrator of the method that `options` ask for (Integrator::step is told its size), of the compiled library for

@@ -11,7 +11,7 @@
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/library.hpp>
-#include <pendula/run/simulation.hpp>
+#include <pendula/run/schedule.hpp>
 #include <random>
 #include <stdexcept>
 #include <string>

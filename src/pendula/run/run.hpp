@@ -18,7 +18,7 @@
 #include <pendula/run/observer.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
-#include <pendula/run/simulation.hpp>
+#include <pendula/run/schedule.hpp>
 #include <pendula/run/track.hpp>
 #include <pendula/run/viewer.hpp>
 #include <stdexcept>
@@ -29,12 +29,6 @@
 namespace pendula {
 
 namespace detail {
-
-/// Of the polynomial that shows a step: through the stages of an implicit method, the series itself, else a cubic.
-inline int glance_degree(const RunOptions& options) {
-  if (options.method == Method::taylor) return 8;
-  return is_explicit(options.method) ? 3 : options.stages;
-}
 
 /// How far rows are apart; 0 where steps tell it.
 inline double row_spacing(const RunSetup& setup) {

@@ -18,9 +18,20 @@ namespace pendula {
 /// A system of any other kind as what a run moves.
 class SystemSubject : public Subject {
  public:
-  /// `table` is kept, with whatever it was loaded from.
+  /// `table` is kept, with whatever it was loaded from. Throws std::invalid_argument on another number of parameters or
+  /// inputs than it has, and on sines on inputs that it has not.
   SystemSubject(std::shared_ptr<const SystemTable> table, SystemNumbers numbers)
-      : table_(std::move(table)), numbers_(std::move(numbers)) {}
+      : table_(std::move(table)), numbers_(std::move(numbers)) {
+    const auto& sizes = info().parameter_sizes;
+    require_size("parameters", numbers_.parameters.size(),
+                 static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0)));
+    require_size("inputs", numbers_.inputs.size(), info().inputs.size());
+    for (const InputSine& sine : numbers_.sines) {
+      if (sine.input >= 0 && static_cast<std::size_t>(sine.input) < info().inputs.size()) continue;
+      throw std::invalid_argument("sines: expected an input from 0 to before " + std::to_string(info().inputs.size()) +
+                                  ", got " + std::to_string(sine.input));
+    }
+  }
 
   const SystemTable& table() const { return *table_; }
   const SystemInfo& info() const { return table_->info; }
@@ -147,6 +158,12 @@ class SystemSubject : public Subject {
   }
 
  private:
+  void require_size(const char* what, std::size_t got, std::size_t expected) const {
+    if (got == expected) return;
+    throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(expected) + " numbers for " +
+                                std::string(info().name) + ", got " + std::to_string(got));
+  }
+
   static std::string rate_unit(std::string_view unit) { return (unit.empty() ? "1" : std::string(unit)) + "/s"; }
 
   // For functions that depend on no inputs; `time` has to outlive them.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <ostream>
 #include <string_view>
 
@@ -45,6 +46,15 @@ inline constexpr std::array<std::string_view, 3> names_of<Iteration>{"auto", "ne
 template <class Option>
 requires(!names_of<Option>.empty()) constexpr std::string_view name_of(Option option) {
   return names_of<Option>[static_cast<std::size_t>(option)];
+}
+
+/// The option of that name; none where there is none of it.
+template <class Option>
+requires(!names_of<Option>.empty()) constexpr std::optional<Option> option_of(std::string_view name) {
+  for (std::size_t k = 0; k < names_of<Option>.size(); ++k) {
+    if (names_of<Option>[k] == name) return static_cast<Option>(k);
+  }
+  return std::nullopt;
 }
 
 template <class Option>

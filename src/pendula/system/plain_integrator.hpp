@@ -53,9 +53,16 @@ class PlainIntegrator {
   /// derivative.
   virtual double resolved_decay(double /*error*/) const { return 0; }
 
+  /// Rows of a variation of the parameters, once `linearize` has asked for derivatives.
+  virtual int parameters() { return 0; }
+
   /// Replaces tangents at the start of the last step, (rows x count) row by row, by those at its end, once `linearize`
-  /// has asked for that.
-  virtual void push(double* /*tangents*/, int /*count*/) {}
+  /// has asked for that; where parameters vary, too, by (parameters x count), if that is not null.
+  virtual void push(double* /*tangents*/, int /*count*/, const double* /*parameters*/) {}
+
+  /// The transpose: replaces gradients with respect to the end of the last step by those with respect to its start, and
+  /// adds those with respect to the parameters to (parameters x count), if that is not null.
+  virtual void pull(double* /*gradients*/, int /*count*/, double* /*parameters*/) {}
 };
 
 }  // namespace pendula

@@ -3,10 +3,15 @@
 #include <iostream>
 #include <memory>
 #include <pendula/chain/chain_numbers.hpp>
+#include <pendula/chain/chain_solver.hpp>
 #include <pendula/explicit/extrapolation_integrator.hpp>
 #include <pendula/explicit/system_forward_dynamics.hpp>
+#include <pendula/gauss/stepper.hpp>
 #include <pendula/kernels/planar_3.hpp>
 #include <pendula/pendula.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/schedule.hpp>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -66,6 +71,21 @@ State<Planar> by_stepper(const Chain<Planar>& chain) {
   return stepper.state();
 }
 
+// The same again by what is behind pendula.h; callbacks and rows come back from there.
+State<Planar> by_simulation(const Chain<Planar>& chain) {
+  Simulation run(chain, start<Planar>(), {.stages = 2, .solver = Solver::chain, .step = step});
+  std::vector<std::vector<double>> rows;
+  int lows = 0;
+  run.on({.value = [](const Motion& motion) { return motion.v[0]; }}, [&](const Motion&) { ++lows; });
+  run.on_rows(every(duration / 2), [&](std::span<const double> row) { rows.emplace_back(row.begin(), row.end()); });
+  Simulation copy = run;
+  run.advance_to(duration);
+  copy.advance_to(duration);
+  if (rows.size() != 3 || lows == 0) throw std::runtime_error("expected 3 rows and an event");
+  if (copy.motion().q != run.motion().q) throw std::runtime_error("a copy went elsewhere");
+  return run.motion();
+}
+
 template <class Space>
 bool same(const std::string& what, const State<Space>& a, const State<Space>& b) {
   const double difference = (a.q - b.q).cwiseAbs().maxCoeff() + (a.v - b.v).cwiseAbs().maxCoeff();
@@ -98,6 +118,7 @@ int main() {
   const auto planar = loaded_chain<Planar>();
 
   bool good = same("here and there", by_library<Planar>(chain), by_stepper(planar));
+  good = same("in a simulation", by_library<Planar>(chain), by_simulation(planar)) && good;
   good = same("in the plane", by_library<Planar>(exact_chain), by_library<Planar>(exact_dense)) && good;
   good = same("in space", by_library<Spatial>(exact_chain), by_library<Spatial>(exact_dense)) && good;
   // The method from there, the accelerations from here.
@@ -116,6 +137,10 @@ int main() {
                           }) &&
          good;
   good = throws<std::invalid_argument>("expected 1 to 8", [&] { make_integrator(planar, {.stages = 99}); }) && good;
+  good = throws<std::invalid_argument>(
+             "expected 3 numbers, got 4",
+             [&] { Simulation(planar, State<Planar>::from_angles(Eigen::VectorXd::Ones(4))); }) &&
+         good;
   good = throws<std::invalid_argument>(
              "expected 3 numbers",
              [&] { make_integrator(planar, chain)->start(State<Planar>::from_angles(Eigen::VectorXd::Ones(4))); }) &&

@@ -2,9 +2,14 @@
 // project's build and the library's own must agree.
 #include <cmath>
 #include <iostream>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/gauss/lagrangian_solver.hpp>
+#include <pendula/gauss/stepper.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/kernels/spatial_4.hpp>
 #include <pendula/pendula.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/schedule.hpp>
 #include <stdexcept>
 
 using namespace pendula;

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <pendula/pendula.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace pendula::front {
+
+/// The mathematics failed; the message says how.
+class RunFailure : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Keeps what pendula_error() says to this thread; gives `status`.
+pendula_status fail(pendula_status status, const char* what) noexcept;
+
+/// The same of the exception that is being handled.
+pendula_status fail() noexcept;
+
+/// Does it; what that throws becomes a status.
+template <class Do>
+pendula_status guarded(Do&& act) noexcept {
+  try {
+    return act();
+  } catch (...) {
+    return fail();
+  }
+}
+
+/// Does it; what that throws makes it null.
+template <class Do>
+auto made(Do&& make) noexcept -> decltype(make()) {
+  try {
+    return make();
+  } catch (...) {
+    fail();
+    return nullptr;
+  }
+}
+
+}  // namespace pendula::front

@@ -1,0 +1,93 @@
+#include "front/linearize.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cstddef>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/gauss/parameter_slopes.hpp>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/run/no_kernel.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <pendula/system/system_model.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace pendula::front {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+template <class Space>
+SystemModel model_of_chain(const Chain<Space>& chain) {
+  for (const SystemTable* kernel : library_of<Space>().kernels) {
+    if (kernel->info.links != chain.links()) continue;
+    const std::vector<PlainChain::Drive> drives = plain_drives(chain);
+    return {*kernel, ChainSystem(plain(chain, drives), Space::torque_components).plain()};
+  }
+  throw NoKernel("no kernel for a " + std::string(Space::name) + " chain of " + std::to_string(chain.links()) +
+                 " links in this build; its linearization needs one");
+}
+
+SystemModel model_of(const Subject& subject) {
+  if (const auto* system = dynamic_cast<const SystemSubject*>(&subject)) {
+    return {system->table(), system->numbers().plain()};
+  }
+  if (const auto* chain = dynamic_cast<const ChainSubject<Planar>*>(&subject)) return model_of_chain(chain->chain());
+  return model_of_chain(dynamic_cast<const ChainSubject<Spatial>&>(subject).chain());
+}
+
+/// A column for each coordinate, then for each rate; so many at once as a kernel's functions take.
+void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
+  constexpr std::size_t width = 8;
+  const auto n = static_cast<std::size_t>(motion.q.size());
+  Eigen::Map<RowMajor> all(a, 2 * motion.q.size(), 2 * motion.q.size());
+  all.setZero();
+  all.topRightCorner(motion.q.size(), motion.q.size()).setIdentity();
+  PackRows<width> numbers(6 * n);
+  for (std::size_t k = 0; k < n; ++k) {
+    std::fill_n(numbers[k], width, motion.q[static_cast<Eigen::Index>(k)]);
+    std::fill_n(numbers[n + k], width, motion.v[static_cast<Eigen::Index>(k)]);
+  }
+  for (std::size_t first = 0; first < 2 * n; first += width) {
+    const std::size_t count = std::min(width, 2 * n - first);
+    std::fill_n(numbers[2 * n], 2 * n * width, 0.0);
+    for (std::size_t lane = 0; lane < count; ++lane) numbers[2 * n + first + lane][lane] = 1;
+    here(&SystemFunctions::acceleration_along, numbers[0], numbers[n], numbers[2 * n], numbers[3 * n], numbers[4 * n],
+         numbers[5 * n]);
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t lane = 0; lane < count; ++lane) {
+        all(static_cast<Eigen::Index>(n + k), static_cast<Eigen::Index>(first + lane)) = numbers[5 * n + k][lane];
+      }
+    }
+  }
+}
+
+// Inputs stand in forces alone: M δa = δf.
+void find_b(const SystemModel& model, const Motion& motion, double* b) {
+  const Eigen::Index n = motion.q.size(), inputs = static_cast<Eigen::Index>(model.inputs());
+  Eigen::Map<RowMajor> all(b, 2 * n, inputs);
+  SystemAt<1> here(model);
+  here.set_time(motion.time);
+  RowMajor mass(n, n);
+  here(&SystemFunctions::mass_matrix, motion.q.data(), mass.data());
+  ParameterSlopes slopes(model);
+  slopes.evaluate(motion.time, motion.q.data(), motion.v.data());
+  all.topRows(n).setZero();
+  all.bottomRows(n) = mass.partialPivLu().solve(slopes.f.rightCols(inputs));
+}
+
+}  // namespace
+
+void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
+  const SystemModel model = model_of(subject);
+  if (a != nullptr) {
+    SystemAt<8> here(model);
+    here.set_time(motion.time);
+    find_a(here, motion, a);
+  }
+  if (b != nullptr && model.inputs() > 0) find_b(model, motion, b);
+}
+
+}  // namespace pendula::front

@@ -1,0 +1,160 @@
+#include "front/model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <pendula/chain/chain_numbers.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/run/no_kernel.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <pendula/system/system_table.hpp>
+#include <pendula/version.hpp>
+#include <span>
+#include <stdexcept>
+
+#include "front/errors.hpp"
+
+namespace pendula::front {
+namespace {
+
+template <class Space>
+pendula_model* make_chain(const pendula_chain& given) {
+  if (given.links < 1) throw std::invalid_argument("links: expected at least 1, got " + std::to_string(given.links));
+  if (given.masses == nullptr || given.lengths == nullptr) {
+    throw std::invalid_argument("masses, lengths: expected a number for each link, got none");
+  }
+  const auto links = static_cast<std::size_t>(given.links);
+  const std::vector<double> none(links * Space::torque_components);
+  std::vector<PlainChain::Drive> drives;
+  for (const pendula_drive& drive : std::span(given.drives, given.drive_count)) {
+    PlainChain::Drive& added = drives.emplace_back(PlainChain::Drive{drive.link, {}, drive.frequency, drive.phase});
+    std::copy_n(drive.amplitude, Space::torque_components, added.amplitude);
+  }
+  const PlainChain plain{given.links,
+                         given.gravity,
+                         given.masses,
+                         given.lengths,
+                         given.damping == nullptr ? none.data() : given.damping,
+                         given.torque == nullptr ? none.data() : given.torque,
+                         drives};
+  return new pendula_model(std::make_shared<ChainSubject<Space>>(chain_of<Space>(plain)), Space::dof * links,
+                           links * Space::torque_components);
+}
+
+pendula_model* make_system(const SystemTable& table, std::span<const double> parameters,
+                           std::span<const double> inputs) {
+  SystemNumbers numbers{{parameters.begin(), parameters.end()}, {inputs.begin(), inputs.end()}, {}};
+  if (inputs.empty()) numbers.inputs.assign(table.info.inputs.size(), 0.0);
+  const std::shared_ptr<const SystemTable> shared(std::shared_ptr<void>(), &table);
+  return new pendula_model(std::make_shared<SystemSubject>(shared, std::move(numbers)), table.info.coordinates.size(),
+                           table.info.inputs.size());
+}
+
+/// The numbers that a model has itself. Throws std::invalid_argument where one has none.
+std::vector<double> defaults_of(const SystemInfo& info) {
+  std::vector<double> numbers;
+  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+    if (std::isnan(info.parameter_defaults[k])) {
+      throw std::invalid_argument("parameters: expected a number for " + std::string(info.parameters[k]) +
+                                  ", which the model has no default for");
+    }
+    numbers.insert(numbers.end(), static_cast<std::size_t>(info.parameter_sizes[k]), info.parameter_defaults[k]);
+  }
+  return numbers;
+}
+
+const SystemTable& find_system(const std::string& name, int links) {
+  std::string built;
+  for (const SystemTable* table : library().systems) {
+    if (table->info.model == name && (links == 0 || table->info.links == links)) return *table;
+    built += (built.empty() ? "" : ", ") + std::string(table->info.name);
+  }
+  throw NoKernel("no kernel for the model " + name + (links > 0 ? " of " + std::to_string(links) + " links" : "") +
+                 " in this build; it has " + (built.empty() ? "none" : built));
+}
+
+}  // namespace
+
+Motion motion_of(const pendula_model& model, double time, const double* q, const double* v) {
+  if (q == nullptr)
+    throw std::invalid_argument("q: expected " + std::to_string(model.coordinates) + " numbers, got none");
+  const auto count = static_cast<Eigen::Index>(model.coordinates);
+  using Numbers = Eigen::Map<const Eigen::VectorXd>;
+  return {time, Numbers(q, count), v == nullptr ? Eigen::VectorXd(Eigen::VectorXd::Zero(count)) : Numbers(v, count)};
+}
+
+void write(const Motion& motion, double* q, double* v) {
+  if (q != nullptr) std::ranges::copy(motion.q, q);
+  if (v != nullptr) std::ranges::copy(motion.v, v);
+}
+
+}  // namespace pendula::front
+
+using namespace pendula;
+using namespace pendula::front;
+
+extern "C" {
+
+const char* pendula_version(void) {
+  return version.data();
+}
+
+const char* pendula_instruction_set(void) {
+  return made([] { return library().instruction_set.data(); });
+}
+
+pendula_model* pendula_model_of_chain(const pendula_chain* chain) {
+  return made([&]() -> pendula_model* {
+    if (chain->dimension == 2) return make_chain<Planar>(*chain);
+    if (chain->dimension == 3) return make_chain<Spatial>(*chain);
+    throw std::invalid_argument("dimension: expected 2 or 3, got " + std::to_string(chain->dimension));
+  });
+}
+
+pendula_model* pendula_model_named(const char* name, int links, const double* parameters, size_t count) {
+  return made([&] {
+    const SystemTable& table = find_system(name, links);
+    const std::vector<double> numbers =
+        parameters == nullptr ? defaults_of(table.info) : std::vector<double>(parameters, parameters + count);
+    return make_system(table, numbers, {});
+  });
+}
+
+pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
+                                      const double* inputs, size_t input_count) {
+  return made([&] {
+    return make_system(*static_cast<const SystemTable*>(table), {parameters, parameter_count}, {inputs, input_count});
+  });
+}
+
+void pendula_model_free(pendula_model* model) {
+  delete model;
+}
+
+size_t pendula_coordinates(const pendula_model* model) {
+  return model->coordinates;
+}
+size_t pendula_inputs(const pendula_model* model) {
+  return model->inputs;
+}
+size_t pendula_columns(const pendula_model* model) {
+  return model->names.size();
+}
+const char* pendula_column_name(const pendula_model* model, size_t column) {
+  return column < model->names.size() ? model->names[column].c_str() : nullptr;
+}
+const char* pendula_column_unit(const pendula_model* model, size_t column) {
+  return column < model->units.size() ? model->units[column].c_str() : nullptr;
+}
+
+pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row) {
+  return guarded([&] {
+    const Motion motion = motion_of(*model, time, q, v);
+    std::vector<double> numbers;
+    model->subject->append_row(motion, model->subject->observe(motion), numbers);
+    std::ranges::copy(numbers, row);
+    return PENDULA_OK;
+  });
+}
+}

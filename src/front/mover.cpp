@@ -1,0 +1,163 @@
+#include "front/mover.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/schedule.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace pendula::front {
+
+Mover::Mover(std::shared_ptr<const Subject> subject, const RunOptions& options, bool remembers)
+    : subject_(std::move(subject)),
+      options_(options),
+      integrator_(subject_->make_integrator(options)),
+      remembers_(remembers),
+      watch_({}, detail::glance_degree(options)) {}
+
+Mover::Mover(const Mover& other)
+    : subject_(other.subject_),
+      options_(other.options_),
+      integrator_(subject_->make_integrator(options_)),
+      motion_(other.motion_),
+      origin_(other.origin_),
+      steps_(other.steps_),
+      remembers_(other.remembers_),
+      history_(other.history_),
+      watch_(other.watch_),
+      happened_(other.happened_),
+      stopped_by_(other.stopped_by_),
+      stop_(other.stop_) {
+  integrator_->resume(other.integrator_->member());
+}
+
+Mover::~Mover() = default;
+
+Outcome Mover::start(const Motion& motion) {
+  const Outcome started = integrator_->start(motion);
+  if (!started) return started;
+  motion_ = motion;
+  origin_ = motion.time;
+  watch_.start(motion);
+  if (remembers_) history_.add(motion);
+  return started;
+}
+
+Advance Mover::advance_to(double time) {
+  if (!(time >= motion_.time) || std::isinf(time)) {
+    throw std::invalid_argument("time: expected at least " + shortest(motion_.time) + " s, which it is, got " +
+                                shortest(time));
+  }
+  Schedule schedule;
+  schedule.step = is_adaptive(options_) ? std::numeric_limits<double>::infinity() : options_.step;
+  schedule.duration = time - origin_;
+  schedule.every = std::numeric_limits<std::int64_t>::max();
+  stopping_.reset();
+  stopped_by_.reset();
+  integrator_->remember_steps(!watch_.events().empty() || !viewers_.empty());
+  const RunResult result = go_on(
+      *integrator_, origin_, schedule, {}, [](const Motion&) {}, stop_, [](const RowPlace&, bool) {},
+      [this] { return after_step(); });
+  motion_ = integrator_->state();
+  if (stopping_) {
+    stopped_by_ = stopping_->event;
+    restart_after(*std::exchange(stopping_, {}));
+  }
+  return {result.outcome, result.stopped, stopped_by_};
+}
+
+std::optional<Motion> Mover::after_step() {
+  ++steps_;
+  std::optional<Motion> end;
+  if (!watch_.events().empty()) {
+    const Heeding nothing(*integrator_, {});  // what is found has to be right
+    for (const Occurrence& happened : watch_.after_step(*integrator_)) {
+      const std::size_t k = happened.event;
+      const bool stops = happened_[k] && happened_[k](happened.up, happened.motion);
+      if (!stops && !watch_.events()[k].stop) continue;
+      stopping_ = happened;
+      end = happened.motion;
+      break;
+    }
+  }
+  if (remembers_) history_.add(end ? *end : integrator_->state());
+  for (Viewer& viewer : viewers_) viewer.follow(*integrator_, end, 0);
+  return end;
+}
+
+// The rest of the step is not taken.
+void Mover::restart_after(const Occurrence& happened) {
+  motion_ = happened.motion;
+  integrator_->start(motion_);
+  watch_.start_after(happened);
+}
+
+Outcome Mover::at(double time, Motion& motion) {
+  if (time == motion_.time) {
+    motion = motion_;
+    return {};
+  }
+  if (!history_.covers(time)) {
+    throw std::invalid_argument("time: expected one since the start that steps were kept of, until " +
+                                shortest(motion_.time) + " s, got " + shortest(time));
+  }
+  motion = history_.before(time);
+  if (motion.time == time) return {};
+  if (!again_) again_ = subject_->make_integrator(options_);
+  Outcome outcome = again_->start(motion);
+  const double near = 4 * std::numeric_limits<double>::epsilon() * std::abs(time);
+  while (outcome && time - again_->time() > near) outcome = again_->step(time - again_->time());
+  if (outcome) motion = again_->state();
+  motion.time = outcome ? time : motion.time;
+  return outcome;
+}
+
+void Mover::on(Event event, Happened happened) {
+  if (event.formula) throw std::invalid_argument("formula: expected none, events of a simulation are functions alone");
+  if (!event.value) throw std::invalid_argument("value: expected a function of the motion, got none");
+  watch_.add(std::move(event), motion_);
+  happened_.push_back(std::move(happened));
+}
+
+void Mover::replace(std::vector<Event> events, std::vector<Happened> happened) {
+  watch_.replace(std::move(events));
+  happened_ = std::move(happened);
+}
+
+void Mover::add(std::unique_ptr<Observer> observer, const RowTimes& times) {
+  if (!times.any()) throw std::invalid_argument("rows: expected an interval > 0 or times");
+  viewers_.emplace_back(*subject_, *observer, times).begin(motion_, motion_.time);
+  observers_.push_back(std::move(observer));
+}
+
+void Mover::finish() {
+  viewers_.clear();
+  const std::vector<std::unique_ptr<Observer>> observers = std::exchange(observers_, {});
+  for (const auto& observer : observers) observer->finish();
+}
+
+Member Mover::save() {
+  Member all = member_of(*this);
+  const Member steps = integrator_->member();
+  all.numbers.insert(all.numbers.end(), steps.numbers.begin(), steps.numbers.end());
+  return all;
+}
+
+void Mover::resume(const Member& saved) {
+  const std::size_t own = member_of(*this).numbers.size(), all = own + integrator_->member().numbers.size();
+  if (saved.numbers.size() != all) {
+    throw std::invalid_argument("saved: expected " + std::to_string(all) +
+                                " numbers of the same model and options, got " + std::to_string(saved.numbers.size()));
+  }
+  const auto end = saved.numbers.begin() + static_cast<std::ptrdiff_t>(own);
+  integrator_->resume({{end, saved.numbers.end()}});
+  become(*this, {{saved.numbers.begin(), end}});
+  watch_.resume(motion_);
+  history_.clear();
+  if (remembers_) history_.add(motion_);
+}
+
+}  // namespace pendula::front

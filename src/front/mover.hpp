@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <pendula/run/event.hpp>
+#include <pendula/run/event_watch.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/observer.hpp>
+#include <pendula/run/row_times.hpp>
+#include <pendula/run/subject.hpp>
+#include <pendula/run/viewer.hpp>
+#include <pendula/system/member.hpp>
+#include <pendula/system/motion.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
+#include <vector>
+
+#include "front/step_history.hpp"
+
+namespace pendula::front {
+
+/// How an advance ended.
+struct Advance {
+  Outcome outcome;  ///< of the last step
+  bool stopped = false;
+  std::optional<std::size_t> event = {};  // NOLINT(readability-redundant-member-init): left out in initializers
+};
+
+/// Moves a subject through time, on and on: what is behind a pendula_simulation. A copy goes on as the first does, to
+/// the bit, without its rows.
+class Mover {
+ public:
+  /// Told that an event has happened; true stops the run there.
+  using Happened = std::function<bool(bool up, const Motion& motion)>;
+
+  /// Throws std::invalid_argument as make_integrator does, NoKernel.
+  Mover(std::shared_ptr<const Subject> subject, const RunOptions& options, bool remembers);
+  Mover(const Mover& other);
+  Mover& operator=(const Mover&) = delete;
+  ~Mover();
+
+  /// Begins, or goes on, from a motion.
+  Outcome start(const Motion& motion);
+
+  const Subject& subject() const { return *subject_; }
+  const Motion& motion() const { return motion_; }
+  std::size_t steps() const { return steps_; }
+  std::optional<std::size_t> stopped_by() const { return stopped_by_; }
+
+  /// To `time`, where a step ends. Throws std::invalid_argument where that is past, and what callbacks throw.
+  Advance advance_to(double time);
+
+  /// The motion at a time since the start, at the full order of the method, by a step from where the step that it lies
+  /// in began. Throws std::invalid_argument where there is none.
+  Outcome at(double time, Motion& motion);
+
+  /// Asked after every step, and within long ones.
+  void heed(std::function<bool()> stop) { stop_ = std::move(stop); }
+  void on(Event event, Happened happened);
+  /// Other callbacks, as many as there are events.
+  void replace(std::vector<Event> events, std::vector<Happened> happened);
+  /// Rows from now on.
+  void add(std::unique_ptr<Observer> observer, const RowTimes& times);
+  /// No more rows; throws what the last of them do.
+  void finish();
+
+  /// All that the next steps depend on.
+  Member save();
+  void resume(const Member& member);
+
+  /// What is kept besides the integrator's.
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(motion_.time, motion_.q, motion_.v, origin_, watch_);
+  }
+
+ private:
+  std::optional<Motion> after_step();
+  void restart_after(const Occurrence& happened);
+
+  std::shared_ptr<const Subject> subject_;
+  RunOptions options_;
+  std::unique_ptr<Integrator> integrator_;
+  std::unique_ptr<Integrator> again_;  // takes steps again, to look into them
+  Motion motion_;
+  double origin_ = 0;  // where times are counted from
+  std::size_t steps_ = 0;
+  bool remembers_;
+  StepHistory history_;
+  EventWatch watch_;
+  std::vector<Happened> happened_;
+  std::optional<Occurrence> stopping_;
+  std::optional<std::size_t> stopped_by_;
+  std::function<bool()> stop_ = [] { return false; };
+  std::vector<std::unique_ptr<Observer>> observers_;
+  std::vector<Viewer> viewers_;
+};
+
+}  // namespace pendula::front

@@ -1,0 +1,69 @@
+#include <pendula/ensemble/propagate.hpp>
+
+#include <pendula/pendula.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "front/errors.hpp"
+#include "front/model.hpp"
+#include "front/options.hpp"
+
+using namespace pendula;
+using namespace pendula::front;
+
+namespace {
+
+std::vector<EnsembleMember> members_of(const pendula_ensemble& ensemble) {
+  const std::span models(ensemble.models, ensemble.model_count);
+  if (models.size() != 1 && models.size() != ensemble.members) {
+    throw std::invalid_argument("models: expected one, or one for each of " + std::to_string(ensemble.members) +
+                                " members, got " + std::to_string(models.size()));
+  }
+  const std::size_t coordinates = models[0]->coordinates;
+  std::vector<EnsembleMember> members;
+  for (std::size_t k = 0; k < ensemble.members; ++k) {
+    const pendula_model& model = *models[models.size() == 1 ? 0 : k];
+    if (model.coordinates != coordinates) throw std::invalid_argument("models: expected as many coordinates of each");
+    const double* start = ensemble.starts + k * 2 * coordinates;
+    members.push_back({model.subject, motion_of(model, ensemble.time, start, start + coordinates)});
+  }
+  return members;
+}
+
+pendula_status status_of(RunEnd end) {
+  if (end == RunEnd::complete || end == RunEnd::event) return PENDULA_OK;
+  return end == RunEnd::stopped ? PENDULA_STOPPED : PENDULA_FAILED;
+}
+
+}  // namespace
+
+extern "C" pendula_status pendula_propagate(const pendula_ensemble* ensemble, double* ends, pendula_status* how,
+                                            double* energy_errors) {
+  return guarded([&] {
+    if (ensemble->members == 0) return PENDULA_OK;
+    const std::vector<EnsembleMember> members = members_of(*ensemble);
+    const std::size_t coordinates = ensemble->models[0]->coordinates;
+    EnsembleSchedule schedule;
+    schedule.options = options_of(ensemble->options);
+    schedule.duration = ensemble->duration;
+    schedule.threads =
+        ensemble->threads > 0 ? ensemble->threads : static_cast<int>(std::thread::hardware_concurrency());
+    schedule.threads = std::max(schedule.threads, 1);
+    if (ensemble->stop != nullptr) {
+      schedule.stop = [stop = ensemble->stop, context = ensemble->context] { return stop(context) != 0; };
+    }
+    propagate(members, schedule, [&](std::size_t number, const RunReport& report) {
+      const Motion& last = report.last.q.size() > 0 ? report.last : members[number].start;
+      write(last, ends + number * 2 * coordinates, ends + (number * 2 + 1) * coordinates);
+      if (how != nullptr) how[number] = status_of(report.end);
+      if (energy_errors != nullptr) energy_errors[number] = report.energy_error.largest;
+    });
+    return ensemble->stop != nullptr && schedule.stop() ? PENDULA_STOPPED : PENDULA_OK;
+  });
+}

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <pendula/pendula.h>
+
+#include <cstddef>
+#include <pendula/run/no_kernel.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace pendula {
+
+/// The mathematics of a run failed: a step did not converge, a start is singular. The message says how.
+class RunFailed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+namespace detail {
+
+/// Throws what a function of pendula.h has failed by.
+[[noreturn]] inline void throw_error(pendula_status status) {
+  const std::string what = pendula_error();
+  if (status == PENDULA_INVALID) throw std::invalid_argument(what);
+  if (status == PENDULA_NO_KERNEL) throw NoKernel(what);
+  if (status == PENDULA_FAILED) throw RunFailed(what);
+  throw std::runtime_error(what);
+}
+
+/// Throws where that is a failure; gives it.
+inline pendula_status require(pendula_status status) {
+  if (status >= PENDULA_FAILED) throw_error(status);
+  return status;
+}
+
+/// Throws where nothing was made.
+template <class Thing>
+Thing* made(Thing* thing) {
+  if (thing == nullptr) throw_error(pendula_error_kind());
+  return thing;
+}
+
+inline void require_size(const char* what, std::size_t got, std::size_t expected) {
+  if (got == expected) return;
+  throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(expected) + " numbers, got " +
+                              std::to_string(got));
+}
+
+}  // namespace detail
+}  // namespace pendula

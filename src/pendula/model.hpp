@@ -1,0 +1,90 @@
+#pragma once
+
+#include <pendula/pendula.h>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <pendula/c_error.hpp>
+#include <pendula/chain/chain.hpp>
+#include <pendula/system/motion.hpp>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace pendula {
+
+/// What moves, with its numbers: a chain, a built-in model, or one of your own. Immutable; copies share it.
+class Model {
+ public:
+  /// Of a chain.
+  template <class Space, int N>
+  Model(const Chain<Space, N>& chain) : Model(of_chain(chain)) {}  // NOLINT(google-explicit-constructor)
+
+  /// One that is built in, "cart_chain", with these parameters, one after the other; with its own where there are none.
+  /// Throws NoKernel where this build does not have it, std::invalid_argument on another number of parameters.
+  explicit Model(const std::string& name, int links = 0, std::span<const double> parameters = {})
+      : Model(pendula_model_named(name.c_str(), links, parameters.empty() ? nullptr : parameters.data(),
+                                  parameters.size())) {}
+
+  /// As the C interface has it, which this one owns from now on; throws what pendula_error() says where it is null.
+  explicit Model(pendula_model* model) : model_(detail::made(model), pendula_model_free) {}
+
+  std::size_t coordinates() const { return pendula_coordinates(get()); }
+  std::size_t inputs() const { return pendula_inputs(get()); }
+
+  /// Names of the numbers of a row: t, coordinates, rates, inputs, points, energy.
+  std::vector<std::string> columns() const {
+    std::vector<std::string> names(pendula_columns(get()));
+    for (std::size_t k = 0; k < names.size(); ++k) names[k] = pendula_column_name(get(), k);
+    return names;
+  }
+
+  /// The numbers of the row that a motion is.
+  std::vector<double> row(const Motion& motion) const {
+    require(motion);
+    std::vector<double> numbers(pendula_columns(get()));
+    detail::require(pendula_row(get(), motion.time, motion.q.data(), motion.v.data(), numbers.data()));
+    return numbers;
+  }
+
+  /// One of them, by the name of its column. Throws std::invalid_argument where there is none of that name.
+  double number(std::string_view column, const Motion& motion) const {
+    std::string all;
+    for (std::size_t k = 0; k < pendula_columns(get()); ++k) {
+      const char* const name = pendula_column_name(get(), k);
+      if (name == column) return row(motion)[k];
+      all.append(all.empty() ? "" : ", ").append(name);
+    }
+    throw std::invalid_argument("column: expected one of " + all + ", got " + std::string(column));
+  }
+
+  /// Throws std::invalid_argument unless a motion has as many coordinates and rates.
+  void require(const Motion& motion) const {
+    detail::require_size("q", static_cast<std::size_t>(motion.q.size()), coordinates());
+    detail::require_size("v", static_cast<std::size_t>(motion.v.size()), coordinates());
+  }
+
+  pendula_model* get() const { return model_.get(); }
+
+ private:
+  template <class Space, int N>
+  static pendula_model* of_chain(const Chain<Space, N>& chain) {
+    std::vector<pendula_drive> drives;
+    for (const Drive<Space>& drive : chain.drives()) {
+      drives.push_back({drive.link, {}, drive.frequency, drive.phase});
+      for (int k = 0; k < Space::torque_components; ++k) drives.back().amplitude[k] = drive.amplitude[k];
+    }
+    const pendula_chain plain{
+        Space::dimension, chain.links(),          chain.masses().data(),          chain.lengths().data(),
+        chain.gravity(),  chain.damping().data(), chain.constant_torque().data(), drives.data(),
+        drives.size()};
+    return pendula_model_of_chain(&plain);
+  }
+
+  std::shared_ptr<pendula_model> model_;
+};
+
+}  // namespace pendula

@@ -1,0 +1,284 @@
+#pragma once
+
+#include <pendula/pendula.h>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <pendula/c_error.hpp>
+#include <pendula/model.hpp>
+#include <pendula/run/event.hpp>
+#include <pendula/run/row_times.hpp>
+#include <pendula/system/member.hpp>
+#include <pendula/system/motion.hpp>
+#include <pendula/system/options.hpp>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// How a simulation takes its steps: of its own choice, unless `step` says how long they are.
+struct SimulationOptions {
+  Method method = Method::gauss;
+  int stages = 0;  ///< 0: as many as the tolerance wants, 4 for constant steps
+  Form form = Form::momentum;
+  Solver solver = Solver::automatic;
+  Iteration iteration = Iteration::automatic;
+  double step = 0;          ///< s
+  double tolerance = 1e-9;  ///< of the motion, relative to its size, but for what chaos makes of it
+  bool remember = true;     ///< whether earlier steps are kept, for `at`: so many numbers a step as a motion has
+};
+
+/// Rows this far apart, whatever the steps are  [s].
+inline RowTimes every(double interval) {
+  return {interval, {}};
+}
+
+namespace detail {
+
+/// The same for C; it points to literals.
+inline pendula_options plain(const SimulationOptions& options) {
+  return {name_of(options.method).data(),
+          name_of(options.form).data(),
+          name_of(options.solver).data(),
+          name_of(options.iteration).data(),
+          options.stages,
+          options.step,
+          options.tolerance,
+          options.remember ? 0 : 1};
+}
+
+/// What callbacks throw does not go through C: it is kept, and thrown where that is left.
+struct Thrown {
+  std::exception_ptr failure = nullptr;
+
+  template <class Result, class Do>
+  Result guard(Result otherwise, Do act) noexcept {
+    try {
+      return act();
+    } catch (...) {
+      if (!failure) failure = std::current_exception();
+      return otherwise;
+    }
+  }
+  void rethrow() {
+    if (failure) std::rethrow_exception(std::exchange(failure, nullptr));
+  }
+};
+
+}  // namespace detail
+
+/// A motion that goes on as far as it is asked to. It is a value: a copy goes on as the first one does, to the last
+/// bit, with the same events; rows stay with the first.
+class Simulation {
+ public:
+  /// Throws std::invalid_argument on options or a start that make no sense, NoKernel, and RunFailed where the motion
+  /// cannot begin (at a pole of the dense solver).
+  Simulation(Model model, const Motion& start, const SimulationOptions& options = {}) : model_(std::move(model)) {
+    model_.require(start);
+    const pendula_options plain = detail::plain(options);
+    hold(pendula_simulation_new(model_.get(), start.time, start.q.data(), start.v.data(), &plain));
+  }
+
+  Simulation(const Simulation& other) : model_(other.model_) {
+    std::vector<void*> contexts;
+    for (const auto& event : other.events_) {
+      events_.push_back(std::make_unique<Watched>(*event, thrown_.get()));
+      contexts.push_back(events_.back().get());
+    }
+    hold(pendula_simulation_copy(other.get(), contexts.data()));
+  }
+  Simulation(Simulation&&) noexcept = default;
+  Simulation& operator=(Simulation other) noexcept {
+    std::swap(model_, other.model_);
+    std::swap(thrown_, other.thrown_);
+    std::swap(events_, other.events_);
+    std::swap(rows_, other.rows_);
+    std::swap(stop_, other.stop_);
+    std::swap(simulation_, other.simulation_);
+    return *this;
+  }
+  ~Simulation() = default;
+
+  const Model& model() const { return model_; }
+
+  /// Goes on to `time`, where a step ends. False where an event or a request stopped it before. Throws RunFailed where
+  /// the mathematics fails, what callbacks throw, and std::invalid_argument where that time is past.
+  bool advance_to(double time) {
+    const pendula_status status = pendula_advance_to(get(), time);
+    thrown_->rethrow();
+    return detail::require(status) == PENDULA_OK;
+  }
+
+  double time() const { return pendula_time(get()); }
+  /// Steps that were taken.
+  std::size_t steps() const { return pendula_steps(get()); }
+
+  Motion motion() const {
+    Motion motion = empty_motion(time());
+    pendula_motion(get(), motion.q.data(), motion.v.data());
+    return motion;
+  }
+  /// At any time since the start, at the full order of the method.
+  Motion at(double time) {
+    Motion motion = empty_motion(time);
+    detail::require(pendula_at(get(), time, motion.q.data(), motion.v.data()));
+    return motion;
+  }
+
+  /// A number of the row that the motion is, by the name of its column: "x_2", "energy". Throws std::invalid_argument
+  /// where there is none of that name.
+  double operator[](std::string_view column) const { return model_.number(column, motion()); }
+
+  /// Goes on from another motion: after an impact, say.
+  void restart(const Motion& motion) {
+    model_.require(motion);
+    detail::require(pendula_restart(get(), motion.time, motion.q.data(), motion.v.data()));
+  }
+
+  /// Tells happened(motion) where event.value changes its sign, from now on; event.stop ends the advance there. Gives
+  /// the event's number.
+  std::size_t on(Event event, std::function<void(const Motion&)> happened = nullptr) {
+    if (event.formula)
+      throw std::invalid_argument("formula: expected none, events of a simulation are functions alone");
+    if (!event.value) throw std::invalid_argument("value: expected a function of the motion, got none");
+    events_.push_back(std::make_unique<Watched>(std::move(event), std::move(happened), empty_motion(0), thrown_.get()));
+    const Event& told = events_.back()->event;
+    const int direction = told.direction == Direction::up ? 1 : told.direction == Direction::down ? -1 : 0;
+    const pendula_event plain{&Watched::value, &Watched::tell, events_.back().get(), direction, told.stop ? 1 : 0};
+    detail::require(pendula_on(get(), &plain));
+    return events_.size() - 1;
+  }
+  /// The event that stopped the last advance.
+  std::optional<std::size_t> stopped_by() const {
+    const int event = pendula_stopped_by(get());
+    return event < 0 ? std::nullopt : std::optional<std::size_t>(static_cast<std::size_t>(event));
+  }
+
+  /// Rows from now on, at these times counted from now, to a CSV file; it is written when the simulation, or `finish`,
+  /// is.
+  void write_csv(const std::string& file, const RowTimes& rows) {
+    detail::require(pendula_write_csv(get(), file.c_str(), interval_of(rows)));
+  }
+  /// The same, to take(numbers), in the order of Model::columns.
+  void on_rows(const RowTimes& rows, std::function<void(std::span<const double>)> take) {
+    rows_.push_back(std::make_unique<Rows>(std::move(take), thrown_.get()));
+    detail::require(pendula_on_rows(get(), interval_of(rows), &Rows::take_row, rows_.back().get()));
+    thrown_->rethrow();
+  }
+  /// No more rows; throws std::runtime_error where a file cannot be written.
+  void finish() { detail::require(pendula_finish(get())); }
+
+  /// Stops advances, within long steps too, where that is requested; a copy heeds nobody.
+  void heed(std::stop_token stop) {
+    stop_ = std::make_unique<std::stop_token>(std::move(stop));
+    const auto asked = [](void* token) { return static_cast<std::stop_token*>(token)->stop_requested() ? 1 : 0; };
+    detail::require(pendula_heed(get(), asked, stop_.get()));
+  }
+
+  /// d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly: A is (2n x 2n), B (2n x inputs).
+  std::pair<Eigen::MatrixXd, Eigen::MatrixXd> linearize() const {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const auto n = static_cast<Eigen::Index>(2 * model_.coordinates());
+    RowMajor a(n, n), b(n, static_cast<Eigen::Index>(model_.inputs()));
+    detail::require(pendula_linearize(get(), a.data(), b.data()));
+    return {a, b};
+  }
+
+  /// All that its next steps depend on.
+  Member save() const {
+    Member saved{std::vector<double>(pendula_saved(get()))};
+    detail::require(pendula_save(get(), saved.numbers.data(), saved.numbers.size()));
+    return saved;
+  }
+  /// Goes on from what another one with the same model, options and events had come to, to the last bit. Throws
+  /// std::invalid_argument on another number of numbers.
+  void resume(const Member& saved) {
+    detail::require(pendula_resume(get(), saved.numbers.data(), saved.numbers.size()));
+  }
+
+  /// As the C interface has it.
+  pendula_simulation* get() const { return simulation_.get(); }
+
+ private:
+  struct Free {
+    void operator()(pendula_simulation* simulation) const { pendula_simulation_free(simulation); }
+  };
+
+  struct Watched {
+    Watched(Event watched, std::function<void(const Motion&)> told, Motion place, detail::Thrown* guard)
+        : event(std::move(watched)), happened(std::move(told)), motion(std::move(place)), thrown(guard) {}
+    Watched(const Watched& other, detail::Thrown* guard)
+        : event(other.event), happened(other.happened), motion(other.motion), thrown(guard) {}
+
+    const Motion& place(double time, const double* q, const double* v) {
+      motion.time = time;
+      motion.q = Eigen::Map<const Eigen::VectorXd>(q, motion.q.size());
+      motion.v = Eigen::Map<const Eigen::VectorXd>(v, motion.v.size());
+      return motion;
+    }
+    static double value(void* context, double time, const double* q, const double* v) {
+      auto& self = *static_cast<Watched*>(context);
+      const double unknown = std::numeric_limits<double>::quiet_NaN();
+      return self.thrown->guard(unknown, [&] { return self.event.value(self.place(time, q, v)); });
+    }
+    static int tell(void* context, int /*up*/, double time, const double* q, const double* v) {
+      auto& self = *static_cast<Watched*>(context);
+      if (self.thrown->failure) return 1;
+      return self.thrown->guard(1, [&] {
+        if (self.happened) self.happened(self.place(time, q, v));
+        return 0;
+      });
+    }
+
+    Event event;
+    std::function<void(const Motion&)> happened;
+    Motion motion;
+    detail::Thrown* thrown;
+  };
+
+  struct Rows {
+    Rows(std::function<void(std::span<const double>)> taker, detail::Thrown* guard)
+        : take(std::move(taker)), thrown(guard) {}
+
+    static int take_row(void* context, const double* numbers, std::size_t count) {
+      auto& self = *static_cast<Rows*>(context);
+      return self.thrown->guard(1, [&] {
+        self.take(std::span(numbers, count));
+        return 0;
+      });
+    }
+
+    std::function<void(std::span<const double>)> take;
+    detail::Thrown* thrown;
+  };
+
+  void hold(pendula_simulation* simulation) { simulation_.reset(detail::made(simulation)); }
+
+  Motion empty_motion(double time) const {
+    const auto count = static_cast<Eigen::Index>(model_.coordinates());
+    return {time, Eigen::VectorXd(count), Eigen::VectorXd(count)};
+  }
+
+  static double interval_of(const RowTimes& rows) {
+    if (rows.times.empty()) return rows.interval;
+    throw std::invalid_argument("rows: expected an interval, every(0.01), got times");
+  }
+
+  Model model_;
+  std::unique_ptr<detail::Thrown> thrown_ = std::make_unique<detail::Thrown>();
+  std::vector<std::unique_ptr<Watched>> events_;
+  std::vector<std::unique_ptr<Rows>> rows_;
+  std::unique_ptr<std::stop_token> stop_;
+  std::unique_ptr<pendula_simulation, Free> simulation_;  // goes first: it may write rows
+};
+
+}  // namespace pendula
