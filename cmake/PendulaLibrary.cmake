@@ -131,7 +131,7 @@ function(pendula_add_copies target)
   set(pointers "")
   foreach(arch IN LISTS PENDULA_ARCHS)
     _pendula_compile_copy(pendula_${arch} ${arch} ${ARGN})
-    _pendula_seal(${target} pendula_${arch} pendula_library_${arch})
+    _pendula_seal(${target} pendula_${arch} pendula_library_${arch} pendula_${arch})
     string(APPEND declarations "extern const pendula::Library pendula_library_${arch};\n")
     list(APPEND pointers "&pendula_library_${arch}")
   endforeach()
@@ -164,9 +164,13 @@ function(_pendula_compile_copy copy arch)
   endif()
 endfunction()
 
-# Links the objects of COPY into one, of which nothing is seen but SYMBOLS, a pattern; adds it to TARGET.
+# Links the objects of OBJECT_LIBRARIES into COPY, of which nothing is seen but SYMBOLS, a pattern; adds it to TARGET.
 function(_pendula_seal target copy symbols)
-  set(objects "$<FILTER:$<TARGET_OBJECTS:${copy}>,EXCLUDE,cmake_pch>")  # CMake counts precompiled headers among them
+  set(objects "")
+  foreach(library IN LISTS ARGN)
+    # CMake counts precompiled headers among them.
+    list(APPEND objects "$<FILTER:$<TARGET_OBJECTS:${library}>,EXCLUDE,cmake_pch>")
+  endforeach()
   if(NOT PENDULA_ELF)
     target_sources(${target} PRIVATE ${objects})
     return()
@@ -185,21 +189,25 @@ function(_pendula_seal target copy symbols)
     COMMENT "Sealing ${copy}.o" COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties("${sealed}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
   target_sources(${target} PRIVATE "${sealed}")
-  add_dependencies(${target} ${copy})
+  add_dependencies(${target} ${ARGN})
 endfunction()
 
-# Compiles SOURCES of what is behind pendula.h and adds them to TARGET, for any processor: Eigen is in there, so nothing
-# of them is seen but the functions of pendula.h.
-function(pendula_add_front target)
+# Compiles SOURCES of this project's own, in which Eigen's vectors pass, once, for any processor. Whoever links the objects
+# is compiled for the same.
+function(pendula_add_objects name)
   list(GET _pendula_archs 0 least)
-  add_library(pendula_front OBJECT ${ARGN})
-  pendula_own_target(pendula_front)
-  target_compile_options(pendula_front PRIVATE ${_pendula_flags_${least}} -fno-lto
-                                               $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
-  target_include_directories(pendula_front PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
-  target_link_libraries(pendula_front PRIVATE pendula_kernels pendula::xsimd)
-  set_target_properties(pendula_front PROPERTIES POSITION_INDEPENDENT_CODE ON INTERPROCEDURAL_OPTIMIZATION OFF)
-  _pendula_seal(${target} pendula_front "pendula_*")
+  add_library(${name} OBJECT ${ARGN})
+  pendula_own_target(${name})
+  target_compile_options(${name} PUBLIC ${_pendula_flags_${least}}
+                                 PRIVATE -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+  target_include_directories(${name} PUBLIC "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
+  target_link_libraries(${name} PUBLIC pendula_kernels pendula::xsimd)
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON INTERPROCEDURAL_OPTIMIZATION OFF)
+endfunction()
+
+# Adds the objects of OBJECT_LIBRARIES to TARGET, of which nothing is seen but the functions of pendula.h.
+function(pendula_add_front target)
+  _pendula_seal(${target} pendula_front "pendula_*" ${ARGN})
 endfunction()
 
 _pendula_check_seal()

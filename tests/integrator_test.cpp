@@ -114,7 +114,7 @@ TEST(Integrator, PushesAndPullsParameters) {
     EXPECT_GT((pushed - alone).norm(), 1e-3) << solver;
     const double forward = weights.cwiseProduct(pushed).sum();
     const double backward = pulled.cwiseProduct(start).sum() + by_parameters.cwiseProduct(varied).sum();
-    EXPECT_NEAR(forward, backward, 1e-13) << solver;  // measured
+    EXPECT_NEAR(forward, backward, 2e-14) << solver;  // measured 5.6e-16
     Directions<> wrong = Directions<>::Zero(rows + 1, 3);
     EXPECT_THROW(integrator->push(wrong), std::invalid_argument);
     EXPECT_THROW(integrator->push(pushed, wrong), std::invalid_argument);
@@ -409,13 +409,13 @@ std::vector<double> row_times(const Schedule& schedule) {
   return times;
 }
 
-TEST(Simulation, RowsAreEveryFewStepsAndTheLast) {
+TEST(Schedule, RowsAreEveryFewStepsAndTheLast) {
   EXPECT_EQ(row_times({0.25, 1.0, 2}), (std::vector<double>{0, 0.5, 1.0}));
   EXPECT_EQ(row_times({0.25, 1.0, 3}), (std::vector<double>{0, 0.75, 1.0}));
   EXPECT_EQ(row_times({0.25, 0.0, 3}), (std::vector<double>{0}));
 }
 
-TEST(Simulation, StopsAfterTheStepInWhichItIsAsked) {
+TEST(Schedule, StopsAfterTheStepInWhichItIsAsked) {
   const auto integrator = make_integrator(equal_chain<Planar>(1), gauss(2));
   std::vector<double> times;
   int steps = 0;
@@ -427,7 +427,7 @@ TEST(Simulation, StopsAfterTheStepInWhichItIsAsked) {
   EXPECT_EQ(times, (std::vector<double>{0, 0.75}));  // its last state is a row
 }
 
-TEST(Simulation, TheLastStepIsCut) {
+TEST(Schedule, TheLastStepIsCut) {
   const std::vector<double> times = row_times({0.3, 1.0, 1});
   ASSERT_EQ(times.size(), 5u);
   EXPECT_DOUBLE_EQ(times[3], 0.9);
@@ -435,7 +435,7 @@ TEST(Simulation, TheLastStepIsCut) {
   EXPECT_EQ(row_times({0.1, 1.0, 1}).size(), 11u) << "no sliver of a step at the end";
 }
 
-TEST(Simulation, RefusesANonsensicalSchedule) {
+TEST(Schedule, RefusesANonsensicalSchedule) {
   EXPECT_THROW(row_times({0.0, 1.0, 1}), std::invalid_argument);
   EXPECT_THROW(row_times({0.1, -1.0, 1}), std::invalid_argument);
   EXPECT_THROW(row_times({0.1, 1.0, 0}), std::invalid_argument);

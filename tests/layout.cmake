@@ -2,7 +2,8 @@
 cmake_minimum_required(VERSION 3.25)
 set(patterns "")
 foreach(folder IN ITEMS src tests bench examples)
-  list(APPEND patterns "${SOURCE}/${folder}/*.hpp" "${SOURCE}/${folder}/*.cpp")
+  list(APPEND patterns "${SOURCE}/${folder}/*.hpp" "${SOURCE}/${folder}/*.cpp" "${SOURCE}/${folder}/*.h"
+                       "${SOURCE}/${folder}/*.c")
 endforeach()
 file(GLOB_RECURSE files ${patterns})
 execute_process(COMMAND "${CLANG_FORMAT}" --dry-run --Werror ${files} RESULT_VARIABLE result ERROR_VARIABLE complaints)

@@ -154,6 +154,11 @@ TEST(Simulation, ThrowsWhatCallbacksThrow) {
   Simulation run(equal_chain<Planar>(2), let_go());
   run.on({.value = [](const Motion& m) { return m.q[1]; }}, [](const Motion&) { throw Odd(); });
   EXPECT_THROW(run.advance_to(5), Odd);
+  EXPECT_LT(run.time(), 2);
+  Simulation one(equal_chain<Planar>(2), let_go());
+  one.on({.value = [](const Motion& m) { return m.time > 1 ? throw Odd() : 1.0; }});
+  EXPECT_THROW(one.advance_to(1e3), Odd);
+  EXPECT_LT(one.time(), 2);
   Simulation other(equal_chain<Planar>(2), let_go());
   other.on_rows(every(0.1), [](std::span<const double> numbers) {
     if (numbers[0] > 0.55) throw Odd();

@@ -89,11 +89,6 @@ void write(const Motion& motion, double* q, double* v) {
   if (v != nullptr) std::ranges::copy(motion.v, v);
 }
 
-}  // namespace pendula::front
-
-using namespace pendula;
-using namespace pendula::front;
-
 extern "C" {
 
 const char* pendula_version(void) {
@@ -158,3 +153,5 @@ pendula_status pendula_row(const pendula_model* model, double time, const double
   });
 }
 }
+
+}  // namespace pendula::front

@@ -14,9 +14,7 @@
 #include "front/model.hpp"
 #include "front/options.hpp"
 
-using namespace pendula;
-using namespace pendula::front;
-
+namespace pendula::front {
 namespace {
 
 std::vector<EnsembleMember> members_of(const pendula_ensemble& ensemble) {
@@ -67,3 +65,5 @@ extern "C" pendula_status pendula_propagate(const pendula_ensemble* ensemble, do
     return ensemble->stop != nullptr && schedule.stop() ? PENDULA_STOPPED : PENDULA_OK;
   });
 }
+
+}  // namespace pendula::front

@@ -17,19 +17,17 @@
 #include "front/options.hpp"
 #include "io/trajectory.hpp"
 
-using namespace pendula;
-using namespace pendula::front;
-
 struct pendula_simulation {
-  pendula_simulation(const pendula_model& moved, const RunOptions& options, bool remembers)
+  pendula_simulation(const pendula_model& moved, const pendula::RunOptions& options, bool remembers)
       : model(moved), mover(model.subject, options, remembers) {}
 
   pendula_model model;
-  Mover mover;
+  pendula::front::Mover mover;
   std::vector<pendula_event> events;  // as they were asked for
   bool asked_to_stop = false;         // by a row
 };
 
+namespace pendula::front {
 namespace {
 
 /// Throws RunFailure unless it is ok.
@@ -220,3 +218,5 @@ pendula_status pendula_linearize(const pendula_simulation* simulation, double* a
   });
 }
 }
+
+}  // namespace pendula::front

@@ -8,6 +8,9 @@
  * Functions that make something give NULL where they fail, the others a status that is not PENDULA_OK; pendula_error()
  * says why, in words. Models never change and may be shared by threads; a simulation is one thread's at a time. */
 
+/* NOLINTBEGIN(modernize-deprecated-headers, modernize-use-using, modernize-redundant-void-arg,
+   readability-identifier-naming): C */
+
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -170,5 +173,8 @@ pendula_status pendula_propagate(const pendula_ensemble* ensemble, double* ends,
 #ifdef __cplusplus
 }
 #endif
+
+/* NOLINTEND(modernize-deprecated-headers, modernize-use-using, modernize-redundant-void-arg,
+   readability-identifier-naming) */
 
 #endif

@@ -56,12 +56,18 @@ inline pendula_options plain(const SimulationOptions& options) {
           options.remember ? 0 : 1};
 }
 
-/// What callbacks throw does not go through C: it is kept, and thrown where that is left.
-struct Thrown {
+/// What callbacks throw does not go through C: it is kept, stops the run, and is thrown where C is left.
+struct Guard {
   std::exception_ptr failure = nullptr;
+  std::stop_token stop = {};
+
+  static int stops(void* guard) {
+    const auto& self = *static_cast<const Guard*>(guard);
+    return self.failure || self.stop.stop_requested() ? 1 : 0;
+  }
 
   template <class Result, class Do>
-  Result guard(Result otherwise, Do act) noexcept {
+  Result keep(Result otherwise, Do act) noexcept {
     try {
       return act();
     } catch (...) {
@@ -91,7 +97,7 @@ class Simulation {
   Simulation(const Simulation& other) : model_(other.model_) {
     std::vector<void*> contexts;
     for (const auto& event : other.events_) {
-      events_.push_back(std::make_unique<Watched>(*event, thrown_.get()));
+      events_.push_back(std::make_unique<Watched>(*event, guard_.get()));
       contexts.push_back(events_.back().get());
     }
     hold(pendula_simulation_copy(other.get(), contexts.data()));
@@ -99,10 +105,9 @@ class Simulation {
   Simulation(Simulation&&) noexcept = default;
   Simulation& operator=(Simulation other) noexcept {
     std::swap(model_, other.model_);
-    std::swap(thrown_, other.thrown_);
+    std::swap(guard_, other.guard_);
     std::swap(events_, other.events_);
     std::swap(rows_, other.rows_);
-    std::swap(stop_, other.stop_);
     std::swap(simulation_, other.simulation_);
     return *this;
   }
@@ -114,7 +119,7 @@ class Simulation {
   /// the mathematics fails, what callbacks throw, and std::invalid_argument where that time is past.
   bool advance_to(double time) {
     const pendula_status status = pendula_advance_to(get(), time);
-    thrown_->rethrow();
+    guard_->rethrow();
     return detail::require(status) == PENDULA_OK;
   }
 
@@ -150,7 +155,7 @@ class Simulation {
     if (event.formula)
       throw std::invalid_argument("formula: expected none, events of a simulation are functions alone");
     if (!event.value) throw std::invalid_argument("value: expected a function of the motion, got none");
-    events_.push_back(std::make_unique<Watched>(std::move(event), std::move(happened), empty_motion(0), thrown_.get()));
+    events_.push_back(std::make_unique<Watched>(std::move(event), std::move(happened), empty_motion(0), guard_.get()));
     const Event& told = events_.back()->event;
     const int direction = told.direction == Direction::up ? 1 : told.direction == Direction::down ? -1 : 0;
     const pendula_event plain{&Watched::value, &Watched::tell, events_.back().get(), direction, told.stop ? 1 : 0};
@@ -170,19 +175,15 @@ class Simulation {
   }
   /// The same, to take(numbers), in the order of Model::columns.
   void on_rows(const RowTimes& rows, std::function<void(std::span<const double>)> take) {
-    rows_.push_back(std::make_unique<Rows>(std::move(take), thrown_.get()));
+    rows_.push_back(std::make_unique<Rows>(std::move(take), guard_.get()));
     detail::require(pendula_on_rows(get(), interval_of(rows), &Rows::take_row, rows_.back().get()));
-    thrown_->rethrow();
+    guard_->rethrow();
   }
   /// No more rows; throws std::runtime_error where a file cannot be written.
   void finish() { detail::require(pendula_finish(get())); }
 
   /// Stops advances, within long steps too, where that is requested; a copy heeds nobody.
-  void heed(std::stop_token stop) {
-    stop_ = std::make_unique<std::stop_token>(std::move(stop));
-    const auto asked = [](void* token) { return static_cast<std::stop_token*>(token)->stop_requested() ? 1 : 0; };
-    detail::require(pendula_heed(get(), asked, stop_.get()));
-  }
+  void heed(std::stop_token stop) { guard_->stop = std::move(stop); }
 
   /// d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly: A is (2n x 2n), B (2n x inputs).
   std::pair<Eigen::MatrixXd, Eigen::MatrixXd> linearize() const {
@@ -214,10 +215,10 @@ class Simulation {
   };
 
   struct Watched {
-    Watched(Event watched, std::function<void(const Motion&)> told, Motion place, detail::Thrown* guard)
-        : event(std::move(watched)), happened(std::move(told)), motion(std::move(place)), thrown(guard) {}
-    Watched(const Watched& other, detail::Thrown* guard)
-        : event(other.event), happened(other.happened), motion(other.motion), thrown(guard) {}
+    Watched(Event watched, std::function<void(const Motion&)> told, Motion place, detail::Guard* kept_by)
+        : event(std::move(watched)), happened(std::move(told)), motion(std::move(place)), guard(kept_by) {}
+    Watched(const Watched& other, detail::Guard* kept_by)
+        : event(other.event), happened(other.happened), motion(other.motion), guard(kept_by) {}
 
     const Motion& place(double time, const double* q, const double* v) {
       motion.time = time;
@@ -228,12 +229,12 @@ class Simulation {
     static double value(void* context, double time, const double* q, const double* v) {
       auto& self = *static_cast<Watched*>(context);
       const double unknown = std::numeric_limits<double>::quiet_NaN();
-      return self.thrown->guard(unknown, [&] { return self.event.value(self.place(time, q, v)); });
+      return self.guard->keep(unknown, [&] { return self.event.value(self.place(time, q, v)); });
     }
     static int tell(void* context, int /*up*/, double time, const double* q, const double* v) {
       auto& self = *static_cast<Watched*>(context);
-      if (self.thrown->failure) return 1;
-      return self.thrown->guard(1, [&] {
+      if (self.guard->failure) return 1;
+      return self.guard->keep(1, [&] {
         if (self.happened) self.happened(self.place(time, q, v));
         return 0;
       });
@@ -242,26 +243,29 @@ class Simulation {
     Event event;
     std::function<void(const Motion&)> happened;
     Motion motion;
-    detail::Thrown* thrown;
+    detail::Guard* guard;
   };
 
   struct Rows {
-    Rows(std::function<void(std::span<const double>)> taker, detail::Thrown* guard)
-        : take(std::move(taker)), thrown(guard) {}
+    Rows(std::function<void(std::span<const double>)> taker, detail::Guard* kept_by)
+        : take(std::move(taker)), guard(kept_by) {}
 
     static int take_row(void* context, const double* numbers, std::size_t count) {
       auto& self = *static_cast<Rows*>(context);
-      return self.thrown->guard(1, [&] {
+      return self.guard->keep(1, [&] {
         self.take(std::span(numbers, count));
         return 0;
       });
     }
 
     std::function<void(std::span<const double>)> take;
-    detail::Thrown* thrown;
+    detail::Guard* guard;
   };
 
-  void hold(pendula_simulation* simulation) { simulation_.reset(detail::made(simulation)); }
+  void hold(pendula_simulation* simulation) {
+    simulation_.reset(detail::made(simulation));
+    detail::require(pendula_heed(get(), &detail::Guard::stops, guard_.get()));
+  }
 
   Motion empty_motion(double time) const {
     const auto count = static_cast<Eigen::Index>(model_.coordinates());
@@ -274,10 +278,9 @@ class Simulation {
   }
 
   Model model_;
-  std::unique_ptr<detail::Thrown> thrown_ = std::make_unique<detail::Thrown>();
+  std::unique_ptr<detail::Guard> guard_ = std::make_unique<detail::Guard>();
   std::vector<std::unique_ptr<Watched>> events_;
   std::vector<std::unique_ptr<Rows>> rows_;
-  std::unique_ptr<std::stop_token> stop_;
   std::unique_ptr<pendula_simulation, Free> simulation_;  // goes first: it may write rows
 };
 

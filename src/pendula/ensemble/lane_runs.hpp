@@ -11,106 +11,21 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/gauss/step_shape.hpp>
+#include <pendula/ensemble/lane_kind.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
-#include <pendula/run/run.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/run/track.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
-#include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 namespace pendula {
-
-/// Runs that members in lanes can take together: all that their steps have in common.
-struct LaneKind {
-  int dimension = 0, links = 0;         // of chains
-  const SystemTable* kernel = nullptr;  // of others
-  int stages = 0;
-  Method method = Method::gauss;
-  Iteration iteration = Iteration::automatic;
-  double step = 0, tolerance = 0;
-  std::int64_t every = 0;
-
-  auto tied() const { return std::tie(dimension, links, kernel, stages, method, iteration, step, tolerance, every); }
-  bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
-  bool operator==(const LaneKind& other) const { return tied() == other.tied(); }
-};
-
-namespace detail {
-
-/// Of a system, and of chains with loads, nothing is known before but what they do: a method that was not asked for has
-/// to keep the energy, where it is kept, and to be over soon.
-inline bool has_to_be_tried(const Subject& subject) {
-  return subject.loaded() || dynamic_cast<const SystemSubject*>(&subject) != nullptr;
-}
-
-/// What error estimates of few stages look at besides, where there are loads, lanes do not.
-inline bool misses_loads(const RunSetup& setup, const RunOptions& options) {
-  return is_adaptive(options) && options.stages == StepShape::few_stages && setup.subject->loaded();
-}
-
-/// What is moved, where lanes are for it.
-template <class Space>
-bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
-  const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
-  if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
-  if (options.method == Method::taylor && setup.subject->loaded()) return false;
-  if (!is_explicit(options.method)) {
-    if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
-    // By steps that do not resolve a chain fixed points hardly arrive; those that are chosen may become shorter.
-    if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
-  }
-  kind.dimension = Space::dimension;
-  kind.links = chain->chain().links();
-  return true;
-}
-inline bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
-  const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
-  if (system == nullptr || library().system_lanes(options) == nullptr) return false;
-  const bool is_seen = !system->info().depends_on_time && !misses_loads(setup, options);
-  if (!is_explicit(options.method) && !is_seen) return false;
-  if (system->may_be_narrow()) return false;  // lanes do not look between their stages
-  kind.kernel = &system->table();
-  return true;
-}
-
-}  // namespace detail
-
-/// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
-/// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
-/// on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods. None of systems whose forces
-/// may be narrow by other functions than powers and logarithms.
-inline std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
-  const double chosen = is_adaptive(options) ? options.tolerance : options.step;
-  const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;
-  const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
-                    setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
-                    setup.accuracy.error == 0;
-  LaneKind kind;
-  if (!fits || !(detail::name_chain<Planar>(setup, options, kind) ||
-                 detail::name_chain<Spatial>(setup, options, kind) || detail::name_kernel(setup, options, kind))) {
-    return {};
-  }
-  if (options.method == Method::gauss) kind.stages = options.stages;
-  kind.method = options.method;
-  kind.iteration = options.iteration;
-  (is_adaptive(options) ? kind.tolerance : kind.step) = chosen;
-  kind.every = setup.every;
-  return kind;
-}
-inline std::optional<LaneKind> lane_kind(const RunSetup& setup) {
-  return lane_kind(setup, setup.options);
-}
 
 namespace detail {
 

@@ -10,7 +10,6 @@
 #include <pendula/ensemble/chunks.hpp>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/event.hpp>
-#include <pendula/run/run.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>

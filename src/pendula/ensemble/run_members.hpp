@@ -1,103 +1,25 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
 #include <functional>
-#include <limits>
 #include <optional>
-#include <pendula/ensemble/lane_exponents.hpp>
-#include <pendula/ensemble/lane_runs.hpp>
-#include <pendula/ensemble/second_looks.hpp>
-#include <pendula/run/chain_subject.hpp>
+#include <pendula/ensemble/lane_kind.hpp>
 #include <pendula/run/lyapunov.hpp>
-#include <pendula/run/run.hpp>
 #include <pendula/run/run_report.hpp>
-#include <pendula/run/track.hpp>
+#include <pendula/system/options.hpp>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace pendula {
-
-namespace detail {
-
-/// Of a chain of one kind; none of others.
-template <class Space>
-int links_of(const Subject& subject) {
-  const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
-  return found == nullptr ? 0 : found->chain().links();
-}
-
-/// About how fast a chain of one kind swings  [1/s]; none of others.
-template <class Space>
-std::optional<double> natural_pace_in(const Subject& subject) {
-  const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
-  if (found == nullptr) return {};
-  const Chain<Space>& chain = found->chain();
-  return chain.links() * std::sqrt(0.15 * std::abs(chain.gravity()) / chain.lengths().sum());
-}
-
-/// About how fast a chain swings  [1/s]; infinite for what is none.
-inline double natural_pace(const Subject& subject) {
-  const std::optional<double> planar = natural_pace_in<Planar>(subject);
-  return planar ? *planar : natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
-}
-
-// Whether an explicit method loses no more energy in a run, step by step, than the motion's errors are, and how much
-// longer the run is: by what swings, and by what turns where it starts.
-inline constexpr double short_run = 100;
-inline double run_length(const RunSetup& setup) {
-  return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
-}
-
-// Of few links series are summed up in registers (library/lane_methods.hpp); how long such a chain's run is, is known.
-inline bool goes_by_series(const RunSetup& setup) {
-  const bool is_short = links_of<Planar>(*setup.subject) + links_of<Spatial>(*setup.subject) <= 3;
-  return setup.options.tolerance >= 1e-13 && is_short && std::isfinite(natural_pace(*setup.subject)) &&
-         !setup.subject->loaded();
-}
-
-// Of a tolerance by which no more of the energy is lost than in a short run, a hundredth: what the motion makes of the
-// errors of steps. In powers of ten, so that members whose runs are about as long go in lanes together.
-inline double tolerance_of_steps(const RunSetup& setup, double finest) {
-  const double length = run_length(setup);
-  const double longer = length > short_run && std::isfinite(length) ? length / short_run : 1;
-  return std::max(finest, 0.01 * setup.options.tolerance / std::pow(10, std::ceil(std::log10(longer))));
-}
-
-}  // namespace detail
 
 /// The options of a run, or those of an explicit method where lanes come to the same errors sooner by that. Of a Gauss
 /// run by a tolerance those are Taylor series where the chain is short; else Fehlberg's pair, by a tolerance of more
 /// than a few last digits, where nothing is looked for step by step, and the run is over before the energy, which an
 /// explicit method loses step by step, is off by more than the motion.
-inline RunOptions quickest_in_lanes(const RunSetup& setup) {
-  RunOptions options = setup.options;
-  if (options.method != Method::gauss || options.step != 0) return options;
-  if (detail::goes_by_series(setup)) {
-    options.method = Method::taylor;
-    options.tolerance = detail::tolerance_of_steps(setup, 1e-16);
-    return lane_kind(setup, options) ? options : setup.options;
-  }
-  if (options.tolerance < 1e-9 || !setup.events.empty()) return options;
-  options.method = Method::fehlberg78;
-  options.tolerance *= 0.01;
-  const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
-  const bool is_short = lane_kind(setup) && detail::run_length(setup) <= detail::short_run;
-  return is_tried || is_short ? options : setup.options;
-}
+RunOptions quickest_in_lanes(const RunSetup& setup);
 
 /// The same for the leading exponent of a run, however long that is: the longer, the smaller the tolerance, so that no
 /// more of the energy is lost in all. How much longer is known of chains.
-inline RunOptions quickest_with_tangents(const RunSetup& setup) {
-  RunOptions options = setup.options;
-  if (options.method != Method::gauss || options.step != 0) return options;
-  options.method = Method::fehlberg78;
-  options.tolerance = detail::tolerance_of_steps(setup, 1e-13);
-  const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
-  return is_tried || lane_kind(setup) ? options : setup.options;
-}
+RunOptions quickest_with_tangents(const RunSetup& setup);
 
 /// How members are moved.
 enum class MemberMethod {
@@ -106,122 +28,20 @@ enum class MemberMethod {
 };
 
 /// The options by which a run goes in lanes.
-inline RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
-  return method == MemberMethod::quickest ? quickest_in_lanes(setup) : setup.options;
-}
-
-namespace detail {
-
-// The lanes in which a run was tried last, and what came of it, if they moved it.
-struct Tried {
-  std::optional<LaneKind> kind;
-  std::optional<RunReport> report;
-  std::optional<Track> track;  // of one that is to be looked at again
-};
-
-// Those of which nothing came yet, if lanes are others than before.
-inline void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const std::function<bool()>& stop,
-                         std::vector<Tried>& tried) {
-  RunsByKind kinds;
-  for (std::size_t k = 0; k < setups.size(); ++k) {
-    if (tried[k].report) continue;
-    const auto kind = lane_kind(setups[k], lane_options(setups[k], method));
-    if (!kind || tried[k].kind == kind) continue;
-    tried[k].kind = kind;
-    kinds[*kind].push_back(k);
-  }
-  for (const auto& [kind, numbers] : kinds) {
-    const std::vector<const RunSetup*> alike = chosen(setups, numbers);
-    std::vector<Track*> tracks;
-    for (const std::size_t k : numbers) {
-      tracks.push_back(is_estimated(setups[k]) ? &tried[k].track.emplace(lane_track()) : nullptr);
-    }
-    auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop, tracks);
-    for (std::size_t k = 0; k < numbers.size(); ++k) tried[numbers[k]].report = std::move(reports[k]);
-  }
-}
-
-// Those that lanes have moved to their ends.
-inline void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<bool()>& stop,
-                                std::vector<Tried>& tried) {
-  std::vector<Doubted> doubted;
-  for (std::size_t k = 0; k < setups.size(); ++k) {
-    Tried& one = tried[k];
-    if (one.report && one.track && one.report->end != RunEnd::stopped) {
-      doubted.push_back({setups[k], *one.report, *one.track});
-    }
-  }
-  look_again(doubted, stop);
-}
-
-}  // namespace detail
+RunOptions lane_options(const RunSetup& setup, MemberMethod method);
 
 /// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. Those
 /// that are to be estimated are looked at again, those in lanes by others in lanes. A report depends on its setup
 /// alone, to the last bit; of a run that was stopped it says that and nothing else. Throws as Run.
-inline std::vector<RunReport> run_members(
+std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
-    MemberMethod method = MemberMethod::asked) {
-  std::vector<detail::Tried> tried(setups.size());
-  if (method == MemberMethod::quickest) detail::try_in_lanes(setups, method, stop, tried);
-  detail::try_in_lanes(setups, MemberMethod::asked, stop, tried);
-  detail::look_again_in_lanes(setups, stop, tried);
-  std::vector<RunReport> reports;
-  reports.reserve(setups.size());
-  for (std::size_t k = 0; k < setups.size(); ++k) {
-    std::optional<RunReport>& report = tried[k].report;
-    reports.push_back(report ? std::move(*report) : Run(setups[k]).go(stop));
-  }
-  return reports;
-}
-
-namespace detail {
-
-inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(const LaneKind& kind,
-                                                                       std::span<const RunSetup* const> alike,
-                                                                       const RunOptions& options,
-                                                                       const std::function<bool()>& stop) {
-  if (kind.kernel != nullptr) return LaneExponents<PlainSystems>(alike, options, stop).go();
-  if (kind.dimension == Planar::dimension) return LaneExponents<PlainChains<Planar>>(alike, options, stop).go();
-  return LaneExponents<PlainChains<Spatial>>(alike, options, stop).go();
-}
-
-}  // namespace detail
+    MemberMethod method = MemberMethod::asked);
 
 /// The leading Lyapunov exponents of those of the runs that go in lanes, each over the whole of its duration, with one
 /// tangent; of others, and of those that could not be moved so, none. Empty where it was stopped. Who loses too much
 /// energy by a method that was not asked for tries a hundredth of the tolerance, and then goes as its options tell.
-inline std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
+std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
-    MemberMethod method = MemberMethod::asked) {
-  std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
-  std::vector<std::optional<LaneKind>> tried(setups.size());
-  const auto quickest = [](const RunSetup& setup) { return quickest_with_tangents(setup); };
-  const auto finer = [](const RunSetup& setup) {
-    RunOptions options = quickest_with_tangents(setup);
-    if (options.method != setup.options.method) options.tolerance = std::max(1e-13, 0.01 * options.tolerance);
-    return options;
-  };
-  const auto asked = [](const RunSetup& setup) { return setup.options; };
-  std::vector<std::function<RunOptions(const RunSetup&)>> attempts;
-  if (method == MemberMethod::quickest) attempts = {quickest, finer};
-  attempts.emplace_back(asked);
-  for (const auto& options_of : attempts) {
-    detail::RunsByKind kinds;
-    for (std::size_t k = 0; k < setups.size(); ++k) {
-      const auto kind = lane_kind(setups[k], options_of(setups[k]));
-      if (!kind || exponents[k] || tried[k] == kind) continue;
-      tried[k] = kind;
-      kinds[*kind].push_back(k);
-    }
-    for (const auto& [kind, numbers] : kinds) {
-      const std::vector<const RunSetup*> alike = detail::chosen(setups, numbers);
-      auto found = detail::exponents_in_lanes(kind, alike, options_of(*alike[0]), stop);
-      if (found.empty()) return {};
-      for (std::size_t k = 0; k < numbers.size(); ++k) exponents[numbers[k]] = std::move(found[k]);
-    }
-  }
-  return exponents;
-}
+    MemberMethod method = MemberMethod::asked);
 
 }  // namespace pendula

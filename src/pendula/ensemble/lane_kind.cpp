@@ -1,0 +1,72 @@
+#include <cmath>
+#include <functional>
+#include <pendula/chain/chain_links.hpp>
+#include <pendula/ensemble/lane_kind.hpp>
+#include <pendula/gauss/step_shape.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/run/system_subject.hpp>
+
+namespace pendula {
+
+namespace {
+
+// What error estimates of few stages look at besides, where there are loads, lanes do not.
+bool misses_loads(const RunSetup& setup, const RunOptions& options) {
+  return is_adaptive(options) && options.stages == StepShape::few_stages && setup.subject->loaded();
+}
+
+// What is moved, where lanes are for it.
+template <class Space>
+bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
+  const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
+  if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
+  if (options.method == Method::taylor && setup.subject->loaded()) return false;
+  if (!is_explicit(options.method)) {
+    if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
+    // By steps that do not resolve a chain fixed points hardly arrive; those that are chosen may become shorter.
+    if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
+  }
+  kind.dimension = Space::dimension;
+  kind.links = chain->chain().links();
+  return true;
+}
+bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
+  const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
+  if (system == nullptr || library().system_lanes(options) == nullptr) return false;
+  const bool is_seen = !system->info().depends_on_time && !misses_loads(setup, options);
+  if (!is_explicit(options.method) && !is_seen) return false;
+  if (system->may_be_narrow()) return false;  // lanes do not look between their stages
+  kind.kernel = &system->table();
+  return true;
+}
+
+}  // namespace
+
+bool detail::has_to_be_tried(const Subject& subject) {
+  return subject.loaded() || dynamic_cast<const SystemSubject*>(&subject) != nullptr;
+}
+
+std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
+  const double chosen = is_adaptive(options) ? options.tolerance : options.step;
+  const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;
+  const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
+                    setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
+                    setup.accuracy.error == 0;
+  LaneKind kind;
+  if (!fits || !(name_chain<Planar>(setup, options, kind) || name_chain<Spatial>(setup, options, kind) ||
+                 name_kernel(setup, options, kind))) {
+    return {};
+  }
+  if (options.method == Method::gauss) kind.stages = options.stages;
+  kind.method = options.method;
+  kind.iteration = options.iteration;
+  (is_adaptive(options) ? kind.tolerance : kind.step) = chosen;
+  kind.every = setup.every;
+  return kind;
+}
+std::optional<LaneKind> lane_kind(const RunSetup& setup) {
+  return lane_kind(setup, setup.options);
+}
+
+}  // namespace pendula

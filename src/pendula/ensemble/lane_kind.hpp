@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <pendula/run/run_report.hpp>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/system_table.hpp>
+#include <tuple>
+
+namespace pendula {
+
+/// Runs that members in lanes can take together: all that their steps have in common.
+struct LaneKind {
+  int dimension = 0, links = 0;         // of chains
+  const SystemTable* kernel = nullptr;  // of others
+  int stages = 0;
+  Method method = Method::gauss;
+  Iteration iteration = Iteration::automatic;
+  double step = 0, tolerance = 0;
+  std::int64_t every = 0;
+
+  auto tied() const { return std::tie(dimension, links, kernel, stages, method, iteration, step, tolerance, every); }
+  bool operator<(const LaneKind& other) const { return tied() < other.tied(); }
+  bool operator==(const LaneKind& other) const { return tied() == other.tied(); }
+};
+
+/// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
+/// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
+/// on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods. None of systems whose forces
+/// may be narrow by other functions than powers and logarithms.
+std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options);
+std::optional<LaneKind> lane_kind(const RunSetup& setup);
+
+namespace detail {
+
+/// Of a system, and of chains with loads, nothing is known before but what they do: a method that was not asked for has
+/// to keep the energy, where it is kept, and to be over soon.
+bool has_to_be_tried(const Subject& subject);
+
+}  // namespace detail
+
+}  // namespace pendula

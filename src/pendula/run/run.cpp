@@ -1,0 +1,323 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <pendula/run/doubts.hpp>
+#include <pendula/run/run.hpp>
+#include <pendula/run/schedule.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace pendula {
+
+namespace {
+
+// How far rows are apart; 0 where steps tell it.
+double row_spacing(const RunSetup& setup) {
+  if (setup.rows.any()) return setup.rows.interval;
+  return is_adaptive(setup.options) ? 0 : static_cast<double>(setup.every) * setup.options.step;
+}
+
+}  // namespace
+
+Run::Run(RunSetup setup)
+    : setup_(std::move(setup)),
+      integrator_(setup_.subject->make_integrator(setup_.options)),
+      kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, row_spacing(setup_)),
+            EventWatch(setup_.events, detail::glance_degree(setup_.options)),
+            {}},
+      description_(integrator_->describe()) {}
+
+RunReport Run::go(const std::function<bool()>& stop) {
+  if (!is_aimed() || aim(stop)) return go(nullptr, stop);
+  RunReport report;
+  report.end = RunEnd::stopped;
+  conclude(report);
+  return report;
+}
+
+RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
+  become(kept_, checkpoint.record);
+  if (is_aimed() != (kept_.aim.tolerance > 0)) throw std::invalid_argument("checkpoint: it is of another accuracy");
+  if (is_aimed()) follow_aim();
+  integrator_->resume(checkpoint.integrator);
+  return go(&checkpoint, stop);
+}
+
+// As far as it comes, until `stop`, asked of its track after every step. Its start is off by `share` of itself: what a
+// motion makes of that, errors of steps do not show where they vanish with it, as beside an equilibrium.
+Track Run::try_out(const RunOptions& options, double share, Track track,
+                   const std::function<bool(const Track&)>& stop) const {
+  RunSetup trial = setup_;
+  trial.accuracy.error = 0;
+  trial.options = options;
+  trial.start.q *= 1 + share;
+  trial.start.v *= 1 + share;
+  trial.every = std::numeric_limits<std::int64_t>::max();
+  trial.rows = {};
+  trial.doubted = false;
+  std::erase_if(trial.events, [](const Event& event) { return !event.stop; });
+  Run run(std::move(trial));
+  run.track_ = std::move(track);
+  run.go([&] { return stop(*run.track_); });
+  return *std::move(run.track_);
+}
+
+// Whether the trials came to their ends.
+bool Run::aim(const std::function<bool()>& stop) {
+  integrator_.reset();  // of a long chain as large as that of a trial; follow_aim makes one anew
+  bool stopped = false;
+  const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
+  double share = -1;
+  std::optional<Track> alike;  // by times of the first one, which are those of all
+  const auto run_alike = [&](double tolerance) -> std::optional<Track> {
+    if (stopped) return {};
+    RunOptions options = setup_.options;
+    options.tolerance = tolerance;
+    choose_stages(options);
+    Track track = try_out(options, share, alike.value_or(own_track()), stops);
+    if (!track.is_complete()) return {};
+    if (!alike) alike = Track::at_times_of(track);
+    return track;
+  };
+  const auto run = [&](double tolerance) {
+    share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
+    return run_alike(tolerance);  // no two begin alike
+  };
+  const auto apart = [&](const Track& a, const Track& b) { return Separation(*setup_.subject, a, b); };
+  const double wanted = setup_.accuracy.error;
+  const detail::FinestTolerance finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
+  const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides what was before
+  const double start = setup_.start.time;
+  kept_.aim = detail::find_aim(wanted, coarsest, finest, start, run, run_alike, apart);
+  if (!stopped) follow_aim();
+  return !stopped;
+}
+
+// The same for all trials and the run: errors of few and of many stages are not of one size.
+void Run::choose_stages(RunOptions& options) const {
+  const Accuracy& accuracy = setup_.accuracy;
+  if (accuracy.chooses_stages) options.stages = stages_for(options.method, 0.01 * accuracy.error);
+}
+
+void Run::follow_aim() {
+  RunOptions& options = setup_.options;
+  options.tolerance = kept_.aim.tolerance;
+  choose_stages(options);
+  integrator_ = setup_.subject->make_integrator(options);
+  description_ = integrator_->describe();
+  kept_.watch.set_degree(detail::glance_degree(options));
+}
+
+RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
+  RunReport report;
+  report.stepping_seconds = std::nan("");
+  const bool has_trials = from == nullptr && is_aimed() && kept_.aim.finest;
+  if (is_estimated()) track_ = has_trials ? Track::at_times_of(*kept_.aim.finest) : own_track();
+  integrate(from, stop, report);
+  conclude(report);
+  doubt(report, from != nullptr, stop);
+  return report;
+}
+
+void Run::conclude(RunReport& report) {
+  finish(report);
+  report.last = kept_.record.last();
+  report.rows = rows_;
+  report.options = setup_.options;
+  if (is_aimed()) report.aimed = kept_.aim;
+  if (integrator_) {
+    report.statistics = integrator_->statistics();
+    description_ = integrator_->describe();
+  }
+  report.description = description_;
+  report.energy_error = kept_.record.energy_error();
+  report.energy_final = kept_.record.energy();
+  report.table = kept_.record.table();
+  report.events = kept_.watch.tallies();
+  report.event_cost = kept_.watch.cost();
+  if (track_) track_->finish(report.last, report.end == RunEnd::complete || report.end == RunEnd::event);
+}
+
+void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
+  const RunOptions& options = setup_.options;
+  const double largest_step = is_adaptive(options) ? std::numeric_limits<double>::infinity() : options.step;
+  const Schedule schedule{largest_step, setup_.duration, setup_.every, setup_.rows};
+  const auto on_row = [&](const Motion& motion, double work = 0) { take(motion, work); };
+  const auto on_way = [&](const RowPlace& place, bool last) { come_by(place, last); };
+  const auto on_step = [&] {
+    const double begin = std::exchange(step_end_, integrator_->time());
+    step_ = step_end_ - begin;
+    if (!missed_ && detail::misses(options, integrator_->statistics().largest_defect)) missed_ = begin;
+    std::optional<Motion> end = take_events(report);
+    if (track_) track_->follow(*integrator_, end);
+    if (!viewers_.empty()) view(end);
+    return end;
+  };
+  integrator_->remember_steps(!setup_.events.empty() || (track_ && track_->looks()) || !viewers_.empty());
+  rows_ = from == nullptr ? 0 : from->rows;
+  step_end_ = from == nullptr ? setup_.start.time : from->time;
+  try {
+    if (from == nullptr && setup_.rows.any() && setup_.rows.at(0) != 0) look_at(setup_.start, 0);
+    from == nullptr ? kept_.watch.start(setup_.start) : kept_.watch.resume(integrator_->state());
+    const Motion begin = from == nullptr ? setup_.start : integrator_->state();
+    if (track_) track_->begin(begin);
+    for (Viewer& viewer : viewers_) viewer.begin(begin, setup_.start.time);
+    const RunResult result = from == nullptr
+                                 ? simulate(*integrator_, setup_.start, schedule, on_row, stop, on_way, on_step)
+                                 : pendula::go_on(*integrator_, setup_.start.time, schedule,
+                                                  {from->rows, from->since_row}, on_row, stop, on_way, on_step);
+    if (setup_.rows.any()) look_at_end(result);
+    if (step_end_ > begin.time) {
+      for (Viewer& viewer : viewers_) viewer.finish(result.end ? *result.end : integrator_->state());
+    }
+    report.stepping_seconds = result.stepping_seconds - viewing_seconds_;
+    report.step = result.outcome;
+    report.end = !result.outcome  ? RunEnd::step_failed
+                 : result.end     ? RunEnd::event
+                 : result.stopped ? RunEnd::stopped
+                                  : RunEnd::complete;
+  } catch (const NotFinite&) {
+    report.end = RunEnd::not_finite;
+    report.step.time = integrator_->time();
+  } catch (...) {
+    report.end = RunEnd::observer_failed;
+    report.failure = std::current_exception();
+  }
+}
+
+void Run::take(const Motion& motion, double work) {
+  const Observation seen = look_at(motion, work);
+  ++rows_;
+  if (track_ && setup_.rows.any() && !is_adaptive(setup_.options)) track_->add_row(motion);
+  for (Observer* observer : takers_) observer->take({motion, seen, row_, step_});
+}
+
+// The first event that ends the run does so, and is the last one that is told.
+std::optional<Motion> Run::take_events(RunReport& report) {
+  if (setup_.events.empty()) return {};
+  const Heeding nothing(*integrator_, {});  // what is found has to be right
+  for (const Occurrence& happened : kept_.watch.after_step(*integrator_)) {
+    tell(happened);
+    if (!setup_.events[happened.event].stop) continue;
+    report.ended_by = happened.event;
+    return happened.motion;
+  }
+  return {};
+}
+
+void Run::tell(const Occurrence& happened) {
+  const Observation seen = setup_.subject->observe(happened.motion);
+  event_row_.clear();
+  setup_.subject->append_row(happened.motion, seen, event_row_);
+  const EventRow row{setup_.events[happened.event], happened.up, {happened.motion, seen, event_row_, step_}};
+  for (Observer* observer : observers_) observer->happen(row);
+}
+
+// Between steps, but no part of stepping.
+void Run::view(const std::optional<Motion>& end) {
+  using Clock = std::chrono::steady_clock;
+  const auto before = Clock::now();
+  for (Viewer& viewer : viewers_) viewer.follow(*integrator_, end, step_);
+  viewing_seconds_ += std::chrono::duration<double>(Clock::now() - before).count();
+}
+
+// The energy is not finite wherever anything else is not.
+Observation Run::look_at(const Motion& motion, double work) {
+  Observation seen = setup_.subject->observe(motion);
+  if (!std::isfinite(seen.energy)) throw NotFinite();
+  row_.clear();
+  setup_.subject->append_row(motion, seen, row_);
+  kept_.record.add(motion, seen, row_, work);
+  return seen;
+}
+
+// The last state, where that is no row.
+void Run::look_at_end(const RunResult& result) {
+  const double time = result.end ? result.end->time : integrator_->time();
+  if (time == kept_.record.last().time) return;
+  Motion motion;
+  double work = 0;
+  if (integrator_->look(time, motion, work)) look_at(motion, work);
+}
+
+void Run::come_by(const RowPlace& place, bool last) {
+  using Clock = std::chrono::steady_clock;
+  if (observers_.empty()) return;
+  const auto wants = [](const Observer* observer) { return observer->wants_checkpoint(); };
+  if (!last && std::ranges::none_of(observers_, wants)) {
+    if (std::isinf(setup_.checkpoint)) return;
+    const Clock::time_point now = Clock::now();
+    if (std::chrono::duration<double>(now - kept_at_).count() < setup_.checkpoint) return;
+    kept_at_ = now;
+  }
+  const Checkpoint checkpoint{integrator_->time(), place.rows, place.since_row, integrator_->member(),
+                              member_of(kept_)};
+  for (Observer* observer : observers_) observer->keep(checkpoint);
+}
+
+// What trials told is not known of an end that came later.
+void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) {
+  report.warnings = event_warnings(setup_.events, report.events);
+  if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
+  const auto add = [&](detail::Doubt doubt) {
+    if (doubt) report.warnings.push_back(*std::move(doubt));
+  };
+  add(detail::of_energy(*setup_.subject, setup_.options, kept_.record.balance()));
+  add(detail::of_pole(*setup_.subject, setup_.options, report));
+  if (is_aimed() && !went_on) {
+    std::optional<Separation> parted;
+    if (track_ && kept_.aim.finest) parted.emplace(*setup_.subject, *track_, *kept_.aim.finest);
+    add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
+  } else if (track_) {
+    add(look_again(report, stop));
+  }
+  add(detail::of_defect(setup_, report.statistics.largest_defect, missed_, report.trust));
+  add(detail::of_unseen(setup_, report.statistics, report.trust));
+}
+
+// By a run that takes less time; where that says that this one cannot be trusted, by one that takes more, if there is
+// time for it: of constant steps not where the other came far.
+detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
+  bool stopped = false;
+  integrator_.reset();
+  double asked = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
+  if (is_aimed()) asked = std::min(asked, setup_.accuracy.error);
+  const auto compare = [&](const detail::SecondLook& look) {
+    const double share =
+        std::max(0.01 * std::min(asked, look.options.tolerance), std::numeric_limits<double>::epsilon());
+    Divergence divergence(*setup_.subject, *track_);
+    const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {
+      stopped = stopped || stop();
+      return stopped || divergence.exceeds(track, detail::visible / look.trusted);
+    });
+    return Separation(*setup_.subject, *track_, other);
+  };
+  std::string unknown = "it was interrupted while it ran again to see how far it can be trusted: that is not known";
+  const detail::SecondLook coarser = detail::coarser(setup_.options, report.statistics);
+  const Separation first = compare(coarser);
+  if (stopped) return unknown;
+  detail::Doubt doubt = detail::of_second_look(setup_, coarser, first, report.trust);
+  if (!doubt) return doubt;
+  const double begin = setup_.start.time, end = report.last.time;
+  const bool is_soon = first.within(detail::visible / coarser.trusted, begin) < begin + (end - begin) / 2;
+  const std::optional<detail::SecondLook> finer = detail::finer(setup_.options);
+  if (!finer || !(is_adaptive(setup_.options) || is_soon)) return doubt;
+  const Separation second = compare(*finer);
+  return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);
+}
+
+// The first failure is the one that is told.
+void Run::finish(RunReport& report) {
+  for (Observer* observer : observers_) {
+    try {
+      observer->finish();
+    } catch (...) {
+      if (report.end != RunEnd::complete && report.end != RunEnd::event && report.end != RunEnd::stopped) continue;
+      report.end = RunEnd::observer_failed;
+      report.failure = std::current_exception();
+    }
+  }
+}
+
+}  // namespace pendula
