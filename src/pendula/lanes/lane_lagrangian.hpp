@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/lanes/lane_columns.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_inertia.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
-#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/lanes/lane_stage_tangent.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/lanes/lane_turned.hpp>

@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstddef>
+#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/lanes/lane_columns.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
 #include <pendula/lanes/lane_pack.hpp>
-#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/lanes/lane_system_tangent.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <vector>
