@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_angles.hpp>
 #include <pendula/chain/chain_links.hpp>
@@ -21,6 +22,7 @@ class ExplicitChain {
   static constexpr double tolerance_share = 0.2;
 
   int subject() const { return chain_.links(); }
+  std::size_t coordinates() const { return Space::dof * static_cast<std::size_t>(chain_.links()); }
   std::string_view kernel() const { return ""; }
 
   template <class Steps>

@@ -48,6 +48,7 @@ class ExplicitSystem {
   static constexpr double tolerance_share = 1;
 
   Dynamics& subject() { return *dynamics_; }
+  std::size_t coordinates() const { return count(); }
   std::string_view kernel() const { return model_.info().name; }
 
   template <class Steps>

@@ -8,12 +8,13 @@
 #include <pendula/system/plain_integrator.hpp>
 #include <pendula/system/stop_sign.hpp>
 #include <utility>
+#include <vector>
 
 namespace pendula {
 
 /// An explicit method behind the run-time interface: one motion, by the text that moves members of ensembles. `Steps`
 /// takes them, of plain numbers; `Subject` knows the coordinates that users see, and looks for what steps do not:
-///   Steps(subject.subject());  Outcome start(time, q, v, steps);  void follow(steps): a step was taken
+///   Steps(subject.subject());  coordinates();  Outcome start(time, q, v, steps);  void follow(steps): a step was taken
 ///   void read(steps, q, v);  void read_within(steps, share, q, v): when a share of the last step was done
 ///   void read_near(i, place, rate, q, v): of a part, whose q is known nearly
 ///   double followed(steps, time, h): the longest step up to h in which it sees what depends on time
@@ -21,7 +22,7 @@ namespace pendula {
 ///   tolerance_share: of the user's tolerance, what the steps are given
 ///   void move_on();  void member(numbers);  kernel()
 template <class Steps, class Subject>
-class SingleIntegrator : public PlainIntegrator {
+class SingleIntegrator final : public PlainIntegrator {
  public:
   SingleIntegrator(Subject subject, double tolerance, typename Steps::Options options = {})
       : subject_(std::move(subject)),
@@ -29,7 +30,11 @@ class SingleIntegrator : public PlainIntegrator {
         controller_(Subject::tolerance_share * tolerance),
         kept_(steps_.place()),
         end_(kept_),
-        tolerance_(tolerance) {}
+        tolerance_(tolerance) {
+    // Members of others are resumed without a start: numbers of the subject come into the steps here.
+    const std::vector<double> zero(subject_.coordinates());
+    start(0, zero.data(), zero.data());
+  }
 
   Outcome start(double time, const double* q, const double* v) override {
     time_.assign(time);
