@@ -12,6 +12,7 @@
 #include <pendula/ensemble/propagate.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/lyapunov.hpp>
+#include <pendula/run/run.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -12,6 +12,7 @@
 #include <pendula/ensemble/chunks.hpp>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/doubts.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/version.hpp>
 #include <string>

@@ -68,7 +68,7 @@ class Mover {
 
   /// All that the next steps depend on.
   Member save();
-  void resume(const Member& member);
+  void resume(const Member& saved);
 
   /// What is kept besides the integrator's.
   template <class Numbers>

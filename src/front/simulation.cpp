@@ -18,8 +18,8 @@
 #include "io/trajectory.hpp"
 
 struct pendula_simulation {
-  pendula_simulation(const pendula_model& moved, const pendula::RunOptions& options, bool remembers)
-      : model(moved), mover(model.subject, options, remembers) {}
+  pendula_simulation(pendula_model moved, const pendula::RunOptions& options, bool remembers)
+      : model(std::move(moved)), mover(model.subject, options, remembers) {}
 
   pendula_model model;
   pendula::front::Mover mover;
