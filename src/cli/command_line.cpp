@@ -70,6 +70,14 @@ int whole_number(const std::string& text) {
   return read_number<int>(text).value_or(0);
 }
 
+[[noreturn]] void reject_two_words(const std::string& key, const std::string& next, std::string value) {
+  std::erase(value, '=');
+  std::string one = key.substr(0, key.find('=')) + '=' + (value.ends_with(".toml") ? "VALUE" : value);
+  if (one.find_first_of(" []{}*") != std::string::npos) one = '"' + one + '"';
+  throw io::InputError("--set " + key + ' ' + next +
+                       ": expected KEY=VALUE without blanks around '=', got two words; write --set " + one);
+}
+
 CLI::Validator set_of(const std::vector<std::string_view>& words) {
   return CLI::IsMember(std::vector<std::string>(words.begin(), words.end()));
 }
@@ -301,17 +309,11 @@ std::string likely_meant(const CLI::App& app, const std::string& word) {
 
 void require_one_word(const std::vector<std::string>& words) {
   for (std::size_t k = 0; k + 2 < words.size(); ++k) {
-    std::string key = words[k + 1], value = words[k + 2];
-    const bool is_number = read_number<double>(value).has_value();
-    if (words[k] != "--set" || (value.starts_with('-') && !is_number)) continue;
+    const std::string &key = words[k + 1], &next = words[k + 2];
+    const bool is_number = read_number<double>(next).has_value();
+    if (words[k] != "--set" || (next.starts_with('-') && !is_number)) continue;
     if (key.find('=') < key.size() - (is_number ? 1 : 0)) continue;
-    if (value == "=" && k + 3 < words.size()) value += words[k + 3];
-    const std::string got = key + ' ' + words[k + 2];
-    std::erase(key, '=');
-    std::string one = key + '=' + (value.ends_with(".toml") ? "VALUE" : value.substr(value.starts_with('=') ? 1 : 0));
-    if (one.find_first_of(" []{}*") != std::string::npos) one = '"' + one + '"';
-    throw io::InputError("--set " + got +
-                         ": expected KEY=VALUE without blanks around '=', got two words; write --set " + one);
+    reject_two_words(key, next, next == "=" && k + 3 < words.size() ? words[k + 3] : next);
   }
 }
 

@@ -13,12 +13,13 @@ namespace pendula::cli {
 
 /// What a word of the command line may be, for completion: a file of some endings, where there are any, one of some
 /// words, or a key of the scenario.
+// NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct Expected {
   std::vector<std::string_view> endings = {};
   std::vector<std::string_view> words = {};
   bool is_file = false;
   bool is_key = false;
-};
+};  // NOLINTEND(readability-redundant-member-init)
 
 /// What else can be asked for help on, beside commands.
 inline constexpr std::string_view scenario_topic = "scenario", summary_topic = "summary";

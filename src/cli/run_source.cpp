@@ -29,11 +29,10 @@ void require_free(const std::vector<std::string>& overrides) {
   for (const std::string_view key : io::all_keys()) {
     if (may_change(key)) free.append(free.empty() ? "" : " or ").append(key);
   }
-  for (const std::string& change : overrides) {
-    if (may_change(key_of(change))) continue;
-    throw io::InputError("--set " + change + ": expected " + free + ", which a run that goes on may have anew, got " +
-                         key_of(change));
-  }
+  const auto wrong = std::ranges::find_if_not(overrides, may_change, key_of);
+  if (wrong == overrides.end()) return;
+  throw io::InputError("--set " + *wrong + ": expected " + free + ", which a run that goes on may have anew, got " +
+                       key_of(*wrong));
 }
 
 void require_same(const std::string& file, const std::string& what, const std::string& here, const std::string& got) {

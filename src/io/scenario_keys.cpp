@@ -81,7 +81,7 @@ constexpr std::array<ScenarioKey, 4> chain_drive = {
 };
 
 constexpr std::array<ScenarioKey, 4> system = {
-    another("model", text, required, "a model file (.py, relative to the scenario), or the name of a built-in model"),
+    another("model", text, required, "a model file, or the name of a built-in model"),
     an_integer("links", 1, 64, InWords{"1, for the model to say"}, "number of links, where the model has some"),
     another("parameters", names, InWords{"those of the model"}, "a table by name"),
     another("drive", tables, none, "constant + amplitude sin(frequency t + phase), added to an input"),
