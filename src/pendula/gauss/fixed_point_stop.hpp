@@ -64,6 +64,7 @@ class FixedPointStop {
     }
     const Num bound = Num(enough_) * scale_;
     Verdict verdict{correction <= bound, !(correction <= Num(largest) * scale_)};
+    if (count_ < Sequences) verdict.done = Mask(false);  // from rest the first correction is exactly zero
     if (count_ <= Sequences) return verdict;
     const Num now = size(0), rate = now / size(Sequences);
     if (count_ == Sequences + 1) {

@@ -28,6 +28,7 @@ class LagrangianSolver {
   using Model = SystemModel;
   using Real = double;
   using State = Motion;
+  static constexpr int sequences = 2;  ///< of corrections of its fixed point (FixedPointStop)
 
   /// Throws std::invalid_argument unless the method has so many stages, at most Width.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
