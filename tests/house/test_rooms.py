@@ -66,7 +66,9 @@ GENERATED = {"pendula/kernels"}
 
 def included(file: Path) -> set[str]:
     """Folders of this project's headers that a file includes."""
-    names = re.findall(r'#include [<"]((?:pendula|io|view|cli|front|library)/[\w/]+\.hpp)[>"]', file.read_text())
+    names = re.findall(
+        r'#include [<"]((?:pendula|io|view|cli|front|library)/[\w/]+\.hpp)[>"]', file.read_text()
+    )
     return {name.rsplit("/", 1)[0] for name in names}
 
 

@@ -30,6 +30,7 @@ ONCE = [
         "kernel_comparison",
         "kernel_text",
         "kernel_values",
+        "kernel_widths",
         "library",
     )
 ]
