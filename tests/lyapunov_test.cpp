@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <pendula/chain/chain_numbers.hpp>
@@ -10,6 +11,7 @@
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/system/member.hpp>
 #include <random>
+#include <vector>
 
 #include "support/random_chain.hpp"
 
@@ -68,12 +70,20 @@ TEST(LyapunovExponents, ComeInPairsInSpace) {
 }
 
 // Published: 2.46 1/s at an energy that is not told (sites.google.com/view/lyapunov-spectrum).
+// One run may stay beside a regular motion for long: it is the median of five.
 TEST(LyapunovExponents, OfAPublishedDoublePendulum) {
-  const State<Planar> start = State<Planar>::from_angles(Eigen::Vector2d(1.5, 1.5));
   for (const Solver solver : {Solver::chain, Solver::dense}) {
-    const LyapunovSpectrum found = spectrum(double_pendulum(), start, 0.004, 1000, 1, solver);
-    EXPECT_NEAR(found.exponents[0], 2.46, 0.5);
-    EXPECT_LT(found.errors[0], 0.25);  // measured 0.14
+    std::vector<double> exponents, errors;
+    for (int k = 0; k < 5; ++k) {
+      const auto start = State<Planar>::from_angles(Eigen::Vector2d::Constant(1.5 + 1e-3 * k));
+      const LyapunovSpectrum found = spectrum(double_pendulum(), start, 0.004, 1000, 1, solver);
+      exponents.push_back(found.exponents[0]);
+      errors.push_back(found.errors[0]);
+    }
+    std::ranges::sort(exponents);
+    std::ranges::sort(errors);
+    EXPECT_NEAR(exponents[2], 2.46, 0.5);  // measured 2.64 to 2.82, of two instruction sets
+    EXPECT_LT(errors[2], 0.25);            // measured 0.06 to 0.09
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <pendula/lanes/explicit_tableau.hpp>
 #include <pendula/lanes/lane_error_controller.hpp>
 #include <pendula/lanes/lane_part.hpp>
@@ -61,7 +62,7 @@ class LaneExplicit : public LaneState<Dynamics> {
 
   /// Where the members are, with all that their next steps depend on.
   struct Place {
-    Place(const Parts& where, const LowParts& rest) : parts(where), slopes(where), low(rest) {}
+    Place(Parts where, LowParts rest) : parts(std::move(where)), slopes(parts), low(std::move(rest)) {}
 
     Parts parts, slopes;
     [[no_unique_address]] LowParts low;
@@ -142,7 +143,7 @@ class LaneExplicit : public LaneState<Dynamics> {
     if constexpr (can_choose) find_error(time, h, pace);
     tried_ = h;
     tried_from_ = time;
-    if constexpr (!Dynamics::limits_turns) return wanted & (pace == pace);
+    if constexpr (!Dynamics::limits_turns) return wanted & (pace <= L(std::numeric_limits<double>::infinity()));
     const L turned = max(pace, State::pace_squared()) * (h * h);
     return wanted & (turned < L(largest_turn * largest_turn));
   }

@@ -289,13 +289,31 @@ class EventWatch {
       }
       found.push_back({k, up, values.seen()});
     }
+    forget_noise(before, resolution * std::abs(motion_.time - before_.time), found);
     return true;
+  }
+
+  /// Where a function crosses zero, states that are rounded may cross it several times within their rounding: there and
+  /// back is nothing, and twice is once.
+  static void forget_noise(std::size_t first, double resolution, std::vector<Occurrence>& found) {
+    for (std::size_t n = first; n + 1 < found.size();) {
+      if (found[n + 1].motion.time - found[n].motion.time > most_noise * resolution) {
+        ++n;
+        continue;
+      }
+      const bool is_back = found[n + 1].up != found[n].up;
+      const auto at = found.begin() + static_cast<std::ptrdiff_t>(n);
+      found.erase(is_back ? at : at + 1, at + 2);
+      if (is_back && n > first) --n;
+    }
   }
 
   /// The first time that something was so.
   void note(double& time) const {
     if (std::isnan(time)) time = motion_.time;
   }
+
+  static constexpr double most_noise = 16;  // of instants, in resolutions: 3.4 were seen
 
   std::vector<Event> events_;
   std::vector<EventTally> tallies_;
