@@ -64,10 +64,10 @@ std::vector<double> defaults_of(const SystemInfo& info) {
   return numbers;
 }
 
-const SystemTable& find_system(const std::string& name, int links) {
+const SystemTable* find_system(const std::string& name, int links) {
   std::string built;
   for (const SystemTable* table : library().systems) {
-    if (table->info.model == name && (links == 0 || table->info.links == links)) return *table;
+    if (table->info.model == name && (links == 0 || table->info.links == links)) return table;
     built += (built.empty() ? "" : ", ") + std::string(table->info.name);
   }
   throw NoKernel("no kernel for the model " + name + (links > 0 ? " of " + std::to_string(links) + " links" : "") +
@@ -109,10 +109,10 @@ pendula_model* pendula_model_of_chain(const pendula_chain* chain) {
 
 pendula_model* pendula_model_named(const char* name, int links, const double* parameters, size_t count) {
   return made([&] {
-    const SystemTable& table = find_system(name, links);
+    const SystemTable* table = find_system(name, links);
     const std::vector<double> numbers =
-        parameters == nullptr ? defaults_of(table.info) : std::vector<double>(parameters, parameters + count);
-    return make_system(table, numbers, {});
+        parameters == nullptr ? defaults_of(table->info) : std::vector<double>(parameters, parameters + count);
+    return make_system(*table, numbers, {});
   });
 }
 
