@@ -25,8 +25,7 @@ struct Case {
 };
 
 pendula::Chain<Spatial> equal_chain(int links) {
-  return pendula::Chain<Spatial>(
-      {.masses = Eigen::VectorXd::Ones(links), .lengths = Eigen::VectorXd::Ones(links), .drives = {}});
+  return pendula::Chain<Spatial>({.masses = Eigen::VectorXd::Ones(links), .lengths = Eigen::VectorXd::Ones(links)});
 }
 
 std::vector<Case> cases() {

@@ -17,7 +17,7 @@ constexpr double duration = 100;  // s; as in heyoka_lyapunov.py
 /// That of sites.google.com/view/lyapunov-spectrum, from an angle of 1.5 of both links.
 void leading_exponent(benchmark::State& state, double tolerance) {
   const pendula::Chain<Planar> chain(
-      {.masses = Eigen::Vector2d(0.2, 0.1), .lengths = Eigen::Vector2d(0.1, 0.08), .gravity = 9.8, .drives = {}});
+      {.masses = Eigen::Vector2d(0.2, 0.1), .lengths = Eigen::Vector2d(0.1, 0.08), .gravity = 9.8});
   const auto start = pendula::State<Planar>::from_angles(Eigen::Vector2d(1.5, 1.5));
   const int stages = pendula::stages_for(pendula::Method::gauss, tolerance);
   const auto integrator = make_integrator(chain, {.stages = stages, .step = 0, .tolerance = tolerance});

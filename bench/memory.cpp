@@ -23,9 +23,8 @@ int main(int argc, char** argv) {
   const int links = argc > 1 ? std::atoi(argv[1]) : 100'000;
   const int stages = argc > 2 ? std::atoi(argv[2]) : 2;
   const double before = peak_mebibytes();
-  const pendula::Chain<Planar> chain({.masses = Eigen::VectorXd::Constant(links, 1.),
-                                      .lengths = Eigen::VectorXd::Constant(links, 1. / links),
-                                      .drives = {}});
+  const pendula::Chain<Planar> chain(
+      {.masses = Eigen::VectorXd::Constant(links, 1.), .lengths = Eigen::VectorXd::Constant(links, 1. / links)});
   const auto integrator = pendula::make_integrator(
       chain, {.stages = stages, .solver = pendula::Solver::chain, .iteration = pendula::Iteration::newton});
   auto outcome = integrator->start(pendula::State<Planar>::from_angles(Eigen::VectorXd::Constant(links, 1.5)));

@@ -26,9 +26,8 @@ struct Case {
 /// special about it, no link is at the pole, and it stays like this for the steps that a benchmark takes.
 template <class Space>
 pendula::Chain<Space> chain_of(int links) {
-  return pendula::Chain<Space>({.masses = Eigen::VectorXd::Constant(links, 1.),
-                                .lengths = Eigen::VectorXd::Constant(links, 1. / links),
-                                .drives = {}});
+  return pendula::Chain<Space>(
+      {.masses = Eigen::VectorXd::Constant(links, 1.), .lengths = Eigen::VectorXd::Constant(links, 1. / links)});
 }
 
 template <class Space>

@@ -6,7 +6,7 @@
 
 int main() {
   using namespace pendula;
-  const Chain<Planar> chain({.masses = Eigen::Vector2d(1, 1), .lengths = Eigen::Vector2d(1, 1), .drives = {}});
+  const Chain<Planar> chain({.masses = Eigen::Vector2d(1, 1), .lengths = Eigen::Vector2d(1, 1)});
   const auto start = State<Planar>::from_angles(Eigen::Vector2d::Constant(std::numbers::pi / 2));
 
   // A motion, by steps of its own choice, and its rows.

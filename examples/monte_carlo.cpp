@@ -17,8 +17,7 @@ int main() {
   std::vector<Model> models;
   for (double& mass : masses) {
     mass = uniform(random);
-    models.emplace_back(
-        Chain<Planar>({.masses = Eigen::Vector2d(1, mass), .lengths = Eigen::Vector2d(1, 0.8), .drives = {}}));
+    models.emplace_back(Chain<Planar>({.masses = Eigen::Vector2d(1, mass), .lengths = Eigen::Vector2d(1, 0.8)}));
   }
 
   Eigen::MatrixXd starts(masses.size(), 2);

@@ -92,8 +92,7 @@ TEST(Allocation, NoneInAStepOfFixedSize) {
   const Chain<Spatial, 3> chain({.masses = Eigen::Vector3d::Ones(),
                                  .lengths = Eigen::Vector3d::Ones(),
                                  .damping = Eigen::Vector3d::Zero(),
-                                 .torque = Torque<Spatial, 3>::Zero(),
-                                 .drives = {}});
+                                 .torque = Torque<Spatial, 3>::Zero()});
   GaussStepper<ChainSolver<Spatial, 2, 3>> stepper(chain, 2);
   State<Spatial, 3> start;
   start.q << 1.0, 0.5, 0.2, 0.3, 0.1, 0.4;

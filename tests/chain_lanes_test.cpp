@@ -274,6 +274,32 @@ TEST(EnsembleLanesTest, EnergyStaysToTheLastDigits) {
   for (const LaneEnd& end : ends) EXPECT_LT(end.energy_error / energy_scale(chain), 4e-15);  // measured 1e-15
 }
 
+// By few stages, stages are predicted from the steps that there were: from a cold start on, each more of them helps.
+TEST(EnsembleLanesTest, EveryStepOfOneSizeHelpsThePrediction) {
+  using Stepper = LaneStepper<LaneChain<Planar, 2>>;
+  using L = Stepper::L;
+  std::mt19937 random(2);
+  const Chain<Planar> chain = drawn_chain<Planar>(random, 3);
+  const ChainLinks<Planar> links(chain);
+  Stepper stepper(3);
+  for (int lane = 0; lane < L::size; ++lane) {
+    const Eigen::Vector3d q(0.5, 0.2 + 0.1 * lane, -0.3), v(0.1, -0.2, 0.3);
+    stepper.start(lane, 0, chain, links, q.data(), v.data());
+  }
+  const double h = 0.002;
+  std::vector<std::int64_t> iterations;
+  for (int step = 0; step < 12; ++step) {
+    const std::int64_t before = stepper.iterations();
+    const auto found = stepper.solve(L(step * h), L(h), L(0.0) <= L(0.0));
+    ASSERT_TRUE(xsimd::all(found));
+    stepper.accept(found);
+    iterations.push_back(stepper.iterations() - before);
+    RecordProperty("step " + std::to_string(step), static_cast<int>(iterations.back()));
+  }
+  for (std::size_t step = 2; step < iterations.size(); ++step) EXPECT_LE(iterations[step], iterations[1]) << step;
+  EXPECT_LE(iterations.back(), iterations[1] - 2);  // measured ITER
+}
+
 // Steps so large that a fixed point does not contract: reported, and left where they were.
 TEST(EnsembleLanesTest, AMemberThatFailsSaysSo) {
   std::mt19937 random(9);

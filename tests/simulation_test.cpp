@@ -208,7 +208,7 @@ TEST(Simulation, LinearizesExactly) {
   ASSERT_EQ(a.rows(), 4);
   ASSERT_EQ(b.cols(), 2);
   const auto field = [&](const Eigen::Vector4d& x, double torque_2) {
-    ChainParameters<Planar> parameters{.masses = chain.masses(), .lengths = chain.lengths(), .drives = {}};
+    ChainParameters<Planar> parameters{.masses = chain.masses(), .lengths = chain.lengths()};
     parameters.torque = Torque<Planar, Eigen::Dynamic>::Zero(1, 2);
     parameters.torque(0, 1) = torque_2;
     // By the accelerations of a step that is next to nothing.
@@ -292,8 +292,7 @@ TEST(Propagate, IsThatOfEachAlone) {
 TEST(Propagate, TakesAModelEach) {
   std::vector<Model> models;
   for (const double mass : {0.5, 1.0, 2.0}) {
-    models.emplace_back(
-        Chain<Planar>({.masses = Eigen::Vector2d(1, mass), .lengths = Eigen::Vector2d(1, 1), .drives = {}}));
+    models.emplace_back(Chain<Planar>({.masses = Eigen::Vector2d(1, mass), .lengths = Eigen::Vector2d(1, 1)}));
   }
   const Ends ends = propagate(models, Eigen::MatrixXd::Constant(3, 4, 0.3), {.duration = 1});
   Simulation second(models[1], {0, Eigen::Vector2d::Constant(0.3), Eigen::Vector2d::Constant(0.3)});

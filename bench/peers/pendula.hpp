@@ -12,8 +12,7 @@ namespace bench {
 inline pendula::Chain<pendula::Planar> chain_of(const Problem& problem) {
   return pendula::Chain<pendula::Planar>({.masses = Eigen::VectorXd::Constant(problem.links, problem.mass),
                                           .lengths = Eigen::VectorXd::Constant(problem.links, problem.length),
-                                          .gravity = problem.gravity,
-                                          .drives = {}});
+                                          .gravity = problem.gravity});
 }
 
 /// Runs through the public factory, as a program that knows n only at run time would.

@@ -192,10 +192,10 @@ class LastCheckpoint : public Observer {
 };
 
 /// Runs a scenario and says what came out, but for what was moved.
-class Session {
+class RunSession {
  public:
-  Session(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const RunSource& source,
-          const std::string& model, const SimulateOptions& options)
+  RunSession(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const RunSource& source,
+             const std::string& model, const SimulateOptions& options)
       : setup_(std::move(setup)),
         options_(options),
         from_(checkpoint_of(source, setup_.start.time + setup_.duration)),
@@ -222,7 +222,7 @@ class Session {
     const auto interrupted = [&] { return guard.interrupted(); };
     io::Summary summary;
     if (page_) page_->begin_run(options_.copies > 0 ? "start" : "");
-    static_cast<RunReport&>(summary) = from_ ? run_.go_on(*from_, interrupted) : run_.go(interrupted);
+    static_cast<RunReport&>(summary) = from_ ? go_on(interrupted) : run_.go(interrupted);
     summary.accuracy = setup_.accuracy.error;
     summary.duration = setup_.duration;
     summary.every = setup_.every;
@@ -257,6 +257,17 @@ class Session {
   }
 
  private:
+  /// Throws io::InputError where what the file was left with is not what these steps go on from.
+  RunReport go_on(const std::function<bool()>& stop) {
+    try {
+      return run_.go_on(*from_, stop);
+    } catch (const std::invalid_argument& error) {
+      throw io::InputError(*options_.resume +
+                           ": expected a file of this version of pendula, which keeps other numbers (" + error.what() +
+                           ")");
+    }
+  }
+
   /// Runs the copies, and writes the page.
   void finish_page(const std::function<bool()>& interrupted, io::Summary& summary) {
     page_->end_run(summary.energy_error);
@@ -386,7 +397,7 @@ ExitStatus simulate(const SimulateOptions& options) {
                              .checkpoint = scenario.checkpoint,
                              .events = io::events_of(scenario.events, subject, scenario.start)};
         check_events(options, setup);
-        Session session(setup, scene_of(scenario, source), scenario, source, model, options);
+        RunSession session(setup, scene_of(scenario, source), scenario, source, model, options);
         io::Summary summary = session.run();
         summary.kernel_by = kernel_by;
         describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);

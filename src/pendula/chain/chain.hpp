@@ -30,7 +30,7 @@ struct ChainParameters {
   LinkVector<N> damping = LinkVector<N>::Zero(at_first);
   /// Constant torque, or empty for none  N m
   Torque<Space, N> torque = Torque<Space, N>::Zero(Space::torque_components, at_first);
-  std::vector<Drive<Space>> drives;  ///< sinusoidal torques
+  std::vector<Drive<Space>> drives = {};  ///< sinusoidal torques
 
  private:
   static constexpr Eigen::Index at_first = N == Eigen::Dynamic ? 0 : N;

@@ -10,6 +10,7 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -169,6 +170,21 @@ struct LinkConstants {
   Real drag{0.0};            ///< λ/l²
   Real weight{1.0};          ///< M g, M the mass that the rod carries
   Real hanging{0.0};         ///< M |g|/l, its tension over its length where the chain hangs at rest
+
+  /// Takes over a link of one of several members.
+  void set(int member, const LinkConstants<double>& given) {
+    const auto take = [member](Real& number, double value) { pendula::set(number, member, value); };
+    take(mass, given.mass);
+    take(length, given.length);
+    take(inverse_length, given.inverse_length);
+    take(inverse_square, given.inverse_square);
+    take(inverse_mass.value, given.inverse_mass.value);
+    take(inverse_mass.low, given.inverse_mass.low);
+    take(inverse_masses, given.inverse_masses);
+    take(drag, given.drag);
+    take(weight, given.weight);
+    take(hanging, given.hanging);
+  }
 };
 
 /// The constants of a chain link by link.

@@ -42,7 +42,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     set_coefficients(stages.columns());
     run_out(stages);
     inward(stages);
-    return outward(stages, [](int, const L&) {});
+    return outward(stages);
   }
 
   /// The link where one more iteration changes most.
@@ -51,7 +51,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     set_coefficients(stages.columns());
     run_out(stages);
     inward(stages);
-    outward(stages, [&](int i, const L& change) { worst.see(i, detail::StageChange<S, L>::largest_of(change)); });
+    outward(stages, &worst);
     return worst.link();
   }
 
@@ -121,7 +121,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  PENDULA_IN_REGISTERS void inward(Stages& stages, int begin, int end, Carried& carried) {
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void inward(Stages& stages, int begin, int end, Carried& carried) {
     Vector G = carried.G;
     Terms terms;
     for (int i = end; i-- > begin;) {
@@ -196,10 +196,9 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  // From the pivot to the tip: the changes of all stages; visit(i, what they turn rod i). Number by number, not in
-  // lanes: what a link waits for is short then.
-  template <class Visit>
-  PENDULA_IN_REGISTERS Correction outward(Stages& stages, Visit visit) {
+  // From the pivot to the tip: the changes of all stages. Number by number, not in lanes: what a link waits for is
+  // short then.
+  PENDULA_IN_REGISTERS Correction outward(Stages& stages, detail::WorstLink<Real>* worst = nullptr) {
     Real dw[vectors] = {};
     detail::StageChange<S, L> change;
     for (int begin = 0; begin < stages.links() && !stop_(); begin += block_) {
@@ -208,14 +207,13 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
         Carried again = below_[static_cast<std::size_t>(begin / block_ - 1)];
         inward(stages, begin, end, again);
       }
-      outward(stages, begin, end, dw, change, visit);
+      outward(stages, begin, end, dw, change, worst);
     }
     return {change.relative(), -1};
   }
 
-  template <class Visit>
   PENDULA_IN_REGISTERS void outward(Stages& stages, int begin, int end, Real (&dw)[vectors],
-                                    detail::StageChange<S, L>& change, Visit& visit) {
+                                    detail::StageChange<S, L>& change, detail::WorstLink<Real>* worst) {
     const auto& columns = stages.columns();
     for (int i = begin; i < end; ++i) {
       alignas(pack_alignment) Real dV[D][Lanes] = {};
@@ -227,7 +225,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
         U[d] = U[d] + dU[d];
       }
       stages.set_increments(i, U);
-      visit(i, change.add(stages.kept_rod(i), dU, stages.advance(i), stages.constants(i).inverse_square));
+      const L turned = change.add(stages.kept_rod(i), dU, stages.advance(i), stages.constants(i).inverse_square);
+      if (worst != nullptr) worst->see(i, detail::StageChange<S, L>::largest_of(turned));
     }
   }
 

@@ -228,10 +228,10 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     });
     return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / fastest_) : 0;
   }
-  /// How much larger the error of a prediction is than that defect. Predictions from many steps do not tell it: of
-  /// them, some are looked at (0), and the others are not.
+  /// How much larger the error of a prediction is than that defect, at least. Predictions from many steps are better
+  /// than that: some of these steps are looked at whatever they show (0).
   double predictor_gain() const {
-    if (depth_ > S) return steps_ % looked_at == 0 ? 0 : std::numeric_limits<double>::infinity();
+    if (depth_ > S && steps_ % looked_at == 0) return 0;
     return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1;
   }
 

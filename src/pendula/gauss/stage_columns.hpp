@@ -40,7 +40,6 @@ class StageColumns {
   void predict_at(Real from, Real ratio) {
     from_ = from;
     ratio_ = from == 1 ? ratio : Real(0);
-    half_ = polynomials_.lagrange(Real(from + ratio / 2));
     const auto values = polynomials_.lagrange(fma(L(ratio), L::load(c_), L(from)));
     // b_i/b_j, not of h b: of a step of no length that would be no number.
     for (std::size_t j = 0; j < stages_; ++j) {
@@ -103,13 +102,6 @@ class StageColumns {
 
   /// The same of values that hold the factor h b of their step.
   L extrapolated_increments(const Real* last) const { return product(increments_, last); }
-
-  /// That polynomial in the middle of this step.
-  Real at_half(const Real* last) const {
-    Real sum = half_[0] * last[0];
-    for (std::size_t j = 1; j < stages_; ++j) sum += half_[j] * last[j];
-    return sum;
-  }
 
   using Weights = typename NodePolynomials<S, Real>::Values;
 
@@ -187,7 +179,7 @@ class StageColumns {
   alignas(pack_alignment) Real hc_[Z] = {};
   alignas(pack_alignment) Real hc_low_[Z] = {};
   Real c_low_[columns] = {}, inverse_b_[columns] = {};
-  typename NodePolynomials<S, Real>::Values half_{}, start_{};
+  typename NodePolynomials<S, Real>::Values start_{};
 };
 
 }  // namespace pendula::detail

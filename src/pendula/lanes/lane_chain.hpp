@@ -7,7 +7,6 @@
 #include <pendula/chain/chain_motion.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/lanes/lane_chain_tangent.hpp>
-#include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_loads.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
@@ -57,7 +56,7 @@ class LaneChain
     if (loads_.any()) this->expect_loads();
     double length = 0;
     for (int i = 0; i < links(); ++i) {
-      set_link(constants_[i], lane, chain[i]);
+      constants_[i].set(lane, chain[i]);
       rods_.set_mass(i, constants_[i].inverse_mass);
       length += chain[i].length;
       std::array<Wide, Space::dof> angles, rates;

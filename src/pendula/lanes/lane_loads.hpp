@@ -6,7 +6,6 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/lanes/lane_inputs.hpp>
-#include <pendula/lanes/lane_links.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/width.hpp>
@@ -45,8 +44,7 @@ class LaneLoads {
   L fastest_drive() const { return inputs_.fastest(); }
 
   /// Torque on a link at the time that was set, over l_i².
-  template <class Link>
-  auto torque(int i, const Link& link) const {
+  auto torque(int i, const LinkConstants<L>& link) const {
     typename Space::Link::template Torque<L> torque;
     for (std::size_t k = 0; k < components; ++k) {
       torque[k] = link.inverse_square * from_row<L>(torques_[static_cast<std::size_t>(i) * components + k]);

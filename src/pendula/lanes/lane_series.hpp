@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <pendula/chain/chain_links.hpp>
-#include <pendula/lanes/lane_links.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_rods.hpp>

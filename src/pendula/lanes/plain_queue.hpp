@@ -12,21 +12,18 @@
 
 namespace pendula::detail {
 
-/// Moves members by a Queue, as MoveMembers and MoveSystemMembers tell.
-template <class Queue>
-bool move_plainly(typename Queue::Common common, const RunOptions& options, std::int64_t every,
-                  std::span<const typename Queue::Member> members, std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+inline LaneOptions lane_options(const RunOptions& options, std::int64_t every) {
   LaneOptions asked;
   asked.step = is_adaptive(options) ? 0 : options.step;
   asked.tolerance = options.tolerance;
   asked.energy_every = every;
   // Who asks for the iteration of lanes has one that `simulate` takes as well, to round-off.
   if (options.iteration == Iteration::fixed_point) asked.enough = LaneStepperOptions{}.enough;
-  Queue queue(common, asked);
-  queue.set_watch(watch);
-  std::vector<LaneEnd> reached(members.size());
-  const bool is_done = queue.run(members, reached);
-  for (std::size_t k = 0; k < members.size(); ++k) {
+  return asked;
+}
+
+inline void tell_ends(std::span<const LaneEnd> reached, std::span<PlainMemberEnd> ends) {
+  for (std::size_t k = 0; k < reached.size(); ++k) {
     const LaneEnd& from = reached[k];
     PlainMemberEnd& to = ends[k];
     std::copy_n(from.motion.q.data(), from.motion.q.size(), to.q);
@@ -38,6 +35,17 @@ bool move_plainly(typename Queue::Common common, const RunOptions& options, std:
     to.energy_error = from.energy_error;
     to.energy_sum = from.energy_sum;
   }
+}
+
+/// Moves members by a Queue, as MoveMembers and MoveSystemMembers tell.
+template <class Queue>
+bool move_plainly(typename Queue::Common common, const RunOptions& options, std::int64_t every,
+                  std::span<const typename Queue::Member> members, std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+  Queue queue(common, lane_options(options, every));
+  queue.set_watch(watch);
+  std::vector<LaneEnd> reached(members.size());
+  const bool is_done = queue.run(members, reached);
+  tell_ends(reached, ends);
   return is_done;
 }
 
