@@ -197,7 +197,7 @@ endfunction()
 function(pendula_add_objects name)
   list(GET _pendula_archs 0 least)
   add_library(${name} OBJECT ${ARGN})
-  pendula_own_target(${name})
+  pendula_own_target(${name} JOINED)
   target_compile_options(${name} PUBLIC ${_pendula_flags_${least}}
                                  PRIVATE -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
   target_include_directories(${name} PUBLIC "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")

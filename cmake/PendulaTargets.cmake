@@ -12,6 +12,7 @@ endif()
 option(PENDULA_NATIVE "Compile tests and benchmarks for this machine's processor (-march=native)"
        ${_pendula_native_default})
 option(PENDULA_WARNINGS_AS_ERRORS "Treat warnings in pendula's own sources as errors" ${PROJECT_IS_TOP_LEVEL})
+option(PENDULA_JOIN_SOURCES "Compile sources of the program many at once: sooner in all, later for who changes one" ON)
 option(PENDULA_CHECKED "Sanitizers (address, undefined), library assertions, new Eigen storage filled with NaN" OFF)
 
 if(PROJECT_IS_TOP_LEVEL)
@@ -60,11 +61,16 @@ set(_pendula_sanitizers -fsanitize=address,undefined -fno-sanitize=null,object-s
                         -fno-sanitize-recover=all -fno-omit-frame-pointer
                         $<$<CXX_COMPILER_ID:GNU>:--param=asan-use-after-return=0>)
 
-# Compiles a target of this project by the project's own rules; for this machine alone where NATIVE is given.
+# Compiles a target of this project by the project's own rules; for this machine alone where NATIVE is given. Sources of
+# one that is JOINED are compiled many at once where PENDULA_JOIN_SOURCES is on: more than half of what each of them takes
+# is reading the same headers.
 function(pendula_own_target target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "NATIVE" "" "")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "NATIVE;JOINED" "" "")
   target_compile_features(${target} PUBLIC cxx_std_20)
-  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF UNITY_BUILD OFF)
+  if(arg_JOINED AND PENDULA_JOIN_SOURCES)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+  endif()
   target_compile_options(${target} PRIVATE ${_pendula_warnings} $<$<BOOL:${arg_NATIVE}>:${_pendula_native_flags}>)
   if(PENDULA_CHECKED)
     target_compile_options(${target} PRIVATE ${_pendula_sanitizers})

@@ -19,6 +19,17 @@ string(REPLACE " -fno-gnu-unique" "" database "${database}")
 string(REGEX REPLACE " -Winvalid-pch -include [^ ]+" "" database "${database}")
 string(REGEX REPLACE " -Winvalid-pch (-Xclang )?-include-pch -Xclang [^ ]+ -Xclang -include -Xclang [^ ]+" "" database
        "${database}")
+# Of sources that are compiled many at once it has one command: each gets its own.
+file(GLOB joined "${BUILD}/src/CMakeFiles/*.dir/Unity/*.cxx")
+foreach(together IN LISTS joined)
+  string(REGEX MATCH "{[^{}]*\"file\": \"${together}\"[^{}]*}" entry "${database}")
+  file(STRINGS "${together}" includes REGEX "^#include")
+  foreach(include IN LISTS includes)
+    string(REGEX REPLACE "^#include \"(.*)\"$" "\\1" source "${include}")
+    string(REPLACE "${together}" "${source}" own "${entry}")
+    string(REGEX REPLACE "\n]" ",\n${own}\n]" database "${database}")
+  endforeach()
+endforeach()
 file(WRITE "${BUILD}/lint/compile_commands.json" "${database}")
 execute_process(
   COMMAND xargs -P ${jobs} -n 1 -a "${BUILD}/lint.txt" "${CLANG_TIDY}" --quiet -p "${BUILD}/lint"

@@ -15,7 +15,7 @@ namespace pendula::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Row = std::vector<std::string>;
+using TableRow = std::vector<std::string>;
 
 /// What the generator says of a model. Throws io::InputError.
 template <class Ask>
@@ -32,13 +32,13 @@ std::string text(const Json& object, const char* key) {
 }
 
 /// Rows in columns, the first of them headings.
-void print(const std::vector<Row>& rows) {
+void print(const std::vector<TableRow>& rows) {
   constexpr std::size_t gap = 2;
   std::vector<std::size_t> widths(rows.front().size());
-  for (const Row& row : rows) {
+  for (const TableRow& row : rows) {
     for (std::size_t k = 0; k < row.size(); ++k) widths[k] = std::max(widths[k], row[k].size() + gap);
   }
-  for (const Row& row : rows) {
+  for (const TableRow& row : rows) {
     std::string line;
     for (std::size_t k = 0; k < row.size(); ++k) line += row[k] + std::string(widths[k] - row[k].size(), ' ');
     std::cout << line.substr(0, line.find_last_not_of(' ') + 1) << '\n';
@@ -47,9 +47,9 @@ void print(const std::vector<Row>& rows) {
 
 /// A list of the model, if it has any of that: row_of(entry) are the cells before the remark.
 template <class RowOf>
-void print_list(const Json& model, const char* list, Row head, RowOf row_of) {
+void print_list(const Json& model, const char* list, TableRow head, RowOf row_of) {
   head.emplace_back();
-  std::vector<Row> rows{std::move(head)};
+  std::vector<TableRow> rows{std::move(head)};
   for (const Json& entry : model[list]) {
     rows.push_back(row_of(entry));
     rows.back().push_back(text(entry, "remark"));
@@ -80,16 +80,16 @@ std::string listed(const Json& names) {
 void print_model(const Json& model) {
   std::cout << text(model, "model") << ": " << text(model, "about") << '\n';
   print_list(model, "coordinates", {"coordinate", "unit", "rate", "momentum"}, [](const Json& each) {
-    return Row{text(each, "name"), text(each, "unit"), text(each, "rate"), text(each, "momentum")};
+    return TableRow{text(each, "name"), text(each, "unit"), text(each, "rate"), text(each, "momentum")};
   });
   print_list(model, "parameters", {"parameter", "unit", "default", ""}, [](const Json& each) {
-    return Row{text(each, "name"), text(each, "unit"), default_of(each), limits_of(each)};
+    return TableRow{text(each, "name"), text(each, "unit"), default_of(each), limits_of(each)};
   });
   print_list(model, "inputs", {"input", "unit"}, [](const Json& each) {
-    return Row{text(each, "name"), text(each, "unit")};
+    return TableRow{text(each, "name"), text(each, "unit")};
   });
   print_list(model, "points", {"point", "columns"}, [](const Json& each) {
-    return Row{text(each, "name"), listed(each["columns"])};
+    return TableRow{text(each, "name"), listed(each["columns"])};
   });
   std::cout << '\n' << "file  " << text(model, "file") << '\n';
   if (model["has_links"]) std::cout << "links " << model["links"] << "; --links N tells it of N\n";
@@ -114,7 +114,7 @@ ExitStatus models(bool json) {
     std::cout << models.dump() << '\n';
     return done;
   }
-  std::vector<Row> rows{{"model", "coordinates", ""}};
+  std::vector<TableRow> rows{{"model", "coordinates", ""}};
   for (const Json& model : models) {
     std::string coordinates;
     for (const Json& each : model["coordinates"]) coordinates += (coordinates.empty() ? "" : ", ") + text(each, "name");

@@ -80,9 +80,9 @@ Kept kept_of(const Scenario& scenario, const io::EnsemblePlan& plan) {
 }
 
 /// An ensemble from its scenario to its file.
-class Session {
+class EnsembleSession {
  public:
-  Session(const EnsembleOptions& options, Ranks& ranks)
+  EnsembleSession(const EnsembleOptions& options, Ranks& ranks)
       : options_(options),
         ranks_(ranks),
         scenarios_(options.scenario, options.overrides, options.json),
@@ -334,9 +334,9 @@ class Session {
 
 ExitStatus ensemble(const EnsembleOptions& options) {
   Ranks ranks(options.shard.has_value());
-  if (ranks.size() == 1) return Session(options, ranks).run();
+  if (ranks.size() == 1) return EnsembleSession(options, ranks).run();
   try {
-    return Session(options, ranks).run();
+    return EnsembleSession(options, ranks).run();
   } catch (const std::exception& error) {
     std::cerr << "pendula: rank " << ranks.rank() << ": " << error.what() << '\n';
     ranks.abort(dynamic_cast<const io::InputError*>(&error) != nullptr ? wrong_input : failed);

@@ -49,7 +49,7 @@ std::string options(const CLI::App& command) {
   return text;
 }
 
-std::string examples(std::string_view command) {
+std::string example_lines(std::string_view command) {
   std::string text;
   for (const Example& example : examples_of(command)) {
     text += ".PP\n" + plain(example.what) + ":\n.PP\n.RS 4\n.nf\n" + plain(example.call) + "\n.fi\n.RE\n";
@@ -84,7 +84,7 @@ std::string manual_page(const CommandLine& line) {
   text += section("COMMANDS");
   for (const CLI::App* command : line.app.get_subcommands(all)) {
     text += ".SS \"" + plain(usage(*command)) + "\"\n" + plain(command->get_description()) + ".\n" + options(*command) +
-            examples(command->get_name());
+            example_lines(command->get_name());
   }
   text +=
       section("SCENARIO") +

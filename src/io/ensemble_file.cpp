@@ -28,7 +28,7 @@ namespace {
 using hdf5::Type;
 
 /// Where a data set of one number a member lies in its file.
-struct Place {
+struct Stored {
   std::uint64_t offset = 0;
   Type type = Type::real;
 };
@@ -73,7 +73,7 @@ class Columns {
  public:
   Columns(const Bytes& bytes, const EnsembleHead& head) : bytes_(bytes), width_(head.width()) {}
 
-  void write(const DoneChunk& chunk, std::size_t column, const Place& place) {
+  void write(const DoneChunk& chunk, std::size_t column, const Stored& place) {
     switch (place.type) {
       case Type::real:
         return write_as<double>(chunk, column, place);
@@ -86,7 +86,7 @@ class Columns {
 
  private:
   template <class Number>
-  void write_as(const DoneChunk& chunk, std::size_t column, const Place& place) {
+  void write_as(const DoneChunk& chunk, std::size_t column, const Stored& place) {
     packed_.resize(static_cast<std::size_t>(chunk.members.size()) * sizeof(Number));
     for (std::size_t k = 0; k < packed_.size() / sizeof(Number); ++k) {
       const double value = chunk.rows[k * width_ + column];
@@ -210,11 +210,11 @@ std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleH
 }
 
 /// The data sets, empty, and where each lies: of the flags, the columns; of members at random their numbers and keys.
-std::vector<Place> create_columns(const hdf5::Handle& file, const EnsembleHead& head) {
+std::vector<Stored> create_columns(const hdf5::Handle& file, const EnsembleHead& head) {
   Words words;
   const std::vector<hdf5::Handle> scales = write_scales(file, head, words);
   const std::vector<std::int64_t> shape = head.plan.shape();
-  std::vector<Place> places;
+  std::vector<Stored> places;
   const auto create = [&](const std::string& name, const std::string& meaning, const std::string& unit, Type type) {
     hdf5::Handle dataset = hdf5::create_array(file, name, shape, type);
     describe(dataset, meaning, head, unit);
@@ -228,7 +228,7 @@ std::vector<Place> create_columns(const hdf5::Handle& file, const EnsembleHead& 
   hdf5::write_flags(status, Type::byte, not_run, meanings);
   const hdf5::Handle trusted = create("trusted", "whether a second look at the member agrees", "", Type::byte);
   hdf5::write_flags(trusted, Type::byte, -1, std::array<std::string, 3>{"not_looked_at", "no", "yes"});
-  std::vector<Place> drawn;
+  std::vector<Stored> drawn;
   for (const EnsembleDraw& draw : head.plan.draws) {
     create(words.of(draw.key), draw.key, unit_of_key(draw.key), Type::real);
     drawn.push_back(places.back());
@@ -257,7 +257,7 @@ void write_failures(const hdf5::Handle& file, const std::vector<DoneChunk::Messa
 }
 
 /// Numbers of members at random, and the keys that are drawn for each.
-void write_draws(const Bytes& bytes, const EnsembleHead& head, std::span<const Place> places) {
+void write_draws(const Bytes& bytes, const EnsembleHead& head, std::span<const Stored> places) {
   if (places.empty()) return;
   std::vector<std::int64_t> numbers;
   std::vector<std::vector<double>> keys(places.size() - 1);
@@ -321,7 +321,7 @@ bool is_complete(const std::string& file, const EnsembleHead& head) {
 EnsembleTally write_ensemble(const std::string& file, const EnsembleHead& head, const std::string& folder) {
   const Found found = look_through(folder, head);
   const std::string target = link_target(file), part = folder + "/whole" + std::to_string(getpid()) + ".h5";
-  std::vector<Place> places;
+  std::vector<Stored> places;
   hdf5::begin();
   try {
     hdf5::Handle opened = hdf5::create_file(part);

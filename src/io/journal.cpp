@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view magic = "pendula journal 1\n";
-constexpr std::string_view ending = ".journal";
+constexpr std::string_view journal_ending = ".journal";
 
 void append(std::string& bytes, std::uint64_t word) {
   for (int k = 0; k < 8; ++k) bytes += static_cast<char>((word >> (8 * k)) & 0xff);
@@ -85,7 +85,7 @@ std::vector<fs::path> journals_in(const std::string& folder) {
   std::error_code none;
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, none)) {
-    if (entry.path().extension() == ending) files.push_back(entry.path());
+    if (entry.path().extension() == journal_ending) files.push_back(entry.path());
   }
   std::ranges::sort(files);
   return files;
@@ -141,7 +141,7 @@ Journal::Journal(const std::string& folder, const JournalKind& kind) {
     reject_output(folder, folder, errno);
   }
   for (int k = 0; descriptor_ < 0; ++k) {
-    name_ = folder + "/" + std::to_string(getpid()) + "-" + std::to_string(k) + std::string(ending);
+    name_ = folder + "/" + std::to_string(getpid()) + "-" + std::to_string(k) + std::string(journal_ending);
     descriptor_ = open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0666);
     if (descriptor_ < 0 && errno != EEXIST) reject_output(name_, name_, errno);
   }

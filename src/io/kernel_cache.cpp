@@ -373,7 +373,7 @@ void remove_unused_kernels(const fs::path& cache) {
 
 /// Numbers with commas between them.
 template <class Numbers>
-std::string listed(const Numbers& numbers) {
+std::string numbers_text(const Numbers& numbers) {
   std::string text;
   for (const double number : numbers) {
     if (!text.empty()) text += ',';
@@ -507,10 +507,10 @@ std::vector<double> written_values(const std::string& model, std::optional<int> 
                                    unsigned seed) {
   std::vector<std::string> arguments = about("written", find_model(model, folder, toolchain), links);
   const auto add = [&](const char* name, const std::string& value) { arguments.push_back(name + ('=' + value)); };
-  add("--parameters", listed(parameters));
+  add("--parameters", numbers_text(parameters));
   add("--time", shortest(start.time));
-  add("--q", listed(start.q));
-  add("--v", listed(start.v));
+  add("--q", numbers_text(start.q));
+  add("--v", numbers_text(start.v));
   add("--seed", std::to_string(seed));
   std::istringstream words(last_line(run_generator(arguments, toolchain)));
   std::vector<double> numbers;

@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 // Of a row of the table of checkpoints; after them the numbers of the two members, and three of RunSoFar, which tables
 // of old have not.
-enum Place : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
+enum Column : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
 constexpr std::size_t numbers_so_far = 3;
 
 /// Slots for checkpoints: what is being written is never the last that is whole.

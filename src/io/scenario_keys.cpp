@@ -205,7 +205,7 @@ std::vector<std::string> dotted_names() {
   return names;
 }
 
-std::string listed(Names names) {
+std::string alternatives(Names names) {
   std::string text;
   for (const std::string_view name : names) text.append(text.empty() ? "\"" : "\" | \"").append(name);
   return text + '"';
@@ -293,7 +293,7 @@ std::string type_text(const ScenarioKey& key) {
     case text:
       return "string";
     case choice:
-      return listed(key.choices);
+      return alternatives(key.choices);
     case per_link:
       return bounded(key) + ", or an array of one a link";
     case torque:

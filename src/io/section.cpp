@@ -155,7 +155,7 @@ void Section::require_known(Names elsewhere) const {
     std::vector<std::string_view> known(keys_.size());
     std::ranges::transform(keys_, known.begin(), &ScenarioKey::name);
     throw InputError(location(node.source()), dotted(printable(key.str())), "one of " + joined(known, ", "),
-                     "the unknown key " + quoted(key.str()) + hint_at_key(key.str(), known, elsewhere));
+                     "the unknown key " + toml_string(key.str()) + hint_at_key(key.str(), known, elsewhere));
   }
 }
 

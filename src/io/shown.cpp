@@ -49,14 +49,14 @@ std::string printable(std::string_view text) {
   return shown;
 }
 
-std::string quoted(std::string_view text) {
+std::string toml_string(std::string_view text) {
   return '"' + printable(text) + '"';
 }
 
 std::string shown(const toml::node& node) {
   if (const auto* array = node.as_array()) return shown_array(*array);
   if (node.is_table()) return "a table";
-  if (const auto* value = node.as_string()) return quoted(value->get());
+  if (const auto* value = node.as_string()) return toml_string(value->get());
   if (const auto* value = node.as_floating_point()) return shown_float(value->get());
   if (const auto* value = node.as_integer()) return std::to_string(value->get());
   if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";

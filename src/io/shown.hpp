@@ -22,7 +22,7 @@ std::string cut(std::string_view text);
 /// A text on one line, cut where it is long.
 std::string printable(std::string_view text);
 
-std::string quoted(std::string_view text);
+std::string toml_string(std::string_view text);
 
 /// A value as messages show it: one line, cut where it is long.
 std::string shown(const toml::node& node);

@@ -14,10 +14,6 @@
 namespace pendula::io {
 namespace {
 
-bool has_stages(const Summary& summary) {
-  return !is_explicit(summary.options.method);
-}
-
 // The text: labels in one column, values in the next.
 
 constexpr std::size_t label_width = 19;
@@ -203,7 +199,7 @@ std::string events_text(const Summary& summary) {
   return text;
 }
 
-std::string ending(const Summary& summary) {
+std::string end_of_run(const Summary& summary) {
   std::string text = place(summary) + events_text(summary);
   if (summary.event_file) text += line("events", *summary.event_file);
   if (!summary.ending.event.empty()) {
@@ -286,7 +282,7 @@ SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion) {
 std::string to_text(const Summary& summary) {
   return "pendula " + std::string(version) + ": " + summary.model.scenario + "\n\n" + settings(summary) + "\n" +
          table(summary) + "\n" + statistics(summary) + "\n" + energies(summary) + trust(summary) + "\n" +
-         ending(summary);
+         end_of_run(summary);
 }
 
 }  // namespace pendula::io

@@ -80,6 +80,11 @@ struct Summary : RunReport {
   std::optional<std::string> event_file;
 };
 
+/// Whether its steps have stages that are solved for.
+inline bool has_stages(const Summary& summary) {
+  return !is_explicit(summary.options.method);
+}
+
 /// How a run ended; `coordinates` as pendula::message takes them. What an observer threw is thrown again, but for
 /// OutputError. `events` are their names.
 Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates = {},

@@ -14,10 +14,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-bool has_stages(const Summary& summary) {
-  return !is_explicit(summary.options.method);
-}
-
 bool chooses_steps(const Summary& summary) {
   return is_adaptive(summary.options);
 }
@@ -115,7 +111,7 @@ Json events_json(const Summary& summary) {
 }
 
 /// A key, and its value.
-struct Row {
+struct JsonRow {
   SummaryKey key;
   Json (*value)(const Summary&);
 };
@@ -150,13 +146,14 @@ constexpr std::string_view final_schema = R"({"type": "object", "required": ["t"
     "velocities": {"type": "array", "items": {"$ref": "#/$defs/links"}}},
   "additionalProperties": false})";
 
-constexpr std::array<std::string_view, 2> spaces = {Planar::name, Spatial::name}, unit_systems = {"SI", "natural"};
+constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial::name},
+                                          unit_systems = {"SI", "natural"};
 constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
 
-constexpr std::array<Row, 39> rows = {{
+constexpr std::array<JsonRow, 39> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
-    {{"space", "string", "planar or spatial", "", chains, spaces},
+    {{"space", "string", "planar or spatial", "", chains, chain_spaces},
      [](const Summary& s) { return Json(s.model.space); }},
     {{"model", "string", "name of the model", "", systems}, [](const Summary& s) { return Json(s.model.model); }},
     {{"links", "integer", "how many"}, [](const Summary& s) { return Json(s.model.links); }},
@@ -227,7 +224,7 @@ bool applies(const SummaryKey& key, const Summary& summary) {
 
 Json json_of(const Summary& summary) {
   Json json;
-  for (const Row& row : rows) {
+  for (const JsonRow& row : rows) {
     if (applies(row.key, summary)) json[row.key.name] = row.value(summary);
   }
   return json;
@@ -251,7 +248,7 @@ Json schema_of(const SummaryKey& key) {
 /// Names of keys of one kind.
 Json names(Moved of) {
   Json all = Json::array();
-  for (const Row& row : rows) {
+  for (const JsonRow& row : rows) {
     if (row.key.of == of) all.push_back(row.key.name);
   }
   return all;
@@ -266,7 +263,7 @@ std::string one_line(const Json& json) {
 
 std::vector<SummaryKey> summary_keys() {
   std::vector<SummaryKey> keys(rows.size());
-  std::ranges::transform(rows, keys.begin(), &Row::key);
+  std::ranges::transform(rows, keys.begin(), &JsonRow::key);
   return keys;
 }
 
@@ -279,7 +276,7 @@ std::string summary_schema() {
               {"properties", Json::object()},
               {"additionalProperties", false},
               {"$defs", {{"links", {{"type", "array"}, {"items", {{"type", {"number", "null"}}}}}}}}};
-  for (const Row& row : rows) schema["properties"][row.key.name] = schema_of(row.key);
+  for (const JsonRow& row : rows) schema["properties"][row.key.name] = schema_of(row.key);
   return schema.dump(2) + "\n";
 }
 

@@ -144,17 +144,17 @@ toml::table parse_value(std::string_view value, const std::string& where) {
   }
   const std::string number = impossible_number(value);
   throw InputError(where + ": expected " +
-                   (number.empty() ? "a TOML value after '=', got " + quoted(value) : "a number, got " + number));
+                   (number.empty() ? "a TOML value after '=', got " + toml_string(value) : "a number, got " + number));
 }
 
 /// Where a value is to be put.
-struct Place {
+struct KeyPlace {
   const std::string& where;
   std::string_view key;
 };
 
 /// The array that has an element of this number.
-toml::array& array_with(toml::node* node, std::size_t element, const Place& place) {
+toml::array& array_with(toml::node* node, std::size_t element, const KeyPlace& place) {
   toml::array* const array = node == nullptr ? nullptr : node->as_array();
   if (array == nullptr || array->size() < element) {
     throw InputError(place.where, printable(place.key), "an array of at least " + std::to_string(element) + " elements",
@@ -164,7 +164,7 @@ toml::array& array_with(toml::node* node, std::size_t element, const Place& plac
 }
 
 /// The table that a part names which others come after.
-toml::table& table_of(toml::table& table, const KeyPart& part, const Place& place) {
+toml::table& table_of(toml::table& table, const KeyPart& part, const KeyPlace& place) {
   // A table made here takes the override as its place; one that stands in the file keeps its own.
   if (part.elements.empty() && !table.contains(part.name)) {
     table.insert(part.name, std::move(*parse("t = {}", place.where).get("t")));
@@ -179,14 +179,14 @@ toml::table& table_of(toml::table& table, const KeyPart& part, const Place& plac
 }
 
 /// The table that the last part of a key is in.
-toml::table& last_table(toml::table& root, std::span<const KeyPart> path, const Place& place) {
+toml::table& last_table(toml::table& root, std::span<const KeyPart> path, const KeyPlace& place) {
   toml::table* table = &root;
   for (const KeyPart& part : path.first(path.size() - 1)) table = &table_of(*table, part, place);
   return *table;
 }
 
 /// The array that a part's last element is in.
-toml::array& last_array(toml::table& table, const KeyPart& part, const Place& place) {
+toml::array& last_array(toml::table& table, const KeyPart& part, const KeyPlace& place) {
   toml::node* node = table.get(part.name);
   for (std::size_t k = 0; k + 1 < part.elements.size(); ++k) {
     node = array_with(node, part.elements[k], place).get(part.elements[k] - 1);
@@ -197,7 +197,7 @@ toml::array& last_array(toml::table& table, const KeyPart& part, const Place& pl
 /// Puts a value in the place of what `key` names.
 void put(toml::table& root, std::string_view key, toml::node& value, const std::string& where) {
   const std::vector<KeyPart> path = key_path(key);
-  const Place place{where, key};
+  const KeyPlace place{where, key};
   toml::table& table = last_table(root, path, place);
   const auto& [name, elements] = path.back();
   if (elements.empty()) {
@@ -211,7 +211,7 @@ void put(toml::table& root, std::string_view key, toml::node& value, const std::
 /// Takes out what `key` names.
 void take_out(toml::table& root, std::string_view key, const std::string& where) {
   const std::vector<KeyPart> path = key_path(key);
-  const Place place{where, key};
+  const KeyPlace place{where, key};
   toml::table& table = last_table(root, path, place);
   const auto& [name, elements] = path.back();
   if (!elements.empty()) {
@@ -235,7 +235,8 @@ void apply_override(toml::table& root, const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string_view key = trimmed(std::string_view(text).substr(0, equals));
   if (equals == std::string::npos || key_path(key).empty()) {
-    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + quoted(text) + counting_hint(key));
+    throw InputError(where + ": expected KEY=VALUE such as run.step=1e-4, got " + toml_string(text) +
+                     counting_hint(key));
   }
   const std::string_view given = trimmed(std::string_view(text).substr(equals + 1));
   if (given.empty()) return take_out(root, key, where);

@@ -10,23 +10,31 @@
 
 namespace pendula {
 
+/// Members and their chains, which they point to.
+template <class Space, int N>
+struct ChainMembers {
+  explicit ChainMembers(std::span<const PlainMember> members) {
+    chains.reserve(members.size());  // so that pointers to them stay
+    starts.reserve(members.size());
+    for (const PlainMember& member : members) {
+      const auto numbers = [&](const double* from) {
+        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(from, Space::dof * member.chain.links));
+      };
+      chains.push_back(chain_of<Space, N>(member.chain));
+      starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
+    }
+  }
+
+  std::vector<Chain<Space, N>> chains;
+  std::vector<LaneMember<Space, N>> starts;
+};
+
 template <class Space, class Queue>
 bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
                   std::span<PlainMemberEnd> ends, LaneWatch& watch) {
   if (members.empty()) return true;
-  constexpr int N = Queue::Member::links_known;
-  std::vector<Chain<Space, N>> chains;
-  chains.reserve(members.size());  // so that pointers to them stay
-  std::vector<LaneMember<Space, N>> starts;
-  starts.reserve(members.size());
-  for (const PlainMember& member : members) {
-    const auto numbers = [&](const double* from) {
-      return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(from, Space::dof * member.chain.links));
-    };
-    chains.push_back(chain_of<Space, N>(member.chain));
-    starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
-  }
-  return detail::move_plainly<Queue>(chains.front(), options, every, starts, ends, watch);
+  const ChainMembers<Space, Queue::Member::links_known> given(members);
+  return detail::move_plainly<Queue>(given.chains.front(), options, every, given.starts, ends, watch);
 }
 
 /// Series of short chains are summed up in registers.
