@@ -167,7 +167,7 @@ class ChainMotion {
   /// Stages of a motion that goes on as at the start of the step.
   void start_cold(const Mask& cold) {
     C scale(0.0);
-    const auto columns = columns_.at_hand();
+    const auto& columns = columns_.at_hand();
     if constexpr (is_batch<Num>) {
       for (int i = 0; i < links(); ++i) forget(pasts_[i], cold);
     }
@@ -188,7 +188,7 @@ class ChainMotion {
 
   /// Sums up what the stages add to the state, which stays.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void finish() {
-    const auto columns = columns_.at_hand();
+    const auto& columns = columns_.at_hand();
     typename Layout::Sum turn(C(0.0)), scale(C(0.0));
     C quartic(0.0);
     for (int i = 0; i < links(); ++i) {
@@ -365,7 +365,7 @@ class ChainMotion {
   }
 
   [[gnu::always_inline]] void predict_increments(int i) {
-    const auto columns = columns_.at_hand();
+    const auto& columns = columns_.at_hand();
     detail::unrolled<static_cast<int>(D)>([&](auto component) PENDULA_WRITTEN_OUT {
       constexpr std::size_t k = component;
       Row advance;

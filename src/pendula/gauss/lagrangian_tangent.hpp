@@ -47,7 +47,7 @@ class LagrangianTangent {
 
   /// The derivative of the step whose stages are found and that was not accepted yet.
   void linearize(const Stages& stages) {
-    columns_.prepare(stages.columns().h(), 0);
+    columns_.prepare(stages.columns().h());
     jacobians_.evaluate(stages);
     direction_.linearize(stages);
     for (int i = 0; i < columns_.stages(); ++i) times_[static_cast<std::size_t>(i)] = stages.time_of(i);

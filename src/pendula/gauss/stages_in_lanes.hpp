@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -12,16 +13,17 @@
 namespace pendula {
 
 /// How the stages of a number lie where one motion is solved: all of them in one pack. MembersInLanes says the same of
-/// several motions. A Row is one number at all stages; it is made of cells, which are worked on one by one.
-template <int S, class Real>
+/// several motions. A Row is one number at all stages; it is made of cells, which are worked on one by one. Where S is
+/// Eigen::Dynamic, their number is told at run time, at most Width; what a row holds beyond them is zero.
+template <int S, class Real, int Width = lanes_for<Real>(S)>
 struct StagesInLanes {
   using Num = Real;
-  using L = Lanes<S, Real>;
+  using L = Pack<Width, RegisterFor<Width, Real>>;
   using Cell = L;
   using Sum = L;  ///< of what the cells of a row add up to
   static constexpr int stages = S, cells = 1;
   static constexpr int together = 1;  ///< cells that a sweep goes through at a time
-  static constexpr auto Z = static_cast<std::size_t>(L::size);
+  static constexpr auto Z = static_cast<std::size_t>(Width);
 
   class Row {
     static constexpr std::size_t alignment =
@@ -42,26 +44,32 @@ struct StagesInLanes {
 
   /// Σ of what is stored at the stages.
   static Real total(const Real* x) {
+    constexpr std::size_t summed = S == Eigen::Dynamic ? Z : static_cast<std::size_t>(S);
     Real total = x[0];
-    for (std::size_t j = 1; j < S; ++j) total += x[j];
+    for (std::size_t j = 1; j < summed; ++j) total += x[j];
     return total;
   }
-  static Real total(const L& sum) {
-    alignas(pack_alignment) Real x[Z];
-    sum.store(x);
-    return total(x);
+  static Real total(const L& sum) { return total(Stored(sum).x); }
+
+  /// What a cell holds of one stage, and the largest of all.
+  static Real of_stage(const L& cell, int stage) { return Stored(cell).x[stage]; }
+  static Real largest(const L& cell, int stages) {
+    const Stored stored(cell);
+    return *std::max_element(stored.x, stored.x + stages);
   }
 
-  class Columns : public detail::StageColumns<S, Real> {
-    using Base = detail::StageColumns<S, Real>;
+  class Columns : public detail::StageColumns<S, Real, Width> {
+    using Base = detail::StageColumns<S, Real, Width>;
+    static constexpr bool is_fixed = S != Eigen::Dynamic;
 
    public:
     /// Steps that a prediction is made of at most: few stages make small steps, and many large ones.
-    static constexpr int most_depth = S <= 3 && sizeof(Real) >= sizeof(double) ? 8 : 1;
+    static constexpr int most_depth = (is_fixed ? S <= 3 : Width <= 4) && sizeof(Real) >= sizeof(double) ? 8 : 1;
+    int deepest() const { return Base::stages() <= 3 ? most_depth : 1; }
 
-    explicit Columns(Family family = Family::gauss) : Base(family) {
-      for (std::size_t j = 0; j < S; ++j) weights_[j] = Base::b(j);
-      for (std::size_t j = 0; j < S; ++j) inverse_weights_[j] = 1 / weights_[j];
+    explicit Columns(Family family = Family::gauss, int stages = S) : Base(family, stages) {
+      for (int j = 0; j < stages; ++j) weights_[j] = Base::b(static_cast<std::size_t>(j));
+      for (int j = 0; j < stages; ++j) inverse_weights_[j] = 1 / weights_[j];
     }
 
     void prepare(const Real& h) { Base::prepare(h, Real(0)); }
@@ -72,7 +80,7 @@ struct StagesInLanes {
     void predict_at(const Real& from, const Real& ratio, const Real& depth) {
       ratio_ = ratio;
       depth_ = static_cast<int>(depth);
-      if (most_depth > 1 && depth_ > S) {
+      if (is_deep()) {
         Real weight(-1);  // of a polynomial of degree depth − 1: ±binomial coefficients
         for (int d = 0; d < depth_; ++d) {
           weight = weight * Real(d - depth_) / Real(d + 1);
@@ -115,7 +123,21 @@ struct StagesInLanes {
       std::array<L, static_cast<std::size_t>(S)> m_;
       L hb_, hc_, hc_low_;
     };
-    AtHand at_hand() const { return AtHand(*this); }
+    AtHand at_hand() const requires(is_fixed) { return AtHand(*this); }
+
+    /// The same of a number of stages that is told at run time: more than registers need to hold.
+    class Reference {
+     public:
+      explicit Reference(const Columns& columns) : columns_(columns) {}
+      L hb(int /*cell*/) const { return columns_.Base::hb(); }
+      void integrate(const Row& x, const Real& start, Row& integral) const {
+        integral.set(0, columns_.integral(x.numbers(), L(start)));
+      }
+
+     private:
+      const Columns& columns_;
+    };
+    Reference at_hand() const requires(!is_fixed) { return Reference(*this); }
 
     /// b, and 1/b.
     L weight(int /*cell*/) const { return L::load(weights_); }
@@ -124,7 +146,7 @@ struct StagesInLanes {
     /// Stage values of the last steps, the newest first, all of them times h or none, continued at this step's stages.
     using History = std::array<const Row*, static_cast<std::size_t>(most_depth)>;
     [[gnu::always_inline]] void extrapolate(const History& last, Row& next, bool times_h) const {
-      if (most_depth > 1 && depth_ > S) {
+      if (is_deep()) {
         L sum = across_[0] * (*last[0])[0];
         for (std::size_t d = 1; d < static_cast<std::size_t>(depth_); ++d) sum = fma(across_[d], (*last[d])[0], sum);
         next.set(0, sum);
@@ -139,11 +161,19 @@ struct StagesInLanes {
     static Real total(const Row& x) { return StagesInLanes::total(x.numbers()); }
 
    private:
+    bool is_deep() const { return most_depth > 1 && depth_ > (is_fixed ? S : Base::stages()); }
+
     Real from_{1}, made_for_{1}, ratio_{1};
     int depth_ = 1;
     std::array<L, static_cast<std::size_t>(most_depth)> across_;
     alignas(pack_alignment) Real weights_[Z]{};
     alignas(pack_alignment) Real inverse_weights_[Z]{};
+  };
+
+ private:
+  struct Stored {
+    explicit Stored(const L& cell) { cell.store(x); }
+    alignas(pack_alignment) Real x[Z];
   };
 };
 

@@ -466,8 +466,8 @@ class VelocityNewton {
   std::vector<Compensated<double>> state_, saved_, remembered_;  // q, then v
   std::vector<double> acceleration_;                             // at the start: the cold start of the predictor
   std::vector<double> weight_;
-  MassScale masses_;
-  Pace pace_;
+  MassScale<double> masses_;
+  Pace<double> pace_;
   mutable std::vector<double> numbers_;  // workspace: four numbers of each coordinate
   std::vector<double> sums_;
   double time_ = 0, most_kinetic_ = 0;

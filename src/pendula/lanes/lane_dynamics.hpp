@@ -13,13 +13,6 @@
 
 namespace pendula {
 
-/// What a Gauss step has to know of a member where it starts.
-struct LaneStart {
-  double slowest_squared = 0;        ///< κ of the pace  [1/s²]
-  double natural_speed_squared = 0;  ///< Pace::natural_speed_squared  [J]
-  bool loaded = false;               ///< energy may come from outside, or go there
-};
-
 /// Several systems of one kernel, one in each lane: every member has parameters, inputs and times of its own. Numbers
 /// of all lanes lie side by side, those of a coordinate after those of the one before, aligned to `pack_alignment`.
 template <class L>
@@ -31,10 +24,12 @@ class LaneDynamics {
         functions_(functions_of<static_cast<int>(width_of<L>)>(table)),
         parameters_(1 + parameter_count(table.info)),  // none has an address, too
         inputs_now_(1 + table.info.inputs.size()),
+        now_(1),
         inputs_(table.info.inputs.size()) {}
   LaneDynamics(const LaneDynamics&) = delete;
   LaneDynamics& operator=(const LaneDynamics&) = delete;
 
+  const SystemInfo& info() const { return table_.info; }
   int coordinates() const { return static_cast<int>(info().coordinates.size()); }
   /// What kind of numbers coordinates are.
   bool is_angle(int i) const { return info().is_angle[static_cast<std::size_t>(i)]; }
@@ -55,51 +50,37 @@ class LaneDynamics {
   /// Highest frequency of a sine that is added to their inputs  [rad/s].
   L fastest_drives() const { return inputs_.fastest(); }
 
-  /// What starts at q and v  (coordinates): its momenta there, and the largest pivots that its mass matrix has.
-  LaneStart start(const PlainSystem& system, double time, const double* q, const double* v, double* p,
-                  double* pivots) const {
+  /// What starts at q and v  (coordinates): its momenta there, the largest pivots that its mass matrix has, and its
+  /// pace. Gives whether energy may come from outside, or go there.
+  bool start(const PlainSystem& system, double time, const double* q, const double* v, double* p, double* pivots,
+             Pace<double>& pace) const {
     const SystemModel model(table_, system);
     SystemAt<1> here(model);
     here.set_time(time);
     here(&SystemFunctions::momentum_from_velocity, q, v, p);
-    Pace pace(info());
     pace.start(here, q, v);
-    MassScale masses(info());
+    MassScale<double> masses(info());
     masses.start(here, q);
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) pivots[k] = masses.largest_pivot(k);
-    return {pace.slowest_squared(), pace.natural_speed_squared(), model.loaded()};
+    return model.loaded();
   }
 
-  /// q̈ at the times (lanes), of q and q̇ (coordinates, lanes).
-  void accelerations(const double* times, const double* q, const double* v, double* a) {
-    functions_.acceleration(at(times), q, v, a);
+  /// Calls a function at the times of a row, or at one time of each member: call(times,
+  /// &SystemFunctions::acceleration, q, v, a).
+  template <class Function, class... Numbers>
+  void call(const double* times, Function function, Numbers... numbers) {
+    (functions_.*function)(at(times), numbers...);
   }
-  /// The same, and its derivative along tangents (dq, dv) of the motions.
-  void variations(const double* times, const double* q, const double* v, const double* dq, const double* dv, double* a,
-                  double* da) {
-    functions_.acceleration_along(at(times), q, v, dq, dv, a, da);
-  }
-  /// q̇ and ṗ of q and p.
-  void hamiltonian_form(const double* times, const double* q, const double* p, double* v, double* f) {
-    functions_.hamiltonian_form(at(times), q, p, v, f);
-  }
-  /// M  (coordinates, coordinates, lanes).
-  void masses(const double* times, const double* q, double* masses) { functions_.mass_matrix(at(times), q, masses); }
-  /// What forces bring  (lanes)  [W].
-  void powers(const double* times, const double* q, const double* v, double* powers) {
-    functions_.power(at(times), q, v, powers);
-  }
-  /// T, and T + U  (lanes)  [J].
-  void energies(const double* times, const double* q, const double* v, double* kinetic, double* total) {
-    functions_.energies(at(times), q, v, kinetic, total);
+  template <class Function, class... Numbers>
+  void here(const L& time, Function function, Numbers... numbers) {
+    to_row(time, now_[0]);
+    call(now_[0], function, numbers...);
   }
 
  private:
   static std::size_t parameter_count(const SystemInfo& info) {
     return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), std::size_t{0});
   }
-  const SystemInfo& info() const { return table_.info; }
-
   Conditions at(const double* times) {
     inputs_.at(from_row<L>(times), inputs_now_);
     return {table_.context, parameters_[0], times, inputs_now_[0]};
@@ -107,7 +88,7 @@ class LaneDynamics {
 
   const SystemTable& table_;
   SystemFunctions functions_;
-  PackRows<width_of<L>> parameters_, inputs_now_;
+  PackRows<width_of<L>> parameters_, inputs_now_, now_;
   LaneInputs<L> inputs_;
 };
 

@@ -2,31 +2,29 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <limits>
-#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/gauss/step_shape.hpp>
-#include <pendula/lanes/lane_columns.hpp>
+#include <pendula/gauss/system_motion.hpp>
 #include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_inertia.hpp>
 #include <pendula/lanes/lane_pack.hpp>
 #include <pendula/lanes/lane_part.hpp>
 #include <pendula/lanes/lane_stage_tangent.hpp>
 #include <pendula/lanes/lane_tangent.hpp>
-#include <pendula/lanes/lane_turned.hpp>
-#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/lanes/members_in_lanes.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace pendula {
 
-/// Systems of one kernel, one in each lane, and the stages of a Gauss step of theirs in momentum form: equations,
-/// rounding, and what is compared with what are those of LagrangianStages, the layout is not. All stages of one number
-/// are S packs. With a tangent of each member (LaneStageTangent), whose stages are solved after the motion's.
+/// Systems of one kernel, one in each lane, and the stages of a Gauss step of theirs (SystemMotion). With a tangent of
+/// each member (LaneStageTangent), whose stages are solved after the motion's.
 template <int S, class Register = MemberRegister, bool with_tangent = false>
-class LaneLagrangian {
+class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>, LaneDynamics<LanePack<Register>>&> {
+  using Base = SystemMotion<MembersInLanes<S, LanePack<Register>>, LaneDynamics<LanePack<Register>>&>;
+
  public:
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
@@ -38,63 +36,43 @@ class LaneLagrangian {
   static constexpr int most_iterations = 25;  ///< of a step whose size is chosen
   static constexpr std::size_t D = 1;
   using Vector = std::array<L, D>;
-  using Columns = LaneColumns<S, L>;
-  using Stages = typename Columns::Stages;
+  using typename Base::Columns;
 
   /// `dynamics` must outlive it.
-  explicit LaneLagrangian(LaneDynamics<L>& dynamics)
-      : dynamics_(dynamics),
-        count_(dynamics.coordinates()),
-        coordinates_(static_cast<std::size_t>(count_)),
-        inertia_(dynamics),
-        calls_(static_cast<std::size_t>(S * per_call())),
-        state_(3 * coordinates_.size() + 4),
-        tangent_(dynamics, columns_) {
-    for (int k = 0; k < links(); ++k) {
-      Coordinate& coordinate = at(k);
-      coordinate.is_angle = dynamics.is_angle(k);
-      coordinate.is_periodic = dynamics.is_periodic(k);
-      may_miss_ = may_miss_ || !coordinate.is_angle;
-    }
+  explicit LaneLagrangian(LaneDynamics<L>& dynamics) : Base(dynamics, Family::gauss, S), tangent_(dynamics, columns_) {
+    for (const bool is_angle : dynamics.info().is_angle) may_miss_ = may_miss_ || !is_angle;
   }
-  LaneLagrangian(const LaneLagrangian&) = delete;
-  LaneLagrangian& operator=(const LaneLagrangian&) = delete;
 
   /// Coordinates.
-  int links() const { return count_; }
+  int links() const { return static_cast<int>(count_); }
 
   // --- One member ---
 
   /// A member comes into a lane, with its numbers, at q and v at `time`; its next step starts cold.
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v) {
     dynamics_.take(lane, system);
-    std::vector<double> p(coordinates_.size()), pivots(coordinates_.size());
-    const LaneStart start = dynamics_.start(system, time, q, v, p.data(), pivots.data());
-    now_.set(lane, time);
-    slowest_squared_.set(lane, start.slowest_squared);
-    natural_speed_squared_.set(lane, start.natural_speed_squared);
-    loaded_.set(lane, start.loaded ? 1 : 0);
+    std::vector<double> p(count_), pivots(count_);
+    Pace<double> pace(dynamics_.info());
+    loaded_.set(lane, dynamics_.start(system, time, q, v, p.data(), pivots.data(), pace) ? 1 : 0);
+    time_.set(lane, time);
     fastest_.set(lane, 0);
-    for (int k = 0; k < links(); ++k) {
-      at(k).q.set(lane, q[k], at(k).is_periodic);
-      at(k).p.value.set(lane, p[static_cast<std::size_t>(k)]);
-      at(k).p.low.set(lane, 0);
-      inertia_.start(lane, k, pivots[static_cast<std::size_t>(k)]);
-    }
-    read_inertia();
+    pace_.start(lane, pace);
+    masses_.start(lane, pivots.data());
+    for (std::size_t k = 0; k < count_; ++k) Base::start(lane, k, q[k], p[k]);
+    Base::read_masses();
     if constexpr (has_tangent) tangent_.start(lane, time, q, v);
   }
 
   // --- All members ---
 
   /// Coordinate i, with all turns that were made.
-  Vector along(int i) const { return {at(i).q.with_turns()}; }
+  Vector along(int i) const { return {Base::coordinate(static_cast<std::size_t>(i))}; }
 
   /// visit(i, q̇_i, …) of all coordinates.
   template <class Visit>
   void for_each_rate(Visit visit) {
-    find_rates();
-    for (int i = 0; i < links(); ++i) visit(i, Vector{L::load(state(1, i))}, L(0.0));
+    Base::find_rates(time_);
+    for (int i = 0; i < links(); ++i) visit(i, Vector{Base::rate(static_cast<std::size_t>(i))}, L(0.0));
   }
 
   /// Whether fixed points may ask for shorter steps than errors do: forces and lengths may be anything.
@@ -104,8 +82,8 @@ class LaneLagrangian {
 
   /// T + U  [J].
   L energy() {
-    find_rates();
-    const Energies found = energies();
+    Base::find_rates(time_);
+    const auto found = Base::energies(time_);
     energy_sum_ = found.size();
     kinetic_ = found.kinetic;
     return found.total;
@@ -116,7 +94,7 @@ class LaneLagrangian {
   /// What the energy at the end of the step that was solved is to be, by what loads bring  [J].
   L energy_due() {
     const L energy = this->energy();
-    brought_ = work();
+    brought_ = brought();
     kinetic_before_ = kinetic_;
     return energy + brought_;
   }
@@ -124,19 +102,10 @@ class LaneLagrangian {
   L energy_scale(const L& /*due*/) const { return max(max(kinetic_before_, kinetic_), 0.5 * fastest_) + abs(brought_); }
 
   /// R and d ln R/dt, as Pace.
-  void tempo(L& pace, L& quickening) {
-    find_rates();
-    dynamics_.accelerations(state(3), state(0), state(1), state(2));
-    L sum(0.0), growth(0.0);
-    for (int k = 0; k < links(); ++k) {
-      if (!at(k).is_angle) continue;
-      const L v = L::load(state(1, k)), squared = v * v, sixth = squared * squared * squared;
-      sum = fma(sixth, squared, sum);
-      growth = fma(sixth * v, L::load(state(2, k)), growth);
-    }
-    const L root = sqrt(sqrt(sum)), squared = slowest_squared_ + root;
-    pace = sqrt(squared);
-    quickening = select(sum > L(0.0), growth / (root * root * root * squared), L(0.0));
+  void tempo(L& pace, L& quickening) const {
+    const TempoOf<L> found = Base::tempo();
+    pace = found.pace;
+    quickening = found.quickening;
   }
 
   /// The longest step in which stages sum up what inputs are driven by, to a tolerance.
@@ -149,15 +118,12 @@ class LaneLagrangian {
   /// Predicts the stages of a step of `h` from `time`, `ratio` times as long as the one that they are known from.
   void prepare(const L& time, const L& h, const L& ratio, const StagePrediction<L>& from) {
     columns_.prepare(h);
-    columns_.predict_at(select(from.again, L(0.0), L(1.0)), ratio, from.depth);
-    now_ = time;
-    for (int j = 0; j < S; ++j) (time + columns_.hc(j)).store(call(j, 4));
-    for (Coordinate& coordinate : coordinates_) {
-      predict(coordinate, &Past::moved, coordinate.moved);
-      predict(coordinate, &Past::pushed, coordinate.pushed);
+    for (int j = 0; j < S; ++j) (time + columns_.hc(j)).store(Base::call(j, 4));
+    Base::predict(time, ratio, from);
+    if constexpr (has_tangent) {
+      if (any(from.cold)) Base::find_rates(time_);
+      tangent_.prepare(from, time_, Base::room(0), Base::room(2));
     }
-    if (xsimd::any(from.cold)) start_cold(from.cold);
-    if constexpr (has_tangent) tangent_.prepare(from, state(3), state(0), state(1));
     find_scale();
   }
 
@@ -166,10 +132,10 @@ class LaneLagrangian {
   PENDULA_IN_REGISTERS [[gnu::noinline]] L iterate(const Mask& active) {
     find_stages();
     L change(0.0);
-    for (int k = 0; k < links(); ++k) {
-      const L weight = inertia_.weight_squared(k);
-      change = fma(weight, replace(2, k, active, at(k).moved), change);
-      change = fma(columns_.h() * columns_.h() / weight, replace(3, k, active, at(k).pushed), change);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const L& weight = masses_.inertia(k);
+      change = fma(weight, replace(2, k, active), change);
+      change = fma(columns_.h() * columns_.h() / weight, replace(3, k, active), change);
     }
     return change;
   }
@@ -183,38 +149,16 @@ class LaneLagrangian {
   }
   /// The same iteration of the tangents there.
   L iterate_tangent(const Mask& active) requires with_tangent {
-    return tangent_.iterate(active, [this](int j, int which) { return call(j, which == 0 ? 4 : 2 * (which - 1)); });
+    return tangent_.iterate(active,
+                            [this](int j, int which) { return Base::call(j, which == 0 ? 4 : 2 * (which - 1)); });
   }
 
-  /// Sums up what the stages add to the state, which stays; after it `turn`, `pace_squared`, `decay` and `accept`.
+  /// Looks at the stages that were solved; the state stays. After it `turn`, `pace_squared`, `decay` and `accept`.
   void finish() {
-    newest_ = (newest_ + pasts - 1) % pasts;
+    Base::keep_stages();
+    Base::find_speeds();
     turn_ = L(0.0);
-    Stages speeds;
-    speeds.fill(L(0.0));
-    L eighth_powers(0.0);
-    const L inverse_h = L(1.0) / columns_.h();
-    for (int k = 0; k < links(); ++k) {
-      Coordinate& coordinate = at(k);
-      Past& past = coordinate.past[newest_];
-      L turn(0.0);
-      detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT {
-        past.moved[j] = L(columns_.inverse_b(j)) * coordinate.moved[j];
-        past.pushed[j] = L(columns_.inverse_b(j)) * coordinate.pushed[j];
-        const L v = inverse_h * past.moved[j];
-        speeds[j] = fma(inertia_.weight_squared(k) * v, v, speeds[j]);
-        turn = turn + abs(coordinate.moved[j]);
-      });
-      coordinate.moved_by = Columns::total(coordinate.moved);
-      coordinate.pushed_by = Columns::total(coordinate.pushed);
-      if (!coordinate.is_angle) continue;
-      const L v = inverse_h * past.moved[S / 2], squared = v * v, fourth = squared * squared;
-      eighth_powers = fma(fourth, fourth, eighth_powers);
-      turn_ = max(turn_, turn * inertia_.turns_by(k));
-    }
-    fastest_here_ = speeds[0];
-    for (const L& speed : speeds) fastest_here_ = max(fastest_here_, speed);
-    pace_squared_ = slowest_squared_ + sqrt(sqrt(eighth_powers));
+    Base::for_each_turn([&](std::size_t, const L& turn) { turn_ = max(turn_, turn); });
     if constexpr (has_tangent) tangent_.finish();
   }
 
@@ -222,7 +166,7 @@ class LaneLagrangian {
   /// member whose inertia has vanished turns beyond all bounds.
   L turn() const {
     const L infinite(std::numeric_limits<double>::infinity());
-    return select(inertia_.singular(), infinite, turn_ * turn_);
+    return select(masses_.is_singular(), infinite, turn_ * turn_);
   }
   /// From where on stages are no motion: where inertia may vanish, coordinates may move faster than all else  [rad].
   double largest_turn(bool chosen) const { return chosen || dynamics_.constant_masses() ? 3 : 0.25; }
@@ -233,11 +177,11 @@ class LaneLagrangian {
   /// The coefficient of the Legendre polynomial P_n in the rates, times h, relative to the size of the motion, squared;
   /// 0 where it may be what coordinates are rounded by. With a share of the tangent's.
   L decay(int n) const {
-    const L fastest = max(max(fastest_, fastest_here_), natural_speed_squared_);
+    const L fastest = Base::fastest();
     L squared(0.0);
-    for (int k = 0; k < links(); ++k) {
-      const L a = columns_.legendre(n, at(k).past[newest_].moved);
-      squared = fma(inertia_.weight_squared(k) * a, a, squared);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const L a = columns_.legendre(n, pasts_[k][newest_]);
+      squared = fma(masses_.inertia(k) * a, a, squared);
     }
     const L share = squared * (pace_squared_ / fastest);
     constexpr double visible = StepShape::visible;
@@ -248,17 +192,7 @@ class LaneLagrangian {
 
   /// Energy that is missing at the end of the step or too much, relative to what there is, where lengths are among the
   /// coordinates: motion may then be singular beside the stages. 0 of others.
-  L imbalance() {
-    if (!may_miss_) return L(0.0);
-    find_rates();
-    const Energies before = energies();
-    const L brought = work();
-    write_state([](const Coordinate& k) { return (k.q.low + k.moved_by) + k.q.value; },
-                [](const Coordinate& k) { return (k.p.low + k.pushed_by) + k.p.value; }, now_ + columns_.h());
-    const Energies after = energies();
-    const L scale = max(max(before.size(), after.size()), natural_speed_squared_) + abs(brought);
-    return select(scale > L(0.0), abs(after.total - before.total - brought) / scale, L(0.0));
-  }
+  L imbalance() const { return may_miss_ ? Base::imbalance(brought()) : L(0.0); }
 
   /// Coordinates and rates of the members whose step was accepted, when `share` of it was done, by the polynomial
   /// through its stages; visit(i, q_i, q̇_i).
@@ -267,11 +201,12 @@ class LaneLagrangian {
     const typename Columns::Shares& weights = columns_.shares(share);
     const L inverse_h = L(1.0) / columns_.h();
     for (int i = 0; i < links(); ++i) {
-      const Stages& advance = at(i).past[newest_].moved;
+      const auto& advance = pasts_[static_cast<std::size_t>(i)][newest_];
       L ahead(0.0), rate(0.0);
-      for (std::size_t j = 0; j < static_cast<std::size_t>(S); ++j) {
-        ahead = fma(L(weights.ahead[j]), advance[j], ahead);
-        rate = fma(L(weights.values[j]), advance[j], rate);
+      for (int j = 0; j < S; ++j) {
+        const auto at = static_cast<std::size_t>(j);
+        ahead = fma(L(weights.ahead[at]), advance[j], ahead);
+        rate = fma(L(weights.values[at]), advance[j], rate);
       }
       visit(i, Vector{along(i)[0] - ahead}, Vector{rate * inverse_h});
     }
@@ -279,31 +214,19 @@ class LaneLagrangian {
 
   /// Keeps where the members are, and goes back there.
   void save() {
-    for (Coordinate& coordinate : coordinates_) coordinate.saved = {coordinate.q, coordinate.p};
-    saved_time_ = now_;
-    saved_fastest_ = fastest_;
+    Base::keep(saved_);
     if constexpr (has_tangent) tangent_.save();
   }
   void restore(const Mask& which) {
-    for (Coordinate& coordinate : coordinates_) {
-      coordinate.q.assign(which, coordinate.saved.q);
-      assign(which, coordinate.saved.p, coordinate.p);
-    }
-    now_ = select(which, saved_time_, now_);
-    fastest_ = select(which, saved_fastest_, fastest_);
+    Base::take(saved_, which);
     if constexpr (has_tangent) tangent_.restore(which);
-    read_inertia();
+    Base::read_masses();
   }
 
   /// Moves the members that are `accepted` to the end of the step; the others stay where they are.
   void accept(const Mask& accepted) {
-    for (Coordinate& coordinate : coordinates_) {
-      coordinate.q.move(accepted, coordinate.moved_by, coordinate.is_periodic);
-      assign(accepted, detail::added(coordinate.p, coordinate.pushed_by), coordinate.p);
-    }
-    now_ = select(accepted, now_ + columns_.h(), now_);
-    fastest_ = select(accepted, max(fastest_, fastest_here_), fastest_);
-    if (!dynamics_.constant_masses()) read_inertia();
+    Base::move(accepted);
+    if (!dynamics_.constant_masses()) Base::read_masses();
     if constexpr (has_tangent) tangent_.accept(accepted);
   }
 
@@ -311,183 +234,56 @@ class LaneLagrangian {
   L take_growth(const Mask& which) requires with_tangent { return tangent_.take_growth(which); }
 
  private:
-  static constexpr int depth = Columns::most_depth;
-  static constexpr std::size_t pasts = static_cast<std::size_t>(depth);
-  static constexpr double invisible = 1e-9;  // LagrangianStages's
+  using Base::columns_, Base::count_, Base::dynamics_, Base::fastest_, Base::masses_, Base::newest_, Base::pace_,
+      Base::pace_squared_, Base::pasts_, Base::saved_, Base::size_squared_, Base::time_, Base::U_;
 
   struct NoTangent {
     NoTangent(LaneDynamics<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
 
-  // What steps are predicted from: h q̇ and h ṗ.
-  struct Past {
-    Stages moved{}, pushed{};
-  };
-  struct State {
-    LaneTurned<L> q;
-    Twofold<L> p{L(0.0), L(0.0)};
-  };
-  struct Coordinate {
-    bool is_angle = false, is_periodic = false;
-    LaneTurned<L> q;
-    Twofold<L> p{L(0.0), L(0.0)};
-    State saved;
-    Stages moved{}, pushed{};         // h b q̇, h b ṗ
-    std::array<Past, pasts> past{};   // newest_ is the last step's
-    L moved_by{0.0}, pushed_by{0.0};  // in the step
-  };
-  struct Energies {
-    L kinetic, total;
-    L size() const { return abs(kinetic) + abs(total - kinetic); }
-  };
-
-  Coordinate& at(int k) { return coordinates_[static_cast<std::size_t>(k)]; }
-  const Coordinate& at(int k) const { return coordinates_[static_cast<std::size_t>(k)]; }
-
-  static void assign(const Mask& which, const Twofold<L>& from, Twofold<L>& to) {
-    to.value = select(which, from.value, to.value);
-    to.low = select(which, from.low, to.low);
-  }
-
-  // --- Numbers as they cross ---
-
-  // Of each stage: q, p, v, f of all coordinates, and the time.
-  int per_call() const { return 4 * links() + 1; }
-  double* call(int j, int which, int k = 0) { return calls_[j * per_call() + which * links() + k]; }
-
-  // Of the state: q, v, and p or what nobody asks for, of all coordinates; the time, two energies, and a power.
-  double* state(int which, int k = 0) { return state_[which * links() + k]; }
-
-  // Writes a state with its rates.
-  template <class Place, class Momentum>
-  void write_state(Place q, Momentum p, const L& time) {
-    time.store(state(3));
-    for (int k = 0; k < links(); ++k) {
-      q(at(k)).store(state(0, k));
-      p(at(k)).store(state(2, k));
-    }
-    // Forces go where nobody reads them.
-    dynamics_.hamiltonian_form(state(3), state(0), state(2), state(1), call(0, 3));
-  }
-  void find_rates() {
-    write_state([](const Coordinate& k) { return k.q.value; }, [](const Coordinate& k) { return k.p.value; }, now_);
-  }
-
-  // Of the state that was written.
-  Energies energies() {
-    dynamics_.energies(state(3), state(0), state(1), state(3, 1), state(3, 2));
-    return {L::load(state(3, 1)), L::load(state(3, 2))};
-  }
-
-  void read_inertia() {
-    for (int k = 0; k < links(); ++k) at(k).q.value.store(state(0, k));
-    now_.store(state(3));
-    inertia_.read(state(3), state(0));
-  }
-
-  // --- The step ---
-
-  void predict(Coordinate& coordinate, Stages Past::*of, Stages& increments) {
-    typename Columns::History history;
-    for (std::size_t d = 0; d < pasts; ++d) history[d] = &(coordinate.past[(newest_ + d) % pasts].*of);
-    Stages advance;
-    columns_.extrapolate(history, advance, true);
-    detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { increments[j] = L(columns_.b(j)) * advance[j]; });
-  }
-
-  // Motion that goes on as at the start of the step. What a member was predicted from is not weighed any more; but zero
-  // times what is not finite would not be zero.
-  void start_cold(const Mask& cold) {
-    find_rates();
-    for (int k = 0; k < links(); ++k) {
-      Coordinate& coordinate = at(k);
-      const L v = L::load(state(1, k)), f = L::load(call(0, 3, k));
-      for (std::size_t j = 0; j < static_cast<std::size_t>(S); ++j) {
-        const L& hb = columns_.hb(static_cast<int>(j));
-        coordinate.moved[j] = select(cold, hb * v, coordinate.moved[j]);
-        coordinate.pushed[j] = select(cold, hb * f, coordinate.pushed[j]);
-      }
-      for (Past& past : coordinate.past) {
-        for (L& x : past.moved) x = select(cold, L(0.0), x);
-        for (L& x : past.pushed) x = select(cold, L(0.0), x);
-      }
-    }
-  }
-
-  // Nothing is compared with less than would show in the coordinates.
   void find_scale() {
     L step(0.0);
-    size_squared_ = L(0.0);
-    for (int k = 0; k < links(); ++k) {
-      const Coordinate& coordinate = at(k);
-      const L weight = inertia_.weight_squared(k), push_weight = columns_.h() * columns_.h() / weight;
-      for (std::size_t j = 0; j < static_cast<std::size_t>(S); ++j) {
-        step = fma(weight * coordinate.moved[j], coordinate.moved[j], step);
-        step = fma(push_weight * coordinate.pushed[j], coordinate.pushed[j], step);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const L& weight = masses_.inertia(k);
+      const L push_weight = columns_.h() * columns_.h() / weight;
+      for (int j = 0; j < S; ++j) {
+        const L &moved = U_[k][j], &pushed = U_[count_ + k][j];
+        step = fma(weight * moved, moved, step);
+        step = fma(push_weight * pushed, pushed, step);
       }
-      const L size = max(abs(coordinate.q.value), L(coordinate.is_angle ? 1.0 : 0.0));
-      size_squared_ = max(size_squared_, weight * (size * size));
     }
-    scale_ = max(step, L(invisible * invisible) * size_squared_);
+    scale_ = max(step, L(Base::invisible * Base::invisible) * size_squared_);
   }
 
   [[gnu::always_inline]] void find_stages() {
-    for (int k = 0; k < links(); ++k) place_stages(k);
+    for (std::size_t k = 0; k < count_; ++k) {
+      Base::place_stages(k, 0);
+      Base::place_stages(k, 1);
+    }
     for (int j = 0; j < S; ++j) {
-      dynamics_.hamiltonian_form(call(j, 4), call(j, 0), call(j, 1), call(j, 2), call(j, 3));
+      dynamics_.call(Base::call(j, 4), &SystemFunctions::hamiltonian_form, Base::call(j, 0), Base::call(j, 1),
+                     Base::call(j, 2), Base::call(j, 3));
     }
   }
 
-  [[gnu::always_inline]] void place_stages(int k) {
-    const Coordinate& coordinate = at(k);
-    Stages added;
-    columns_.integrate(coordinate.moved, coordinate.q.low, added);
-    detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { (coordinate.q.value + added[j]).store(call(j, 0, k)); });
-    columns_.integrate(coordinate.pushed, coordinate.p.low, added);
-    detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { (coordinate.p.value + added[j]).store(call(j, 1, k)); });
-  }
-
-  // Increments of coordinate k by what was found at the stages; what changed, squared.
-  [[gnu::always_inline]] L replace(int which, int k, const Mask& active, Stages& increments) {
+  // Increments of coordinate k, or of its momentum, by what was found at the stages; what changed, squared.
+  [[gnu::always_inline]] L replace(int which, std::size_t k, const Mask& active) {
+    auto& increments = U_[which == 2 ? k : count_ + k];
     L changed(0.0);
     detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT {
-      const L found = columns_.hb(j) * L::load(call(j, which, k)), change = found - increments[j];
+      const L found = columns_.hb(j) * L::load(Base::call(j, which, k)), change = found - increments[j];
       changed = fma(change, change, changed);
-      increments[j] = select(active, found, increments[j]);
+      increments.set(j, select(active, found, increments[j]));
     });
     return changed;
   }
 
-  // What loads bring in the step that was solved  [J].
-  L work() {
-    if (!xsimd::any(loaded())) return L(0.0);
-    L work(0.0);
-    const L inverse_h = L(1.0) / columns_.h();
-    for (int k = 0; k < links(); ++k) place_stages(k);
-    for (int j = 0; j < S; ++j) {
-      for (int k = 0; k < links(); ++k) {
-        const L rate = (inverse_h * L(columns_.inverse_b(j))) * at(k).moved[static_cast<std::size_t>(j)];
-        rate.store(call(j, 2, k));
-      }
-      dynamics_.powers(call(j, 4), call(j, 0), call(j, 2), state(3, 3));
-      work = fma(columns_.hb(j), L::load(state(3, 3)), work);
-    }
-    return select(loaded(), work, L(0.0));
-  }
+  // By loads, in the step that was solved  [J].
+  L brought() const { return any(loaded()) ? select(loaded(), Base::work(), L(0.0)) : L(0.0); }
 
-  LaneDynamics<L>& dynamics_;
-  int count_;
-  std::vector<Coordinate> coordinates_;
-  LaneInertia<L> inertia_;
-  PackRows<L::width> calls_, state_;
-  Columns columns_;
   bool may_miss_ = false;  // lengths are among the coordinates
-  std::size_t newest_ = 0;
-  L now_{0.0}, saved_time_{0.0};
-  L slowest_squared_{1.0}, natural_speed_squared_{0.0}, loaded_{0.0};
-  // Σ M_kk v_k², of all steps so far and of the stages.
-  L fastest_{0.0}, fastest_here_{0.0}, saved_fastest_{0.0};
-  L scale_{0.0}, size_squared_{0.0}, turn_{0.0}, pace_squared_{1.0};
+  L loaded_{0.0};
+  L scale_{0.0}, turn_{0.0};
   L energy_sum_{0.0}, kinetic_{0.0}, kinetic_before_{0.0}, brought_{0.0};
   [[no_unique_address]] std::conditional_t<with_tangent, LaneStageTangent<S, L>, NoTangent> tangent_;
 };

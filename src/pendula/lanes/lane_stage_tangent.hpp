@@ -42,8 +42,8 @@ class LaneStageTangent {
     }
   }
 
-  /// Predicts the stages of the step that `columns` are prepared for; those that start cold, from (q, q̇) at `times`.
-  void prepare(const StagePrediction<L>& from, const double* times, const double* q, const double* v) {
+  /// Predicts the stages of the step that `columns` are prepared for; those that start cold, from (q, q̇) at `time`.
+  void prepare(const StagePrediction<L>& from, const L& time, const double* q, const double* v) {
     for (Part& part : parts_) {
       typename Columns::History history;
       for (std::size_t d = 0; d < pasts; ++d) history[d] = &part.past[(newest_ + d) % pasts].sped;
@@ -51,7 +51,7 @@ class LaneStageTangent {
       columns_.extrapolate(history, advance, true);
       detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { part.sped[j] = L(columns_.b(j)) * advance[j]; });
     }
-    if (xsimd::any(from.cold)) start_cold(from.cold, times, q, v);
+    if (xsimd::any(from.cold)) start_cold(from.cold, time, q, v);
     find_scale();
   }
 
@@ -70,8 +70,8 @@ class LaneStageTangent {
         at(k).places[at_stage].store(numbers(0, k));
         at(k).rates[at_stage].store(numbers(1, k));
       }
-      dynamics_.variations(stage(j, 0), stage(j, 1), stage(j, 2), numbers(0, 0), numbers(1, 0), numbers(2, 0),
-                           numbers(3, 0));
+      dynamics_.call(stage(j, 0), &SystemFunctions::acceleration_along, stage(j, 1), stage(j, 2), numbers(0, 0),
+                     numbers(1, 0), numbers(2, 0), numbers(3, 0));
       for (int k = 0; k < count(); ++k) {
         L& held = at(k).sped[at_stage];
         const L found = columns_.hb(j) * L::load(numbers(3, k));
@@ -183,12 +183,13 @@ class LaneStageTangent {
     }
   }
 
-  void start_cold(const Mask& cold, const double* times, const double* q, const double* v) {
+  void start_cold(const Mask& cold, const L& time, const double* q, const double* v) {
     for (int k = 0; k < count(); ++k) {
       at(k).place.store(numbers(0, k));
       at(k).rate.store(numbers(1, k));
     }
-    dynamics_.variations(times, q, v, numbers(0, 0), numbers(1, 0), numbers(2, 0), numbers(3, 0));
+    dynamics_.here(time, &SystemFunctions::acceleration_along, q, v, numbers(0, 0), numbers(1, 0), numbers(2, 0),
+                   numbers(3, 0));
     for (int k = 0; k < count(); ++k) {
       Part& part = at(k);
       const L push = L::load(numbers(3, k));

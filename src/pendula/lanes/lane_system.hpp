@@ -80,7 +80,7 @@ class LaneSystem {
   L energy(const L& time, const Parts& parts) {
     write(time, parts);
     alignas(pack_alignment) double kinetic[width_of<L>], total[width_of<L>];
-    dynamics_.energies(times(), numbers(0, 0), numbers(1, 0), kinetic, total);
+    dynamics_.call(times(), &SystemFunctions::energies, numbers(0, 0), numbers(1, 0), kinetic, total);
     const L T = from_row<L>(kinetic), energy = from_row<L>(total);
     energy_sum_ = abs(T) + abs(energy - T);
     return energy;
@@ -194,7 +194,7 @@ class LaneSystem {
     for (int p = 0; p < count; ++p) {
       for (std::size_t i = 0; i < nodes; ++i) {
         to_row(fma(L(p + Gauss::c[i]), part, time), times());
-        dynamics_.accelerations(times(), numbers(0, 0), numbers(1, 0), numbers(2, 0));
+        dynamics_.call(times(), &SystemFunctions::acceleration, numbers(0, 0), numbers(1, 0), numbers(2, 0));
         const L weight = L(Gauss::b[i]) * part;
         for (std::size_t k = 0; k < sums.push.size(); ++k) {
           const L a = from_row<L>(numbers(2, static_cast<int>(k)));
@@ -262,10 +262,10 @@ class LaneSystem {
   void find_accelerations(const L& time, const Parts& parts) {
     write(time, parts);
     if constexpr (with_tangent) {
-      dynamics_.variations(times(), numbers(0, 0), numbers(1, 0), numbers(3, 0), numbers(4, 0), numbers(2, 0),
-                           numbers(5, 0));
+      dynamics_.call(times(), &SystemFunctions::acceleration_along, numbers(0, 0), numbers(1, 0), numbers(3, 0),
+                     numbers(4, 0), numbers(2, 0), numbers(5, 0));
     } else {
-      dynamics_.accelerations(times(), numbers(0, 0), numbers(1, 0), numbers(2, 0));
+      dynamics_.call(times(), &SystemFunctions::acceleration, numbers(0, 0), numbers(1, 0), numbers(2, 0));
     }
   }
   Number acceleration(int i) {

@@ -107,8 +107,8 @@ class LaneSystemTangent {
       L(tangent.place[k]).store(numbers(2, i));
       L(tangent.rate[k]).store(numbers(3, i));
     }
-    dynamics_.variations(times, numbers(0, 0), numbers(1, 0), numbers(2, 0), numbers(3, 0), numbers(4, 0),
-                         numbers(5, 0));
+    dynamics_.call(times, &SystemFunctions::acceleration_along, numbers(0, 0), numbers(1, 0), numbers(2, 0),
+                   numbers(3, 0), numbers(4, 0), numbers(5, 0));
     std::vector<double> found(tangent.rate.size());
     for (int i = 0; i < count(); ++i) found[static_cast<std::size_t>(i)] = numbers(5, i)[lane];
     return found;

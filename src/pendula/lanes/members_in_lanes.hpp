@@ -31,12 +31,16 @@ struct MembersInLanes {
     return x;
   }
   static const L& total(const L& sum) { return sum; }
+  static const Num& of_stage(const Num& cell, int /*stage*/) { return cell; }
+  static const Num& largest(const Num& cell, int /*stages*/) { return cell; }
 
   class Columns : public LaneColumns<S, L> {
     using Base = LaneColumns<S, L>;
 
    public:
-    explicit Columns(Family /*gauss*/ = Family::gauss) {}
+    explicit Columns(Family /*gauss*/ = Family::gauss, int /*stages*/ = S) {}
+    static constexpr int stages() { return S; }
+    static constexpr int deepest() { return Base::most_depth; }
 
     const Columns& at_hand() const { return *this; }  // more than registers hold
     L weight(int j) const { return L(Base::b(j)); }

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <cmath>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/numeric.hpp>
 
 namespace pendula::detail {
 
@@ -11,25 +11,30 @@ inline constexpr double full_turn = 6.283185307179586, full_turn_low = 2.4492935
 /// From where on an angle has full turns to be taken out, and how far a double tells where it is  [rad].
 inline constexpr double some_turns = 8, unknown_turns = 1e15;
 
-/// Takes full turns out of an angle that has some, and adds them to `turns`: of ten thousand turns a double has lost
-/// four digits of where it is within one.
-inline void take_out_turns(Compensated<double>& angle, double& turns) {
-  if (!(std::abs(angle.value) > some_turns) || std::abs(angle.value) > unknown_turns) return;
-  const double whole = std::nearbyint(angle.value / full_turn);
-  const Twofold<double> gone = exact_product(whole, full_turn);
-  const Twofold<double> rest = exact_sum(angle.value, -gone.value);
-  const Twofold<double> within =
-      exact_sum(rest.value, (rest.low - gone.low) + (angle.compensation - whole * full_turn_low));
-  angle = {within.value, within.low};
-  turns += whole;
+/// Takes full turns out of angles that have some, of those `among`, and adds them to `turns`: of ten thousand turns a
+/// double has lost four digits of where it is within one.
+template <class Num>
+void take_out_turns(Compensated<Num>& angle, Num& turns, const MaskOf<Num>& among) {
+  const Num size = abs(angle.value);
+  const MaskOf<Num> has_some = among & (size > Num(some_turns)) & (size <= Num(unknown_turns));
+  if (!any(has_some)) return;
+  const Num whole = floor(fma(angle.value, Num(1 / full_turn), Num(0.5)));
+  const Twofold<Num> gone = exact_product(whole, Num(full_turn));
+  const Twofold<Num> rest = exact_sum(angle.value, -gone.value);
+  const Twofold<Num> within =
+      exact_sum(rest.value, (rest.low - gone.low) + (angle.compensation - whole * Num(full_turn_low)));
+  angle.value = select(has_some, within.value, angle.value);
+  angle.compensation = select(has_some, within.low, angle.compensation);
+  turns = select(has_some, turns + whole, turns);
 }
 
 /// The angle with its turns.
-inline double with_turns(const Compensated<double>& angle, double turns) {
-  if (turns == 0) return angle.value;
-  const Twofold<double> gone = exact_product(turns, full_turn);
-  const Twofold<double> sum = exact_sum(gone.value, angle.value);
-  return sum.value + (sum.low + (gone.low + (turns * full_turn_low + angle.compensation)));
+template <class Num>
+Num with_turns(const Compensated<Num>& angle, const Num& turns) {
+  const Twofold<Num> gone = exact_product(turns, Num(full_turn));
+  const Twofold<Num> sum = exact_sum(gone.value, angle.value);
+  const Num all = sum.value + (sum.low + (gone.low + fma(turns, Num(full_turn_low), angle.compensation)));
+  return select(turns == Num(0.0), angle.value, all);
 }
 
 }  // namespace pendula::detail

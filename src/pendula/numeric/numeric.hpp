@@ -69,6 +69,7 @@ Real fma(const Real& a, const Real& b, const Real& c) {
 
 using std::abs;
 using std::exp;
+using std::floor;
 using std::log;
 using std::sqrt;
 
