@@ -7,7 +7,7 @@
 #include <ctime>
 #include <numbers>
 #include <pendula/chain/invariants.hpp>
-#include <pendula/lanes/lane_queue.hpp>
+#include <pendula/ensemble/member_queue.hpp>
 #include <random>
 #include <type_traits>
 #include <vector>
@@ -34,10 +34,10 @@ Chain<Planar, N> equal_chain(int links) {
 
 // At rest, from random angles.
 template <int N>
-std::vector<LaneMember<Planar, N>> members_of(int links, int count, double end, double widest = std::numbers::pi) {
+std::vector<QueueMember<Planar, N>> members_of(int links, int count, double end, double widest = std::numbers::pi) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> angle(-widest, widest);
-  std::vector<LaneMember<Planar, N>> members(static_cast<std::size_t>(count));
+  std::vector<QueueMember<Planar, N>> members(static_cast<std::size_t>(count));
   for (auto& member : members) {
     member.start = Motion(0, Eigen::VectorXd(links), Eigen::VectorXd::Zero(links));
     for (double& q : member.start.q) q = angle(random);
@@ -48,7 +48,7 @@ std::vector<LaneMember<Planar, N>> members_of(int links, int count, double end, 
 
 // Of nine runs, a member's, sorted.
 template <class Queue, class Members>
-std::vector<double> times_of(Queue& queue, const Members& members, std::vector<LaneEnd>& ends) {
+std::vector<double> times_of(Queue& queue, const Members& members, std::vector<MemberEnd>& ends) {
   std::vector<double> times;
   for (int run = 0; run < 9; ++run) {
     const double start = processor_time();
@@ -61,13 +61,13 @@ std::vector<double> times_of(Queue& queue, const Members& members, std::vector<L
 
 // Medians over runs; energy errors are of one more run, relative to Σ M g l.
 template <class Queue, int N>
-void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<LaneMember<Planar, N>>& members,
-             LaneOptions options) {
-  std::vector<LaneEnd> ends(members.size());
+void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<QueueMember<Planar, N>>& members,
+             QueueOptions options) {
+  std::vector<MemberEnd> ends(members.size());
   Queue queue(chain, options);
   const std::vector<double> times = times_of(queue, members, ends);
   double steps = 0, failed = 0;
-  for (const LaneEnd& end : ends) {
+  for (const MemberEnd& end : ends) {
     steps += static_cast<double>(end.steps);
     failed += end.status == Status::ok ? 0 : 1;
   }
@@ -75,7 +75,7 @@ void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<
   Queue watching(chain, options);
   watching.run(members, ends);
   double energy = 0;
-  for (const LaneEnd& end : ends) energy = std::max(energy, end.energy_error / energy_scale(chain));
+  for (const MemberEnd& end : ends) energy = std::max(energy, end.energy_error / energy_scale(chain));
   const auto count = static_cast<double>(members.size());
   std::printf("%-34s %8.2f us a member (best %8.2f), %7.0f steps, %9.3g member-steps/s, energy %.1e, failed %.0f", what,
               times[4] * 1e6, times[0] * 1e6, steps / count, steps / (times[4] * count), energy, failed);
@@ -91,8 +91,8 @@ void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<
 // --- Against heyoka ---
 
 // At rest, from angles that fill the square evenly.
-std::vector<LaneMember<Planar, 2>> spread_members(int count) {
-  std::vector<LaneMember<Planar, 2>> members(static_cast<std::size_t>(count));
+std::vector<QueueMember<Planar, 2>> spread_members(int count) {
+  std::vector<QueueMember<Planar, 2>> members(static_cast<std::size_t>(count));
   const auto angle = [](double x) { return (2 * (x - std::floor(x)) - 1) * std::numbers::pi; };
   for (int k = 0; k < count; ++k) {
     auto& member = members[static_cast<std::size_t>(k)];
@@ -103,7 +103,7 @@ std::vector<LaneMember<Planar, 2>> spread_members(int count) {
   return members;
 }
 
-void write(const char* file, const std::vector<LaneMember<Planar, 2>>& members, const std::vector<LaneEnd>& ends) {
+void write(const char* file, const std::vector<QueueMember<Planar, 2>>& members, const std::vector<MemberEnd>& ends) {
   std::FILE* const out = std::fopen(file, "w");
   if (out == nullptr) return std::perror(file);
   for (std::size_t k = 0; k < members.size(); ++k) {
@@ -116,7 +116,7 @@ void write(const char* file, const std::vector<LaneMember<Planar, 2>>& members, 
 }
 
 // The error that half of the members have at most: distance in angles and rates from the reference.
-double median_error(const std::vector<LaneEnd>& ends, const std::vector<LaneEnd>& reference) {
+double median_error(const std::vector<MemberEnd>& ends, const std::vector<MemberEnd>& reference) {
   std::vector<double> errors;
   for (std::size_t k = 0; k < ends.size(); ++k) {
     const Motion &a = ends[k].motion, &b = reference[k].motion;
@@ -127,9 +127,9 @@ double median_error(const std::vector<LaneEnd>& ends, const std::vector<LaneEnd>
 }
 
 template <class Queue>
-void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<LaneMember<Planar, 2>>& members,
-          const std::vector<LaneEnd>& reference, const LaneOptions& options) {
-  std::vector<LaneEnd> ends(members.size());
+void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<QueueMember<Planar, 2>>& members,
+          const std::vector<MemberEnd>& reference, const QueueOptions& options) {
+  std::vector<MemberEnd> ends(members.size());
   Queue queue(chain, options);
   const std::vector<double> times = times_of(queue, members, ends);
   std::printf("%-10s %s %-6.0e %7.2f us a member (best %7.2f), error %.1e\n", what,
@@ -140,10 +140,10 @@ void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<Lan
 void race_all(const char* file) {
   const auto chain = equal_chain<2>(2);
   const auto members = spread_members(1024);
-  std::vector<LaneEnd> reference(members.size());
+  std::vector<MemberEnd> reference(members.size());
   GaussLanes<Planar, 8, 2>(chain, {.step = 1.0 / 512}).run(members, reference);
   write(file, members, reference);
-  const auto go = [&](auto queue, const char* what, const LaneOptions& options) {
+  const auto go = [&](auto queue, const char* what, const QueueOptions& options) {
     race<typename decltype(queue)::type>(what, chain, members, reference, options);
   };
   for (const double tolerance : {1e-5, 1e-6, 1e-7}) {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 #include <pendula/chain/invariants.hpp>
-#include <pendula/lanes/lane_queue.hpp>
+#include <pendula/ensemble/member_queue.hpp>
 #include <pendula/run/integrator.hpp>
 #include <random>
 #include <type_traits>
@@ -42,9 +42,9 @@ Chain<Space> of_any_size(const Chain<Space, N>& chain) {
 }
 
 template <class Space, int N>
-std::vector<LaneMember<Space, N>> drawn_members(std::mt19937& random, int links, std::size_t count, double end) {
+std::vector<QueueMember<Space, N>> drawn_members(std::mt19937& random, int links, std::size_t count, double end) {
   std::uniform_real_distribution<double> angle(-3, 3), rate(-2, 2);
-  std::vector<LaneMember<Space, N>> members(count);
+  std::vector<QueueMember<Space, N>> members(count);
   for (auto& member : members) {
     member.start = Motion(0, Eigen::VectorXd(Space::dof * links), Eigen::VectorXd(Space::dof * links));
     for (double& q : member.start.q) q = angle(random);
@@ -55,9 +55,9 @@ std::vector<LaneMember<Space, N>> drawn_members(std::mt19937& random, int links,
 }
 
 template <class Queue, class Space, int N>
-std::vector<LaneEnd> ends_of(const Chain<Space, N>& chain, const std::vector<LaneMember<Space, N>>& members,
-                             const LaneOptions& options) {
-  std::vector<LaneEnd> ends(members.size());
+std::vector<MemberEnd> ends_of(const Chain<Space, N>& chain, const std::vector<QueueMember<Space, N>>& members,
+                               const QueueOptions& options) {
+  std::vector<MemberEnd> ends(members.size());
   Queue queue(chain, options);
   queue.run(members, ends);
   return ends;
@@ -76,7 +76,7 @@ Motion scalar_end(const Chain<Space>& chain, const Motion& start, double end, co
   return integrator->state();
 }
 
-bool same_bits(const LaneEnd& a, const LaneEnd& b) {
+bool same_bits(const MemberEnd& a, const MemberEnd& b) {
   const auto bytes = sizeof(double) * static_cast<std::size_t>(a.motion.q.size());
   return a.status == b.status && a.steps == b.steps && a.motion.q.size() == b.motion.q.size() &&
          std::memcmp(a.motion.q.data(), b.motion.q.data(), bytes) == 0 &&
@@ -147,14 +147,14 @@ TYPED_TEST(EnsembleLanes, ChosenStepsAreThoseOfTheScalarController) {
 // A member alone, among others, elsewhere in the queue, beside one that fails: the same bits.
 TYPED_TEST(EnsembleLanes, AMemberDependsOnItselfAlone) {
   using Space = typename TypeParam::Space;
-  using Member = LaneMember<Space, TypeParam::known>;
+  using Member = QueueMember<Space, TypeParam::known>;
   using Queue = typename TypeParam::Queue;
   std::mt19937 random(3);
   const auto chain = drawn_chain<Space, TypeParam::known>(random, TypeParam::links);
   std::vector<Member> members = drawn_members<Space, TypeParam::known>(random, TypeParam::links, 29, 0.3);
   for (std::size_t k = 0; k < members.size(); ++k) members[k].end = 0.05 * static_cast<double>(1 + k % 7);
   for (const double step : {0.0, 2e-3}) {
-    const LaneOptions options{.step = step, .tolerance = 1e-7};
+    const QueueOptions options{.step = step, .tolerance = 1e-7};
     const auto ends = ends_of<Queue>(chain, members, options);
     std::vector<std::size_t> order(members.size());
     std::iota(order.begin(), order.end(), 0);
@@ -183,7 +183,7 @@ TYPED_TEST(EnsembleLanes, AReversedMemberReturns) {
   std::mt19937 random(4);
   const auto chain = drawn_chain<Space, TypeParam::known>(random, TypeParam::links);
   auto members = drawn_members<Space, TypeParam::known>(random, TypeParam::links, 9, 0.5);
-  const LaneOptions options{.step = 0.5 / 256};
+  const QueueOptions options{.step = 0.5 / 256};
   const auto ends = ends_of<typename TypeParam::Queue>(chain, members, options);
   auto back = members;
   for (std::size_t k = 0; k < back.size(); ++k) back[k].start = Motion(0, ends[k].motion.q, -ends[k].motion.v);
@@ -229,8 +229,8 @@ TEST(EnsembleLanesTest, AnglesAreContinued) {
 }
 
 template <class Queue>
-double error_at(double h, const Chain<Planar, 2>& chain, const std::vector<LaneMember<Planar, 2>>& members,
-                const std::vector<LaneEnd>& reference) {
+double error_at(double h, const Chain<Planar, 2>& chain, const std::vector<QueueMember<Planar, 2>>& members,
+                const std::vector<MemberEnd>& reference) {
   const auto ends = ends_of<Queue>(chain, members, {.step = h});
   double error = 0;
   for (std::size_t k = 0; k < ends.size(); ++k) {
@@ -271,12 +271,12 @@ TEST(EnsembleLanesTest, EnergyStaysToTheLastDigits) {
   const auto chain = drawn_chain<Planar, 2>(random, 2);
   const auto members = drawn_members<Planar, 2>(random, 2, 8, 100);
   const auto ends = ends_of<GaussLanes<Planar, 8, 2>>(chain, members, {.step = 1.0 / 200, .energy_every = 1});
-  for (const LaneEnd& end : ends) EXPECT_LT(end.energy_error / energy_scale(chain), 4e-15);  // measured 1e-15
+  for (const MemberEnd& end : ends) EXPECT_LT(end.energy_error / energy_scale(chain), 4e-15);  // measured 1e-15
 }
 
 // By few stages, stages are predicted from the steps that there were: from a cold start on, each more of them helps.
 TEST(EnsembleLanesTest, EveryStepOfOneSizeHelpsThePrediction) {
-  using Stepper = LaneStepper<LaneChain<Planar, 2>>;
+  using Stepper = MembersStepper<ChainMembers<Planar, 2>>;
   using L = Stepper::L;
   std::mt19937 random(2);
   const Chain<Planar> chain = drawn_chain<Planar>(random, 3);
@@ -323,13 +323,13 @@ TEST(EnsembleLanesTest, WidthsAgree) {
 }
 
 template <class Space>
-using WithTangent = LaneRods<Space, 3, LanePack<MemberRegister>, true>;
+using WithTangent = ChainAccelerations<Space, 3, LanePack<MemberRegister>, true>;
 
 // Rods of members that have started, moved along their tangents.
 template <class Space>
 auto moved_rods(const typename WithTangent<Space>::Parts& rods, double by) {
   using L = typename WithTangent<Space>::L;
-  typename LaneRods<Space, 3>::Parts moved(3);
+  typename ChainAccelerations<Space, 3>::Parts moved(3);
   for (int i = 0; i < 3; ++i) {
     for (std::size_t k = 0; k < WithTangent<Space>::D; ++k) {
       moved[i].place[k] = rods[i].place[k].value + L(by) * rods[i].place[k].slope;
@@ -346,10 +346,10 @@ void expect_derivatives() {
   const auto member = drawn_members<Space, 3>(random, 3, 1, 1)[0];
   WithTangent<Space> rods_with(3);
   typename WithTangent<Space>::Parts rods(3), found(3), restored(3);
-  LaneRods<Space, 3> plain(3);
-  typename LaneRods<Space, 3>::Parts unused(3);
+  ChainAccelerations<Space, 3> plain(3);
+  typename ChainAccelerations<Space, 3>::Parts unused(3);
   for (int i = 0; i < 3; ++i) rods[i] = WithTangent<Space>::resting();
-  for (int i = 0; i < 3; ++i) unused[i] = LaneRods<Space, 3>::resting();
+  for (int i = 0; i < 3; ++i) unused[i] = ChainAccelerations<Space, 3>::resting();
   const ChainLinks<Space, 3, double> links(chain);
   for (int lane = 0; lane < LanePack<MemberRegister>::size; ++lane) {
     rods_with.start(lane, 0, chain, links, member.start.q.data(), member.start.v.data(), rods);
@@ -361,7 +361,7 @@ void expect_derivatives() {
   rods_with.restore(restored);
   const double by = 1e-6;
   auto ahead = moved_rods<Space>(rods, by), behind = moved_rods<Space>(rods, -by);
-  typename LaneRods<Space, 3>::Parts slopes_ahead(3), slopes_behind(3);
+  typename ChainAccelerations<Space, 3>::Parts slopes_ahead(3), slopes_behind(3);
   plain.slopes({}, ahead, slopes_ahead);
   plain.slopes({}, behind, slopes_behind);
   plain.restore(ahead);
@@ -389,9 +389,9 @@ TEST(EnsembleLanesTest, TangentsChangeNothing) {
   std::mt19937 random(13);
   const auto chain = drawn_chain<Spatial, 2>(random, 2);
   const auto members = drawn_members<Spatial, 2>(random, 2, 19, 2);
-  const LaneOptions options{.tolerance = 1e-8};
+  const QueueOptions options{.tolerance = 1e-8};
   const auto expected = ends_of<ExplicitLanes<Spatial, DormandPrince5, 2>>(chain, members, options);
-  std::vector<LaneEnd> ends(members.size());
+  std::vector<MemberEnd> ends(members.size());
   TangentLanes<Spatial, DormandPrince5, 2> queue(chain, options);
   test::Growths all(members.size());
   queue.set_watch(all);
@@ -411,7 +411,7 @@ TEST(EnsembleLanesTest, MembersThatDoNotFitAreRefused) {
   std::mt19937 random(11);
   const auto chain = drawn_chain<Planar>(random, 3);
   auto members = drawn_members<Planar, any>(random, 2, 1, 1);
-  std::vector<LaneEnd> ends(1);
+  std::vector<MemberEnd> ends(1);
   GaussLanes<Planar, 1> queue(chain, {.step = 1e-3});
   EXPECT_THROW(queue.run(members, ends), std::invalid_argument);
   EXPECT_THROW(queue.run({}, ends), std::invalid_argument);

@@ -8,11 +8,11 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
+#include <pendula/ensemble/member_queue.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/stepper.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/kernels/swinging_atwood.hpp>
-#include <pendula/lanes/lane_queue.hpp>
 #include <pendula/system/kernel_table.hpp>
 #include <type_traits>
 #include <vector>
@@ -25,12 +25,12 @@ namespace {
 
 using Kernel = kernels::Planar2;
 using Atwood = kernels::SwingingAtwood;
-using Members = std::vector<LaneSystemMember>;
+using Members = std::vector<QueueSystemMember>;
 
 template <class System, int S = 4, class Register = MemberRegister>
-std::vector<LaneEnd> ends_of(const Members& members, const LaneOptions& options) {
-  LaneDynamics<LanePack<Register>> dynamics(system_table<System>);
-  std::vector<LaneEnd> ends(members.size());
+std::vector<MemberEnd> ends_of(const Members& members, const QueueOptions& options) {
+  MemberSystems<LanePack<Register>> dynamics(system_table<System>);
+  std::vector<MemberEnd> ends(members.size());
   GaussSystemLanes<S, Register> queue(dynamics, options);
   queue.run(members, ends);
   return ends;
@@ -42,7 +42,7 @@ double distance(const Motion& a, const Motion& b) {
 
 /// By the scalar stepper; a step of 0: by the tolerance.
 template <class System>
-Motion alone(const LaneSystemMember& member, int stages, double step, double tolerance = 0) {
+Motion alone(const QueueSystemMember& member, int stages, double step, double tolerance = 0) {
   GaussStepper<LagrangianSolver<>> stepper(SystemModel(system_table<System>, member.system), stages,
                                            {.tolerance = tolerance}, Iteration::fixed_point);
   EXPECT_TRUE(stepper.start(member.start));
@@ -75,8 +75,8 @@ struct Machines {
 };
 
 template <class System, int S>
-double largest_distance(const Members& members, const LaneOptions& options, double tolerance = 0) {
-  const std::vector<LaneEnd> ends = ends_of<System, S>(members, options);
+double largest_distance(const Members& members, const QueueOptions& options, double tolerance = 0) {
+  const std::vector<MemberEnd> ends = ends_of<System, S>(members, options);
   double largest = 0;
   for (std::size_t k = 0; k < ends.size(); ++k) {
     EXPECT_EQ(ends[k].status, Status::ok) << k;
@@ -91,7 +91,7 @@ class SystemGaussLanesTest : public testing::TestWithParam<bool> {};
 // Largest differences seen: 5e-15, 4e-15, 1.4e-14.
 TEST_P(SystemGaussLanesTest, StepsOfOneSizeAreThoseOfTheScalarStepper) {
   const ChainSystems systems(19, GetParam(), 1.2501);
-  const LaneOptions options{.step = 0.004};
+  const QueueOptions options{.step = 0.004};
   EXPECT_LT((largest_distance<Kernel, 2>(systems.members, options)), 1e-13);
   EXPECT_LT((largest_distance<Kernel, 4>(systems.members, options)), 1e-13);
   EXPECT_LT((largest_distance<Kernel, 8>(systems.members, options)), 1e-13);
@@ -110,10 +110,10 @@ TEST_P(SystemGaussLanesTest, MembersKeepTheirTolerance) {
 TEST_P(SystemGaussLanesTest, AMemberDependsOnItselfAlone) {
   ChainSystems systems(23, GetParam(), 1);
   systems.members[4].start.q[0] += 2e6 * std::numbers::pi;
-  for (const LaneOptions& options : {LaneOptions{.tolerance = 1e-8, .energy_every = 3}, LaneOptions{.step = 0.02}}) {
-    const std::vector<LaneEnd> together = ends_of<Kernel, 6>(systems.members, options);
+  for (const QueueOptions& options : {QueueOptions{.tolerance = 1e-8, .energy_every = 3}, QueueOptions{.step = 0.02}}) {
+    const std::vector<MemberEnd> together = ends_of<Kernel, 6>(systems.members, options);
     for (std::size_t k = 0; k < together.size(); ++k) {
-      const LaneEnd one = ends_of<Kernel, 6>({systems.members[k]}, options)[0];
+      const MemberEnd one = ends_of<Kernel, 6>({systems.members[k]}, options)[0];
       EXPECT_EQ(one.status, together[k].status) << k;
       EXPECT_EQ(one.motion.q, together[k].motion.q) << k;
       EXPECT_EQ(one.motion.v, together[k].motion.v) << k;
@@ -127,9 +127,9 @@ TEST_P(SystemGaussLanesTest, AMemberDependsOnItselfAlone) {
 // Registers of two numbers, as of all: to the last bit.
 TEST_P(SystemGaussLanesTest, WidthsAgree) {
   const ChainSystems systems(13, GetParam(), 1);
-  const LaneOptions options{.tolerance = 1e-8, .energy_every = 1};
-  const std::vector<LaneEnd> wide = ends_of<Kernel, 4>(systems.members, options);
-  const std::vector<LaneEnd> narrow = ends_of<Kernel, 4, RegisterFor<2>>(systems.members, options);
+  const QueueOptions options{.tolerance = 1e-8, .energy_every = 1};
+  const std::vector<MemberEnd> wide = ends_of<Kernel, 4>(systems.members, options);
+  const std::vector<MemberEnd> narrow = ends_of<Kernel, 4, RegisterFor<2>>(systems.members, options);
   for (std::size_t k = 0; k < wide.size(); ++k) {
     EXPECT_EQ(wide[k].motion.q, narrow[k].motion.q) << k;
     EXPECT_EQ(wide[k].motion.v, narrow[k].motion.v) << k;
@@ -158,7 +158,7 @@ TEST(SystemGaussLanes, MachinesKeepTheirTolerance) {
 TEST(SystemGaussLanes, HaveTheirOrder) {
   const Machines machines(8, 0.64, false);
   const auto error = [&]<int S>(std::integral_constant<int, S>, double step) {
-    const std::vector<LaneEnd> ends = ends_of<Atwood, S>(machines.members, {.step = step});
+    const std::vector<MemberEnd> ends = ends_of<Atwood, S>(machines.members, {.step = step});
     double sum = 0;
     for (std::size_t k = 0; k < ends.size(); ++k) {
       sum += distance(ends[k].motion, alone<Atwood>(machines.members[k], 8, 0, 1e-15));
@@ -174,19 +174,19 @@ TEST(SystemGaussLanes, HaveTheirOrder) {
 
 /// What tangents of members have grown by at their ends.
 template <class Queue, class System>
-std::vector<double> growths_of(const Members& members, const LaneOptions& options) {
-  LaneDynamics<typename Queue::L> dynamics(system_table<System>);
-  std::vector<LaneEnd> ends(members.size());
+std::vector<double> growths_of(const Members& members, const QueueOptions& options) {
+  MemberSystems<typename Queue::L> dynamics(system_table<System>);
+  std::vector<MemberEnd> ends(members.size());
   Growths growths(members.size());
   Queue queue(dynamics, options);
   queue.set_watch(growths);
   queue.run(members, ends);
-  for (const LaneEnd& end : ends) EXPECT_EQ(end.status, Status::ok);
+  for (const MemberEnd& end : ends) EXPECT_EQ(end.status, Status::ok);
   return growths.grown;
 }
 
 template <class System>
-double largest_growth_distance(const Members& members, const LaneOptions& options) {
+double largest_growth_distance(const Members& members, const QueueOptions& options) {
   const auto expected = growths_of<SystemTangentLanes<DormandPrince5>, System>(members, {.tolerance = 1e-12});
   const auto found = growths_of<GaussSystemTangentLanes<4>, System>(members, options);
   double largest = 0;
@@ -211,17 +211,17 @@ TEST(SystemGaussLanes, TangentsGrowAsThoseOfExplicitSteps) {
 
 // Over a thousand swings, by steps of one size and chosen ones: errors that do not grow.
 TEST(SystemGaussLanes, EnergyStaysWhatItIs) {
-  const auto error = [](double end, const LaneOptions& options) {
+  const auto error = [](double end, const QueueOptions& options) {
     const Machines machines(16, end);
     std::vector<double> errors;
-    for (const LaneEnd& reached : ends_of<Atwood, 2>(machines.members, options)) {
+    for (const MemberEnd& reached : ends_of<Atwood, 2>(machines.members, options)) {
       EXPECT_EQ(reached.status, Status::ok);
       errors.push_back(reached.energy_error / reached.energy_sum);
     }
     return *std::max_element(errors.begin(), errors.end());
   };
-  for (const LaneOptions& options :
-       {LaneOptions{.step = 0.01, .energy_every = 1}, LaneOptions{.tolerance = 1e-5, .energy_every = 1}}) {
+  for (const QueueOptions& options :
+       {QueueOptions{.step = 0.01, .energy_every = 1}, QueueOptions{.tolerance = 1e-5, .energy_every = 1}}) {
     const double early = error(50, options), late = error(1000, options);
     EXPECT_LT(early, 1e-5);        // seen: 1.1e-7, 2.0e-6
     EXPECT_LT(late, 1.5 * early);  // 1.01, 1.09 times
@@ -230,8 +230,8 @@ TEST(SystemGaussLanes, EnergyStaysWhatItIs) {
 
 TEST(SystemGaussLanes, FullTurnsAreCounted) {
   ChainSystems systems(9, false, 3);
-  for (LaneSystemMember& member : systems.members) member.start.v = Eigen::Vector2d(30, 31);
-  const LaneOptions options{.step = 0.002};
+  for (QueueSystemMember& member : systems.members) member.start.v = Eigen::Vector2d(30, 31);
+  const QueueOptions options{.step = 0.002};
   EXPECT_GT((ends_of<Kernel, 6>(systems.members, options)[0].motion.q[0]), 50);
   EXPECT_LT((largest_distance<Kernel, 6>(systems.members, options)), 5e-11);  // 7.6e-12, of 16 turns
 }
@@ -239,11 +239,11 @@ TEST(SystemGaussLanes, FullTurnsAreCounted) {
 // One that is no number, and one whose steps are too long for a fixed point.
 TEST(SystemGaussLanes, AMemberThatFailsStopsNobodyElse) {
   ChainSystems systems(11, false, 1);
-  const LaneOptions options{.step = 0.05};
-  const std::vector<LaneEnd> expected = ends_of<Kernel, 4>(systems.members, options);
+  const QueueOptions options{.step = 0.05};
+  const std::vector<MemberEnd> expected = ends_of<Kernel, 4>(systems.members, options);
   systems.members[2].start.v[1] = std::numeric_limits<double>::quiet_NaN();
   systems.members[6].start.v[0] = 300;
-  const std::vector<LaneEnd> found = ends_of<Kernel, 4>(systems.members, options);
+  const std::vector<MemberEnd> found = ends_of<Kernel, 4>(systems.members, options);
   for (std::size_t k = 0; k < found.size(); ++k) {
     EXPECT_EQ(found[k].status == expected[k].status, k != 2 && k != 6) << k;
     if (k != 2 && k != 6) {

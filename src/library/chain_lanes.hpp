@@ -1,7 +1,7 @@
 #pragma once
 
 #include <pendula/chain/space.hpp>
-#include <pendula/lanes/plain_lanes.hpp>
+#include <pendula/run/plain_members.hpp>
 
 namespace pendula {
 

@@ -1,9 +1,9 @@
+#include <pendula/explicit/chain_accelerations.hpp>
 #include <pendula/explicit/chain_forward_dynamics.hpp>
 #include <pendula/explicit/explicit_chain.hpp>
+#include <pendula/explicit/explicit_steps.hpp>
 #include <pendula/explicit/extrapolation_integrator.hpp>
 #include <pendula/explicit/single_integrator.hpp>
-#include <pendula/lanes/lane_explicit.hpp>
-#include <pendula/lanes/lane_rods.hpp>
 
 #include "library/explicit_methods.hpp"
 
@@ -17,7 +17,7 @@ struct Make {
 
   template <class Method>
   std::unique_ptr<PlainIntegrator> of() const {
-    using Steps = LaneExplicit<LaneRods<Space, Eigen::Dynamic, double>, Method>;
+    using Steps = ExplicitSteps<ChainAccelerations<Space, Eigen::Dynamic, double>, Method>;
     return std::make_unique<SingleIntegrator<Steps, ExplicitChain<Space>>>(ExplicitChain<Space>(chain),
                                                                            options.tolerance);
   }

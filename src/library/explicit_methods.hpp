@@ -2,7 +2,7 @@
 
 #include <memory>
 #include <pendula/chain/chain.hpp>
-#include <pendula/lanes/explicit_tableau.hpp>
+#include <pendula/explicit/explicit_tableau.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
 #include <pendula/system/plain_system.hpp>

@@ -1,10 +1,10 @@
+#include <pendula/explicit/explicit_steps.hpp>
 #include <pendula/explicit/explicit_system.hpp>
 #include <pendula/explicit/extrapolation_integrator.hpp>
 #include <pendula/explicit/single_integrator.hpp>
+#include <pendula/explicit/system_accelerations.hpp>
 #include <pendula/explicit/system_forward_dynamics.hpp>
-#include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_explicit.hpp>
-#include <pendula/lanes/lane_system.hpp>
+#include <pendula/system/member_systems.hpp>
 
 #include "library/explicit_methods.hpp"
 
@@ -18,8 +18,8 @@ struct Make {
 
   template <class Method>
   std::unique_ptr<PlainIntegrator> of() const {
-    using Steps = LaneExplicit<LaneSystem<double>, Method>;
-    using Subject = ExplicitSystem<LaneDynamics<double>, Method>;
+    using Steps = ExplicitSteps<SystemAccelerations<double>, Method>;
+    using Subject = ExplicitSystem<MemberSystems<double>, Method>;
     return std::make_unique<SingleIntegrator<Steps, Subject>>(Subject(table, plain, options.tolerance),
                                                               options.tolerance);
   }

@@ -2,8 +2,8 @@
 
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/lanes/lane_queue.hpp>
-#include <pendula/lanes/plain_queue.hpp>
+#include <pendula/ensemble/member_queue.hpp>
+#include <pendula/ensemble/plain_queue.hpp>
 #include <vector>
 
 #include "library/chain_lanes.hpp"
@@ -12,8 +12,8 @@ namespace pendula {
 
 /// Members and their chains, which they point to.
 template <class Space, int N>
-struct ChainMembers {
-  explicit ChainMembers(std::span<const PlainMember> members) {
+struct GivenMembers {
+  explicit GivenMembers(std::span<const PlainMember> members) {
     chains.reserve(members.size());  // so that pointers to them stay
     starts.reserve(members.size());
     for (const PlainMember& member : members) {
@@ -26,21 +26,21 @@ struct ChainMembers {
   }
 
   std::vector<Chain<Space, N>> chains;
-  std::vector<LaneMember<Space, N>> starts;
+  std::vector<QueueMember<Space, N>> starts;
 };
 
 template <class Space, class Queue>
 bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
-                  std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+                  std::span<PlainMemberEnd> ends, MemberWatch& watch) {
   if (members.empty()) return true;
-  const ChainMembers<Space, Queue::Member::links_known> given(members);
+  const GivenMembers<Space, Queue::Member::links_known> given(members);
   return detail::move_plainly<Queue>(given.chains.front(), options, every, given.starts, ends, watch);
 }
 
 /// Series of short chains are summed up in registers.
 template <class Space>
 bool move_by_series(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
-                    std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+                    std::span<PlainMemberEnd> ends, MemberWatch& watch) {
   [[maybe_unused]] const int links = members.empty() ? 0 : members[0].chain.links;
 #ifndef PENDULA_FEW_LANES
   if (links == 1) return move_members<Space, TaylorLanes<Space, 1>>(options, every, members, ends, watch);

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <pendula/lanes/lane_queue.hpp>
-#include <pendula/lanes/plain_queue.hpp>
+#include <pendula/ensemble/member_queue.hpp>
+#include <pendula/ensemble/plain_queue.hpp>
 #include <vector>
 
 #include "library/system_lanes.hpp"
@@ -11,12 +11,12 @@ namespace pendula {
 
 template <class Queue>
 bool move_systems(const SystemTable& table, const RunOptions& options, std::int64_t every,
-                  std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends, LaneWatch& watch) {
-  LaneDynamics<typename Queue::L> dynamics(table);
+                  std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends, MemberWatch& watch) {
+  MemberSystems<typename Queue::L> dynamics(table);
   const auto numbers = [&](const double* from) {
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(from, dynamics.coordinates()));
   };
-  std::vector<LaneSystemMember> starts;
+  std::vector<QueueSystemMember> starts;
   starts.reserve(members.size());
   for (const PlainSystemMember& member : members) {
     starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, member.system});

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <pendula/lanes/plain_lanes.hpp>
+#include <pendula/run/plain_members.hpp>
 
 namespace pendula {
 

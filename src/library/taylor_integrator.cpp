@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
-#include <pendula/lanes/lane_taylor.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/taylor/taylor_steps.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -19,8 +19,8 @@ namespace {
 /// One chain in the first lane of the least register: steps are those of an ensemble's member.
 template <class Space>
 class TaylorIntegrator : public PlainIntegrator {
-  using Rods = LaneRods<Space, Eigen::Dynamic, LanePack<RegisterFor<2>>>;
-  using Stepper = LaneTaylor<Rods>;
+  using Rods = ChainAccelerations<Space, Eigen::Dynamic, LanePack<RegisterFor<2>>>;
+  using Stepper = TaylorSteps<Rods>;
   using L = typename Stepper::L;
   using Direction = typename Space::Link::template Cartesian<double>;
 
@@ -44,7 +44,7 @@ class TaylorIntegrator : public PlainIntegrator {
     return outcome(Status::not_finite, 0);
   }
 
-  // As LaneQueue takes a member's.
+  // As MemberQueue takes a member's.
   Outcome step(double h) override {
     double wanted = std::min(longest_, stepper_.expand()[lane]);
     for (int attempt = 0; attempt < most_attempts; ++attempt) {

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/lanes/lane_system_seats.hpp>
+#include <pendula/ensemble/system_seats.hpp>
 #include <vector>
 
 #include "support/random_chain.hpp"
@@ -47,7 +47,7 @@ struct ChainSystems {
   std::vector<Chain<Planar>> chains;
   std::vector<std::vector<PlainChain::Drive>> drives;
   std::vector<ChainSystem> numbers;
-  std::vector<LaneSystemMember> members;
+  std::vector<QueueSystemMember> members;
 };
 
 }  // namespace pendula::test

@@ -52,7 +52,7 @@ class LaneExponent {
 
 /// The exponents of members that are moved in lanes, with one tangent each. `Members` is PlainChains or PlainSystems.
 template <class Members>
-class LaneExponents : private LaneWatch {
+class LaneExponents : private MemberWatch {
  public:
   /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they would be run alone.
   LaneExponents(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop)
@@ -86,7 +86,7 @@ class LaneExponents : private LaneWatch {
   bool wants_steps() const override { return true; }
   bool stops() override { return stop_(); }
 
-  void after_step(LaneSteps& steps) override {
+  void after_step(MemberSteps& steps) override {
     for (int lane = 0; lane < steps.lanes(); ++lane) {
       if (!steps.took_step(lane)) continue;
       const std::size_t k = steps.member(lane);

@@ -75,10 +75,10 @@ class PlainChains : public PlainEnds {
   }
 
   /// False where `watch` made it leave off.
-  bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
+  bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
     return library_of<Space>().lanes(options)(options, every, members_, ends(), watch);
   }
-  bool move_with_tangents(const RunOptions& options, LaneWatch& watch) {
+  bool move_with_tangents(const RunOptions& options, MemberWatch& watch) {
     return library_of<Space>().tangent_lanes(options)(options, 0, members_, ends(), watch);
   }
 
@@ -104,10 +104,10 @@ class PlainSystems : public PlainEnds {
     }
   }
 
-  bool move(const RunOptions& options, std::int64_t every, LaneWatch& watch) {
+  bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
     return library().system_lanes(options)(table_, options, every, members_, ends(), watch);
   }
-  bool move_with_tangents(const RunOptions& options, LaneWatch& watch) {
+  bool move_with_tangents(const RunOptions& options, MemberWatch& watch) {
     return library().system_tangent_lanes(options)(table_, options, 0, members_, ends(), watch);
   }
 
@@ -129,7 +129,7 @@ class PlainSystems : public PlainEnds {
 
 /// Runs of one kind, in lanes. `Members` is PlainChains or PlainSystems.
 template <class Members>
-class LaneRuns : private LaneWatch {
+class LaneRuns : private MemberWatch {
  public:
   /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they are run alone. So
   /// must `tracks`, one for each or null, that go along with them.
@@ -241,7 +241,7 @@ class LaneRuns : private LaneWatch {
   /// The last step of the member in a lane, as an EventWatch looks into it.
   class Step {
    public:
-    Step(LaneSteps& steps, int lane, const RunSetup& setup, const RunOptions& options, Alone& alone)
+    Step(MemberSteps& steps, int lane, const RunSetup& setup, const RunOptions& options, Alone& alone)
         : steps_(steps), lane_(lane), setup_(setup), options_(options), alone_(alone) {}
 
     void state(Motion& motion) const {
@@ -267,7 +267,7 @@ class LaneRuns : private LaneWatch {
       motion.v.resize(setup_.start.v.size());
     }
 
-    LaneSteps& steps_;
+    MemberSteps& steps_;
     int lane_;
     const RunSetup& setup_;
     const RunOptions& options_;
@@ -277,7 +277,7 @@ class LaneRuns : private LaneWatch {
   /// The same as a Track follows it: by the polynomial alone.
   class TrackedStep {
    public:
-    TrackedStep(LaneSteps& steps, int lane, const Step& step) : steps_(steps), lane_(lane), step_(step) {}
+    TrackedStep(MemberSteps& steps, int lane, const Step& step) : steps_(steps), lane_(lane), step_(step) {}
 
     double time() const { return steps_.end(lane_); }
     Motion state() const {
@@ -294,7 +294,7 @@ class LaneRuns : private LaneWatch {
     }
 
    private:
-    LaneSteps& steps_;
+    MemberSteps& steps_;
     int lane_;
     const Step& step_;
   };
@@ -302,7 +302,7 @@ class LaneRuns : private LaneWatch {
   bool wants_steps() const override { return wants_steps_; }
   bool stops() override { return stop_(); }
 
-  void after_step(LaneSteps& steps) override {
+  void after_step(MemberSteps& steps) override {
     alone_.resize(static_cast<std::size_t>(steps.lanes()));
     for (int lane = 0; lane < steps.lanes(); ++lane) {
       if (!steps.took_step(lane)) continue;
@@ -316,7 +316,7 @@ class LaneRuns : private LaneWatch {
     }
   }
 
-  void look_into(LaneSteps& steps, int lane) {
+  void look_into(MemberSteps& steps, int lane) {
     const std::size_t k = steps.member(lane);
     const RunSetup& setup = *setups_[k];
     Step step(steps, lane, setup, options_, alone_[static_cast<std::size_t>(lane)]);

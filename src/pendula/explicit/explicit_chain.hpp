@@ -58,7 +58,7 @@ class ExplicitChain {
     angles_.read_near(i, rod, rate, q, v);
   }
 
-  // Torques depend on time by sines alone, of which steps turn little (LaneExplicit::longest_step).
+  // Torques depend on time by sines alone, of which steps turn little (ExplicitSteps::longest_step).
   template <class Steps>
   double followed(const Steps& /*steps*/, double /*time*/, double h) const {
     return h;

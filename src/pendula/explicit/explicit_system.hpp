@@ -19,7 +19,7 @@
 namespace pendula {
 
 /// A system of a generated kernel as SingleIntegrator moves it by a Method of explicit_tableau.hpp. `Dynamics` is
-/// LaneDynamics of plain numbers.
+/// MemberSystems of plain numbers.
 template <class Dynamics, class Method>
 class ExplicitSystem {
   static constexpr bool can_choose = Method::error_order > 0;

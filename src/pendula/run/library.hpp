@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <pendula/chain/plain_chain.hpp>
-#include <pendula/lanes/plain_lanes.hpp>
+#include <pendula/run/plain_members.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
 #include <pendula/system/program.hpp>

@@ -42,9 +42,9 @@ class MassScale {
     }
     read(here, q);
   }
-  /// A member comes, with the largest pivots that it has there  (coordinates).
-  void start(int member, const double* largest) {
-    for (std::size_t k = 0; k < count(); ++k) set(largest_[k], member, largest[k]);
+  /// A member comes, with what it has there.
+  void start(int member, const MassScale<double>& own) {
+    for (std::size_t k = 0; k < count(); ++k) set(largest_[k], member, own.largest_pivot(k));
   }
 
   void read(const SystemAt<1>& here, const double* q) requires(!is_batch<Num>) {

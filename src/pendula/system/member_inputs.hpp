@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
-#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/width.hpp>
@@ -14,9 +14,9 @@ namespace pendula {
 
 /// The inputs of several systems, one in each lane: what is constant of them, and sines of time.
 template <class L>
-class LaneInputs {
+class MemberInputs {
  public:
-  explicit LaneInputs(std::size_t count) : constant_(count, L(0.0)) {}
+  explicit MemberInputs(std::size_t count) : constant_(count, L(0.0)) {}
 
   /// A member's come into a lane; `constant`: (count).
   void take(int lane, const double* constant, std::span<const InputSine> sines) {

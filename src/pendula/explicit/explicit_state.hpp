@@ -2,17 +2,17 @@
 
 #include <array>
 #include <cstddef>
-#include <pendula/lanes/lane_tangent.hpp>
 #include <pendula/numeric/numeric.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
 #include <type_traits>
 
 namespace pendula {
 
 /// What moves, of one motion or of several members, one in each lane, as explicit methods keep it: parts and their
 /// rates at a time, with a tangent of each member or without; of one motion in twice the digits, so that what many
-/// small steps add to it is not lost to rounding. `Dynamics` is LaneRods or LaneSystem.
+/// small steps add to it is not lost to rounding. `Dynamics` is ChainAccelerations or SystemAccelerations.
 template <class Dynamics>
-class LaneState {
+class ExplicitState {
  public:
   using SpaceType = typename Dynamics::SpaceType;
   using L = typename Dynamics::L;
@@ -64,14 +64,15 @@ class LaneState {
 
   static constexpr double largest_turn = 3;  // in a step  [rad]
 
-  explicit LaneState(typename Dynamics::Subject subject) : dynamics_(subject), parts_(dynamics_.parts()), low_(parts_) {
+  explicit ExplicitState(typename Dynamics::Subject subject)
+      : dynamics_(subject), parts_(dynamics_.parts()), low_(parts_) {
     for (int i = 0; i < links(); ++i) parts_[i] = Dynamics::resting();
     if constexpr (is_twofold) {
       for (int i = 0; i < links(); ++i) low_[i] = Part::zero();
     }
   }
 
-  /// A member comes into a lane: LaneRods::start.
+  /// A member comes into a lane: ChainAccelerations::start.
   template <class... Start>
   void seat(int lane, double time, const Start&... start) {
     if constexpr (is_twofold) {

@@ -5,29 +5,28 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
-#include <pendula/lanes/lane_member.hpp>
-#include <pendula/lanes/lane_sight.hpp>
-#include <pendula/lanes/lane_turns.hpp>
+#include <pendula/ensemble/member_view.hpp>
+#include <pendula/ensemble/queue_member.hpp>
+#include <pendula/ensemble/turn_counter.hpp>
 
 namespace pendula {
 
 /// How chains come into the lanes of a stepper and out of them: by angles, whose full turns are counted on the way.
 template <class Stepper>
-class LaneChainSeats {
+class ChainSeats {
   using Space = typename Stepper::SpaceType;
   static constexpr int N = Stepper::links_known;
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
-  using Turns = LaneTurns<Space, N, L>;
+  using Turns = TurnCounter<Space, N, L>;
   using Links = ChainLinks<Space, N, double>;
 
  public:
   using Common = const Chain<Space, N>&;  ///< the chain of members who have none of their own
-  using Member = LaneMember<Space, N>;
-  using Sight = LaneSight<Stepper, Turns>;
+  using Member = QueueMember<Space, N>;
+  using Sight = MemberView<Stepper, Turns>;
 
-  LaneChainSeats(Common chain, Stepper& stepper)
-      : chain_(chain), links_(chain), stepper_(stepper), turns_(chain.links()) {}
+  ChainSeats(Common chain, Stepper& stepper) : chain_(chain), links_(chain), stepper_(stepper), turns_(chain.links()) {}
 
   /// What a stepper of such members is made from.
   static int subject_of(Common chain) { return chain.links(); }

@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstddef>
-#include <pendula/lanes/lane_columns.hpp>
+#include <pendula/gauss/member_columns.hpp>
 #include <pendula/numeric/numeric.hpp>
 
 namespace pendula {
@@ -34,8 +34,8 @@ struct MembersInLanes {
   static const Num& of_stage(const Num& cell, int /*stage*/) { return cell; }
   static const Num& largest(const Num& cell, int /*stages*/) { return cell; }
 
-  class Columns : public LaneColumns<S, L> {
-    using Base = LaneColumns<S, L>;
+  class Columns : public MemberColumns<S, L> {
+    using Base = MemberColumns<S, L>;
 
    public:
     explicit Columns(Family /*gauss*/ = Family::gauss, int /*stages*/ = S) {}

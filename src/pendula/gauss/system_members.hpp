@@ -4,15 +4,15 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <pendula/gauss/members_in_lanes.hpp>
+#include <pendula/gauss/stage_tangents.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>
-#include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_stage_tangent.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
-#include <pendula/lanes/members_in_lanes.hpp>
+#include <pendula/numeric/lane_pack.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>
+#include <pendula/system/member_systems.hpp>
+#include <pendula/system/moving_part.hpp>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -20,16 +20,16 @@
 namespace pendula {
 
 /// Systems of one kernel, one in each lane, and the stages of a Gauss step of theirs (SystemMotion). With a tangent of
-/// each member (LaneStageTangent), whose stages are solved after the motion's.
+/// each member (StageTangents), whose stages are solved after the motion's.
 template <int S, class Register = MemberRegister, bool with_tangent = false>
-class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>, LaneDynamics<LanePack<Register>>&> {
-  using Base = SystemMotion<MembersInLanes<S, LanePack<Register>>, LaneDynamics<LanePack<Register>>&>;
+class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&> {
+  using Base = SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&>;
 
  public:
   using L = LanePack<Register>;
   using Mask = typename L::Mask;
   using SpaceType = CoordinateSpace;
-  using Subject = LaneDynamics<L>&;
+  using Subject = MemberSystems<L>&;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
   static constexpr int sequences = 2;         ///< of corrections of its fixed point, as LagrangianSolver's
@@ -39,7 +39,7 @@ class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>
   using typename Base::Columns;
 
   /// `dynamics` must outlive it.
-  explicit LaneLagrangian(LaneDynamics<L>& dynamics) : Base(dynamics, Family::gauss, S), tangent_(dynamics, columns_) {
+  explicit SystemMembers(MemberSystems<L>& dynamics) : Base(dynamics, Family::gauss, S), tangent_(dynamics, columns_) {
     for (const bool is_angle : dynamics.info().is_angle) may_miss_ = may_miss_ || !is_angle;
   }
 
@@ -51,13 +51,20 @@ class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>
   /// A member comes into a lane, with its numbers, at q and v at `time`; its next step starts cold.
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v) {
     dynamics_.take(lane, system);
-    std::vector<double> p(count_), pivots(count_);
-    Pace<double> pace(dynamics_.info());
-    loaded_.set(lane, dynamics_.start(system, time, q, v, p.data(), pivots.data(), pace) ? 1 : 0);
+    const SystemModel model(dynamics_.table(), system);
+    SystemAt<1> here(model);
+    here.set_time(time);
+    std::vector<double> p(count_);
+    here(&SystemFunctions::momentum_from_velocity, q, v, p.data());
+    Pace<double> pace(model.info());
+    pace.start(here, q, v);
+    MassScale<double> masses(model.info());
+    masses.start(here, q);
+    pace_.start(lane, pace);
+    masses_.start(lane, masses);
+    loaded_.set(lane, model.loaded() ? 1 : 0);
     time_.set(lane, time);
     fastest_.set(lane, 0);
-    pace_.start(lane, pace);
-    masses_.start(lane, pivots.data());
     for (std::size_t k = 0; k < count_; ++k) Base::start(lane, k, q[k], p[k]);
     Base::read_masses();
     if constexpr (has_tangent) tangent_.start(lane, time, q, v);
@@ -230,7 +237,7 @@ class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>
     if constexpr (has_tangent) tangent_.accept(accepted);
   }
 
-  /// LaneStageTangent::take_growth.
+  /// StageTangents::take_growth.
   L take_growth(const Mask& which) requires with_tangent { return tangent_.take_growth(which); }
 
  private:
@@ -238,7 +245,7 @@ class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>
       Base::pace_squared_, Base::pasts_, Base::saved_, Base::size_squared_, Base::time_, Base::U_;
 
   struct NoTangent {
-    NoTangent(LaneDynamics<L>& /*dynamics*/, const Columns& /*columns*/) {}
+    NoTangent(MemberSystems<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
 
   void find_scale() {
@@ -285,7 +292,7 @@ class LaneLagrangian : public SystemMotion<MembersInLanes<S, LanePack<Register>>
   L loaded_{0.0};
   L scale_{0.0}, turn_{0.0};
   L energy_sum_{0.0}, kinetic_{0.0}, kinetic_before_{0.0}, brought_{0.0};
-  [[no_unique_address]] std::conditional_t<with_tangent, LaneStageTangent<S, L>, NoTangent> tangent_;
+  [[no_unique_address]] std::conditional_t<with_tangent, StageTangents<S, L>, NoTangent> tangent_;
 };
 
 }  // namespace pendula

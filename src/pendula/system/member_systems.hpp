@@ -2,13 +2,10 @@
 
 #include <cstddef>
 #include <numeric>
-#include <pendula/gauss/pace.hpp>
-#include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/width.hpp>
-#include <pendula/system/mass_scale.hpp>
+#include <pendula/system/member_inputs.hpp>
 #include <pendula/system/plain_system.hpp>
-#include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
 
 namespace pendula {
@@ -16,19 +13,20 @@ namespace pendula {
 /// Several systems of one kernel, one in each lane: every member has parameters, inputs and times of its own. Numbers
 /// of all lanes lie side by side, those of a coordinate after those of the one before, aligned to `pack_alignment`.
 template <class L>
-class LaneDynamics {
+class MemberSystems {
  public:
   /// `table` must outlive it.
-  explicit LaneDynamics(const SystemTable& table)
+  explicit MemberSystems(const SystemTable& table)
       : table_(table),
         functions_(functions_of<static_cast<int>(width_of<L>)>(table)),
         parameters_(1 + parameter_count(table.info)),  // none has an address, too
         inputs_now_(1 + table.info.inputs.size()),
         now_(1),
         inputs_(table.info.inputs.size()) {}
-  LaneDynamics(const LaneDynamics&) = delete;
-  LaneDynamics& operator=(const LaneDynamics&) = delete;
+  MemberSystems(const MemberSystems&) = delete;
+  MemberSystems& operator=(const MemberSystems&) = delete;
 
+  const SystemTable& table() const { return table_; }
   const SystemInfo& info() const { return table_.info; }
   int coordinates() const { return static_cast<int>(info().coordinates.size()); }
   /// What kind of numbers coordinates are.
@@ -49,21 +47,6 @@ class LaneDynamics {
   }
   /// Highest frequency of a sine that is added to their inputs  [rad/s].
   L fastest_drives() const { return inputs_.fastest(); }
-
-  /// What starts at q and v  (coordinates): its momenta there, the largest pivots that its mass matrix has, and its
-  /// pace. Gives whether energy may come from outside, or go there.
-  bool start(const PlainSystem& system, double time, const double* q, const double* v, double* p, double* pivots,
-             Pace<double>& pace) const {
-    const SystemModel model(table_, system);
-    SystemAt<1> here(model);
-    here.set_time(time);
-    here(&SystemFunctions::momentum_from_velocity, q, v, p);
-    pace.start(here, q, v);
-    MassScale<double> masses(info());
-    masses.start(here, q);
-    for (std::size_t k = 0; k < info().coordinates.size(); ++k) pivots[k] = masses.largest_pivot(k);
-    return model.loaded();
-  }
 
   /// Calls a function at the times of a row, or at one time of each member: call(times,
   /// &SystemFunctions::acceleration, q, v, a).
@@ -89,7 +72,7 @@ class LaneDynamics {
   const SystemTable& table_;
   SystemFunctions functions_;
   PackRows<width_of<L>> parameters_, inputs_now_, now_;
-  LaneInputs<L> inputs_;
+  MemberInputs<L> inputs_;
 };
 
 }  // namespace pendula

@@ -2,8 +2,8 @@
 
 #include <array>
 #include <cstddef>
-#include <pendula/lanes/lane_pack.hpp>
 #include <pendula/numeric/dual.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/numeric.hpp>
 
 namespace pendula {

@@ -13,12 +13,12 @@ namespace pendula {
 
 /// The steps that members in lanes have just taken, as those who watch them see them; q and v are all the angles and
 /// their rates.
-class LaneSteps {
+class MemberSteps {
  public:
-  LaneSteps() = default;
-  LaneSteps(const LaneSteps&) = delete;
-  LaneSteps& operator=(const LaneSteps&) = delete;
-  virtual ~LaneSteps() = default;
+  MemberSteps() = default;
+  MemberSteps(const MemberSteps&) = delete;
+  MemberSteps& operator=(const MemberSteps&) = delete;
+  virtual ~MemberSteps() = default;
 
   virtual int lanes() const = 0;
   /// Whether the member in a lane has taken one.
@@ -42,16 +42,16 @@ class LaneSteps {
 };
 
 /// Who watches members while they are moved.
-class LaneWatch {
+class MemberWatch {
  public:
-  LaneWatch() = default;
-  LaneWatch(const LaneWatch&) = delete;
-  LaneWatch& operator=(const LaneWatch&) = delete;
-  virtual ~LaneWatch() = default;
+  MemberWatch() = default;
+  MemberWatch(const MemberWatch&) = delete;
+  MemberWatch& operator=(const MemberWatch&) = delete;
+  virtual ~MemberWatch() = default;
 
   /// Whether to look into steps at all: `after_step` is called for those of all lanes together.
   virtual bool wants_steps() const = 0;
-  virtual void after_step(LaneSteps& steps) = 0;
+  virtual void after_step(MemberSteps& steps) = 0;
   /// Whether to leave off; asked after every step.
   virtual bool stops() = 0;
 };
@@ -85,11 +85,11 @@ struct PlainMemberEnd {
 /// the next. What becomes of a member depends on that member alone, to the last bit. False where `watch` made it leave
 /// off.
 using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
-                         std::span<PlainMemberEnd> ends, LaneWatch& watch);
+                         std::span<PlainMemberEnd> ends, MemberWatch& watch);
 
 /// The same of systems of one kernel.
 using MoveSystemMembers = bool(const SystemTable& table, const RunOptions& options, std::int64_t every,
                                std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends,
-                               LaneWatch& watch);
+                               MemberWatch& watch);
 
 }  // namespace pendula

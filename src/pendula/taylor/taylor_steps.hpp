@@ -3,20 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <pendula/lanes/lane_rods.hpp>
-#include <pendula/lanes/lane_series.hpp>
-#include <pendula/lanes/lane_state.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/explicit/chain_accelerations.hpp>
+#include <pendula/explicit/explicit_state.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
+#include <pendula/taylor/chain_series.hpp>
 
 namespace pendula {
 
 /// Chooses the steps of every member by the series that it is to be moved by.
 template <class L>
-class LaneSeriesController {
+class SeriesController {
  public:
   using Mask = typename L::Mask;
 
-  explicit LaneSeriesController(double /*tolerance*/) {}
+  explicit SeriesController(double /*tolerance*/) {}
 
   template <class Stepper>
   void start(const Mask& which, Stepper& /*stepper*/) {
@@ -48,33 +48,33 @@ class LaneSeriesController {
   L longest_{unlimited};
 };
 
-/// Steps of Taylor series on several chains at once, one in each lane: as a stepper of LaneQueue. The order follows
+/// Steps of Taylor series on several chains at once, one in each lane: as a stepper of MemberQueue. The order follows
 /// from the tolerance; a step is as long as the last terms of its series allow. After each step rods have their lengths
-/// again, and rates go across. `Rods` is LaneRods, with a tangent of each member or without.
+/// again, and rates go across. `Rods` is ChainAccelerations, with a tangent of each member or without.
 template <class Rods>
-class LaneTaylor : public LaneState<Rods> {
-  using State = LaneState<Rods>;
+class TaylorSteps : public ExplicitState<Rods> {
+  using State = ExplicitState<Rods>;
 
  public:
   static constexpr int stages = 1;
   static constexpr bool can_choose = true;
-  using Chain = LaneTaylor;
+  using Chain = TaylorSteps;
   using typename State::L;
   using typename State::Mask;
   static constexpr bool has_tangent = State::has_tangent;
   using State::links;
-  using Controller = LaneSeriesController<L>;
+  using Controller = SeriesController<L>;
 
   struct Options {
     double tolerance = 1e-9;  ///< of a step's error, relative to the size of the motion
   };
-  explicit LaneTaylor(typename Rods::Subject subject, Options options = {})
+  explicit TaylorSteps(typename Rods::Subject subject, Options options = {})
       : State(subject), series_(dynamics_, order_for(options.tolerance)), trial_(parts_), terms_(parts_) {
     log_reach_ = std::log(std::max(options.tolerance, finest)) / series_.order();
   }
 
-  LaneTaylor& chain() { return *this; }
-  const LaneTaylor& chain() const { return *this; }
+  TaylorSteps& chain() { return *this; }
+  const TaylorSteps& chain() const { return *this; }
 
   template <class... Start>
   void start(int lane, double time, const Start&... start) {
@@ -156,7 +156,7 @@ class LaneTaylor : public LaneState<Rods> {
   /// Of the fewest operations for a tolerance.
   static int order_for(double tolerance) {
     const double order = 3.5 - 1.15 * std::log10(std::max(tolerance, finest));
-    return std::clamp(static_cast<int>(std::lround(order)), least_order, LaneSeries<Rods>::most_order);
+    return std::clamp(static_cast<int>(std::lround(order)), least_order, ChainSeries<Rods>::most_order);
   }
 
   // The last terms shrink as the series does, beside the size of the motion. Those that begin at rest, and symmetric
@@ -183,7 +183,7 @@ class LaneTaylor : public LaneState<Rods> {
     return dynamics_.size_squared(terms_, pace);
   }
 
-  LaneSeries<Rods> series_;
+  ChainSeries<Rods> series_;
   double log_reach_;          // of steps, relative to the radius that terms tell
   L pace_{1.0};               // in which time is counted
   L tried_{0.0}, step_{1.0};  // the steps that were tried, and those that were taken last

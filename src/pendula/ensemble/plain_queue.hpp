@@ -3,28 +3,28 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <pendula/lanes/explicit_tableau.hpp>
-#include <pendula/lanes/lane_queue.hpp>
-#include <pendula/lanes/plain_lanes.hpp>
+#include <pendula/ensemble/member_queue.hpp>
+#include <pendula/explicit/explicit_tableau.hpp>
+#include <pendula/run/plain_members.hpp>
 #include <pendula/system/options.hpp>
 #include <span>
 #include <vector>
 
 namespace pendula::detail {
 
-inline LaneOptions lane_options(const RunOptions& options, std::int64_t every) {
-  LaneOptions asked;
+inline QueueOptions lane_options(const RunOptions& options, std::int64_t every) {
+  QueueOptions asked;
   asked.step = is_adaptive(options) ? 0 : options.step;
   asked.tolerance = options.tolerance;
   asked.energy_every = every;
   // Who asks for the iteration of lanes has one that `simulate` takes as well, to round-off.
-  if (options.iteration == Iteration::fixed_point) asked.enough = LaneStepperOptions{}.enough;
+  if (options.iteration == Iteration::fixed_point) asked.enough = MembersStepperOptions{}.enough;
   return asked;
 }
 
-inline void tell_ends(std::span<const LaneEnd> reached, std::span<PlainMemberEnd> ends) {
+inline void tell_ends(std::span<const MemberEnd> reached, std::span<PlainMemberEnd> ends) {
   for (std::size_t k = 0; k < reached.size(); ++k) {
-    const LaneEnd& from = reached[k];
+    const MemberEnd& from = reached[k];
     PlainMemberEnd& to = ends[k];
     std::copy_n(from.motion.q.data(), from.motion.q.size(), to.q);
     std::copy_n(from.motion.v.data(), from.motion.v.size(), to.v);
@@ -40,10 +40,10 @@ inline void tell_ends(std::span<const LaneEnd> reached, std::span<PlainMemberEnd
 /// Moves members by a Queue, as MoveMembers and MoveSystemMembers tell.
 template <class Queue>
 bool move_plainly(typename Queue::Common common, const RunOptions& options, std::int64_t every,
-                  std::span<const typename Queue::Member> members, std::span<PlainMemberEnd> ends, LaneWatch& watch) {
+                  std::span<const typename Queue::Member> members, std::span<PlainMemberEnd> ends, MemberWatch& watch) {
   Queue queue(common, lane_options(options, every));
   queue.set_watch(watch);
-  std::vector<LaneEnd> reached(members.size());
+  std::vector<MemberEnd> reached(members.size());
   const bool is_done = queue.run(members, reached);
   tell_ends(reached, ends);
   return is_done;

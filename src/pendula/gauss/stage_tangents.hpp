@@ -2,12 +2,12 @@
 
 #include <array>
 #include <cstddef>
+#include <pendula/gauss/member_columns.hpp>
 #include <pendula/gauss/stage_prediction.hpp>
-#include <pendula/lanes/lane_columns.hpp>
-#include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_system_tangent.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/member_systems.hpp>
+#include <pendula/system/system_tangents.hpp>
 #include <vector>
 
 namespace pendula {
@@ -17,23 +17,23 @@ namespace pendula {
 /// own. With the motion's they are one system of equations by one Gauss method, so that they err by its order; the
 /// derivatives of the steps themselves, which are taken in momenta, they are not.
 template <int S, class L>
-class LaneStageTangent {
+class StageTangents {
  public:
   using Mask = typename L::Mask;
-  using Columns = LaneColumns<S, L>;
+  using Columns = MemberColumns<S, L>;
   using Stages = typename Columns::Stages;
 
   /// Both must outlive it.
-  LaneStageTangent(LaneDynamics<L>& dynamics, const Columns& columns)
+  StageTangents(MemberSystems<L>& dynamics, const Columns& columns)
       : dynamics_(dynamics),
         columns_(columns),
         measure_(dynamics),
         parts_(static_cast<std::size_t>(dynamics.coordinates())),
         calls_(kinds * parts_.size()) {}
-  LaneStageTangent(const LaneStageTangent&) = delete;
-  LaneStageTangent& operator=(const LaneStageTangent&) = delete;
+  StageTangents(const StageTangents&) = delete;
+  StageTangents& operator=(const StageTangents&) = delete;
 
-  /// LaneSystemTangent::start.
+  /// SystemTangents::start.
   void start(int lane, double time, const double* q, const double* v) {
     const auto tangent = measure_.start(lane, time, q, v);
     for (std::size_t k = 0; k < parts_.size(); ++k) {
@@ -202,9 +202,9 @@ class LaneStageTangent {
     }
   }
 
-  LaneDynamics<L>& dynamics_;
+  MemberSystems<L>& dynamics_;
   const Columns& columns_;
-  LaneSystemTangent<L> measure_;
+  SystemTangents<L> measure_;
   std::vector<Part> parts_;
   PackRows<L::width> calls_;
   std::size_t newest_ = 0;

@@ -5,16 +5,16 @@
 #include <cstddef>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
-#include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_system_tangent.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/numeric/width.hpp>
 #include <pendula/system/forcing_look.hpp>
+#include <pendula/system/member_systems.hpp>
+#include <pendula/system/moving_part.hpp>
+#include <pendula/system/system_tangents.hpp>
 #include <type_traits>
 #include <vector>
 
@@ -24,25 +24,25 @@ namespace pendula {
 ///
 /// With a tangent, every number has its derivative along one tangent of each member's motion.
 template <class Num = LanePack<MemberRegister>, bool with_tangent = false>
-class LaneSystem {
+class SystemAccelerations {
  public:
   using SpaceType = CoordinateSpace;
   using L = Num;
   using Mask = MaskOf<L>;
   using Number = std::conditional_t<with_tangent, Dual<L>, L>;
-  using Subject = LaneDynamics<L>&;
+  using Subject = MemberSystems<L>&;
   static constexpr int links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
   static constexpr bool limits_turns = is_batch<L>;  ///< whether steps turn angles by less than half a turn
   static constexpr std::size_t D = 1;
-  using Part = LanePart<Number, D>;  ///< q, q̇ of a coordinate
+  using Part = MovingPart<Number, D>;  ///< q, q̇ of a coordinate
   using Parts = detail::PerLink<Part, links_known>;
 
   /// `dynamics` must outlive it.
-  explicit LaneSystem(LaneDynamics<L>& dynamics)
+  explicit SystemAccelerations(MemberSystems<L>& dynamics)
       : dynamics_(dynamics), rows_(static_cast<std::size_t>(kinds * parts()) + 1), tangent_(dynamics) {}
-  LaneSystem(const LaneSystem&) = delete;
-  LaneSystem& operator=(const LaneSystem&) = delete;
+  SystemAccelerations(const SystemAccelerations&) = delete;
+  SystemAccelerations& operator=(const SystemAccelerations&) = delete;
 
   int parts() const { return dynamics_.coordinates(); }
   template <class Body>
@@ -172,7 +172,7 @@ class LaneSystem {
     return select(abs(h) * natural_pace() > L(ForcingLook::finest), largest, L(0.0));
   }
 
-  /// LaneSystemTangent::squared.
+  /// SystemTangents::squared.
   L tangent_squared(const Parts& parts) const requires with_tangent {
     return tangent_.squared([&](int i) -> const L& { return parts[i].place[0].slope; },
                             [&](int i) -> const L& { return parts[i].rate[0].slope; });
@@ -285,14 +285,14 @@ class LaneSystem {
   }
 
   struct NoTangent {
-    explicit NoTangent(LaneDynamics<L>& /*dynamics*/) {}
+    explicit NoTangent(MemberSystems<L>& /*dynamics*/) {}
   };
 
-  LaneDynamics<L>& dynamics_;
+  MemberSystems<L>& dynamics_;
   PackRows<width_of<L>> rows_;
   L pace_squared_{1.0}, energy_sum_{0.0};
   Sums coarse_, fine_;
-  [[no_unique_address]] std::conditional_t<with_tangent, LaneSystemTangent<L>, NoTangent> tangent_;
+  [[no_unique_address]] std::conditional_t<with_tangent, SystemTangents<L>, NoTangent> tangent_;
 };
 
 }  // namespace pendula

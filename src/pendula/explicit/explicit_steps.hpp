@@ -3,26 +3,26 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <pendula/lanes/explicit_tableau.hpp>
-#include <pendula/lanes/lane_error_controller.hpp>
-#include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_rods.hpp>
-#include <pendula/lanes/lane_state.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/explicit/chain_accelerations.hpp>
+#include <pendula/explicit/error_controller.hpp>
+#include <pendula/explicit/explicit_state.hpp>
+#include <pendula/explicit/explicit_tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/numeric.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>
+#include <pendula/system/moving_part.hpp>
 #include <utility>
 #include <vector>
 
 namespace pendula {
 
 /// An explicit Runge–Kutta method, of one motion or on several members at once, one in each lane: for few digits and
-/// short times. After each step rods have their lengths again, and rates go across. `Dynamics` is LaneRods or
-/// LaneSystem, with a tangent of each member or without.
+/// short times. After each step rods have their lengths again, and rates go across. `Dynamics` is ChainAccelerations or
+/// SystemAccelerations, with a tangent of each member or without.
 template <class Dynamics, class Method>
-class LaneExplicit : public LaneState<Dynamics> {
-  using State = LaneState<Dynamics>;
+class ExplicitSteps : public ExplicitState<Dynamics> {
+  using State = ExplicitState<Dynamics>;
   using typename State::LowParts;
   using typename State::Number;
   using typename State::Part;
@@ -33,17 +33,17 @@ class LaneExplicit : public LaneState<Dynamics> {
   static constexpr bool can_choose = Method::error_order > 0;
   /// Of the quadrature that is as good.
   static constexpr int nodes = (Method::error_order + 2) / 2;
-  using Chain = LaneExplicit;
+  using Chain = ExplicitSteps;
   using typename State::L;
   using typename State::Mask;
   using typename State::Vector;
   static constexpr std::size_t D = State::D;
   static constexpr bool has_tangent = State::has_tangent, is_twofold = State::is_twofold;
   using State::links;
-  using Controller = LaneErrorController<L, Method::error_order>;
+  using Controller = ErrorController<L, Method::error_order>;
 
   struct Options {};
-  explicit LaneExplicit(typename Dynamics::Subject subject, Options = {})
+  explicit ExplicitSteps(typename Dynamics::Subject subject, Options = {})
       : State(subject),
         slopes_(parts_),
         trial_(parts_, low_),
@@ -57,8 +57,8 @@ class LaneExplicit : public LaneState<Dynamics> {
     }
   }
 
-  LaneExplicit& chain() { return *this; }
-  const LaneExplicit& chain() const { return *this; }
+  ExplicitSteps& chain() { return *this; }
+  const ExplicitSteps& chain() const { return *this; }
 
   /// Where the members are, with all that their next steps depend on.
   struct Place {
@@ -78,7 +78,7 @@ class LaneExplicit : public LaneState<Dynamics> {
     low_ = place.low;
   }
 
-  /// A member comes into a lane: LaneRods::start.
+  /// A member comes into a lane: ChainAccelerations::start.
   template <class... Start>
   void start(int lane, double time, const Start&... start) {
     State::seat(lane, time, start...);
@@ -96,14 +96,14 @@ class LaneExplicit : public LaneState<Dynamics> {
 
   /// A part and its rate, of the members whose step was accepted, when `share` of it was done: by the polynomial of
   /// degree five through both ends with rates and accelerations.
-  LanePart<L, D> glance(int i, double share) const { return Quintic(share).at(*this, i); }
+  MovingPart<L, D> glance(int i, double share) const { return Quintic(share).at(*this, i); }
 
   /// Of all parts; visit(i, ξ, ξ̇).
   template <class Visit>
   void for_each_glance(double share, Visit visit) const {
     const Quintic path(share);
     for (int i = 0; i < links(); ++i) {
-      const LanePart<L, D> there = path.at(*this, i);
+      const MovingPart<L, D> there = path.at(*this, i);
       visit(i, there.place, there.rate);
     }
   }
@@ -224,11 +224,11 @@ class LaneExplicit : public LaneState<Dynamics> {
           bend_on_rate_(-0.5 * u * squared(u - 1) * (5 * u - 2)),
           bend_off_rate_(0.5 * u * u * (u - 1) * (5 * u - 3)) {}
 
-    LanePart<L, D> at(const LaneExplicit& steps, int i) const {
+    MovingPart<L, D> at(const ExplicitSteps& steps, int i) const {
       const Part &from = steps.before_.parts[i], &to = steps.parts_[i];
       const auto &bend = steps.before_.slopes[i].rate, &bend_after = steps.slopes_[i].rate;
       const L &h = steps.step_, inverse_h = L(1.0) / h;
-      LanePart<L, D> there;
+      MovingPart<L, D> there;
       for (std::size_t k = 0; k < D; ++k) {
         const L moved = value(to.place[k]) - value(from.place[k]);
         const L turning = h * value(from.rate[k]), turned = h * value(to.rate[k]);

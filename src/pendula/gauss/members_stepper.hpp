@@ -7,12 +7,12 @@
 #include <pendula/gauss/fixed_point_stop.hpp>
 #include <pendula/gauss/step_controller.hpp>
 #include <pendula/gauss/step_shape.hpp>
-#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 
 namespace pendula {
 
 /// How far the stage equations are solved.
-struct LaneStepperOptions {
+struct MembersStepperOptions {
   /// Of the first correction that is left out, relative to what the step moves: by default a thousandth of a last bit.
   double enough = 1e-18;
   int max_iterations = 50;
@@ -20,17 +20,17 @@ struct LaneStepperOptions {
 };
 
 /// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Moved`
-/// holds their states and stages: LaneChain of chains, LaneLagrangian of systems.
+/// holds their states and stages: ChainMembers of chains, SystemMembers of systems.
 ///
 /// What becomes of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
 /// and one that fails stays where its last accepted step ended.
 template <class Moved>
-class LaneStepper {
+class MembersStepper {
  public:
   using Chain = Moved;
   using L = typename Chain::L;
   using Mask = typename L::Mask;
-  using Options = LaneStepperOptions;
+  using Options = MembersStepperOptions;
   using SpaceType = typename Chain::SpaceType;
   static constexpr int lanes = L::size, stages = Chain::stages, links_known = Chain::links_known;
   static constexpr bool is_implicit = true, can_choose = true, has_tangent = Chain::has_tangent;
@@ -41,17 +41,17 @@ class LaneStepper {
     explicit Controller(double tolerance) : tolerance_(tolerance), steps_(stages, 2 * stages, tolerance) {}
 
     /// Members that start. Loads take or bring energy anyway.
-    void start(const Mask& which, LaneStepper& stepper) {
+    void start(const Mask& which, MembersStepper& stepper) {
       steps_.steer(which, stepper.chain().loaded());
       steps_.start(which, stepper.tempo());
       longest_ = select(which, stepper.chain().longest_step(tolerance_), longest_);
     }
-    L step(const LaneStepper& /*stepper*/) const { return min(longest_, steps_.step()); }
-    Mask accepts(const Mask& which, const L& h, LaneStepper& stepper) {
+    L step(const MembersStepper& /*stepper*/) const { return min(longest_, steps_.step()); }
+    Mask accepts(const Mask& which, const L& h, MembersStepper& stepper) {
       return steps_.accepts(which, stepper.decay(), h);
     }
     void shrink(const Mask& which, const L& h, const L& factor) { steps_.shrink(which, h, factor); }
-    void move_on(const Mask& which, const L& h, LaneStepper& stepper) {
+    void move_on(const Mask& which, const L& h, MembersStepper& stepper) {
       steps_.move_on(which, h, [&] { return stepper.tempo(); });
     }
 
@@ -61,7 +61,7 @@ class LaneStepper {
     L longest_{std::numeric_limits<double>::infinity()};  // that shows what depends on time
   };
 
-  explicit LaneStepper(typename Chain::Subject subject, LaneStepperOptions options = {})
+  explicit MembersStepper(typename Chain::Subject subject, MembersStepperOptions options = {})
       : chain_(subject),
         options_(options),
         stop_({.enough = options.enough}),
@@ -170,7 +170,7 @@ class LaneStepper {
   }
 
   Chain chain_;
-  LaneStepperOptions options_;
+  MembersStepperOptions options_;
   FixedPointStop<L, sequences_of<Chain>()> stop_;
   FixedPointStop<L> tangent_stop_;  // of stages of tangents that are solved after the motion's
   L known_{cold}, last_{0.0},

@@ -9,7 +9,7 @@ namespace pendula {
 
 /// One member of an ensemble: where it starts, when it ends, and its chain where that is its own.
 template <class Space, int N = Eigen::Dynamic>
-struct LaneMember {
+struct QueueMember {
   static constexpr int links_known = N;
 
   Motion start;                            ///< angles and rates, (dof·n)  rad, rad/s
@@ -18,7 +18,7 @@ struct LaneMember {
 };
 
 /// What became of it.
-struct LaneEnd {
+struct MemberEnd {
   Motion motion;               ///< at the end; where it failed, where its last accepted step ended
   Status status = Status::ok;  ///< otherwise a scalar stepper may do it
   std::int64_t steps = 0;      ///< that were accepted
@@ -28,10 +28,10 @@ struct LaneEnd {
 };
 
 /// How members are moved.
-struct LaneOptions {
+struct QueueOptions {
   double step = 0;          ///< s; 0: of each member's own choice, by tolerance
   double tolerance = 1e-9;  ///< of the motion, relative to its size, as RunOptions::tolerance
-  double enough = 0;  ///< LaneStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
+  double enough = 0;  ///< MembersStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
   std::int64_t energy_every = 0;  ///< steps from one look at the energy to the next; 0: it is not looked at
 };
 

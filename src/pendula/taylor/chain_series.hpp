@@ -3,18 +3,18 @@
 #include <array>
 #include <cstddef>
 #include <pendula/chain/chain_links.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_rods.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/explicit/chain_accelerations.hpp>
+#include <pendula/numeric/lane_pack.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
+#include <pendula/system/moving_part.hpp>
 
 namespace pendula {
 
 /// The Taylor series of the motions of several chains, one in each lane, about where they are: of rods, whose equations
 /// have nothing but products, so that a coefficient is a sum of products of those before it. Chains have no loads.
-/// `Rods` is LaneRods, with a tangent of each member or without.
+/// `Rods` is ChainAccelerations, with a tangent of each member or without.
 template <class Rods>
-class LaneSeries {
+class ChainSeries {
  public:
   using L = typename Rods::L;
   using Number = typename Rods::Number;
@@ -25,7 +25,7 @@ class LaneSeries {
 
   /// Rates up to t^order, rods to one more; order ≤ most_order. Time is counted in 1/pace, so that coefficients are
   /// numbers whatever the units are.
-  LaneSeries(const Rods& rods, int order)
+  ChainSeries(const Rods& rods, int order)
       : order_(order), links_(rods.links()), sums_(Rods::is_short ? 1 : rods.links()) {}
 
   int order() const { return order_; }

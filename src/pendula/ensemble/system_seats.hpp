@@ -1,15 +1,15 @@
 #pragma once
 
 #include <optional>
-#include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_member.hpp>
-#include <pendula/lanes/lane_sight.hpp>
+#include <pendula/ensemble/member_view.hpp>
+#include <pendula/ensemble/queue_member.hpp>
+#include <pendula/system/member_systems.hpp>
 #include <pendula/system/plain_system.hpp>
 
 namespace pendula {
 
 /// A member of an ensemble of systems of one kernel.
-struct LaneSystemMember {
+struct QueueSystemMember {
   Motion start;        ///< coordinates and rates
   double end = 0;      ///< s
   PlainSystem system;  ///< its numbers, which outlive it
@@ -17,16 +17,16 @@ struct LaneSystemMember {
 
 /// How systems come into the lanes of a stepper and out of them.
 template <class Stepper>
-class LaneSystemSeats {
+class SystemSeats {
   struct NoTurns {};
   using Mask = typename Stepper::L::Mask;
 
  public:
-  using Common = LaneDynamics<typename Stepper::L>&;
-  using Member = LaneSystemMember;
-  using Sight = LaneSight<Stepper, NoTurns>;
+  using Common = MemberSystems<typename Stepper::L>&;
+  using Member = QueueSystemMember;
+  using Sight = MemberView<Stepper, NoTurns>;
 
-  LaneSystemSeats(Common dynamics, Stepper& stepper) : coordinates_(dynamics.coordinates()), stepper_(stepper) {}
+  SystemSeats(Common dynamics, Stepper& stepper) : coordinates_(dynamics.coordinates()), stepper_(stepper) {}
 
   static Common subject_of(Common dynamics) { return dynamics; }
   void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }

@@ -3,7 +3,7 @@
 #include <array>
 #include <pendula/gauss/node_polynomials.hpp>
 #include <pendula/gauss/tableau.hpp>
-#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 
 namespace pendula {
 
@@ -23,7 +23,7 @@ template <int S>
 /// opposite to i, k_i'j' = −k_ij. Even and odd parts of stage values, x_j ± x_j', go through matrices of half the size,
 /// A_ij = (k_ij + k_ij')/2 and −Aᵀ: half the products, and symplectic to the last bit whatever A is rounded to.
 template <int S, class L>
-class LaneColumns {
+class MemberColumns {
  public:
   /// One number at all stages.
   template <class Number>
@@ -31,7 +31,7 @@ class LaneColumns {
   using Stages = StagesOf<L>;
   using Mask = typename L::Mask;
 
-  LaneColumns() : tableau_(tableau_of<S>(Family::gauss, S)), polynomials_(detail::node_polynomials<S>(tableau_)) {
+  MemberColumns() : tableau_(tableau_of<S>(Family::gauss, S)), polynomials_(detail::node_polynomials<S>(tableau_)) {
     for (int i = 0; i < half; ++i) {
       for (int j = 0; j < half; ++j) {
         const double same = tableau_.m(i, j) - 0.5, opposite = tableau_.m(i, S - 1 - j) - 0.5;

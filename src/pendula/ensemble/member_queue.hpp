@@ -2,30 +2,30 @@
 
 #include <algorithm>
 #include <optional>
-#include <pendula/lanes/lane_chain.hpp>
-#include <pendula/lanes/lane_chain_seats.hpp>
-#include <pendula/lanes/lane_explicit.hpp>
-#include <pendula/lanes/lane_lagrangian.hpp>
-#include <pendula/lanes/lane_member.hpp>
-#include <pendula/lanes/lane_rods.hpp>
-#include <pendula/lanes/lane_stepper.hpp>
-#include <pendula/lanes/lane_system.hpp>
-#include <pendula/lanes/lane_system_seats.hpp>
-#include <pendula/lanes/lane_taylor.hpp>
+#include <pendula/chain/chain_members.hpp>
+#include <pendula/ensemble/chain_seats.hpp>
+#include <pendula/ensemble/queue_member.hpp>
+#include <pendula/ensemble/system_seats.hpp>
+#include <pendula/explicit/chain_accelerations.hpp>
+#include <pendula/explicit/explicit_steps.hpp>
+#include <pendula/explicit/system_accelerations.hpp>
+#include <pendula/gauss/members_stepper.hpp>
+#include <pendula/gauss/system_members.hpp>
+#include <pendula/taylor/taylor_steps.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>
 
 namespace pendula {
 
-/// Moves the members of an ensemble to their ends by steps of a LaneStepper or LaneExplicit, as many at once as a
+/// Moves the members of an ensemble to their ends by steps of a MembersStepper or ExplicitSteps, as many at once as a
 /// register has lanes; `Seats` brings them into lanes and out of them. A lane whose member has come to its end takes
 /// the next one: none is idle until the last have begun. What a member does depends on nothing but itself, to the last
 /// bit.
 ///
 /// A member that a fixed point cannot move ends where it is and says so; the others go on.
-template <class Stepper, class Seats = LaneChainSeats<Stepper>>
-class LaneQueue {
+template <class Stepper, class Seats = ChainSeats<Stepper>>
+class MemberQueue {
  public:
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
@@ -35,23 +35,23 @@ class LaneQueue {
 
   /// `common`: what members share. Throws std::invalid_argument where they cannot sit in lanes, and where an explicit
   /// method is not told its step.
-  LaneQueue(Common common, const LaneOptions& options)
+  MemberQueue(Common common, const QueueOptions& options)
       : options_(options),
         stepper_(Seats::subject_of(common), stepper_options(options)),
         controller_(options.tolerance),
         seats_(common, stepper_) {}
-  LaneQueue(const LaneQueue&) = delete;
-  LaneQueue& operator=(const LaneQueue&) = delete;
+  MemberQueue(const MemberQueue&) = delete;
+  MemberQueue& operator=(const MemberQueue&) = delete;
 
   /// Who sees every step from now on, and may end a member or all.
-  void set_watch(LaneWatch& watch) {
+  void set_watch(MemberWatch& watch) {
     watch_ = &watch;
     if (watch.wants_steps()) seats_.show(sight_);
   }
 
   /// Moves all members; ends[i] is what becomes of members[i]; false where the watch made it leave off. Throws
   /// std::invalid_argument on another number of links or coordinates, and unless there is an end for each member.
-  bool run(std::span<const Member> members, std::span<LaneEnd> ends) {
+  bool run(std::span<const Member> members, std::span<MemberEnd> ends) {
     if (ends.size() != members.size()) throw std::invalid_argument("ensemble: expected an end for each member");
     members_ = members;
     ends_ = ends;
@@ -78,7 +78,7 @@ class LaneQueue {
   static constexpr double smallest_step = 1e-10;  // of the time that is left
 
   // What a ten-thousandth of the tolerance leaves out is not seen beside what the steps err by.
-  static typename Stepper::Options stepper_options(const LaneOptions& options) {
+  static typename Stepper::Options stepper_options(const QueueOptions& options) {
     if constexpr (Stepper::is_implicit) {
       typename Stepper::Options given;
       given.are_chosen = options.step == 0;
@@ -213,7 +213,7 @@ class LaneQueue {
   }
 
   void write_end(int lane, Status status) {
-    LaneEnd& end = ends_[static_cast<std::size_t>(member_[lane])];
+    MemberEnd& end = ends_[static_cast<std::size_t>(member_[lane])];
     end.status = status;
     end.steps = static_cast<std::int64_t>(steps_[lane]);
     end.rejected_steps = static_cast<std::int64_t>(rejected_[lane]);
@@ -273,64 +273,65 @@ class LaneQueue {
                                 std::to_string(member.start.v.size()));
   }
 
-  LaneOptions options_;
+  QueueOptions options_;
   Stepper stepper_;
   typename Stepper::Controller controller_;
   Seats seats_;
   std::span<const Member> members_;
-  std::span<LaneEnd> ends_;
+  std::span<MemberEnd> ends_;
   std::size_t next_ = 0;
   std::ptrdiff_t member_[L::width] = {};
   Twofold<L> time_{L(0.0), L(0.0)};
   L end_{0.0}, running_{0.0}, begins_{0.0};
   L steps_{0.0}, rejected_{0.0}, unsolved_{0.0}, attempts_{0.0};
   L energy_{0.0}, energy_error_{0.0}, energy_sum_{0.0}, since_look_{0.0};
-  LaneWatch* watch_ = nullptr;
+  MemberWatch* watch_ = nullptr;
   std::optional<typename Seats::Sight> sight_;
 };
 
 /// By Gauss steps of S stages, of chains of N links.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
-using GaussLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register>>>;
+using GaussLanes = MemberQueue<MembersStepper<ChainMembers<Space, S, N, Register>>>;
 
 /// The same with a tangent of each member, whose growth a watch is told of.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
-using GaussTangentLanes = LaneQueue<LaneStepper<LaneChain<Space, S, N, Register, true>>>;
+using GaussTangentLanes = MemberQueue<MembersStepper<ChainMembers<Space, S, N, Register, true>>>;
 
 /// By explicit steps.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
-using ExplicitLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, LanePack<Register>>, Method>>;
+using ExplicitLanes = MemberQueue<ExplicitSteps<ChainAccelerations<Space, N, LanePack<Register>>, Method>>;
 
 /// By explicit steps with a tangent of each member.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
-using TangentLanes = LaneQueue<LaneExplicit<LaneRods<Space, N, LanePack<Register>, true>, Method>>;
+using TangentLanes = MemberQueue<ExplicitSteps<ChainAccelerations<Space, N, LanePack<Register>, true>, Method>>;
 
 /// By Taylor series, of chains without loads.
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
-using TaylorLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, LanePack<Register>>>>;
+using TaylorLanes = MemberQueue<TaylorSteps<ChainAccelerations<Space, N, LanePack<Register>>>>;
 
 /// The same with a tangent of each member.
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
-using TaylorTangentLanes = LaneQueue<LaneTaylor<LaneRods<Space, N, LanePack<Register>, true>>>;
+using TaylorTangentLanes = MemberQueue<TaylorSteps<ChainAccelerations<Space, N, LanePack<Register>, true>>>;
 
-/// By explicit steps, of systems of one kernel (LaneDynamics).
+/// By explicit steps, of systems of one kernel (MemberSystems).
 template <class Method, class Register = MemberRegister>
-using SystemLanes = LaneQueue<LaneExplicit<LaneSystem<LanePack<Register>>, Method>,
-                              LaneSystemSeats<LaneExplicit<LaneSystem<LanePack<Register>>, Method>>>;
+using SystemLanes = MemberQueue<ExplicitSteps<SystemAccelerations<LanePack<Register>>, Method>,
+                                SystemSeats<ExplicitSteps<SystemAccelerations<LanePack<Register>>, Method>>>;
 
 /// The same by Gauss steps of S stages.
 template <int S, class Register = MemberRegister>
 using GaussSystemLanes =
-    LaneQueue<LaneStepper<LaneLagrangian<S, Register>>, LaneSystemSeats<LaneStepper<LaneLagrangian<S, Register>>>>;
+    MemberQueue<MembersStepper<SystemMembers<S, Register>>, SystemSeats<MembersStepper<SystemMembers<S, Register>>>>;
 
 /// By Gauss steps with a tangent of each member.
 template <int S, class Register = MemberRegister>
-using GaussSystemTangentLanes = LaneQueue<LaneStepper<LaneLagrangian<S, Register, true>>,
-                                          LaneSystemSeats<LaneStepper<LaneLagrangian<S, Register, true>>>>;
+using GaussSystemTangentLanes = MemberQueue<MembersStepper<SystemMembers<S, Register, true>>,
+                                            SystemSeats<MembersStepper<SystemMembers<S, Register, true>>>>;
 
 /// By explicit steps with a tangent of each member.
 template <class Method, class Register = MemberRegister>
-using SystemTangentLanes = LaneQueue<LaneExplicit<LaneSystem<LanePack<Register>, true>, Method>,
-                                     LaneSystemSeats<LaneExplicit<LaneSystem<LanePack<Register>, true>, Method>>>;
+using SystemTangentLanes =
+    MemberQueue<ExplicitSteps<SystemAccelerations<LanePack<Register>, true>, Method>,
+                SystemSeats<ExplicitSteps<SystemAccelerations<LanePack<Register>, true>, Method>>>;
 
 }  // namespace pendula

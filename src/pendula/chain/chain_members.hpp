@@ -6,11 +6,11 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/chain_motion.hpp>
 #include <pendula/chain/heading.hpp>
-#include <pendula/lanes/lane_chain_tangent.hpp>
-#include <pendula/lanes/lane_loads.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
-#include <pendula/lanes/members_in_lanes.hpp>
+#include <pendula/chain/member_loads.hpp>
+#include <pendula/chain/rod_tangent.hpp>
+#include <pendula/gauss/members_in_lanes.hpp>
+#include <pendula/numeric/lane_pack.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <type_traits>
 
@@ -22,7 +22,7 @@ namespace pendula {
 /// N may be Eigen::Dynamic. With a tangent, every number has its derivative along one tangent
 /// of each member's motion: that of the step itself, which is solved with it.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister, bool with_tangent = false>
-class LaneChain
+class ChainMembers
     : public ChainMotion<
           Space, MembersInLanes<S, std::conditional_t<with_tangent, Dual<LanePack<Register>>, LanePack<Register>>>, N> {
  public:
@@ -37,7 +37,7 @@ class LaneChain
   static constexpr bool has_tangent = with_tangent;
   using Motion::D, Motion::links, Motion::energy;
 
-  explicit LaneChain(int count) : Motion(count), rates_(count), loads_(count), saved_(count) {
+  explicit ChainMembers(int count) : Motion(count), rates_(count), loads_(count), saved_(count) {
     for (int i = 0; i < count; ++i) {  // unused lanes hold a resting chain
       rods_.set_mass(i, constants_[i].inverse_mass);
       rods_.along(i)[D - 1] = Number(-1.0);
@@ -238,7 +238,7 @@ class LaneChain
     const auto rod_of = [&](int i) {
       return MovingRod<D>{numbers(rods_.along(i)), numbers(rods_.free(i)), constants_[i].inverse_square[lane]};
     };
-    const LaneChainTangent<Space> tangent(links(), this->slowest_pace_[lane], rod_of);
+    const RodTangent<Space> tangent(links(), this->slowest_pace_[lane], rod_of);
     inverse_pace_squared_.set(lane, tangent.inverse_pace_squared());
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
@@ -271,7 +271,7 @@ class LaneChain
   L brought_{0.0};    // by loads, in the step that is looked at
   L restoring_{0.0};  // steps since lengths were restored
   detail::PerLink<Point, N> rates_;
-  LaneLoads<Space, N, L> loads_;
+  MemberLoads<Space, N, L> loads_;
   typename Motion::Rods::Place saved_;
 };
 

@@ -5,10 +5,10 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/lanes/lane_inputs.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/width.hpp>
+#include <pendula/system/member_inputs.hpp>
 #include <vector>
 
 namespace pendula {
@@ -16,11 +16,11 @@ namespace pendula {
 /// What acts on the chains of several members, one in each lane, beside gravity: damping, and torques of their times.
 /// Who has none is moved as if nobody had any, to the last bit.
 template <class Space, int N, class L>
-class LaneLoads {
+class MemberLoads {
   static constexpr std::size_t components = Space::torque_components;
 
  public:
-  explicit LaneLoads(int links)
+  explicit MemberLoads(int links)
       : links_(links), torques_(components * static_cast<std::size_t>(links)), inputs_(torques_.rows()) {}
 
   /// Whether any member that came has some, and who of those in the lanes has.
@@ -70,7 +70,7 @@ class LaneLoads {
   bool any_ = false;
   L loaded_{0.0};
   PackRows<width_of<L>> torques_;  // now
-  LaneInputs<L> inputs_;           // the same at any time
+  MemberInputs<L> inputs_;         // the same at any time
   std::vector<L> drag_;            // λ_i/l_i²
 };
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/numeric.hpp>
 
 namespace pendula {
@@ -10,11 +10,11 @@ namespace pendula {
 /// Chooses the steps of every member by the error of its last one, as explicit methods do that have an estimate of it
 /// of `Order`: a step is to err by no more than a tolerance.
 template <class L, int Order>
-class LaneErrorController {
+class ErrorController {
  public:
   using Mask = MaskOf<L>;
 
-  explicit LaneErrorController(double tolerance)
+  explicit ErrorController(double tolerance)
       : tolerance_(tolerance),
         log_tolerance_(std::log(tolerance)),
         first_(0.5 * std::min(1.0, std::exp(log_tolerance_ * exponent))) {}

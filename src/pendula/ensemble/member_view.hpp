@@ -3,24 +3,24 @@
 #include <array>
 #include <cstddef>
 #include <pendula/chain/heading.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/plain_lanes.hpp>
+#include <pendula/numeric/lane_pack.hpp>
+#include <pendula/run/plain_members.hpp>
 #include <vector>
 
 namespace pendula {
 
-/// Looks into the last steps of all members of a LaneStepper or LaneExplicit at once, and hands out what it sees of
-/// one. What several lanes ask for is found for all of them the first time. `Turns` is as LaneTurns; coordinates of
+/// Looks into the last steps of all members of a MembersStepper or ExplicitSteps at once, and hands out what it sees of
+/// one. What several lanes ask for is found for all of them the first time. `Turns` is as TurnCounter; coordinates of
 /// systems, of one dimension, are what they are.
 template <class Stepper, class Turns>
-class LaneSight : public LaneSteps {
+class MemberView : public MemberSteps {
  public:
   using Space = typename Stepper::SpaceType;
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
   using Vector = typename Stepper::Chain::Vector;
 
-  LaneSight(Stepper& stepper, const Turns& turns)
+  MemberView(Stepper& stepper, const Turns& turns)
       : chain_(stepper.chain()), turns_(turns), now_(coordinates()), views_(most_views, View(coordinates())) {}
 
   /// These members have taken steps.
@@ -56,7 +56,7 @@ class LaneSight : public LaneSteps {
   }
 
   bool look(int lane, double share, double* q, double* v) override {
-    if constexpr (Stepper::is_implicit) return LaneSteps::look(lane, share, q, v);
+    if constexpr (Stepper::is_implicit) return MemberSteps::look(lane, share, q, v);
     look_now();
     look_again(share).read(lane, q, v);
     return true;

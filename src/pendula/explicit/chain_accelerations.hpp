@@ -6,13 +6,13 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
+#include <pendula/chain/member_loads.hpp>
 #include <pendula/chain/multipliers.hpp>
-#include <pendula/lanes/lane_chain_tangent.hpp>
-#include <pendula/lanes/lane_loads.hpp>
-#include <pendula/lanes/lane_pack.hpp>
-#include <pendula/lanes/lane_part.hpp>
-#include <pendula/lanes/lane_tangent.hpp>
+#include <pendula/chain/rod_tangent.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/numeric.hpp>
+#include <pendula/numeric/tangent_numbers.hpp>
+#include <pendula/system/moving_part.hpp>
 #include <type_traits>
 
 namespace pendula {
@@ -22,7 +22,7 @@ namespace pendula {
 ///
 /// With a tangent, every number has its derivative along one tangent of each member's motion.
 template <class Space, int N = Eigen::Dynamic, class Num = LanePack<MemberRegister>, bool with_tangent = false>
-class LaneRods {
+class ChainAccelerations {
  public:
   using SpaceType = Space;
   using L = Num;
@@ -33,11 +33,12 @@ class LaneRods {
   static constexpr bool limits_turns = true;  ///< whether steps turn rods by less than half a turn
   static constexpr std::size_t D = Space::dimension;
 
-  using Part = LanePart<Number, D>;  ///< ξ, ξ̇
+  using Part = MovingPart<Number, D>;  ///< ξ, ξ̇
   using Parts = detail::PerLink<Part, N>;
 
   using Subject = int;  ///< how many links there are
-  explicit LaneRods(int links) : links_(links), constants_(links), rows_(links), loads_(links), freed_(links) {}
+  explicit ChainAccelerations(int links)
+      : links_(links), constants_(links), rows_(links), loads_(links), freed_(links) {}
 
   int links() const {
     if constexpr (N == Eigen::Dynamic) return links_;
@@ -319,7 +320,7 @@ class LaneRods {
     const auto rod_of = [&](int i) {
       return MovingRod<D>{numbers(rods[i].place), numbers(rods[i].rate), get(constants_[i].inverse_square, lane)};
     };
-    const LaneChainTangent<Space> tangent(links(), get(slowest_pace_, lane), rod_of);
+    const RodTangent<Space> tangent(links(), get(slowest_pace_, lane), rod_of);
     set(inverse_pace_squared_, lane, tangent.inverse_pace_squared());
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
@@ -333,7 +334,7 @@ class LaneRods {
   L gravity_{0.0}, swing_squared_{1.0}, slowest_pace_{1.0}, inverse_pace_squared_{1.0};
   detail::PerLink<LinkConstants<L>, N> constants_;
   detail::PerLink<MultiplierRow<Number>, N> rows_;
-  LaneLoads<Space, N, L> loads_;
+  MemberLoads<Space, N, L> loads_;
   detail::PerLink<std::array<Number, D>, N> freed_;
 };
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <pendula/lanes/lane_dynamics.hpp>
-#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/member_systems.hpp>
 #include <random>
 #include <vector>
 
@@ -15,10 +15,10 @@ namespace pendula {
 /// angles, and of others the largest coordinate of the same unit where the member began; ω how fast it moved then, and
 /// what is a little beside it.
 template <class L>
-class LaneSystemTangent {
+class SystemTangents {
  public:
   /// `dynamics` must outlive it.
-  explicit LaneSystemTangent(LaneDynamics<L>& dynamics)
+  explicit SystemTangents(MemberSystems<L>& dynamics)
       : dynamics_(dynamics),
         rows_(static_cast<std::size_t>(kinds * count()) + 1),
         inverse_sizes_(static_cast<std::size_t>(count()), L(1.0)) {}
@@ -114,7 +114,7 @@ class LaneSystemTangent {
     return found;
   }
 
-  LaneDynamics<L>& dynamics_;
+  MemberSystems<L>& dynamics_;
   PackRows<L::width> rows_;
   std::vector<L> inverse_sizes_;
   L inverse_pace_squared_{1.0};

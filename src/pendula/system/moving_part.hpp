@@ -14,11 +14,11 @@ struct CoordinateSpace {
 /// A part of what moves, of several members of an ensemble: where it is and its rate, of D components; of slopes their
 /// derivatives by time.
 template <class Number, std::size_t D>
-struct LanePart {
+struct MovingPart {
   std::array<Number, D> place, rate;
 
-  static LanePart zero() {
-    LanePart part;
+  static MovingPart zero() {
+    MovingPart part;
     part.place.fill(Number(0.0));
     part.rate.fill(Number(0.0));
     return part;

@@ -5,21 +5,21 @@
 #include <numbers>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
-#include <pendula/lanes/lane_pack.hpp>
+#include <pendula/numeric/lane_pack.hpp>
 
 namespace pendula {
 
 /// Counts the full turns of every member's links, for the angles of their ends: AngleAnchor where a link has moved so
 /// far from where it was last followed to.
 template <class Space, int N, class L>
-class LaneTurns {
+class TurnCounter {
   static constexpr std::size_t D = Space::dimension;
   static constexpr std::size_t lanes = static_cast<std::size_t>(L::size);
 
  public:
   using Mask = typename L::Mask;
 
-  explicit LaneTurns(int links) : links_(links), turns_(links) {}
+  explicit TurnCounter(int links) : links_(links), turns_(links) {}
 
   /// A member comes into a lane, at angles q; along(i): the rods.
   template <class Along>
@@ -161,11 +161,11 @@ class LaneTurns {
 
 /// In the plane a link has turned once more where it has passed the upward vertical.
 template <int N, class L>
-class LaneTurns<Planar, N, L> {
+class TurnCounter<Planar, N, L> {
  public:
   using Mask = typename L::Mask;
 
-  explicit LaneTurns(int links) : links_(links), turns_(links) {}
+  explicit TurnCounter(int links) : links_(links), turns_(links) {}
 
   template <class Along>
   void start(int lane, const double* q, Along along) {

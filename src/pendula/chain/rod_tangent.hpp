@@ -21,14 +21,14 @@ struct MovingRod {
 /// and turning faster by another; the same ones for all members. Its length is 1, of all rods |δξ|²/l² + |δξ̇|²/(l ω)²,
 /// ω being how fast the member swings where it begins.
 template <class Space>
-class LaneChainTangent {
+class RodTangent {
  public:
   static constexpr std::size_t D = Space::dimension;
   using Vector = std::array<double, D>;
 
   /// `rod(i)` tells MovingRods; `slowest_squared`: of the rates that ω is no less than  [1/s²].
   template <class Rod>
-  LaneChainTangent(int links, double slowest_squared, Rod rod) {
+  RodTangent(int links, double slowest_squared, Rod rod) {
     double squared = slowest_squared;
     for (int i = 0; i < links; ++i) {
       const MovingRod<D> here = rod(i);
