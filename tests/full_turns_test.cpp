@@ -19,7 +19,7 @@ TEST(FullTurns, AreTakenOutAndPutBack) {
     const double angle = random.uniform(-size, size);
     Compensated<double> within{angle, 0};
     double turns = 0;
-    detail::take_out_turns(within, turns);
+    detail::take_out_turns(within, turns, true);
     EXPECT_LE(std::abs(within.value), 8);
     EXPECT_EQ(detail::with_turns(within, turns), angle);
     EXPECT_NEAR(std::sin(within.value), std::sin(angle), 5e-16) << angle;  // measured 2.3e-16

@@ -128,8 +128,8 @@ TEST(SystemLanes, AccelerationsHaveTheirDerivatives) {
       dv[i][k] = 1.7 - static_cast<double>(k);
     }
   }
-  dynamics.accelerations(times[0], q[0], v[0], expected[0]);
-  dynamics.variations(times[0], q[0], v[0], dq[0], dv[0], a[0], da[0]);
+  dynamics.call(times[0], &SystemFunctions::acceleration, q[0], v[0], expected[0]);
+  dynamics.call(times[0], &SystemFunctions::acceleration_along, q[0], v[0], dq[0], dv[0], a[0], da[0]);
   for (std::size_t k = 0; k < lanes; ++k) {
     const auto member = [k](const PackRows<lanes>& rows) { return Eigen::Vector2d(rows[0][k], rows[1][k]); };
     SystemAt<1> here(SystemModel(system_table<Kernel>, systems.members[k].system));

@@ -8,6 +8,7 @@
 
 #include "library/chain_integrator.hpp"
 #include "library/explicit_methods.hpp"
+#include "library/solver_choice.hpp"
 #include "library/system_integrator.hpp"
 #include "library/taylor_integrator.hpp"
 
@@ -53,29 +54,13 @@ std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const Ru
   return make_explicit_chain(chain_of<Space>(chain), options);
 }
 
-// On few links in the plane fixed points over the generated kernel take less, whatever the registers are (table "few
-// links" in docs/benchmarks.md). In space kernels cannot pass a pole.
-template <class Space>
-bool kernel_is_faster(int links, const RunOptions& options) {
-  if (Space::dof != 1 || options.iteration == Iteration::newton || find_kernel<Space>(links) == nullptr) return false;
-  return links == 1 || (links <= 3 && options.stages > links);
-}
-
-// The velocity form is the dense solver's alone.
-template <class Space>
-Solver solver_for(int links, const RunOptions& options) {
-  if (options.solver != Solver::automatic) return options.solver;
-  const bool dense = options.form == Form::velocity || kernel_is_faster<Space>(links, options);
-  return dense ? Solver::dense : Solver::chain;
-}
-
 }  // namespace
 
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options) {
   if (is_explicit(options.method)) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
-  if (solver_for<Space>(chain.links, options) == Solver::chain)
+  if (solver_for<Space>(chain.links, options, find_kernel<Space>(chain.links) != nullptr) == Solver::chain)
     return make_chain_integrator(chain_of<Space>(chain), options);
   return make_over<Space>(require_kernel<Space>(chain.links), chain, options);
 }

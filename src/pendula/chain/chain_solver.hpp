@@ -8,8 +8,7 @@
 #include <pendula/chain/chain_newton.hpp>
 #include <pendula/chain/chain_stages.hpp>
 #include <pendula/chain/chain_tangent.hpp>
-#include <pendula/gauss/iteration_choice.hpp>
-#include <pendula/gauss/roundoff.hpp>
+#include <pendula/gauss/stage_iterations.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
@@ -31,20 +30,20 @@ constexpr double newton_cost(int stages) {
 /// takes less: a StageSolver for GaussStepper. Poles are no obstacle. Real is any floating-point type; float and double
 /// go in SIMD registers.
 template <class SpaceType, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
-class ChainSolver {
+class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType, Arch>> {
+  using Base = StageIterations<ChainStages<SpaceType, S, N, RealType, Arch>>;
+
  public:
   using Space = SpaceType;
-  using Real = RealType;
   using Model = Chain<Space, N>;
-  using State = pendula::State<Space, N, Real>;
+  using typename Base::Real, typename Base::State;
 
   /// Throws std::invalid_argument unless `stages` is S, and the method has so many.
   ChainSolver(const Model& chain, int stages, Iteration iteration = Iteration::automatic, Family family = Family::gauss)
-      : family_(family),
-        stages_(chain, family),
+      : Base(iteration, newton_cost<Space>(S), chain, family),
+        family_(family),
         newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
-        turn_(stages, order_of(family, stages)),
-        choice_(iteration, newton_cost<Space>(S)) {
+        turn_(stages, order_of(family, stages)) {
     tableau_of<S>(family, stages);
   }
 
@@ -53,71 +52,34 @@ class ChainSolver {
     return Status::ok;
   }
 
-  void prepare(double time, double h) {
-    stages_.prepare(time, h);
-    choice_.begin_step();
-    count_ = 0;
-  }
-
-  void prepare_again(double time, double h) {
-    stages_.prepare_again(time, h);
-    count_ = 0;
-  }
-
-  Correction correct() {
-    ++count_;
-    choice_.count_iteration();
-    if (choice_.active() == Iteration::newton) return last_ = newton_.correct(stages_);
-    const Correction correction{stages_.iterate(), -1};
-    if (choice_.is_automatic() &&
-        diverges(correction.relative, last_.relative, count_, usual_rounding(parts(), epsilon), epsilon)) {
-      if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN(), -1};
-      stages_.start_cold();
-      choice_.give_up_fixed_point();
-      return last_ = newton_.correct(stages_);
-    }
-    return last_ = correction;
-  }
-
-  void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
+  Correction correct() { return Base::correct(newton_, stages_.links()); }
   void heed(StopSign stop) { newton_.heed(stop); }
 
-  Convergence convergence() const {
-    return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
-  }
-
   /// Iterations take no note of where they change what; one more tells.
-  int worst_part() {
-    return choice_.active() == Iteration::newton ? newton_.worst_link(stages_) : stages_.worst_link();
+  int part_of(Status status) {
+    if (status == Status::singular_mass_matrix || status == Status::wrong_root) return -1;
+    return is_by_newton() ? newton_.worst_link(stages_) : stages_.worst_link();
   }
 
-  int singular_part() const { return -1; }
-  static constexpr double largest_turn() { return 3; }
-  double turn() { return stages_.turn(); }
-  static constexpr int turning_part() { return -1; }
-  double defect() { return stages_.defect(); }
-  double predictor_gain() const { return stages_.predictor_gain(); }
-  Tempo tempo() const { return stages_.tempo(); }
+  double turn() {
+    return !is_by_newton() || newton_.positive() ? stages_.turn() : std::numeric_limits<double>::infinity();
+  }
   StepShape shape() const { return stages_.shape(); }
-  bool loaded() const { return stages_.loaded(); }
-  bool damped() const { return stages_.chain().damped(); }
   double followed(double, double h, double tolerance) const {
     const double fastest = stages_.chain().fastest_drive();
     return fastest > 0 ? std::min(h, turn_.within(tolerance) / fastest) : h;
   }
-  bool dissipates() const { return family_ == Family::radau; }
-  static constexpr int stages() { return S; }
-  int parts() const { return stages_.links(); }
-  int coordinates() const { return Space::dof * stages_.links(); }
-  double work() const { return static_cast<double>(stages_.work()); }
-  bool continues() const { return choice_.active() == Iteration::fixed_point || newton_.positive(); }
+  SolverTraits traits() const {
+    return {stages_.links(),          Space::dof * stages_.links(), S, 3, stages_.loaded(),
+            stages_.chain().damped(), family_ == Family::radau};
+  }
   double energy_defect() {
-    if (choice_.active() == Iteration::newton) newton_.find_multipliers(stages_);
+    if (is_by_newton()) newton_.find_multipliers(stages_);
     return stages_.energy_defect();
   }
 
   void accept() {
-    if (choice_.active() == Iteration::newton) newton_.find_multipliers(stages_);
+    if (is_by_newton()) newton_.find_multipliers(stages_);
     choice_.end_step();
     stages_.accept();
   }
@@ -126,37 +88,16 @@ class ChainSolver {
   using Tangent = ChainTangent<Space, S, N, Real, Arch>;
   Tangent make_tangent() const { return Tangent(stages_.links()); }
   void linearize(Tangent& tangent) {
-    if (choice_.active() == Iteration::newton) newton_.find_multipliers(stages_);
+    if (is_by_newton()) newton_.find_multipliers(stages_);
     tangent.linearize(stages_);
   }
 
-  State state(double time) const { return stages_.state(time); }
-  template <class Numbers>
-  void member(Numbers& numbers) {
-    numbers(stages_, choice_);
-  }
-  void forget() { stages_.forget(); }
-  State glance(double time, double x) const { return stages_.glance(time, x); }
-  void remember() { stages_.remember(); }
-  void return_to_start() {
-    stages_.return_to_start();
-    choice_.begin_look();
-  }
-  void save() { stages_.save(); }
-  void restore() { stages_.restore(); }
-
-  Iteration iteration() const { return choice_.preferred(); }
-
  private:
-  static constexpr double epsilon = static_cast<double>(std::numeric_limits<Real>::epsilon());
+  using Base::choice_, Base::is_by_newton, Base::stages_;
 
   Family family_;
-  ChainStages<Space, S, N, Real, Arch> stages_;
   ChainNewton<Space, S, N, Real, Arch> newton_;
   SineTurn turn_;
-  IterationChoice choice_;
-  Correction last_;
-  int count_ = 0;
 };
 
 }  // namespace pendula

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
-#include <pendula/chain/chain_motion.hpp>
+#include <pendula/chain/chain_turns.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/multipliers.hpp>
@@ -25,23 +24,20 @@ namespace pendula {
 
 /// Rods and stages of one chain, with its angles, as both iterations on the stages see them: the fixed point of
 /// ChainMotion and Newton's. All stages of one number are a Lanes<S, Real>, everything is done for all of them at once.
-template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
-class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
-  using Base = ChainMotion<Space, StagesInLanes<S, Real>, N>;
-  using Base::columns_, Base::constants_, Base::rods_, Base::stages_, Base::kept_, Base::pasts_, Base::newest_;
+template <class Space, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
+class ChainStages : public ChainTurns<Space, S, N, RealType> {
+  using Base = ChainTurns<Space, S, N, RealType>;
+  using Base::anchors_, Base::columns_, Base::constants_, Base::direction, Base::entry, Base::kept_, Base::last_h_,
+      Base::past, Base::rate_at, Base::rods_, Base::stages_, Base::turn_;
 
  public:
-  using L = Lanes<S, Real>;
-  using Base::D, Base::links;
-  static constexpr std::size_t Z = L::size;
+  using Real = RealType;
+  using Base::D, Base::links, Base::Z;
+  using typename Base::L, typename Base::Numbers, typename Base::State;
   using Vector = std::array<L, D>;  ///< one vector at all stages
-  using Numbers = std::array<Real, D>;
 
   explicit ChainStages(const Chain<Space, N>& chain, Family family = Family::gauss)
-      : Base(chain.links(), family),
-        chain_(chain),
-        restoring_interval_(family == Family::gauss ? 16 : 1),
-        anchors_(chain.links()) {
+      : Base(chain.links(), family), chain_(chain), restoring_interval_(family == Family::gauss ? 16 : 1) {
     const ChainLinks<Space, N, Real> given(chain);
     Real length(0);
     for (int i = 0; i < links(); ++i) {
@@ -73,6 +69,8 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     is_finished_ = false;
     stages_[i].tau.set(0, tau);
   }
+
+  using Base::keep, Base::place;
 
   /// Where a rod is at the stages.
   Vector place(int i) const {
@@ -129,7 +127,7 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
 
   // --- A step ---
 
-  void start(const State<Space, N, Real>& state) {
+  void start(const State& state) {
     forget();
     steps_ = 0;
     fastest_ = 0;
@@ -271,7 +269,7 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   /// Moves the state to the end of the step.
   void accept() {
     if (!is_finished_) finish();
-    follow_turns();
+    Base::follow_turns();
     Base::move(Everyone{});
     ++steps_;
     if (steps_ % restoring_interval_ == 0) rods_.restore_lengths(constants_, Everyone{});
@@ -284,9 +282,9 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     numbers(rods_, last_h_, fastest_, steps_, depth_, this->newest_, this->hangs_, this->scale_);
     for (int i = 0; i < links(); ++i) {
       numbers(anchors_[i]);
-      for (auto& past : this->pasts_[i]) {
-        for (auto& row : past.advance) numbers.range(row.numbers(), S);
-        numbers.range(past.tau.numbers(), S);
+      for (auto& step : this->pasts_[i]) {
+        for (auto& row : step.advance) numbers.range(row.numbers(), S);
+        numbers.range(step.tau.numbers(), S);
       }
     }
   }
@@ -297,56 +295,10 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     depth_ = 0;
   }
 
-  State<Space, N, Real> state(double time) const {
-    State<Space, N, Real> state = empty_state(time);
-    rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
-      read_angles(i, rods_.heading(0, i, rate), anchors_[i], state);
-    });
-    return state;
-  }
-
-  /// Remembers the start of the step; goes back there, the stages still known.
-  void remember() {
-    if (!remembered_) remembered_.emplace(rods_.place());
-    *remembered_ = rods_.place();
-    remembered_anchors_ = anchors_;
-  }
-  void return_to_start() {
-    rods_.place() = *remembered_;
-    anchors_ = remembered_anchors_;
-  }
-
-  /// The state at x of the last step, by the polynomials through its rates.
-  State<Space, N, Real> glance(double time, double x) const {
-    State<Space, N, Real> state = empty_state(time);
-    const auto up_to = columns_.integrals(Real(x));
-    for (int i = 0; i < links(); ++i) {
-      const Real* along = remembered_->along[i];
-      const Numbers rate = rate_at(i, Real(x), Real(last_h_)), rod = rod_in_step(along, i, up_to), low{};
-      AngleAnchor<Space, Real> anchor = remembered_anchors_[i];
-      if (may_leave(anchor, i, along, turn_ * std::abs(x))) follow_turn(anchor, along, i, Real(x), rod);
-      read_angles(i, Base::Rods::heading_of(rod, low, rate), anchor, state);
-    }
-    return state;
-  }
-
-  /// Keeps the state, to go back to where a step has to be given up half-way.
-  void save() {
-    saved_ = rods_.place();
-    saved_anchors_ = anchors_;
-  }
-  void restore() {
-    rods_.place() = saved_;
-    anchors_ = saved_anchors_;
-    forget();
-  }
-
  private:
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
   static constexpr std::int64_t looked_at = 8;  // of the steps, one in so many
-
-  const auto& past(int i) const { return this->pasts_[i][this->newest_]; }
 
   void predict(double time, double h, double ratio, const StagePrediction<Real>& kind) {
     const bool other = Real(h) != columns_.h();
@@ -364,50 +316,6 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     is_finished_ = true;
     turn_ = std::sqrt(static_cast<double>(this->turn_squared()));
   }
-
-  using Weights = typename Base::Columns::Weights;
-  static Real weighed(const Weights& weights, const Real* x) {
-    Real sum(0);
-    for (std::size_t j = 0; j < S; ++j) sum += weights[j] * x[j];
-    return sum;
-  }
-
-  // Of the step whose stages are known: the rate of a rod at x of it, and the rod from its start on.
-  Numbers rate_at(int i, const Real& x, const Real& h) const {
-    const Weights weights = columns_.values(x);
-    return components<D>([&](std::size_t k) {
-      return h == 0 ? Real(rods_.free(i)[k]) : Real(weighed(weights, past(i).advance[k].numbers()) / h);
-    });
-  }
-  Numbers rod_in_step(const Real* along, int i, const Weights& up_to) const {
-    return components<D>([&](std::size_t k) { return Real(along[k] + weighed(up_to, past(i).advance[k].numbers())); });
-  }
-
-  State<Space, N, Real> empty_state(double time) const {
-    State<Space, N, Real> state;
-    state.time = time;
-    state.q.resize(Space::dof * links());
-    state.v.resize(Space::dof * links());
-    return state;
-  }
-
-  template <class LinkHeading>
-  void read_angles(int i, const LinkHeading& heading, const AngleAnchor<Space, Real>& anchor,
-                   State<Space, N, Real>& state) const {
-    using Wide = typename decltype(heading.u)::value_type;
-    std::array<Wide, Space::dof> near;
-    for (std::size_t a = 0; a < near.size(); ++a) near[a] = Wide(anchor.angles()[a]);
-    const auto angles = user_angles(heading, near);
-    for (std::size_t a = 0; a < near.size(); ++a) {
-      state.q[entry(i, a)] = Real(angles.q[a]);
-      state.v[entry(i, a)] = Real(angles.v[a]);
-    }
-  }
-
-  // Where coordinate a of link i stands in the user's vectors.
-  Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
-
-  Numbers direction(int i) const { return scaled(constants_[i].inverse_length, Base::Rods::vector(rods_.along(i))); }
 
   StepShape shape_of(const L& quartic, const L& decay) const {
     alignas(pack_alignment) Real paces[Z], squares[Z];
@@ -475,68 +383,13 @@ class ChainStages : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return scale > 0 ? scale : 1;
   }
 
-  // Whether a link may turn so far from where a step began that its anchor does not hold it.
-  bool may_leave(const AngleAnchor<Space, Real>& anchor, int i, const Real* along, double turn) const {
-    using std::sqrt;
-    const Numbers off = components<D>(
-        [&](std::size_t k) { return Real(along[k] * constants_[i].inverse_length - anchor.direction()[k]); });
-    const Real farthest = sqrt(dot(off, off)) + Real(1.5 * turn);
-    return farthest * farthest > anchor.reach_squared();
-  }
-
-  // Takes an anchor from a rod on through the stages to x of the step, where it is at `end`; where the stages are too
-  // far apart for that, by a pole, along the polynomial through them.
-  void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, int i, const Real& x,
-                   const Numbers& end) const {
-    const Real& inverse_length = constants_[i].inverse_length;
-    alignas(pack_alignment) Real u[D][2 * Z];
-    L squared(Real(0));
-    for (std::size_t k = 0; k < D; ++k) {
-      const L moved = columns_.integral(columns_.weight(0) * past(i).advance[k][0]);
-      const L direction = L(inverse_length) * (L(along[k]) + moved), off = direction - L(anchor.direction()[k]);
-      direction.store(u[k]);
-      squared = fma(off, off, squared);
-    }
-    std::size_t before = 0;
-    while (before < S && columns_.c(before) < x) ++before;
-    Real farthest(0);
-    for (std::size_t k = 0; k < D; ++k) {
-      u[k][before] = inverse_length * end[k];
-      const Real off = u[k][before] - anchor.direction()[k];
-      farthest += off * off;
-    }
-    alignas(pack_alignment) Real stored[Z];
-    squared.store(stored);
-    for (std::size_t j = 0; j < before; ++j) farthest = std::max(farthest, stored[j]);
-    if (farthest <= anchor.reach_squared() || anchor.follow_through(u, before + 1)) return;
-    const auto direction_at = [&](const Real& at) {
-      return scaled(inverse_length, rod_in_step(along, i, columns_.integrals(at)));
-    };
-    anchor.follow_path(direction_at, x);
-  }
-
-  // Of the step that is solved.
-  void follow_turns() {
-    for (int i = 0; i < links(); ++i) {
-      const Real* along = rods_.along(i);
-      if (!may_leave(anchors_[i], i, along, turn_)) continue;
-      const Numbers end = components<D>(
-          [&](std::size_t k) { return Real(along[k] + (columns_.h() * rods_.free(i)[k] + this->moved_[i][k])); });
-      follow_turn(anchors_[i], along, i, Real(1), end);
-    }
-  }
-
   Chain<Space, N> chain_;
   std::int64_t restoring_interval_;  // steps: Gauss methods keep lengths but for rounding
-  detail::PerLink<AngleAnchor<Space, Real>, N> anchors_, saved_anchors_{anchors_}, remembered_anchors_{anchors_};
-  typename Base::Rods::Place saved_{links()}, trial_{links()};
-  std::optional<typename Base::Rods::Place> remembered_;
+  typename Base::Rods::Place trial_{links()};
   double fastest_ = 0;  // bob, squared  [m²/s²]
   bool torque_is_set_ = false, is_predicted_ = false, is_finished_ = false, is_first_ = true;
   int depth_ = 0;    // steps of this size that a step follows
   double step_ = 0;  // of the stages
-  double turn_ = 0;
-  double last_h_ = 0;  // of the step that the stages belong to; 0: they belong to none
   std::int64_t steps_ = 0;
 };
 

@@ -73,8 +73,8 @@ class GaussIntegrator : public PlainIntegrator {
     return 0;
   }
   double resolved_decay(double error) const override {
-    const Solver& solver = stepper_.solver();
-    return pendula::resolved_decay(solver.dissipates() ? Family::radau : Family::gauss, solver.stages(), error);
+    const SolverTraits traits = stepper_.solver().traits();
+    return pendula::resolved_decay(traits.dissipates ? Family::radau : Family::gauss, traits.stages, error);
   }
   int parameters() override {
     if constexpr (LinearizingSolver<Solver>) return stepper_.linearization().parameters();
@@ -93,7 +93,7 @@ class GaussIntegrator : public PlainIntegrator {
   }
 
  private:
-  Eigen::Index coordinates() const { return stepper_.solver().coordinates(); }
+  Eigen::Index coordinates() const { return stepper_.solver().traits().coordinates; }
 
   void write(const State& state, double* q, double* v) const {
     std::copy_n(state.q.data(), coordinates(), q);

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
-#include <pendula/gauss/iteration_choice.hpp>
 #include <pendula/gauss/lagrangian_field.hpp>
 #include <pendula/gauss/lagrangian_newton.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
 #include <pendula/gauss/lagrangian_tangent.hpp>
 #include <pendula/gauss/roundoff.hpp>
+#include <pendula/gauss/stage_iterations.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
@@ -23,22 +23,22 @@ namespace pendula {
 /// symplectic. Solved by exact Newton, by fixed point, or by whichever takes less. Up to `Width` stages: 2, 4 or
 /// 8.
 template <int Width = max_stages>
-class LagrangianSolver {
+class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
+  using Base = StageIterations<LagrangianStages<Width>>;
+
  public:
   using Model = SystemModel;
-  using Real = double;
-  using State = Motion;
+  using typename Base::State;
   static constexpr int sequences = 2;  ///< of corrections of its fixed point (FixedPointStop)
 
   /// Throws std::invalid_argument unless the method has so many stages, at most Width.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
                    Family family = Family::gauss)
-      : family_(family),
-        stages_(model, checked(stages), family),
+      : Base(iteration, newton_cost(model, stages), model, checked(stages), family),
+        family_(family),
         newton_(model.coordinates(), stages),
         forcing_(model, family, stages),
         field_(model, stages),
-        choice_(iteration, newton_cost(stages)),
         // Where lengths change, motion may be singular beside the stages, which angles alone never are. What depends on
         // time keeps no energy.
         may_miss_(family != Family::radau && !model.info().depends_on_time &&
@@ -50,56 +50,19 @@ class LagrangianSolver {
     return stages_.start(state.time, state.q.data(), state.v.data());
   }
 
-  void prepare(double time, double h) {
-    stages_.prepare(time, h);
-    choice_.begin_step();
-    count_ = 0;
-  }
-
-  void prepare_again(double time, double h) {
-    stages_.prepare_again(time, h);
-    count_ = 0;
-  }
-
   Correction correct() {
-    ++count_;
-    choice_.count_iteration();
-    if (choice_.active() == Iteration::fixed_point) {
-      const double change = stages_.iterate();
-      if (!gives_up(change)) {
-        forces_are_found_ = true;
-        last_change_ = change;
-        last_part_ = -1;
-        return {change, -1};
-      }
-      if (!choice_.newton_is_allowed()) return {std::numeric_limits<double>::quiet_NaN(), -1};
-      stages_.start_cold();
-      choice_.give_up_fixed_point();
-    }
-    forces_are_found_ = false;
-    const Correction correction = newton_.correct(stages_);
-    last_change_ = correction.relative;
-    last_part_ = correction.part;
+    const Correction correction = Base::correct(newton_, coordinates());
+    forces_are_found_ = correction.convergence == Convergence::linear;
     return correction;
   }
 
-  void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
-
-  Convergence convergence() const {
-    return choice_.active() == Iteration::newton ? Convergence::quadratic : Convergence::linear;
+  int part_of(Status status) {
+    if (status == Status::singular_mass_matrix) return stages_.singular_coordinate();
+    if (status == Status::wrong_root) return stages_.turning_coordinate();
+    return last_.part >= 0 ? last_.part : stages_.most_changing_coordinate();
   }
 
-  int worst_part() { return last_part_ >= 0 ? last_part_ : stages_.most_changing_coordinate(); }
-  int singular_part() const { return stages_.singular_coordinate(); }
-  static constexpr bool continues() { return true; }
-
-  // Where inertia may vanish, coordinates may move faster than all else.
-  double largest_turn() const { return stages_.info().constant_masses ? 3 : 0.25; }
   double turn() const { return stages_.turn(); }
-  int turning_part() const { return stages_.turning_coordinate(); }
-  double defect() { return stages_.defect(); }
-  double predictor_gain() const { return stages_.predictor_gain(); }
-  Tempo tempo() const { return stages_.tempo(); }
   StepShape shape() {
     StepShape shape = stages_.shape();
     if (may_miss_) {
@@ -114,20 +77,19 @@ class LagrangianSolver {
     find_forces();
     return field_.unseen(stages_);
   }
-  bool loaded() const { return stages_.model().loaded(); }
-  bool damped() const { return stages_.model().damped(); }
   double followed(double time, double h, double tolerance) {
     return forcing_.followed(h, tolerance, [&] {
       const double pace = stages_.tempo().pace;
-      const auto [q, v] = stages_.place(time);
+      const auto [q, v] = stages_.here(time);
       return SystemForcing::Here{time, q, v, pace};
     });
   }
-  bool dissipates() const { return family_ == Family::radau; }
-  int stages() const { return stages_.stages(); }
-  int parts() const { return coordinates(); }
-  int coordinates() const { return static_cast<int>(stages_.count()); }
-  double work() const { return stages_.work(); }
+  SolverTraits traits() const {
+    const SystemModel& model = stages_.model();
+    // Where inertia may vanish, coordinates may move faster than all else.
+    return {coordinates(),  coordinates(),  stages_.stages(),        model.info().constant_masses ? 3 : 0.25,
+            model.loaded(), model.damped(), family_ == Family::radau};
+  }
   double energy_defect() {
     find_forces();
     return stages_.energy_defect();
@@ -144,25 +106,10 @@ class LagrangianSolver {
   Tangent make_tangent() const { return Tangent(stages_); }
   void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
 
-  State state(double time) const { return stages_.motion(time); }
-  template <class Numbers>
-  void member(Numbers& numbers) {
-    numbers(stages_, choice_);
-  }
-  void forget() { stages_.forget(); }
-  State glance(double time, double x) const { return stages_.glance(time, x); }
-  void remember() { stages_.remember(); }
-  void return_to_start() {
-    stages_.return_to_start();
-    choice_.begin_look();
-  }
-  void save() { stages_.save(); }
-  void restore() { stages_.restore(); }
-
-  Iteration iteration() const { return choice_.preferred(); }
-
  private:
-  static constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  using Base::choice_, Base::last_, Base::stages_;
+
+  int coordinates() const { return static_cast<int>(stages_.count()); }
 
   static int checked(int stages) {
     if (stages <= Width) return stages;
@@ -172,14 +119,11 @@ class LagrangianSolver {
 
   // Of a Newton iteration in fixed-point iterations, as measured on kernels of one to six coordinates (g++ 12, AVX2 and
   // AVX-512): within a third.
-  double newton_cost(int stages) const { return stages * std::min(1.6 + 0.75 * coordinates(), 5.5); }
+  static double newton_cost(const Model& model, int stages) {
+    return stages * std::min(1.6 + 0.75 * static_cast<double>(model.coordinates()), 5.5);
+  }
 
   bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }
-
-  // Whether a fixed point that changed so much leaves the step to Newton.
-  bool gives_up(double change) const {
-    return choice_.is_automatic() && diverges(change, last_change_, count_, usual_rounding(parts(), epsilon), epsilon);
-  }
 
   // Newton leaves the forces of the rates before its last correction.
   void find_forces() {
@@ -188,15 +132,10 @@ class LagrangianSolver {
   }
 
   Family family_;
-  LagrangianStages<Width> stages_;
   LagrangianNewton<Width> newton_;
   SystemForcing forcing_;
   LagrangianField<Width> field_;
-  IterationChoice choice_;
   bool may_miss_;
-  double last_change_ = 0;  // of the last correction, apart from the next: written and read one by one
-  int last_part_ = -1;
-  int count_ = 0;
   bool forces_are_found_ = true;
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <pendula/gauss/stage_dynamics.hpp>
 #include <pendula/gauss/stages_in_lanes.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>
@@ -19,39 +20,6 @@
 
 namespace pendula {
 
-/// A system where it moves, and at the stages of a step.
-template <int Width>
-class StageDynamics {
- public:
-  explicit StageDynamics(const SystemModel& model) : at_stages_(model), here_(model) {}
-
-  const SystemModel& model() const { return at_stages_.model(); }
-  const SystemInfo& info() const { return model().info(); }
-
-  const SystemAt<1>& at(double time) const {
-    here_.set_time(time);
-    return here_;
-  }
-  template <class Function, class... Numbers>
-  void here(double time, Function function, Numbers... numbers) const {
-    at(time)(function, numbers...);
-  }
-
-  const SystemAt<Width>& stages() const { return at_stages_; }
-  template <class Times>
-  void set_times(Times times) {
-    at_stages_.set_times(times);
-  }
-  template <class Function, class... Numbers>
-  void call(const double* /*times*/, Function function, Numbers... numbers) const {
-    at_stages_(function, numbers...);
-  }
-
- private:
-  SystemAt<Width> at_stages_;
-  mutable SystemAt<1> here_;
-};
-
 /// The stages of a step of any system in momentum form (SystemMotion), of one motion, all of them in the lanes of a
 /// pack: what both iterations on them share. `Width` is at least the number of stages, which is a run-time number:
 /// lanes beyond it repeat the start of the step.
@@ -62,12 +30,14 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
  public:
   using L = Pack<Width, RegisterFor<Width>>;
   using typename Base::Columns;
+  using Real = double;
+  using State = Motion;
   using Rows = PackRows<static_cast<std::size_t>(Width)>;
   /// One number a lane.
   using Stored = double[static_cast<std::size_t>(Width)];
 
   LagrangianStages(const SystemModel& model, int stages, Family family)
-      : Base(StageDynamics<Width>(model), family, stages), remembered_(saved_), weights_(2 * count_) {}
+      : Base(StageDynamics<Width>(model), family, stages), weights_(2 * count_) {}
 
   const SystemModel& model() const { return dynamics_.model(); }
   using Base::columns, Base::count, Base::info;
@@ -94,7 +64,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
 
   /// Coordinates with all turns that were made, and rates.
-  Motion motion(double time) const {
+  Motion state(double time) const {
     Motion motion(time, Eigen::VectorXd(eigen_count()), Eigen::VectorXd(eigen_count()));
     for (std::size_t k = 0; k < count_; ++k) motion.q[index(k)] = Base::coordinate(k);
     find_rates(time);
@@ -103,10 +73,10 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
   /// Where the system is  (coordinates), those that are periodic within a turn or so. What is told stays until the next
   /// call.
-  struct Place {
+  struct Here {
     const double *q, *v;
   };
-  Place place(double time) const {
+  Here here(double time) const {
     find_rates(time);
     return {room(0), room(2)};
   }
@@ -119,30 +89,26 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
       for (auto& row : past) numbers.range(row.numbers(), static_cast<std::size_t>(stages()));
     }
   }
-  void save() { Base::keep(saved_); }
-  void restore() {
-    Base::take(saved_, true);
-    see_masses();  // as they are here, not where the step failed
-    forget();
+  using Base::keep, Base::place;
+  using typename Base::Place;
+  void go_to(const Place& there) {
+    Base::go_to(there, true);
+    see_masses();  // as they are here, not where a step failed
   }
 
-  /// Remembers the start of the step; goes back there, the stages still known.
-  void remember() { Base::keep(remembered_); }
-  void return_to_start() { Base::take(remembered_, true); }
-
-  /// The state at x of the last step, by the polynomials through its rates.
-  Motion glance(double time, double x) const {
+  /// The state at x of the last step, which began there, by the polynomials through its rates.
+  Motion glance(const Place& begin, double time, double x) const {
     const auto up_to = columns_.up_to(x), rate_at = columns_.rate_at(x, last_h_);
     Motion motion(time, Eigen::VectorXd(eigen_count()), Eigen::VectorXd(eigen_count()));
     for (std::size_t k = 0; k < count_; ++k) {
-      Compensated<double> q = remembered_.state[k];
+      Compensated<double> q = begin.state[k];
       double gone = 0, rate = 0;
       for (std::size_t j = 0; j < static_cast<std::size_t>(stages()); ++j) {
         gone += up_to[j] * moved(k)[j];
         rate += rate_at[j] * moved(k)[j];
       }
       q.add(gone);
-      motion.q[index(k)] = detail::with_turns(q, remembered_.turns[k]);
+      motion.q[index(k)] = detail::with_turns(q, begin.turns[k]);
       motion.v[index(k)] = rate;
     }
     return motion;
@@ -329,8 +295,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   double size_of(std::span<const double> changes, double pace) const {
     double places = 0, pushes = 0;
     for (std::size_t k = 0; k < count_; ++k) {
-      const double place = weight(k) * changes[k], push = changes[count_ + k] / weight(k);
-      places += place * place;
+      const double shift = weight(k) * changes[k], push = changes[count_ + k] / weight(k);
+      places += shift * shift;
       pushes += push * push;
     }
     return std::sqrt((pace * pace * places + pushes) / Base::fastest());
@@ -359,8 +325,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
  private:
   using Base::columns_, Base::count_, Base::dynamics_, Base::fastest_, Base::fastest_here_, Base::find_rates,
-      Base::masses_, Base::newest_, Base::room, Base::pace_, Base::pace_squared_, Base::pasts_, Base::saved_,
-      Base::state_, Base::time_, Base::turns_, Base::U_;
+      Base::masses_, Base::newest_, Base::room, Base::pace_, Base::pace_squared_, Base::pasts_, Base::state_,
+      Base::time_, Base::turns_, Base::U_;
 
   // Farther than this the polynomial of the last step is no prediction.
   static constexpr double farthest_extrapolation = 1.5;
@@ -412,7 +378,6 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     for (std::size_t k = 0; k < count_; ++k) weights_[k] = std::sqrt(masses_.inertia(k));
   }
 
-  typename Base::Kept remembered_;
   std::vector<double> weights_;  // √M_kk, then h over that
   double floor_ = 0, step_ = 0, last_h_ = 0;
   double most_kinetic_ = 0;

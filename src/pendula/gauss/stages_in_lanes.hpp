@@ -53,9 +53,9 @@ struct StagesInLanes {
 
   /// What a cell holds of one stage, and the largest of all.
   static Real of_stage(const L& cell, int stage) { return Stored(cell).x[stage]; }
-  static Real largest(const L& cell, int stages) {
+  static Real largest(const L& cell, int count) {
     const Stored stored(cell);
-    return *std::max_element(stored.x, stored.x + stages);
+    return *std::max_element(stored.x, stored.x + count);
   }
 
   class Columns : public detail::StageColumns<S, Real, Width> {
@@ -67,9 +67,9 @@ struct StagesInLanes {
     static constexpr int most_depth = (is_fixed ? S <= 3 : Width <= 4) && sizeof(Real) >= sizeof(double) ? 8 : 1;
     int deepest() const { return Base::stages() <= 3 ? most_depth : 1; }
 
-    explicit Columns(Family family = Family::gauss, int stages = S) : Base(family, stages) {
-      for (int j = 0; j < stages; ++j) weights_[j] = Base::b(static_cast<std::size_t>(j));
-      for (int j = 0; j < stages; ++j) inverse_weights_[j] = 1 / weights_[j];
+    explicit Columns(Family family = Family::gauss, int count = S) : Base(family, count) {
+      for (int j = 0; j < count; ++j) weights_[j] = Base::b(static_cast<std::size_t>(j));
+      for (int j = 0; j < count; ++j) inverse_weights_[j] = 1 / weights_[j];
     }
 
     void prepare(const Real& h) { Base::prepare(h, Real(0)); }

@@ -4,13 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <pendula/gauss/fixed_point_stop.hpp>
 #include <pendula/gauss/linearization.hpp>
-#include <pendula/gauss/newton_stop.hpp>
-#include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
-#include <pendula/gauss/step_controller.hpp>
-#include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/step_solution.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
@@ -21,16 +17,11 @@
 
 namespace pendula {
 
-struct StepperOptions {
-  int max_iterations = 50;
-  double tolerance = 0;  ///< of the error of a step, relative to the size of the motion; 0: steps are as asked for
-  /// How steps are chosen. Loads take or bring energy anyway.
-  std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
-};
-
 /// Takes implicit Gauss–Legendre steps with any solver of the stage equations, and does not know which one it has.
 template <StageSolver Solver>
-class GaussStepper {
+class GaussStepper : private StepSolution<Solver> {
+  using Base = StepSolution<Solver>;
+
  public:
   using Model = typename Solver::Model;
   using State = typename Solver::State;
@@ -38,13 +29,7 @@ class GaussStepper {
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
   template <class... SolverOptions>
   GaussStepper(const Model& model, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
-      : solver_(model, stages, solver_options...),
-        options_(options),
-        fixed_point_stop_(correction_limits(solver_.parts())),
-        newton_stop_(solver_.parts(), epsilon()),
-        controller_(stages, order_of(solver_.dissipates() ? Family::radau : Family::gauss, stages), options.tolerance,
-                    options.steering.value_or(solver_.loaded() || solver_.dissipates() ? Steering::greedy
-                                                                                       : Steering::symmetric)) {}
+      : Base(model, stages, options, solver_options...), start_(solver_.place()) {}
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
@@ -54,7 +39,7 @@ class GaussStepper {
     forget_linearization();
     const Status status = solver_.start(state);
     if (status == Status::ok && controller_.chooses()) controller_.start(true, solver_.tempo());
-    return {.status = status, .time = time(), .part = status == Status::ok ? -1 : solver_.singular_part()};
+    return started(status);
   }
 
   /// Advances by `h`; where there is a tolerance, by a step of its own choice, at most `h`. Where the stage equations
@@ -76,13 +61,14 @@ class GaussStepper {
     const Status status = solver_.start(state);
     controller_.turn_back();
     before_.step = 0;
-    return {.status = status, .time = time(), .part = status == Status::ok ? -1 : solver_.singular_part()};
+    return started(status);
   }
 
   /// Whether steps are remembered from now on, for glance and look.
   void remember_steps(bool wanted) {
     remembers_ = wanted;
     before_.step = 0;
+    if (wanted && !before_.place) before_.place.emplace(solver_.place());
   }
 
   /// The state at `time` within the last step, by the polynomials through its stages: positions of one order more than
@@ -92,7 +78,7 @@ class GaussStepper {
     if (before_.step == 0) return state();
     State there;
     if (before_.in_parts && look(time, there)) return there;
-    return solver_.glance(time, before_.elapsed(time) / before_.step);
+    return solver_.glance(*before_.place, time, before_.elapsed(time) / before_.step);
   }
 
   /// The same at the full order of the method, by a step from where the last one began, which the polynomials predict.
@@ -108,22 +94,22 @@ class GaussStepper {
       there = solver_.state(time);
       return {.status = Status::ok, .time = time};
     }
-    const Remembered before = before_;
+    const Compensated<double> begin = before_.time;
     const bool remembers = std::exchange(remembers_, false);
     looks_ = true;
     read_member();
-    solver_.return_to_start();
-    time_ = before.time;
-    statistics_.load_work = before.work;
-    const double h = before.elapsed(time);
+    solver_.go_to(*before_.place);
+    time_ = begin;
+    statistics_.load_work = before_.work;
+    const double h = before_.elapsed(time);
     Outcome outcome;
     if (!is_rounding(h)) {
-      if (!before.in_parts) {
+      if (!before_.in_parts) {
         solver_.prepare_again(this->time(), h);
-        outcome = solve(h);
+        outcome = Base::solve(h);
         if (outcome) outcome = accept(h, outcome);
       }
-      if (before.in_parts || !outcome) {
+      if (before_.in_parts || !outcome) {
         solver_.forget();
         outcome = attempt(h);
         if (!outcome) outcome = step_in_parts(h);
@@ -140,17 +126,17 @@ class GaussStepper {
   /// Asked from now on between iterations, where there is much to iterate on. A step that ends by it leaves the state
   /// as it was, but not all that the next steps depend on.
   void heed(StopSign stop) {
-    stop_ = solver_.parts() > quick_parts ? stop : StopSign{};
+    stop_ = traits_.parts > quick_parts ? stop : StopSign{};
     if constexpr (requires { solver_.heed(stop_); }) solver_.heed(stop_);
   }
 
-  double time() const { return time_.value; }
+  double time() const { return Base::time(); }
   State state() const { return solver_.state(time()); }
   const Statistics& statistics() const { return statistics_; }
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, statistics_, fixed_point_stop_, newton_stop_, controller_, solver_);
+    numbers(time_, statistics_, Base::fixed_point_stop_, Base::newton_stop_, controller_, solver_);
   }
 
   const Solver& solver() const { return solver_; }
@@ -169,18 +155,6 @@ class GaussStepper {
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
-  static double epsilon() { return static_cast<double>(std::numeric_limits<typename Solver::Real>::epsilon()); }
-
-  // From where on the defect of a step is looked for. It is told, not acted on: steps of different sizes would cost
-  // what symplectic ones are taken for, and long chains move well in modes far slower than their fastest.
-  static constexpr double noticed_defect = 1e-6;
-  static constexpr double visible_turn = 1e-10;  // rad, or of a coordinate
-
-  // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
-  // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
-  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
-  static constexpr double largest_energy_defect = 0.02;
-
   // Halvings of a step that cost less by fixed point than the whole by Newton. Where they do not help, it is Newton's.
   static constexpr int fixed_point_worth = 3;
 
@@ -223,7 +197,7 @@ class GaussStepper {
       const double h = is_cut ? most : chosen;
       is_found ? solver_.prepare_again(time(), h) : solver_.prepare(time(), h);
       solver_.allow_newton(shorter == 0);
-      Outcome outcome = solve(h);
+      Outcome outcome = Base::solve(h);
       solver_.allow_newton(true);
       is_found = bool(outcome);
       if (is_found) {
@@ -266,71 +240,9 @@ class GaussStepper {
   /// One step of exactly h; on failure the state is what it was.
   Outcome attempt(double h) {
     solver_.prepare(time(), h);
-    const Outcome outcome = solve(h);
+    const Outcome outcome = Base::solve(h);
     return outcome ? accept(h, outcome) : outcome;
   }
-
-  /// Iterates on the stages, which are predicted.
-  Outcome solve(double h) {
-    newton_stop_.restart();
-    fixed_point_stop_.restart(1);
-    Correction correction;
-    double first = 0;
-    for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
-      correction = solver_.correct();
-      ++statistics_.newton_iterations;
-      if (stop_()) return failure(Status::interrupted, h, iteration, {});
-      if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
-      if (iteration == 1) first = correction.relative;
-      if (!is_at_roundoff(correction.relative)) continue;
-      const Status status = status_of_solution(first);
-      if (status != Status::ok) return failure(status, h, iteration, correction);
-      return {
-          .status = Status::ok, .time = time(), .step = h, .iterations = iteration, .residual = correction.relative};
-    }
-    return failure(Status::not_converged, h, options_.max_iterations, correction);
-  }
-
-  // A fixed point that is lost the solver itself leaves to Newton.
-  bool is_at_roundoff(double correction) {
-    if (solver_.convergence() == Convergence::quadratic) return newton_stop_.reached(correction);
-    return fixed_point_stop_.judge(correction * correction, true).done;
-  }
-
-  // Of what is left out, a thousandth of a last bit: of ten times that energy drifts, by 1e-21 a step (8 stages).
-  static CorrectionLimits correction_limits(int parts) {
-    return {.enough = 1e-19 * coarseness(epsilon()),
-            .last_bit = epsilon(),
-            .usual = usual_rounding(parts, epsilon()),
-            .small = most_rounding(parts, epsilon()),
-            .certainly = 8};
-  }
-
-  // Whether the stages are the solution that continues from a step of no length. Methods that
-  // damp what they do not resolve are asked for no more than that energy does not grow.
-  Status status_of_solution(double first) {
-    const double turn = solver_.turn();
-    if (!solver_.continues() || !(turn < largest_turn())) return Status::wrong_root;
-    if (first > trusted_prediction || turn > trusted_turn) {
-      const double energy = solver_.energy_defect();
-      if (!(energy < largest_energy_defect)) return Status::wrong_root;
-      if (!(energy > -largest_energy_defect) && !solver_.damped()) return Status::wrong_root;
-    }
-    defect_ = 0;
-    if (!solver_.dissipates() && may_have_defect(first, turn)) defect_ = solver_.defect();
-    return Status::ok;
-  }
-
-  // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that. What
-  // hardly moves has rates that are nothing to compare with.
-  bool may_have_defect(double first, double turn) const {
-    if (turn < visible_turn) return false;
-    if (controller_.chooses()) return solver_.damped();
-    return first >= noticed_defect * solver_.predictor_gain();
-  }
-
-  // Of a step of the controller's choice, the error is known too.
-  double largest_turn() const { return controller_.chooses() ? 3 : solver_.largest_turn(); }
 
   // All that the next steps depend on, in and out of a place for it.
   void read_member() {
@@ -357,7 +269,7 @@ class GaussStepper {
 
   Outcome parts_of(double h, const Compensated<double>& start) {
     const double work = statistics_.load_work;
-    solver_.save();
+    solver_.keep(start_);
     double done = 0, part = 0.5;
     while (done < 1) {
       const Outcome outcome = attempt(h * part);
@@ -368,7 +280,8 @@ class GaussStepper {
       } else if (part > smallest_part && outcome.status != Status::interrupted) {
         part /= 2;
       } else {
-        solver_.restore();
+        solver_.go_to(start_);
+        solver_.forget();
         time_ = start;
         statistics_.load_work = work;
         forget_linearization();
@@ -387,11 +300,11 @@ class GaussStepper {
   }
 
   Outcome accept(double h, Outcome outcome) {
-    if (solver_.singular_part() >= 0) {
-      return failure(Status::singular_mass_matrix, h, outcome.iterations, {outcome.residual, -1});
+    if (Base::singular_part() >= 0) {
+      return Base::failure(Status::singular_mass_matrix, h, outcome.iterations, {outcome.residual, -1});
     }
     const double work = statistics_.load_work;
-    if (solver_.loaded()) statistics_.load_work += solver_.work();
+    if (traits_.loaded) statistics_.load_work += solver_.work();
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
     count_unseen();
     if (remembers_) remember(h, false, work);
@@ -413,54 +326,40 @@ class GaussStepper {
     }
   }
 
-  // A failure where coordinates are singular is theirs, whatever shape it took.
-  Outcome failure(Status status, double h, int iterations, const Correction& correction) {
-    ++statistics_.rejected_steps;
-    const int singular = solver_.singular_part();
-    if (singular >= 0) status = Status::singular_mass_matrix;
-    const int part = singular >= 0                  ? singular
-                     : status == Status::wrong_root ? solver_.turning_part()
-                     : correction.part >= 0         ? correction.part
-                                                    : solver_.worst_part();
-    return {.status = status,
-            .time = time(),
-            .step = h,
-            .iterations = iterations,
-            .residual = correction.relative,
-            .part = part};
-  }
-
   // The last step, which began here.
   struct Remembered {
     Compensated<double> time{};
     double step = 0;  // 0: there was none
     bool in_parts = false;
     double work = 0;  // that loads had brought
+    std::optional<typename Solver::Place> place{};
 
     double elapsed(double at) const { return (at - time.value) - time.compensation; }
   };
 
   // Of the time.
-  bool is_rounding(double h) const { return std::abs(h) <= 8 * epsilon() * std::abs(time()); }
+  bool is_rounding(double h) const { return std::abs(h) <= 8 * Base::epsilon() * std::abs(time()); }
 
   void remember(double h, bool in_parts, double work) {
-    solver_.remember();
-    before_ = {time_, h, in_parts, work};
+    before_.time = time_;
+    before_.step = h;
+    before_.in_parts = in_parts;
+    before_.work = work;
+    solver_.keep(*before_.place);
   }
 
-  Solver solver_;
-  StepperOptions options_;
-  FixedPointStop<double, sequences_of<Solver>()> fixed_point_stop_;
-  NewtonStop newton_stop_;
-  StepController<double> controller_;
-  Compensated<double> time_{};
-  double defect_ = 0;  // of the last solution
+  Outcome started(Status status) {
+    return {.status = status, .time = time(), .part = status == Status::ok ? -1 : Base::singular_part()};
+  }
+
+  using Base::controller_, Base::defect_, Base::options_, Base::solver_, Base::statistics_, Base::stop_, Base::time_,
+      Base::traits_;
+
   Unseen unseen_;
-  Statistics statistics_;
-  StopSign stop_;
   bool remembers_ = false, looks_ = false;
   Remembered before_;
-  std::vector<double> member_;  // to come back to: of the end of the step, while `look` is in it, or of its start
+  typename Solver::Place start_;  // of a step that is taken in parts
+  std::vector<double> member_;    // to come back to: of the end of the step, while `look` is in it, or of its start
   std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;
 };
 

@@ -39,7 +39,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   using typename Base::Columns;
 
   /// `dynamics` must outlive it.
-  explicit SystemMembers(MemberSystems<L>& dynamics) : Base(dynamics, Family::gauss, S), tangent_(dynamics, columns_) {
+  explicit SystemMembers(MemberSystems<L>& dynamics)
+      : Base(dynamics, Family::gauss, S), saved_(Base::place()), tangent_(dynamics, columns_) {
     for (const bool is_angle : dynamics.info().is_angle) may_miss_ = may_miss_ || !is_angle;
   }
 
@@ -225,7 +226,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     if constexpr (has_tangent) tangent_.save();
   }
   void restore(const Mask& which) {
-    Base::take(saved_, which);
+    Base::go_to(saved_, which);
     if constexpr (has_tangent) tangent_.restore(which);
     Base::read_masses();
   }
@@ -242,7 +243,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
 
  private:
   using Base::columns_, Base::count_, Base::dynamics_, Base::fastest_, Base::masses_, Base::newest_, Base::pace_,
-      Base::pace_squared_, Base::pasts_, Base::saved_, Base::size_squared_, Base::time_, Base::U_;
+      Base::pace_squared_, Base::pasts_, Base::size_squared_, Base::time_, Base::U_;
 
   struct NoTangent {
     NoTangent(MemberSystems<L>& /*dynamics*/, const Columns& /*columns*/) {}
@@ -288,6 +289,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   // By loads, in the step that was solved  [J].
   L brought() const { return any(loaded()) ? select(loaded(), Base::work(), L(0.0)) : L(0.0); }
 
+  typename Base::Place saved_;
   bool may_miss_ = false;  // lengths are among the coordinates
   L loaded_{0.0};
   L scale_{0.0}, turn_{0.0};

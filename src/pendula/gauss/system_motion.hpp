@@ -47,7 +47,6 @@ class SystemMotion {
         pasts_(2 * count_),
         state_(2 * count_, {Num(0.0), Num(0.0)}),
         turns_(count_, Num(0.0)),
-        saved_{state_, turns_, Num(0.0), Num(0.0)},
         masses_(info()),
         pace_(info()),
         calls_(static_cast<std::size_t>(Layout::cells) * per_call()),
@@ -70,6 +69,26 @@ class SystemMotion {
     find_rates(time_);
     dynamics_.here(time_, &SystemFunctions::acceleration, room(0), room(2), room(3));
     return pace_.at(room(2), room(3));
+  }
+
+  /// Where the motion is, to come back to.
+  struct Place {
+    std::vector<Compensated<Num>> state;
+    std::vector<Num> turns;
+    Num time, fastest;
+  };
+  Place place() const { return {state_, turns_, time_, fastest_}; }
+  void keep(Place& place) const {
+    place.state = state_;
+    place.turns = turns_;
+    place.time = time_;
+    place.fastest = fastest_;
+  }
+  void go_to(const Place& place, const Mask& which) {
+    for (std::size_t k = 0; k < 2 * count_; ++k) assign(which, place.state[k], state_[k]);
+    for (std::size_t k = 0; k < count_; ++k) turns_[k] = select(which, place.turns[k], turns_[k]);
+    time_ = select(which, place.time, time_);
+    fastest_ = select(which, place.fastest, fastest_);
   }
 
   // --- Of the step that was solved ---
@@ -111,12 +130,6 @@ class SystemMotion {
     Energies start, finish;
     Num missing() const { return (finish.total - start.total) - brought; }
   };
-  struct Kept {
-    std::vector<Compensated<Num>> state;
-    std::vector<Num> turns;
-    Num time, fastest;
-  };
-
   template <class Body>
   [[gnu::always_inline]] static void each_cell(Body body) {
     detail::unrolled<Layout::cells>(body);
@@ -136,18 +149,6 @@ class SystemMotion {
     set(state_[count_ + k].compensation, member, 0);
   }
 
-  void keep(Kept& kept) const {
-    kept.state = state_;
-    kept.turns = turns_;
-    kept.time = time_;
-    kept.fastest = fastest_;
-  }
-  void take(const Kept& kept, const Mask& which) {
-    for (std::size_t k = 0; k < 2 * count_; ++k) assign(which, kept.state[k], state_[k]);
-    for (std::size_t k = 0; k < count_; ++k) turns_[k] = select(which, kept.turns[k], turns_[k]);
-    time_ = select(which, kept.time, time_);
-    fastest_ = select(which, kept.fastest, fastest_);
-  }
   static void assign(const Mask& which, const Compensated<Num>& from, Compensated<Num>& to) {
     to.value = select(which, from.value, to.value);
     to.compensation = select(which, from.compensation, to.compensation);
@@ -319,7 +320,6 @@ class SystemMotion {
   std::vector<std::array<Row, pasts>> pasts_;  // newest_ is the last step's
   std::vector<Compensated<Num>> state_;        // coordinates, then momenta
   std::vector<Num> turns_;                     // full turns that were taken out of coordinates
-  Kept saved_;
   MassScale<Num> masses_;
   Pace<Num> pace_;
   std::size_t newest_ = 0;

@@ -1,27 +1,17 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <pendula/gauss/pace.hpp>
-#include <pendula/gauss/stage_columns.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/stage_system.hpp>
-#include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_forcing.hpp>
-#include <pendula/gauss/tableau.hpp>
-#include <pendula/numeric/compensated.hpp>
+#include <pendula/gauss/velocity_stages.hpp>
 #include <pendula/numeric/lanes.hpp>
-#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/field_look.hpp>
-#include <pendula/system/mass_scale.hpp>
-#include <pendula/system/motion.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace pendula {
@@ -32,85 +22,31 @@ namespace pendula {
 /// Unknown are the stage accelerations K_i, so that the mass matrix is never inverted;
 ///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,  residual E(Q_i, V_i, K_i, t_i)  (paper eq.
 ///   27).
-/// All stages of one number are in the lanes of a pack of `Width`, which is at least the number of stages.
 template <int Width = max_stages>
-class VelocityNewton {
-  using L = Pack<Width, RegisterFor<Width>>;
-  using Rows = PackRows<static_cast<std::size_t>(Width)>;
-  using Stored = double[static_cast<std::size_t>(Width)];
+class VelocityNewton : public VelocityStages<Width> {
+  using Base = VelocityStages<Width>;
+  using typename Base::L, typename Base::Rows;
 
  public:
   using Model = SystemModel;
   using Real = double;
-  using State = Motion;
+  using typename Base::State;
 
   /// Throws std::invalid_argument unless the method has so many stages, at most Width.
   VelocityNewton(const Model& model, int stages, Family family = Family::gauss)
-      : family_(family),
-        at_(model),
-        here_(model),
-        columns_(family, stages),
-        count_(model.coordinates()),
+      : Base(model, stages, family),
+        family_(family),
         system_(count_, stages),
         forcing_(model, family, stages),
         look_(stages, few_samples, model.info().argument_is_base),
-        stages_(4 * count_),
-        last_a_(count_),
         jacobians_(3 * count_ * count_),
-        state_(2 * count_),
-        saved_(state_),
-        remembered_(state_),
-        acceleration_(count_),
-        weight_(count_),
-        masses_(model.info()),
-        pace_(model.info()),
-        numbers_(4 * count_),
         sums_(3 * count_) {}
-
-  Status start(const State& state) {
-    at_.model().require(state);
-    forget();
-    fastest_ = fastest_here_ = most_kinetic_ = 0;
-    time_ = state.time;
-    for (std::size_t k = 0; k < count_; ++k) {
-      state_[k] = {state.q[index(k)], 0};
-      state_[count_ + k] = {state.v[index(k)], 0};
-    }
-    const SystemAt<1>& here = at(time_);
-    pace_.start(here, state.q.data(), state.v.data());
-    masses_.start(here, state.q.data());
-    if (masses_.singular() >= 0) return Status::singular_mass_matrix;
-    here(&SystemFunctions::acceleration, state.q.data(), state.v.data(), acceleration_.data());
-    return Status::ok;
-  }
-
-  void prepare(double time, double h) {
-    columns_.prepare(h, last_h_);
-    set_times(time);
-    is_predicted_ = last_h_ != 0;
-    for (std::size_t k = 0; k < count_; ++k) {
-      (is_predicted_ ? columns_.extrapolated(last_a_[k]) : L(acceleration_[k])).store(a(k));
-    }
-    last_h_ = 0;  // what was predicted from is gone until the step is accepted
-    set_weights();
-  }
-
-  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
-  /// one's.
-  void prepare_again(double time, double h) {
-    const Rows& found = last_h_ != 0 ? last_a_ : stages_;
-    columns_.predict_at(0, h / (last_h_ != 0 ? last_h_ : columns_.h()));
-    columns_.prepare(h, 0);
-    set_times(time);
-    for (std::size_t k = 0; k < count_; ++k) columns_.extrapolated(found[k]).store(a(k));
-    set_weights();
-  }
 
   Correction correct() {
     place_stages();
     at_(&SystemFunctions::residual_with_jacobians, q(0), v(0), a(0), stages_[3 * count_], jacobian(0, 0, 0),
         jacobian(1, 0, 0), jacobian(2, 0, 0));
-    for (int i = 0; i < stages(); ++i) masses_.see(jacobian(2, 0, 0) + i, static_cast<std::size_t>(Width));
+    for (int i = 0; i < Base::stages(); ++i) masses_.see(jacobian(2, 0, 0) + i, static_cast<std::size_t>(Width));
     for (std::size_t row = 0; row < count_; ++row) system_.set_residual(row, L::load(stages_[3 * count_ + row]));
     for (std::size_t k = 0; k < system_.stages(); ++k) {
       const L ha = columns_.ha(k), h2a2 = columns_.integral(columns_.hb() * ha);
@@ -125,103 +61,27 @@ class VelocityNewton {
   }
 
   static constexpr void allow_newton(bool) {}
-  static constexpr Convergence convergence() { return Convergence::quadratic; }
   static constexpr Iteration iteration() { return Iteration::newton; }
-  static constexpr int worst_part() { return -1; }
-  int singular_part() const { return masses_.singular(); }
-  static constexpr bool continues() { return true; }
-  double largest_turn() const { return info().constant_masses ? 3 : 0.25; }
-  bool loaded() const { return at_.model().loaded(); }
-  bool damped() const { return at_.model().damped(); }
+  int part_of(Status status) const {
+    if (status == Status::singular_mass_matrix) return masses_.singular();
+    return status == Status::wrong_root ? Base::farthest_turn().second : -1;
+  }
+  SolverTraits traits() const {
+    const int coordinates = static_cast<int>(count_);
+    return {coordinates,          coordinates,          Base::stages(),          info().constant_masses ? 3 : 0.25,
+            at_.model().loaded(), at_.model().damped(), family_ == Family::radau};
+  }
   double followed(double time, double h, double tolerance) {
     return forcing_.followed(h, tolerance, [&] {
-      const double pace = tempo().pace;
+      const double pace = Base::tempo().pace;
       read_state(numbers(0), numbers(1));
       return SystemForcing::Here{time, numbers(0), numbers(1), pace};
     });
   }
-  bool dissipates() const { return family_ == Family::radau; }
-  int stages() const { return columns_.stages(); }
-  int parts() const { return coordinates(); }
-  int coordinates() const { return static_cast<int>(count_); }
-  double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
-
-  double turn() const { return farthest_turn().first; }
-  int turning_part() const { return farthest_turn().second; }
-
-  double energy_defect() {
-    find_increments();
-    const double brought = loaded() ? work() : 0;
-    double *const q_at = numbers(2), *const v_at = numbers(3);
-    read_state(q_at, v_at);
-    const auto [start, kinetic] = energies(time_, q_at, v_at);
-    for (std::size_t k = 0; k < count_; ++k) {
-      q_at[k] += numbers(0)[k];
-      v_at[k] += numbers(1)[k];
-    }
-    const auto [end, kinetic_at_end] = energies(time_ + columns_.h(), q_at, v_at);
-    most_kinetic_ = std::max(most_kinetic_, kinetic);
-    const double scale = std::max(most_kinetic_, kinetic_at_end) + std::abs(brought);
-    return scale > 0 ? (end - start - brought) / scale : 0;
-  }
-
-  double defect() {
-    double first = 0, last = 0;
-    for (std::size_t k = 0; k < count_; ++k) {
-      const double squared = weight_[k] * weight_[k], rate = state_[count_ + k].value, later = v(k)[stages() - 1];
-      first += squared * rate * rate;
-      last += squared * later * later;
-    }
-    fastest_ = std::max({fastest_, first, last});
-    const double off = missed_at_start();
-    return off > 0 ? std::sqrt(off / fastest_) : 0;
-  }
-
-  Tempo tempo() const {
-    read_state(numbers(0), numbers(1));
-    at(time_)(&SystemFunctions::acceleration, numbers(0), numbers(1), numbers(2));
-    return pace_.at(numbers(1), numbers(2));
-  }
-
-  StepShape shape() {
-    place_stages();
-    L speed(0.0), coefficients(0.0);
-    double largest = 0;
-    for (std::size_t k = 0; k < count_; ++k) {
-      const L rate = L(weight_[k]) * L::load(v(k));
-      alignas(pack_alignment) Stored advance;
-      (columns_.hb() * rate).store(advance);
-      const L coefficient = columns_.legendre(advance);
-      speed = fma(rate, rate, speed);
-      coefficients = fma(coefficient, coefficient, coefficients);
-      const double size = std::max(std::abs(state_[k].value), info().is_angle[k] ? 1.0 : 0.0);
-      largest = std::max(largest, weight_[k] * size);
-      numbers(0)[k] = v(k)[stages() / 2];
-      numbers(1)[k] = 0;
-    }
-    alignas(pack_alignment) Stored speeds, squares;
-    speed.store(speeds);
-    coefficients.store(squares);
-    fastest_here_ = *std::max_element(speeds, speeds + stages());
-    const double fastest = this->fastest();
-    StepShape shape;
-    shape.pace = pace_.at(numbers(0), numbers(1)).pace;
-    const double rounding = StepShape::visible * largest;
-    for (int k = 0; k < stages(); ++k) {
-      const double size = std::sqrt(squares[k]);
-      if (size > rounding) shape.decay[static_cast<std::size_t>(k)] = size * shape.pace / std::sqrt(fastest);
-    }
-    if (stages() == StepShape::few_stages && loaded()) {
-      const double size = std::abs(columns_.h()) * std::sqrt(missed_at_start());
-      if (size > rounding) shape.beyond = size * shape.pace / std::sqrt(fastest);
-    }
-    return shape;
-  }
-
   /// Of what forces do between the stages that were solved.
   Unseen unseen() {
     if (!look_.has_to_look()) return {};
-    shape();  // places the stages
+    Base::shape();  // places the stages
     const std::size_t arguments = info().argument_is_base.size();
     const auto find_arguments = [&](std::span<const double> shares, double* found) {
       for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -238,7 +98,7 @@ class VelocityNewton {
         missed(moments.data() + count_, count_);
     look_.sum(accelerations, {sums, moments, missed});
     find_increments();
-    const double fastest = this->fastest(), h = columns_.h();
+    const double fastest = Base::fastest(), h = columns_.h();
     double impulse_squared = 0, lack_squared = 0;
     for (std::size_t k = 0; k < count_; ++k) {
       const double impulse = weight_[k] * h * missed[k], lack = weight_[k] * (h * sums[k] - numbers(1)[k]);
@@ -249,179 +109,21 @@ class VelocityNewton {
     return {std::max(impulse, lacks), lacks + Unseen::of_wall(impulse / std::sqrt(fastest_here_ / fastest))};
   }
 
-  double work() const {
-    alignas(pack_alignment) Stored powers;
-    at_(&SystemFunctions::power, q(0), v(0), powers);
-    double work = 0;
-    for (std::size_t i = 0; i < system_.stages(); ++i) work += columns_.hb(i) * powers[i];
-    return work;
-  }
-
-  void accept() {
-    find_increments();
-    for (std::size_t k = 0; k < 2 * count_; ++k) state_[k].add(numbers_[k]);
-    last_h_ = columns_.h();
-    time_ += last_h_;
-    for (std::size_t k = 0; k < count_; ++k) std::copy_n(a(k), Width, last_a_[k]);
-    fastest_ = std::max(fastest_, std::exchange(fastest_here_, 0));
-  }
-
-  template <class Numbers>
-  void member(Numbers& numbers) {
-    numbers(time_, state_, acceleration_, last_h_, masses_, pace_, fastest_, most_kinetic_, last_a_);
-  }
-  void save() { saved_ = state_; }
-
-  void restore() {
-    state_ = saved_;
-    forget();
-  }
-
-  State state(double time) const {
-    State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
-    read_state(state.q.data(), state.v.data());
-    return state;
-  }
-
-  void remember() { remembered_ = state_; }
-  void return_to_start() { state_ = remembered_; }
-
-  /// The state at x of the last step, by the polynomials through its rates and accelerations.
-  State glance(double time, double x) const {
-    const auto up_to = columns_.up_to(x);
-    State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
-    for (std::size_t k = 0; k < count_; ++k) {
-      alignas(pack_alignment) Stored pushed, moved;
-      (columns_.hb() * L::load(last_a_[k])).store(pushed);
-      const double rate = remembered_[count_ + k].value;
-      (columns_.hb() * columns_.integral(pushed, L(rate))).store(moved);
-      double place = remembered_[k].value, speed = rate;
-      for (std::size_t j = 0; j < system_.stages(); ++j) {
-        place += up_to[j] * moved[j];
-        speed += up_to[j] * pushed[j];
-      }
-      state.q[index(k)] = place;
-      state.v[index(k)] = speed;
-    }
-    return state;
-  }
-
-  /// The next step starts cold.
-  void forget() { last_h_ = 0; }
-
  private:
+  using Base::a, Base::along, Base::at_, Base::columns_, Base::count_, Base::fastest_here_, Base::find_increments,
+      Base::info, Base::masses_, Base::numbers, Base::place_stages, Base::q, Base::read_state, Base::stages_,
+      Base::state_, Base::v, Base::weight_;
   static constexpr int few_samples = 3;  // for what may be narrow
 
-  static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
-
-  const SystemInfo& info() const { return at_.model().info(); }
-
-  // Of the stages: K, Q, V of coordinate k.
-  double* a(std::size_t k) { return stages_[k]; }
-  const double* a(std::size_t k) const { return stages_[k]; }
-  double* q(std::size_t k) { return stages_[count_ + k]; }
-  const double* q(std::size_t k) const { return stages_[count_ + k]; }
-  double* v(std::size_t k) { return stages_[2 * count_ + k]; }
-  const double* v(std::size_t k) const { return stages_[2 * count_ + k]; }
   // ∂E/∂q, ∂E/∂v, ∂E/∂a.
   double* jacobian(std::size_t which, std::size_t row, std::size_t column) {
     return jacobians_[(which * count_ + row) * count_ + column];
-  }
-
-  // Room for numbers of one state, (coordinates) each.
-  double* numbers(std::size_t which) const { return numbers_.data() + which * count_; }
-
-  // The system at one time.
-  const SystemAt<1>& at(double time) const {
-    here_.set_time(time);
-    return here_;
-  }
-
-  void read_state(double* q, double* v) const {
-    for (std::size_t k = 0; k < count_; ++k) {
-      q[k] = state_[k].value;
-      v[k] = state_[count_ + k].value;
-    }
-  }
-
-  double fastest() const { return std::max({fastest_, fastest_here_, pace_.natural_speed_squared()}); }
-
-  // Lanes beyond the stages hold the start of the step.
-  void set_times(double time) {
-    time_ = time;
-    at_.set_times([&](std::size_t j) { return j < system_.stages() ? time + columns_.h() * columns_.c(j) : time; });
-  }
-
-  void set_weights() {
-    for (std::size_t k = 0; k < count_; ++k) weight_[k] = std::sqrt(masses_.inertia(k));
-  }
-
-  void place_stages() {
-    for (std::size_t k = 0; k < count_; ++k) {
-      const Compensated<double>&place = state_[k], &rate = state_[count_ + k];
-      const L pushed = columns_.integral(columns_.hb() * L::load(a(k)), L(rate.compensation));
-      const L moved =
-          columns_.integral(columns_.hb() * pushed, fma(columns_.hc(), L(rate.value), L(place.compensation)));
-      (L(place.value) + moved).store(q(k));
-      (L(rate.value) + pushed).store(v(k));
-    }
   }
 
   // ∂(residual of row, stage i)/∂(K of column, stage k) of all i.
   L derivative(std::size_t row, std::size_t column, std::size_t k, const L& ha, const L& h2a2) {
     return fma(ha, L::load(jacobian(1, row, column)),
                fma(h2a2, L::load(jacobian(0, row, column)), L(jacobian(2, row, column)[k]) * columns_.unit(k)));
-  }
-
-  // The system at a share of the step, and its q and v in numbers(2), numbers(3), by the polynomials through the rates
-  // and accelerations of the stages, which are placed.
-  const SystemAt<1>& along(double share) {
-    const auto up_to = columns_.up_to(share);
-    read_state(numbers(2), numbers(3));
-    for (std::size_t k = 0; k < count_; ++k) {
-      for (std::size_t j = 0; j < system_.stages(); ++j) {
-        numbers(2)[k] += up_to[j] * columns_.hb(j) * v(k)[j];
-        numbers(3)[k] += up_to[j] * columns_.hb(j) * a(k)[j];
-      }
-    }
-    return at(time_ + columns_.h() * share);
-  }
-
-  // By how much the polynomial through the stages' rates is off at the start of the step: Σ M_kk of it².
-  double missed_at_start() const {
-    double missed = 0;
-    for (std::size_t k = 0; k < count_; ++k) {
-      alignas(pack_alignment) Stored advance;
-      (columns_.hb() * L::load(v(k))).store(advance);
-      const double off = weight_[k] * (columns_.at_start(advance) - state_[count_ + k].value);
-      missed += off * off;
-    }
-    return missed;
-  }
-
-  // Of all angles, one whose inertia nearly vanishes counted twice; and whose it is.
-  std::pair<double, int> farthest_turn() const {
-    std::pair<double, int> farthest{0, -1};
-    for (std::size_t k = 0; k < count_; ++k) {
-      if (!info().is_angle[k]) continue;
-      double turn = 0;
-      for (std::size_t i = 0; i < system_.stages(); ++i) turn += std::abs(columns_.hb(i) * v(k)[i]);
-      if (masses_.is_small(k)) turn *= 2;
-      if (turn > farthest.first) farthest = {turn, static_cast<int>(k)};
-    }
-    return farthest;
-  }
-
-  // Of q and v, over the step, into numbers(0), numbers(1).
-  void find_increments() {
-    place_stages();
-    for (std::size_t k = 0; k < count_; ++k) {
-      numbers(0)[k] = numbers(1)[k] = 0;
-      for (std::size_t j = 0; j < system_.stages(); ++j) {
-        numbers(0)[k] += columns_.hb(j) * v(k)[j];
-        numbers(1)[k] += columns_.hb(j) * a(k)[j];
-      }
-    }
   }
 
   // Subtracts the solution from the accelerations; compared are the changes of rates that they make.
@@ -442,38 +144,15 @@ class VelocityNewton {
         worst = static_cast<int>(k);
       }
     }
-    return {largest > 0 ? largest / scale : 0, worst};
-  }
-
-  // h and T.
-  std::array<double, 2> energies(double time, const double* q, const double* v) const {
-    double energy = 0, kinetic = 0;
-    at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
-    return {energy, kinetic};
+    return {largest > 0 ? largest / scale : 0, worst, Convergence::quadratic};
   }
 
   Family family_;
-  SystemAt<Width> at_;
-  mutable SystemAt<1> here_;
-  detail::StageColumns<Eigen::Dynamic, double, Width> columns_;
-  std::size_t count_;
   detail::StageSystem system_;
   SystemForcing forcing_;
   FieldLook look_;
-  Rows stages_;                                                  // K, Q, V, E
-  Rows last_a_;                                                  // of the last step
-  Rows jacobians_;                                               // ∂E/∂q, ∂E/∂v, ∂E/∂a
-  std::vector<Compensated<double>> state_, saved_, remembered_;  // q, then v
-  std::vector<double> acceleration_;                             // at the start: the cold start of the predictor
-  std::vector<double> weight_;
-  MassScale<double> masses_;
-  Pace<double> pace_;
-  mutable std::vector<double> numbers_;  // workspace: four numbers of each coordinate
+  Rows jacobians_;  // ∂E/∂q, ∂E/∂v, ∂E/∂a
   std::vector<double> sums_;
-  double time_ = 0, most_kinetic_ = 0;
-  double last_h_ = 0;  // of the step that the last accelerations belong to; 0: they belong to none
-  bool is_predicted_ = false;
-  double fastest_ = 0, fastest_here_ = 0;  // Σ M_kk v_k², of all steps so far and of the stages
 };
 
 }  // namespace pendula

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <pendula/chain/chain_motion.hpp>
+#include <pendula/chain/heading.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/gauss/stages_in_lanes.hpp>
+#include <pendula/numeric/lanes.hpp>
+
+namespace pendula {
+
+/// The angles of one chain whose rods move by Gauss steps: which of all that belong to a rod are those that the motion
+/// came to, at the end of a step and within it.
+template <class Space, int S, int N, class Real>
+class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
+  using Base = ChainMotion<Space, StagesInLanes<S, Real>, N>;
+
+ public:
+  using State = pendula::State<Space, N, Real>;
+  using L = Lanes<S, Real>;
+  using Base::D, Base::links;
+  static constexpr std::size_t Z = L::size;
+  using Numbers = std::array<Real, D>;
+
+  ChainTurns(int count, Family family) : Base(count, family), anchors_(count) {}
+
+  State state(double time) const {
+    State state = empty_state(time);
+    rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
+      read_angles(i, rods_.heading(0, i, rate), anchors_[i], state);
+    });
+    return state;
+  }
+
+  /// Where the chain is, to come back to.
+  struct Place {
+    typename Base::Rods::Place rods;
+    detail::PerLink<AngleAnchor<Space, Real>, N> anchors;
+  };
+  Place place() const { return {rods_.place(), anchors_}; }
+  void keep(Place& place) const {
+    place.rods = rods_.place();
+    place.anchors = anchors_;
+  }
+  void go_to(const Place& place) {
+    rods_.place() = place.rods;
+    anchors_ = place.anchors;
+  }
+
+  /// The state at x of the last step, which began there, by the polynomials through its rates.
+  State glance(const Place& begin, double time, double x) const {
+    State state = empty_state(time);
+    const auto up_to = columns_.integrals(Real(x));
+    for (int i = 0; i < links(); ++i) {
+      const Real* along = begin.rods.along[i];
+      const Numbers rate = rate_at(i, Real(x), Real(last_h_)), rod = rod_in_step(along, i, up_to), low{};
+      AngleAnchor<Space, Real> anchor = begin.anchors[i];
+      if (may_leave(anchor, i, along, turn_ * std::abs(x))) follow_turn(anchor, along, i, Real(x), rod);
+      read_angles(i, Base::Rods::heading_of(rod, low, rate), anchor, state);
+    }
+    return state;
+  }
+
+ protected:
+  using Base::columns_, Base::constants_, Base::rods_;
+
+  const auto& past(int i) const { return this->pasts_[i][this->newest_]; }
+
+  using Weights = typename Base::Columns::Weights;
+  static Real weighed(const Weights& weights, const Real* x) {
+    Real sum(0);
+    for (std::size_t j = 0; j < S; ++j) sum += weights[j] * x[j];
+    return sum;
+  }
+
+  // Of the step whose stages are known: the rate of a rod at x of it, and the rod from its start on.
+  Numbers rate_at(int i, const Real& x, const Real& h) const {
+    const Weights weights = columns_.values(x);
+    return components<D>([&](std::size_t k) {
+      return h == 0 ? Real(rods_.free(i)[k]) : Real(weighed(weights, past(i).advance[k].numbers()) / h);
+    });
+  }
+  Numbers rod_in_step(const Real* along, int i, const Weights& up_to) const {
+    return components<D>([&](std::size_t k) { return Real(along[k] + weighed(up_to, past(i).advance[k].numbers())); });
+  }
+
+  State empty_state(double time) const {
+    State state;
+    state.time = time;
+    state.q.resize(Space::dof * links());
+    state.v.resize(Space::dof * links());
+    return state;
+  }
+
+  template <class LinkHeading>
+  void read_angles(int i, const LinkHeading& heading, const AngleAnchor<Space, Real>& anchor, State& state) const {
+    using Wide = typename decltype(heading.u)::value_type;
+    std::array<Wide, Space::dof> near;
+    for (std::size_t a = 0; a < near.size(); ++a) near[a] = Wide(anchor.angles()[a]);
+    const auto angles = user_angles(heading, near);
+    for (std::size_t a = 0; a < near.size(); ++a) {
+      state.q[entry(i, a)] = Real(angles.q[a]);
+      state.v[entry(i, a)] = Real(angles.v[a]);
+    }
+  }
+
+  // Where coordinate a of link i stands in the user's vectors.
+  Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
+
+  Numbers direction(int i) const { return scaled(constants_[i].inverse_length, Base::Rods::vector(rods_.along(i))); }
+
+  // Whether a link may turn so far from where a step began that its anchor does not hold it.
+  bool may_leave(const AngleAnchor<Space, Real>& anchor, int i, const Real* along, double turn) const {
+    using std::sqrt;
+    const Numbers off = components<D>(
+        [&](std::size_t k) { return Real(along[k] * constants_[i].inverse_length - anchor.direction()[k]); });
+    const Real farthest = sqrt(dot(off, off)) + Real(1.5 * turn);
+    return farthest * farthest > anchor.reach_squared();
+  }
+
+  // Takes an anchor from a rod on through the stages to x of the step, where it is at `end`; where the stages are too
+  // far apart for that, by a pole, along the polynomial through them.
+  void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, int i, const Real& x,
+                   const Numbers& end) const {
+    const Real& inverse_length = constants_[i].inverse_length;
+    alignas(pack_alignment) Real u[D][2 * Z];
+    L squared(Real(0));
+    for (std::size_t k = 0; k < D; ++k) {
+      const L moved = columns_.integral(columns_.weight(0) * past(i).advance[k][0]);
+      const L direction = L(inverse_length) * (L(along[k]) + moved), off = direction - L(anchor.direction()[k]);
+      direction.store(u[k]);
+      squared = fma(off, off, squared);
+    }
+    std::size_t before = 0;
+    while (before < S && columns_.c(before) < x) ++before;
+    Real farthest(0);
+    for (std::size_t k = 0; k < D; ++k) {
+      u[k][before] = inverse_length * end[k];
+      const Real off = u[k][before] - anchor.direction()[k];
+      farthest += off * off;
+    }
+    alignas(pack_alignment) Real stored[Z];
+    squared.store(stored);
+    for (std::size_t j = 0; j < before; ++j) farthest = std::max(farthest, stored[j]);
+    if (farthest <= anchor.reach_squared() || anchor.follow_through(u, before + 1)) return;
+    const auto direction_at = [&](const Real& at) {
+      return scaled(inverse_length, rod_in_step(along, i, columns_.integrals(at)));
+    };
+    anchor.follow_path(direction_at, x);
+  }
+
+  // Of the step that is solved.
+  void follow_turns() {
+    for (int i = 0; i < links(); ++i) {
+      const Real* along = rods_.along(i);
+      if (!may_leave(anchors_[i], i, along, turn_)) continue;
+      const Numbers end = components<D>(
+          [&](std::size_t k) { return Real(along[k] + (columns_.h() * rods_.free(i)[k] + this->moved_[i][k])); });
+      follow_turn(anchors_[i], along, i, Real(1), end);
+    }
+  }
+
+  double turn_ = 0;    // the most that a link turns in the step that was solved
+  double last_h_ = 0;  // of the step that the stages belong to; 0: they belong to none
+  detail::PerLink<AngleAnchor<Space, Real>, N> anchors_;
+};
+
+}  // namespace pendula

@@ -1,0 +1,147 @@
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <pendula/gauss/fixed_point_stop.hpp>
+#include <pendula/gauss/newton_stop.hpp>
+#include <pendula/gauss/roundoff.hpp>
+#include <pendula/gauss/stage_solver.hpp>
+#include <pendula/gauss/step_controller.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/system/outcome.hpp>
+#include <pendula/system/stop_sign.hpp>
+
+namespace pendula {
+
+struct StepperOptions {
+  int max_iterations = 50;
+  double tolerance = 0;  ///< of the error of a step, relative to the size of the motion; 0: steps are as asked for
+  /// How steps are chosen. Loads take or bring energy anyway.
+  std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
+};
+
+/// Solves the stage equations of one step: iterates until only rounding is left, and judges whether what it found is
+/// the motion. GaussStepper takes steps by it.
+template <StageSolver Solver>
+class StepSolution {
+ protected:
+  template <class... SolverOptions>
+  StepSolution(const typename Solver::Model& model, int stages, const StepperOptions& options,
+               const SolverOptions&... solver_options)
+      : solver_(model, stages, solver_options...),
+        options_(options),
+        traits_(solver_.traits()),
+        controller_(
+            stages, order_of(traits_.dissipates ? Family::radau : Family::gauss, stages), options.tolerance,
+            options.steering.value_or(traits_.loaded || traits_.dissipates ? Steering::greedy : Steering::symmetric)),
+        fixed_point_stop_(correction_limits(traits_.parts)),
+        newton_stop_(traits_.parts, epsilon()) {}
+
+  static double epsilon() { return static_cast<double>(std::numeric_limits<typename Solver::Real>::epsilon()); }
+
+  double time() const { return time_.value; }
+  int singular_part() { return solver_.part_of(Status::singular_mass_matrix); }
+
+  /// Iterates on the stages, which are predicted.
+  Outcome solve(double h) {
+    newton_stop_.restart();
+    fixed_point_stop_.restart(1);
+    Correction correction;
+    double first = 0;
+    for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
+      correction = solver_.correct();
+      ++statistics_.newton_iterations;
+      if (stop_()) return failure(Status::interrupted, h, iteration, {});
+      if (!std::isfinite(correction.relative)) return failure(Status::not_finite, h, iteration, correction);
+      if (iteration == 1) first = correction.relative;
+      if (!is_at_roundoff(correction)) continue;
+      const Status status = status_of_solution(first);
+      if (status != Status::ok) return failure(status, h, iteration, correction);
+      return {
+          .status = Status::ok, .time = time(), .step = h, .iterations = iteration, .residual = correction.relative};
+    }
+    return failure(Status::not_converged, h, options_.max_iterations, correction);
+  }
+
+  // A failure where coordinates are singular is theirs, whatever shape it took.
+  Outcome failure(Status status, double h, int iterations, const Correction& correction) {
+    ++statistics_.rejected_steps;
+    const int singular = singular_part();
+    if (singular >= 0) status = Status::singular_mass_matrix;
+    const bool is_told = status != Status::singular_mass_matrix && status != Status::wrong_root && correction.part >= 0;
+    const int part = is_told ? correction.part : solver_.part_of(status);
+    return {.status = status,
+            .time = time(),
+            .step = h,
+            .iterations = iterations,
+            .residual = correction.relative,
+            .part = part};
+  }
+
+  Solver solver_;
+  StepperOptions options_;
+  SolverTraits traits_;
+  StepController<double> controller_;
+  Compensated<double> time_{};
+  double defect_ = 0;  // of the last solution
+  Statistics statistics_;
+  StopSign stop_;
+  FixedPointStop<double, sequences_of<Solver>()> fixed_point_stop_;
+  NewtonStop newton_stop_;
+
+ private:
+  // From where on the defect of a step is looked for. It is told, not acted on: steps of different sizes would cost
+  // what symplectic ones are taken for, and long chains move well in modes far slower than their fastest.
+  static constexpr double noticed_defect = 1e-6;
+  static constexpr double visible_turn = 1e-10;  // rad, or of a coordinate
+
+  // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
+  // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
+  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
+  static constexpr double largest_energy_defect = 0.02;
+
+  // A fixed point that is lost the solver itself leaves to Newton.
+  bool is_at_roundoff(const Correction& correction) {
+    const double change = correction.relative;
+    if (correction.convergence == Convergence::quadratic) return newton_stop_.reached(change);
+    return fixed_point_stop_.judge(change * change, true).done;
+  }
+
+  // Of what is left out, a thousandth of a last bit: of ten times that energy drifts, by 1e-21 a step (8 stages).
+  static CorrectionLimits correction_limits(int parts) {
+    return {.enough = 1e-19 * coarseness(epsilon()),
+            .last_bit = epsilon(),
+            .usual = usual_rounding(parts, epsilon()),
+            .small = most_rounding(parts, epsilon()),
+            .certainly = 8};
+  }
+
+  // Whether the stages are the solution that continues from a step of no length. Methods that
+  // damp what they do not resolve are asked for no more than that energy does not grow.
+  Status status_of_solution(double first) {
+    const double turn = solver_.turn();
+    if (!(turn < largest_turn())) return Status::wrong_root;
+    if (first > trusted_prediction || turn > trusted_turn) {
+      const double energy = solver_.energy_defect();
+      if (!(energy < largest_energy_defect)) return Status::wrong_root;
+      if (!(energy > -largest_energy_defect) && !traits_.damped) return Status::wrong_root;
+    }
+    defect_ = 0;
+    if (!traits_.dissipates && may_have_defect(first, turn)) defect_ = solver_.defect();
+    return Status::ok;
+  }
+
+  // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that. What
+  // hardly moves has rates that are nothing to compare with.
+  bool may_have_defect(double first, double turn) const {
+    if (turn < visible_turn) return false;
+    if (controller_.chooses()) return traits_.damped;
+    return first >= noticed_defect * solver_.predictor_gain();
+  }
+
+  // Of a step of the controller's choice, the error is known too.
+  double largest_turn() const { return controller_.chooses() ? 3 : traits_.largest_turn; }
+};
+
+}  // namespace pendula
