@@ -9,8 +9,8 @@
 #include <numbers>
 #include <optional>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/event_location.hpp>
 #include <pendula/run/run.hpp>
-#include <pendula/run/sign_search.hpp>
 #include <string>
 #include <utility>
 #include <vector>

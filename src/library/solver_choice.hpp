@@ -4,9 +4,9 @@
 
 namespace pendula {
 
-/// What `solver = "auto"` is. The velocity form is the dense solver's alone. On few links in the plane fixed points
-/// over the generated kernel, where there is one, take less, whatever the registers are (table "few links" in
-/// docs/benchmarks.md). In space kernels cannot pass a pole.
+/// The solver that `solver = "auto"` stands for. Only the dense solver has the velocity form. On few links in the plane
+/// it is the faster one by fixed-point iteration, on every instruction set (table "few links" in docs/benchmarks.md).
+/// In space a generated kernel cannot pass a pole, so there it is the chain solver.
 template <class Space>
 Solver solver_for(int links, const RunOptions& options, bool has_kernel) {
   if (options.solver != Solver::automatic) return options.solver;

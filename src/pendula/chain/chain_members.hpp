@@ -8,7 +8,7 @@
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/member_loads.hpp>
 #include <pendula/chain/rod_tangent.hpp>
-#include <pendula/gauss/members_in_lanes.hpp>
+#include <pendula/gauss/member_layout.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>

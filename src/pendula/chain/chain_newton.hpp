@@ -27,8 +27,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
  public:
   using Stages = ChainStages<Space, S, N, Real, Arch>;
 
-  /// Gains are kept of so many links: those of a long chain would take more room than all else. The others are found
-  /// again when it is their turn outward, to the same bits, from what was carried to where they begin.
+  /// The gains of so many links are kept: those of a long chain would take more room than all else. Of the other links
+  /// they are computed a second time, to the same bits, when the sweep outward comes to them.
   static constexpr int most_kept = 4096;
 
   explicit ChainNewton(int links, int kept = most_kept)

@@ -14,7 +14,7 @@
 #include <pendula/chain/rod_state.hpp>
 #include <pendula/chain/stage_change.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/gauss/stages_in_lanes.hpp>
+#include <pendula/gauss/stage_layout.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <utility>

@@ -7,7 +7,7 @@
 #include <pendula/chain/chain_motion.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/gauss/stages_in_lanes.hpp>
+#include <pendula/gauss/stage_layout.hpp>
 #include <pendula/numeric/lanes.hpp>
 
 namespace pendula {

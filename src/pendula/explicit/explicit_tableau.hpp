@@ -5,9 +5,10 @@
 
 namespace pendula {
 
-// Explicit Runge–Kutta methods: stage i is at y + h Σ_j a_ij k_j, the end at y + h Σ_i b_i k_i, and what the step errs
-// by is h Σ_i e_i k_i, the last of them being the slopes at the end. A method without `error_order` has no such
-// estimate; that of one that is blind compares slopes at the ends alone, and does not see what depends on time.
+// Explicit Runge–Kutta methods: stage i is at y + h Σ_j a_ij k_j, the end at y + h Σ_i b_i k_i. The error of the step
+// is h Σ_i e_i k_i, the last k being the slope at the end; a method with `error_order` 0 has no such estimate. The
+// estimate of a method that `is_blind` compares slopes at both ends only, and does not see what depends on time. A new
+// method has a case in library/explicit_methods.hpp and in ensemble/plain_queue.hpp, too.
 
 /// The classical method.
 struct ClassicalRungeKutta {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <pendula/gauss/stage_dynamics.hpp>
-#include <pendula/gauss/stages_in_lanes.hpp>
+#include <pendula/gauss/stage_layout.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>
 #include <pendula/numeric/lanes.hpp>

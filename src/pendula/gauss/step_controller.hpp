@@ -14,15 +14,15 @@ enum class Steering {
   greedy      ///< by the error of the last step alone: for motion that takes or gives energy anyway
 };
 
-/// Chooses the steps of a method of even or odd order, of one motion or of several, so that each errs by no more than a
+/// Chooses the steps of a Gauss or Radau method, of one motion or of several, so that each errs by no more than a
 /// tolerance. Errors are compared by their logarithms.
 ///
 /// Symmetric steps are h = c/ρ, where the density ρ follows the pace R of the motion,
 ///   ρ₊ = ρ₋ + c d ln R/dt,
 /// from the step before a state to the one after it, the derivative being that of the state (Hairer and Söderlind,
-/// SIAM J. Sci. Comput. 26 (2005) 1838). Backwards that is the same recursion. What a tolerance asks for is c, which
-/// changes seldom, the rarer the longer the run: where a step errs by more, and where all of the last 2^k erred by
-/// less.
+/// SIAM J. Sci. Comput. 26 (2005) 1838). Backwards that is the same recursion. The tolerance decides on c. It becomes
+/// smaller where a step errs by more, and larger where all of the last 2^k steps erred by less; k grows with each such
+/// change, so that c changes less and less often.
 template <class Num>
 class StepController {
  public:
@@ -153,7 +153,7 @@ class StepController {
   // What errors grow by on their way to the end of a run, as measured on random chains.
   static constexpr double safety = 4;
   static constexpr double aim = 0.2;  // of the tolerance, where c is set
-  // Of energy, in tolerances, as long as stages say that all is well: what they stand beside they do not see.
+  // Energy that may be missing, in tolerances, where stages show no error: beside them motion may be singular.
   static constexpr double most_imbalance = 5, energy_rounding = 1e-13;
   static constexpr double greedy_aim = 0.03, greedy_growth = 1.5, least_growth = 0.3;
   static constexpr double most_growth = 4, worthwhile = 1.05;

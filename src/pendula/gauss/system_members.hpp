@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
-#include <pendula/gauss/members_in_lanes.hpp>
+#include <pendula/gauss/member_layout.hpp>
 #include <pendula/gauss/stage_tangents.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>

@@ -7,9 +7,9 @@
 #include <functional>
 #include <limits>
 #include <pendula/run/event.hpp>
+#include <pendula/run/event_location.hpp>
 #include <pendula/run/formula_search.hpp>
 #include <pendula/run/integrator.hpp>
-#include <pendula/run/sign_search.hpp>
 #include <pendula/system/options.hpp>
 #include <span>
 #include <utility>

@@ -9,7 +9,7 @@
 #include <optional>
 #include <pendula/numeric/reach.hpp>
 #include <pendula/numeric/sampled_polynomial.hpp>
-#include <pendula/run/sign_search.hpp>
+#include <pendula/run/event_location.hpp>
 #include <span>
 #include <utility>
 #include <vector>

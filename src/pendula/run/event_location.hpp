@@ -17,7 +17,7 @@ inline int sign_of(double value) {
   return value > 0 ? 1 : value < 0 ? -1 : 0;
 }
 
-/// Where a function of time changes its sign once, in parts of a step.
+/// Where a function of time, an event's, changes its sign once: in parts of a step.
 struct SignChange {
   double from = 0, to = 0;
   int sign = 0;                 ///< after it

@@ -7,8 +7,8 @@
 
 namespace pendula {
 
-/// How the stages of a number lie where several motions are solved, one in each lane: one after the other, each of them
-/// of all members. As StagesInLanes is of one motion.
+/// How stage values are laid out where several members are solved at once: a pack for each stage, with a member in each
+/// lane. StagesInLanes is the layout of one motion.
 template <int S, class Number>
 struct MembersInLanes {
   using Num = Number;
@@ -16,7 +16,8 @@ struct MembersInLanes {
   using Cell = Num;
   using Sum = L;
   static constexpr int stages = S, cells = S;
-  static constexpr int together = S == 1 ? 1 : 2;  ///< so that one does not wait for itself
+  static constexpr int together =
+      S == 1 ? 1 : 2;  ///< stages in a sweep: of one alone each operation waits for the one before
 
   template <int Count>
   struct Cells : std::array<Num, static_cast<std::size_t>(Count)> {
