@@ -123,7 +123,7 @@ struct StagesInLanes {
       std::array<L, static_cast<std::size_t>(S)> m_;
       L hb_, hc_, hc_low_;
     };
-    AtHand at_hand() const requires(is_fixed) { return AtHand(*this); }
+    AtHand at_hand() const requires is_fixed { return AtHand(*this); }
 
     /// The same of a number of stages that is told at run time: more than registers need to hold.
     class Reference {
