@@ -1,10 +1,8 @@
 #include <benchmark/benchmark.h>
 
-#include <limits>
 #include <lyapunov.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/run/integrator.hpp>
-#include <pendula/run/lyapunov.hpp>
+#include <pendula/lyapunov.hpp>
 #include <string>
 
 namespace bench {
@@ -19,13 +17,9 @@ void leading_exponent(benchmark::State& state, double tolerance) {
   const pendula::Chain<Planar> chain(
       {.masses = Eigen::Vector2d(0.2, 0.1), .lengths = Eigen::Vector2d(0.1, 0.08), .gravity = 9.8});
   const auto start = pendula::State<Planar>::from_angles(Eigen::Vector2d(1.5, 1.5));
-  const int stages = pendula::stages_for(pendula::Method::gauss, tolerance);
-  const auto integrator = make_integrator(chain, {.stages = stages, .step = 0, .tolerance = tolerance});
   pendula::LyapunovSpectrum found;
   for (auto _ : state) {
-    found = find_lyapunov_spectrum(
-        *integrator, start, std::numeric_limits<double>::infinity(), duration, 1,
-        [](const pendula::LyapunovProgress&) {}, [] { return false; });
+    found = lyapunov(chain, start, {.duration = duration, .count = 1, .run = {.tolerance = tolerance}});
   }
   state.counters["exponent"] = found.exponents[0];
   state.counters["tolerance"] = tolerance;

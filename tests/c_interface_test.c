@@ -44,6 +44,8 @@ static void a_chain(void) {
   pendula_event event = {height, count_crossing, NULL, 0, 0};
   struct counter counter = {0, 0, 0}, other = {0, 0, 0};
   void* contexts[1];
+  const double torques[2] = {0.5, -0.1};
+  double held[2];
   double end[4], copied[4], half[4], a[16], row[10], saved[4096];
   expect(chain != NULL && pendula_coordinates(chain) == 2 && pendula_columns(chain) == 10, "the chain");
   expect(strcmp(pendula_column_name(chain, 3), "theta_2") == 0 && strcmp(pendula_column_unit(chain, 9), "J") == 0 &&
@@ -55,6 +57,11 @@ static void a_chain(void) {
   contexts[0] = &other;
   expect(run != NULL && pendula_on(run, &event) == PENDULA_OK, "an event");
   expect(pendula_on_rows(run, 0.5, count_row, &counter) == PENDULA_OK, "rows");
+  expect(pendula_inputs(chain) == 2 && strcmp(pendula_input_name(chain, 1), "torque_2") == 0, "its inputs");
+  expect(pendula_hold(run, torques, 2) == PENDULA_OK, "torques");
+  pendula_held(run, held);
+  expect(memcmp(held, torques, sizeof held) == 0, "are held");
+  expect(pendula_simulation_row(run, row) == PENDULA_OK && row[1] == 2, "a row");
   expect(pendula_advance_to(run, 2) == PENDULA_OK && pendula_time(run) == 2, "two seconds");
   copy = pendula_simulation_copy(run, contexts);
   expect(copy != NULL && pendula_saved(run) < 4096, "a copy");
@@ -116,10 +123,38 @@ static void an_ensemble(void) {
   pendula_model_free(chain);
 }
 
+static int at_once(void* context) {
+  (void)context;
+  return 1;
+}
+
+static void exponents(void) {
+  const double masses[1] = {1}, lengths[1] = {1}, damping[1] = {0.5}, q[1] = {1};
+  pendula_chain numbers = {2, 1, masses, lengths, 9.81, damping, NULL, NULL, 0};
+  pendula_tangents tangents = {0};
+  pendula_spectrum rest;
+  double found[2];
+  pendula_model* chain = pendula_model_of_chain(&numbers);
+  tangents.model = chain;
+  tangents.q = q;
+  tangents.duration = 100;
+  tangents.count = 2;
+  expect(pendula_lyapunov(&tangents, found, NULL, &rest) == PENDULA_OK && rest.duration == 100, "exponents");
+  expect(fabs(rest.sum + 0.5) < 1e-9, "they add up to the mean divergence"); /* measured 3.4e-13 */
+  tangents.stop = at_once;
+  expect(pendula_lyapunov(&tangents, found, NULL, &rest) == PENDULA_STOPPED && rest.duration < 1, "stopping them");
+  tangents.count = 3;
+  expect(pendula_lyapunov(&tangents, found, NULL, &rest) == PENDULA_INVALID &&
+             strstr(pendula_error(), "count: expected 1 to 2 exponents, got 3") != NULL,
+         "three of two");
+  pendula_model_free(chain);
+}
+
 int main(void) {
   a_chain();
   errors();
   an_ensemble();
+  exponents();
   if (failures == 0) printf("%s on %s\n", pendula_version(), pendula_instruction_set());
   return failures;
 }

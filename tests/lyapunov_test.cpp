@@ -19,14 +19,14 @@ namespace pendula::test {
 namespace {
 
 template <class Space>
-LyapunovSpectrum spectrum(const Chain<Space>& chain, const State<Space>& start, double step, double duration,
-                          int count = 0, Solver solver = Solver::chain) {
+LyapunovRun spectrum(const Chain<Space>& chain, const State<Space>& start, double step, double duration, int count = 0,
+                     Solver solver = Solver::chain) {
   RunOptions options;
   options.stages = 4;
   options.solver = solver;
   const auto integrator = make_integrator(chain, options);
   const auto ignore = [](const LyapunovProgress&) {};
-  const LyapunovSpectrum found =
+  const LyapunovRun found =
       find_lyapunov_spectrum(*integrator, start, step, duration, count, ignore, [] { return false; });
   EXPECT_TRUE(found.result.outcome);
   EXPECT_DOUBLE_EQ(found.duration, duration);

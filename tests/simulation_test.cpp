@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <numbers>
+#include <pendula/kernels/cart_chain_1.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/own_model.hpp>
 #include <pendula/pendula.hpp>
@@ -249,13 +251,143 @@ TEST(Simulation, SaysWhatIsWrong) {
   says([&] { run.advance_to(0.5); }, "time: expected at least 1 s, which it is, got 0.5");
   says([&] { return run["x_3"]; }, "column: expected one of t, theta_1");
   says([&] { run.on({}); }, "value: expected a function");
-  says([&] { run.write_csv("rows.csv", every(0)); }, "rows: expected an interval");
+  says([&] { run.hold("torque_3", 1); }, "input: expected one of torque_1, torque_2, got torque_3");
+  says([&] { run.hold("torque_2", NAN); }, "torque_2: expected a finite number, got nan");
+  says([&] { run.hold(Eigen::Vector3d::Zero()); }, "inputs: expected 2 numbers, got 3");
+  says([&] { run.on_rows(every(0), [](std::span<const double>) {}); }, "rows: expected an interval");
   EXPECT_THROW(Simulation(equal_chain<Planar>(77), {0, Eigen::VectorXd::Ones(77), Eigen::VectorXd::Ones(77)},
                           {.solver = Solver::dense}),
                NoKernel);
   EXPECT_THROW(
       Simulation(equal_chain<Spatial>(1), {0, Eigen::Vector2d(0, 1), Eigen::Vector2d(0, 0)}, {.solver = Solver::dense}),
       RunFailed);
+}
+
+using Cart = kernels::CartChain1;
+
+/// A bob of 0.5 kg on a rod of 0.8 m, on a cart of 2 kg.
+Model cart() {
+  Cart::Parameters<double> parameters{};
+  parameters.masses.setConstant(0.5);
+  parameters.lengths.setConstant(0.8);
+  parameters.damping.setConstant(0);
+  parameters.cart_mass = 2;
+  parameters.cart_friction = 0;
+  parameters.gravity = 9.81;
+  return model<Cart>(parameters);
+}
+
+Motion beside_hanging() {
+  return {0, Eigen::Vector2d(0.1, 0.4), Eigen::Vector2d(-0.2, 0.3)};
+}
+
+constexpr double sample = 0.05;  // s
+double push(int k) {
+  return 4 * std::cos(2.0 * k);
+}
+
+/// Steps of RK4 for the equations of the cart, (x, theta, their rates), as they stand in textbooks.
+Eigen::Vector4d pushed(Eigen::Vector4d state, double force, double duration) {
+  constexpr double m = 0.5, l = 0.8, M = 2, g = 9.81;
+  const auto rate = [&](const Eigen::Vector4d& y) {
+    const double s = std::sin(y[1]), c = std::cos(y[1]);
+    const double x = (force + m * s * (l * y[3] * y[3] + g * c)) / (M + m * s * s);
+    return Eigen::Vector4d(y[2], y[3], x, -(c * x + g * s) / l);
+  };
+  constexpr int steps = 200;
+  const double h = duration / steps;
+  for (int k = 0; k < steps; ++k) {
+    const Eigen::Vector4d a = rate(state), b = rate(state + h / 2 * a), c = rate(state + h / 2 * b),
+                          d = rate(state + h * c);
+    state += h / 6 * (a + 2 * b + 2 * c + d);
+  }
+  return state;
+}
+
+/// Where it comes to by a push a sample.
+Eigen::Vector4d pushed_for(double duration) {
+  const Motion start = beside_hanging();
+  Eigen::Vector4d state;
+  state << start.q, start.v;
+  for (int k = 0; duration - k * sample > 1e-9; ++k) {
+    state = pushed(state, push(k), std::min(sample, duration - k * sample));
+  }
+  return state;
+}
+
+void control(Simulation& run, int from, int to) {
+  for (int k = from; k < to; ++k) {
+    run.hold("push", push(k));
+    run.advance_to((k + 1) * sample);
+  }
+}
+
+double apart(const Motion& a, const Eigen::Vector4d& b) {
+  return (a.q - b.head(2)).norm() + (a.v - b.tail(2)).norm();
+}
+
+TEST(Simulation, HoldsAnInputUntilAnotherIsHeld) {
+  for (const SimulationOptions& options :
+       {SimulationOptions{.tolerance = 1e-10}, {.stages = 4, .step = 0.01}, {.method = Method::dopri5}}) {
+    const double bound = options.method == Method::gauss ? 1e-12 : 5e-8;  // measured 4.9e-14, 2.0e-9
+    Simulation run(cart(), beside_hanging(), options);
+    control(run, 0, 40);
+    EXPECT_EQ(run.held()[0], push(39));
+    EXPECT_EQ(run["push"], push(39));
+    EXPECT_LT(apart(run.motion(), pushed_for(2)), bound) << options.method;
+    for (const double time : {0.0, 0.05, 0.22, 1.0, 1.984}) {
+      EXPECT_LT(apart(run.at(time), pushed_for(time)), bound) << options.method << ' ' << time;
+    }
+  }
+}
+
+TEST(Simulation, HasHeldInputsInCopiesAndInWhatIsSaved) {
+  for (const SimulationOptions& options : {SimulationOptions{}, {.stages = 2, .step = 0.02}}) {
+    Simulation run(cart(), beside_hanging(), options);
+    control(run, 0, 7);
+    run.hold("push", 1.5);
+    Simulation copy = run, other(cart(), beside_hanging(), options);
+    other.resume(run.save());
+    EXPECT_EQ(other.held()[0], 1.5);
+    for (Simulation* one : {&run, &copy, &other}) {
+      one->advance_to(0.6);
+      control(*one, 12, 20);
+    }
+    EXPECT_TRUE(same(run.motion(), copy.motion()));
+    EXPECT_TRUE(same(run.motion(), other.motion()));
+    EXPECT_TRUE(same(run.at(0.58), copy.at(0.58)));
+    EXPECT_THROW(other.at(0.2), std::invalid_argument);
+  }
+}
+
+TEST(Simulation, HoldsTorquesOfAChain) {
+  Eigen::Matrix<double, 3, 2> torque;
+  torque << 0.1, 0.2, -0.3, 0.4, 0.5, -0.6;
+  ChainParameters<Spatial> parameters{.masses = Eigen::Vector2d(1, 2), .lengths = Eigen::Vector2d(0.5, 1)};
+  const Motion start(0, Eigen::Vector4d(0.5, 1, 0.2, -0.4), Eigen::Vector4d(0.1, 0, 0.3, 1));
+  Simulation run(Chain<Spatial>(parameters), start);
+  EXPECT_EQ(run.model().input_names()[4], "torque_y_2");
+  run.hold(torque.reshaped());
+  parameters.torque = torque;
+  Simulation loaded(Chain<Spatial>(parameters), start);
+  run.advance_to(1);
+  loaded.advance_to(1);
+  EXPECT_TRUE(same(run.motion(), loaded.motion()));
+}
+
+TEST(Simulation, HoldsNothingElseWithinAnAdvance) {
+  Simulation run(cart(), beside_hanging());
+  run.on({.value = [](const Motion& m) { return m.q[1]; }}, [&](const Motion&) { run.hold("push", 1); });
+  EXPECT_THROW(run.advance_to(5), std::invalid_argument);
+}
+
+TEST(Simulation, WritesTheInputsThatAreHeld) {
+  Simulation run(cart(), beside_hanging());
+  std::vector<double> pushes;
+  run.on_rows(every(sample), [&](std::span<const double> numbers) { pushes.push_back(numbers[5]); });
+  EXPECT_EQ(run.model().columns()[5], "push");
+  control(run, 0, 3);
+  EXPECT_EQ(pushes, (std::vector{0.0, push(0), push(1), push(2)}));  // of the steps that led there
 }
 
 TEST(Model, IsAKernelWithItsNumbers) {
@@ -309,6 +441,31 @@ TEST(Propagate, StopsWhereThatIsRequested) {
   const Ends ends = propagate(equal_chain<Planar>(2), Eigen::MatrixXd::Constant(3, 2, 1.0),
                               {.duration = 1e6, .stop = source.get_token()});
   EXPECT_EQ(ends.how[2], PENDULA_STOPPED);
+}
+
+// As tests/lyapunov_test.cpp has it of the integrator; published is 2.46 1/s.
+TEST(Lyapunov, OfAPublishedDoublePendulum) {
+  const Chain<Planar> chain(
+      {.masses = Eigen::Vector2d(0.2, 0.1), .lengths = Eigen::Vector2d(0.1, 0.08), .gravity = 9.8});
+  const Motion start(0, Eigen::Vector2d::Constant(1.5), Eigen::Vector2d::Zero());
+  const SimulationOptions options{.stages = 4, .step = 0.004};
+  const LyapunovSpectrum found = lyapunov(chain, start, {.duration = 1000, .run = options});
+  EXPECT_EQ(found.duration, 1000);
+  EXPECT_NEAR(found.exponents[0], 2.46, 0.5);  // measured 2.81
+  EXPECT_LT(found.errors[0], 0.25);            // measured 0.062
+  EXPECT_LT(std::abs(found.sum), 1e-10);       // measured 1.7e-14
+  const LyapunovSpectrum leading = lyapunov(chain, start, {.duration = 1000, .count = 1, .run = options});
+  ASSERT_EQ(leading.exponents.size(), 1);
+  EXPECT_NEAR(leading.exponents[0], found.exponents[0], 0.05);  // measured 2.8e-4
+}
+
+TEST(Lyapunov, SaysWhatIsWrong) {
+  const Model chain = equal_chain<Planar>(2);
+  EXPECT_THROW(lyapunov(chain, let_go(), {.count = 5}), std::invalid_argument);
+  EXPECT_THROW(lyapunov(chain, let_go(), {.run = {.method = Method::dopri5}}), std::invalid_argument);
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_LT(lyapunov(chain, let_go(), {.duration = 1e6, .stop = source.get_token()}).duration, 1);
 }
 
 }  // namespace

@@ -61,7 +61,7 @@ std::vector<double> numbers(const Eigen::VectorXd& x) {
   return {x.begin(), x.end()};
 }
 
-std::string to_json(const LyapunovSpectrum& found, const Statistics& statistics) {
+std::string to_json(const LyapunovRun& found, const Statistics& statistics) {
   const nlohmann::ordered_json json{{"exponents", numbers(found.exponents)},
                                     {"exponents_error", numbers(found.errors)},
                                     {"sum", found.sum},
@@ -104,8 +104,8 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
     if (history) history->add(progress);
   };
   const double largest_step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  const LyapunovSpectrum found = find_lyapunov_spectrum(*integrator, scenario.start, largest_step, scenario.duration,
-                                                        options.count, on_way, [&] { return guard.interrupted(); });
+  const LyapunovRun found = find_lyapunov_spectrum(*integrator, scenario.start, largest_step, scenario.duration,
+                                                   options.count, on_way, [&] { return guard.interrupted(); });
   if (history) history->close();
   if (options.json) {
     std::cout << to_json(found, integrator->statistics());

@@ -29,7 +29,7 @@ io::AnyScenario MemberScenarios::of_member(const io::EnsemblePlan& plan, std::in
   try {
     return parse(overrides);
   } catch (const io::InputError& error) {
-    // What is told as a change on the command line was none.
+    // The members' numbers are overrides, too; messages must not call them --set.
     const std::string_view told = error.what(), sign = "--set ";
     const bool is_of_member = told.starts_with(sign) && std::ranges::any_of(plan.keys(), [&](const std::string& key) {
                                 return told.substr(sign.size()).starts_with(key + '=');
@@ -69,14 +69,14 @@ MemberRuns::MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan,
       guard_(guard),
       width_(kept.columns().size() + io::EnsembleHead::flags) {}
 
-/// One member, from its scenario to its report.
+/// A member, its scenario and its report.
 struct MemberRuns::Member {
-  std::optional<io::AnyScenario> scenario;  // none where it cannot be read
+  std::optional<io::AnyScenario> scenario;  // empty if it cannot be read
   std::string problem;
-  std::optional<RunSetup> setup;  // of one that waits for others
+  std::optional<RunSetup> setup;  // of a member that is run together with others
   RunReport report;
   bool is_looked_at = false;
-  std::optional<LyapunovSpectrum> exponent;  // where it is kept, and was found together with those of others
+  std::optional<LyapunovSpectrum> exponent;  // if it is kept, and was found in lanes
 };
 
 io::DoneChunk MemberRuns::run(const Chunk& members) const {
@@ -99,11 +99,12 @@ io::DoneChunk MemberRuns::run(const Chunk& members) const {
     const std::string message = append(all[k], done.rows);
     if (!message.empty()) done.messages.push_back({members.first + static_cast<std::int64_t>(k), message});
   }
-  if (guard_.interrupted()) throw Interrupted();  // a second look, perhaps, which would tell of a doubt
+  if (guard_.interrupted()) throw Interrupted();  // an interrupted second look would raise false doubts
   return done;
 }
 
-// All of few; of many some, who fill lanes together, evenly by multiples of the golden ratio, whatever rows a grid has.
+// All members of a small ensemble; of a large one some groups that fill lanes, spread evenly by multiples of the golden
+// ratio.
 bool MemberRuns::is_looked_at(std::int64_t number) const {
   constexpr std::uint64_t few = 256, one_of = 32, together = 8, golden = 0x9E3779B97F4A7C15;
   const auto count = static_cast<std::uint64_t>(plan_.count), wanted = std::max(few, count / one_of);
@@ -111,8 +112,7 @@ bool MemberRuns::is_looked_at(std::int64_t number) const {
   return count <= few || static_cast<std::uint64_t>(number) / together * golden < share * wanted;
 }
 
-// Reads a member, and runs it unless it can go with others. One that something is wrong with is read once more, with
-// its places in the file.
+// Reads a member, and runs it unless it can run in lanes. A wrong member is read again with places, for the message.
 MemberRuns::Member MemberRuns::member(std::int64_t number, io::SharedExpressions& shared) const {
   try {
     return member_of(scenarios_.quickly_of_member(plan_, number), number, shared);
@@ -132,7 +132,7 @@ MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, std::int64_t 
   Member member;
   member.scenario = std::move(scenario);
   RunSetup setup = setup_of(*member.scenario, shared);
-  // Trials for an accuracy tell of each how far it can be trusted.
+  // Trials for an accuracy say of each member how far it can be trusted.
   setup.doubted = setup.estimate && (setup.accuracy.error > 0 || is_looked_at(number));
   member.is_looked_at = setup.doubted;
   if (lane_kind(setup, lane_options(setup, method()))) {
@@ -154,8 +154,8 @@ RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpress
   return setup;
 }
 
-// Of the members that go in lanes with a tangent. By Gauss methods not where the scenario's own way is asked for: that
-// is what `pendula lyapunov` does, whose tangents begin otherwise than those in lanes.
+// Exponents of the members that run in lanes with a tangent. Not for Gauss methods with method = "run": the exponents
+// are those of `pendula lyapunov` then, whose tangents begin otherwise than those in lanes.
 void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<RunSetup> setups;
   std::vector<Member*> members;
@@ -178,7 +178,7 @@ RunReport MemberRuns::run_alone(const Scenario& scenario, RunSetup setup) const 
   return one.go([&] { return guard_.interrupted(); });
 }
 
-// Appends the row of a member; gives what there is to say.
+// Appends the row of a member. Returns its message, or an empty one.
 std::string MemberRuns::append(const Member& member, std::vector<double>& rows) const {
   const std::size_t begin = rows.size();
   const auto add = [&](const auto& scenario) {
@@ -213,7 +213,7 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
 template <class Scenario>
 LyapunovSpectrum MemberRuns::leading_exponent(const Scenario& scenario) const {
   const double step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  LyapunovSpectrum found = told_at_keys(scenario, scenarios_.text().name, [&] {
+  LyapunovRun found = told_at_keys(scenario, scenarios_.text().name, [&] {
     const auto integrator = subject_of(scenario)->make_integrator(scenario.run);
     return find_lyapunov_spectrum(
         *integrator, scenario.start, step, scenario.duration, 1, [](const LyapunovProgress&) {},

@@ -18,6 +18,10 @@ constinit thread_local pendula_status kind = PENDULA_OK;
 
 }  // namespace
 
+void require(const Outcome& outcome, const Subject& subject) {
+  if (!outcome) throw RunFailure(message(outcome, subject.coordinates()));
+}
+
 pendula_status fail(pendula_status status, const char* what) noexcept {
   std::strncpy(text, what, longest - 1);
   return kind = status;

@@ -2,6 +2,8 @@
 
 #include <pendula/pendula.h>
 
+#include <pendula/run/subject.hpp>
+#include <pendula/system/outcome.hpp>
 #include <stdexcept>
 #include <string>
 
@@ -12,6 +14,9 @@ class RunFailure : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+
+/// Throws RunFailure unless the outcome is ok.
+void require(const Outcome& outcome, const Subject& subject);
 
 /// Keeps what pendula_error() says to this thread; gives `status`.
 pendula_status fail(pendula_status status, const char* what) noexcept;

@@ -6,13 +6,13 @@
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
-#include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/no_kernel.hpp>
-#include <pendula/run/system_subject.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>
 #include <string>
+
+#include "front/subject_kinds.hpp"
 
 namespace pendula::front {
 namespace {
@@ -20,7 +20,8 @@ namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 template <class Space>
-SystemModel model_of_chain(const Chain<Space>& chain) {
+SystemModel model_of(const ChainSubject<Space>& subject) {
+  const Chain<Space>& chain = subject.chain();
   for (const SystemTable* kernel : library_of<Space>().kernels) {
     if (kernel->info.links != chain.links()) continue;
     const std::vector<PlainChain::Drive> drives = plain_drives(chain);
@@ -30,12 +31,8 @@ SystemModel model_of_chain(const Chain<Space>& chain) {
                  " links in this build; its linearization needs one");
 }
 
-SystemModel model_of(const Subject& subject) {
-  if (const auto* system = dynamic_cast<const SystemSubject*>(&subject)) {
-    return {system->table(), system->numbers().plain()};
-  }
-  if (const auto* chain = dynamic_cast<const ChainSubject<Planar>*>(&subject)) return model_of_chain(chain->chain());
-  return model_of_chain(dynamic_cast<const ChainSubject<Spatial>&>(subject).chain());
+SystemModel model_of(const SystemSubject& subject) {
+  return {subject.table(), subject.numbers().plain()};
 }
 
 /// A column for each coordinate, then for each rate; so many at once as a kernel's functions take.
@@ -81,7 +78,7 @@ void find_b(const SystemModel& model, const Motion& motion, double* b) {
 }  // namespace
 
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
-  const SystemModel model = model_of(subject);
+  const SystemModel model = as_its_kind(subject, [](const auto& kind) { return model_of(kind); });
   if (a != nullptr) {
     SystemAt<8> here(model);
     here.set_time(motion.time);

@@ -7,13 +7,27 @@
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/no_kernel.hpp>
+#include <pendula/run/quantity.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/version.hpp>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "front/errors.hpp"
+#include "front/inputs.hpp"
+
+pendula_model::pendula_model(std::shared_ptr<const pendula::Subject> moved, std::size_t coordinate_count)
+    : subject(std::move(moved)),
+      coordinates(coordinate_count),
+      inputs(pendula::front::input_names(*subject)),
+      names(subject->columns()),
+      units(names.size()) {
+  for (const pendula::Quantity& quantity : subject->quantities()) {
+    for (std::size_t k = 0; k < quantity.size(); ++k) units[quantity.column(k)] = quantity.unit;
+  }
+}
 
 namespace pendula::front {
 namespace {
@@ -38,8 +52,7 @@ pendula_model* make_chain(const pendula_chain& given) {
                          given.damping == nullptr ? none.data() : given.damping,
                          given.torque == nullptr ? none.data() : given.torque,
                          drives};
-  return new pendula_model(std::make_shared<ChainSubject<Space>>(chain_of<Space>(plain)), Space::dof * links,
-                           links * Space::torque_components);
+  return new pendula_model(std::make_shared<ChainSubject<Space>>(chain_of<Space>(plain)), Space::dof * links);
 }
 
 pendula_model* make_system(const SystemTable& table, std::span<const double> parameters,
@@ -47,8 +60,7 @@ pendula_model* make_system(const SystemTable& table, std::span<const double> par
   SystemNumbers numbers{{parameters.begin(), parameters.end()}, {inputs.begin(), inputs.end()}, {}};
   if (inputs.empty()) numbers.inputs.assign(table.info.inputs.size(), 0.0);
   const std::shared_ptr<const SystemTable> shared(std::shared_ptr<void>(), &table);
-  return new pendula_model(std::make_shared<SystemSubject>(shared, std::move(numbers)), table.info.coordinates.size(),
-                           table.info.inputs.size());
+  return new pendula_model(std::make_shared<SystemSubject>(shared, std::move(numbers)), table.info.coordinates.size());
 }
 
 /// The numbers that a model has itself. Throws std::invalid_argument where one has none.
@@ -87,6 +99,12 @@ Motion motion_of(const pendula_model& model, double time, const double* q, const
 void write(const Motion& motion, double* q, double* v) {
   if (q != nullptr) std::ranges::copy(motion.q, q);
   if (v != nullptr) std::ranges::copy(motion.v, v);
+}
+
+void write_row(const Subject& subject, const Motion& motion, double* row) {
+  std::vector<double> numbers;
+  subject.append_row(motion, subject.observe(motion), numbers);
+  std::ranges::copy(numbers, row);
 }
 
 extern "C" {
@@ -131,7 +149,10 @@ size_t pendula_coordinates(const pendula_model* model) {
   return model->coordinates;
 }
 size_t pendula_inputs(const pendula_model* model) {
-  return model->inputs;
+  return model->inputs.size();
+}
+const char* pendula_input_name(const pendula_model* model, size_t input) {
+  return input < model->inputs.size() ? model->inputs[input].c_str() : nullptr;
 }
 size_t pendula_columns(const pendula_model* model) {
   return model->names.size();
@@ -145,10 +166,7 @@ const char* pendula_column_unit(const pendula_model* model, size_t column) {
 
 pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row) {
   return guarded([&] {
-    const Motion motion = motion_of(*model, time, q, v);
-    std::vector<double> numbers;
-    model->subject->append_row(motion, model->subject->observe(motion), numbers);
-    std::ranges::copy(numbers, row);
+    write_row(*model->subject, motion_of(*model, time, q, v), row);
     return PENDULA_OK;
   });
 }

@@ -1,5 +1,6 @@
 #include "front/mover.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -9,19 +10,40 @@
 #include <string>
 #include <utility>
 
+#include "front/inputs.hpp"
+
 namespace pendula::front {
+namespace {
+
+/// Raises a flag for as long as it lives.
+class Raised {
+ public:
+  explicit Raised(bool& flag) : flag_(flag) { flag_ = true; }
+  ~Raised() { flag_ = false; }
+  Raised(const Raised&) = delete;
+  Raised& operator=(const Raised&) = delete;
+
+ private:
+  bool& flag_;
+};
+
+}  // namespace
 
 Mover::Mover(std::shared_ptr<const Subject> subject, const RunOptions& options, bool remembers)
-    : subject_(std::move(subject)),
+    : model_(std::move(subject)),
+      subject_(model_),
       options_(options),
       integrator_(subject_->make_integrator(options)),
+      held_{{-std::numeric_limits<double>::infinity(), inputs_of(*subject_)}},
       remembers_(remembers),
       watch_({}, detail::glance_degree(options)) {}
 
 Mover::Mover(const Mover& other)
-    : subject_(other.subject_),
+    : model_(other.model_),
+      subject_(other.subject_),
       options_(other.options_),
       integrator_(subject_->make_integrator(options_)),
+      held_(other.held_),
       motion_(other.motion_),
       origin_(other.origin_),
       steps_(other.steps_),
@@ -37,6 +59,7 @@ Mover::Mover(const Mover& other)
 Mover::~Mover() = default;
 
 Outcome Mover::start(const Motion& motion) {
+  require_rest("restart");
   const Outcome started = integrator_->start(motion);
   if (!started) return started;
   motion_ = motion;
@@ -46,11 +69,43 @@ Outcome Mover::start(const Motion& motion) {
   return started;
 }
 
+Outcome Mover::hold(std::span<const double> inputs) {
+  require_rest("inputs");
+  if (std::ranges::equal(inputs, this->inputs())) return {};
+  std::shared_ptr<const Subject> subject = with_inputs(model_, inputs);
+  std::unique_ptr<Integrator> integrator = subject->make_integrator(options_);
+  const Outcome started = integrator->start(motion_);
+  if (!started) return started;
+  move_by(std::move(subject), std::move(integrator));
+  if (!remembers_ || held_.back().since == motion_.time) held_.pop_back();
+  held_.push_back({motion_.time, {inputs.begin(), inputs.end()}});
+  return started;
+}
+
+void Mover::require_rest(const char* what) const {
+  if (!is_advancing_) return;
+  throw std::invalid_argument(std::string(what) +
+                              ": expected between advances, got a call from within one (an event with stop ends it)");
+}
+
+void Mover::move_by(std::shared_ptr<const Subject> subject, std::unique_ptr<Integrator> integrator) {
+  subject_ = std::move(subject);
+  integrator_ = std::move(integrator);
+  again_.reset();
+  for (Viewer& viewer : viewers_) viewer.show(*subject_);
+}
+
+const Mover::Held& Mover::held_at(double time) const {
+  return *(std::ranges::upper_bound(held_, time, {}, &Held::since) - 1);
+}
+
 Advance Mover::advance_to(double time) {
   if (!(time >= motion_.time) || std::isinf(time)) {
     throw std::invalid_argument("time: expected at least " + shortest(motion_.time) + " s, which it is, got " +
                                 shortest(time));
   }
+  require_rest("advance");
+  const Raised advancing(is_advancing_);
   Schedule schedule;
   schedule.step = is_adaptive(options_) ? std::numeric_limits<double>::infinity() : options_.step;
   schedule.duration = time - origin_;
@@ -106,7 +161,11 @@ Outcome Mover::at(double time, Motion& motion) {
   }
   motion = history_.before(time);
   if (motion.time == time) return {};
-  if (!again_) again_ = subject_->make_integrator(options_);
+  const Held& held = held_at(motion.time);
+  if (!again_ || again_since_ != held.since) {
+    again_ = with_inputs(model_, held.inputs)->make_integrator(options_);
+    again_since_ = held.since;
+  }
   Outcome outcome = again_->start(motion);
   const double near = 4 * std::numeric_limits<double>::epsilon() * std::abs(time);
   while (outcome && time - again_->time() > near) outcome = again_->step(time - again_->time());
@@ -153,8 +212,15 @@ void Mover::resume(const Member& saved) {
                                 " numbers of the same model and options, got " + std::to_string(saved.numbers.size()));
   }
   const auto end = saved.numbers.begin() + static_cast<std::ptrdiff_t>(own);
+  const std::span held = std::span(saved.numbers).first(inputs().size());
+  if (!std::ranges::equal(held, inputs())) {
+    std::shared_ptr<const Subject> subject = with_inputs(model_, held);
+    std::unique_ptr<Integrator> integrator = subject->make_integrator(options_);
+    move_by(std::move(subject), std::move(integrator));
+  }
   integrator_->resume({{end, saved.numbers.end()}});
   become(*this, {{saved.numbers.begin(), end}});
+  held_ = {{-std::numeric_limits<double>::infinity(), inputs()}};
   watch_.resume(motion_);
   history_.clear();
   if (remembers_) history_.add(motion_);

@@ -15,6 +15,7 @@
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <span>
 #include <vector>
 
 #include "front/step_history.hpp"
@@ -44,10 +45,15 @@ class Mover {
   /// Begins, or goes on, from a motion.
   Outcome start(const Motion& motion);
 
+  /// What moves, with the inputs that are held.
   const Subject& subject() const { return *subject_; }
   const Motion& motion() const { return motion_; }
   std::size_t steps() const { return steps_; }
   std::optional<std::size_t> stopped_by() const { return stopped_by_; }
+
+  const std::vector<double>& inputs() const { return held_.back().inputs; }
+  /// Holds these as the constant parts of inputs from now on. Throws std::invalid_argument as with_inputs.
+  Outcome hold(std::span<const double> inputs);
 
   /// To `time`, where a step ends. Throws std::invalid_argument where that is past, and what callbacks throw.
   Advance advance_to(double time);
@@ -73,20 +79,32 @@ class Mover {
   /// What is kept besides the integrator's.
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(motion_.time, motion_.q, motion_.v, origin_, watch_);
+    numbers(held_.back().inputs, motion_.time, motion_.q, motion_.v, origin_, watch_);
   }
 
  private:
+  /// Inputs, and since when they are held.
+  struct Held {
+    double since;
+    std::vector<double> inputs;
+  };
+
+  void move_by(std::shared_ptr<const Subject> subject, std::unique_ptr<Integrator> integrator);
+  const Held& held_at(double time) const;
+  void require_rest(const char* what) const;
   std::optional<Motion> after_step();
   void restart_after(const Occurrence& happened);
 
-  std::shared_ptr<const Subject> subject_;
+  std::shared_ptr<const Subject> model_, subject_;  // as it was given; with the inputs that are held
   RunOptions options_;
   std::unique_ptr<Integrator> integrator_;
+  std::vector<Held> held_;             // of earlier ones those that steps are kept of
   std::unique_ptr<Integrator> again_;  // takes steps again, to look into them
+  double again_since_ = 0;             // what inputs it has
   Motion motion_;
   double origin_ = 0;  // where times are counted from
   std::size_t steps_ = 0;
+  bool is_advancing_ = false;
   bool remembers_;
   StepHistory history_;
   EventWatch watch_;

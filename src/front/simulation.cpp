@@ -30,11 +30,6 @@ struct pendula_simulation {
 namespace pendula::front {
 namespace {
 
-/// Throws RunFailure unless it is ok.
-void require(const Outcome& outcome, const Subject& subject) {
-  if (!outcome) throw RunFailure(message(outcome, subject.coordinates()));
-}
-
 Event event_of(const pendula_event& given) {
   Event event;
   event.value = [value = given.value, context = given.context](const Motion& motion) {
@@ -123,6 +118,23 @@ void pendula_motion(const pendula_simulation* simulation, double* q, double* v) 
 }
 size_t pendula_steps(const pendula_simulation* simulation) {
   return simulation->mover.steps();
+}
+
+pendula_status pendula_simulation_row(const pendula_simulation* simulation, double* row) {
+  return guarded([&] {
+    write_row(simulation->mover.subject(), simulation->mover.motion(), row);
+    return PENDULA_OK;
+  });
+}
+
+pendula_status pendula_hold(pendula_simulation* simulation, const double* inputs, size_t count) {
+  return guarded([&] {
+    require(simulation->mover.hold({inputs, count}), simulation->mover.subject());
+    return PENDULA_OK;
+  });
+}
+void pendula_held(const pendula_simulation* simulation, double* inputs) {
+  std::ranges::copy(simulation->mover.inputs(), inputs);
 }
 
 pendula_status pendula_at(pendula_simulation* simulation, double time, double* q, double* v) {

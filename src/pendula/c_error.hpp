@@ -6,6 +6,8 @@
 #include <pendula/run/no_kernel.hpp>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace pendula {
 
@@ -37,6 +39,16 @@ template <class Thing>
 Thing* made(Thing* thing) {
   if (thing == nullptr) throw_error(pendula_error_kind());
   return thing;
+}
+
+/// Where a name is among others. Throws std::invalid_argument, with all of them, where it is not.
+inline std::size_t place_of(const char* what, std::string_view name, const std::vector<std::string>& names) {
+  std::string all;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (names[k] == name) return k;
+    all += (k == 0 ? "" : ", ") + names[k];
+  }
+  throw std::invalid_argument(std::string(what) + ": expected one of " + all + ", got " + std::string(name));
 }
 
 inline void require_size(const char* what, std::size_t got, std::size_t expected) {

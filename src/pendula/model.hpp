@@ -9,7 +9,6 @@
 #include <pendula/chain/chain.hpp>
 #include <pendula/system/motion.hpp>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +34,13 @@ class Model {
   std::size_t coordinates() const { return pendula_coordinates(get()); }
   std::size_t inputs() const { return pendula_inputs(get()); }
 
+  /// Names of the inputs: of a chain its torques, link by link, "torque_1", in space "torque_x_1".
+  std::vector<std::string> input_names() const {
+    std::vector<std::string> names(inputs());
+    for (std::size_t k = 0; k < names.size(); ++k) names[k] = pendula_input_name(get(), k);
+    return names;
+  }
+
   /// Names of the numbers of a row: t, coordinates, rates, inputs, points, energy.
   std::vector<std::string> columns() const {
     std::vector<std::string> names(pendula_columns(get()));
@@ -52,13 +58,7 @@ class Model {
 
   /// One of them, by the name of its column. Throws std::invalid_argument where there is none of that name.
   double number(std::string_view column, const Motion& motion) const {
-    std::string all;
-    for (std::size_t k = 0; k < pendula_columns(get()); ++k) {
-      const char* const name = pendula_column_name(get(), k);
-      if (name == column) return row(motion)[k];
-      all.append(all.empty() ? "" : ", ").append(name);
-    }
-    throw std::invalid_argument("column: expected one of " + all + ", got " + std::string(column));
+    return row(motion)[detail::place_of("column", column, columns())];
   }
 
   /// Throws std::invalid_argument unless a motion has as many coordinates and rates.

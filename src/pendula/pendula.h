@@ -75,6 +75,8 @@ void pendula_model_free(pendula_model* model);
 size_t pendula_coordinates(const pendula_model* model);
 size_t pendula_inputs(const pendula_model* model);
 size_t pendula_columns(const pendula_model* model);
+/* Of an input, "push", "torque_1", in space "torque_x_1"; it lives as long as the model. NULL where there is none. */
+const char* pendula_input_name(const pendula_model* model, size_t input);
 /* Of a column, "theta_dot_1", "rad/s"; they live as long as the model. NULL where there is none of that number. */
 const char* pendula_column_name(const pendula_model* model, size_t column);
 const char* pendula_column_unit(const pendula_model* model, size_t column);
@@ -107,10 +109,18 @@ pendula_status pendula_advance_to(pendula_simulation* simulation, double time);
 
 double pendula_time(const pendula_simulation* simulation);
 void pendula_motion(const pendula_simulation* simulation, double* q, double* v);
+/* The numbers of the row where it is, with the inputs that are held. */
+pendula_status pendula_simulation_row(const pendula_simulation* simulation, double* row);
 /* The motion at any time since the start, at the full order of the method. */
 pendula_status pendula_at(pendula_simulation* simulation, double time, double* q, double* v);
 /* Steps that were taken. */
 size_t pendula_steps(const pendula_simulation* simulation);
+
+/* Holds inputs, (count) of them, from now on until others are held; drives are added to them. They are part of copies
+ * and of what is saved. At first those of the model are held. Not from within an advance, by a callback. */
+pendula_status pendula_hold(pendula_simulation* simulation, const double* inputs, size_t count);
+/* Those that are held, (pendula_inputs()). */
+void pendula_held(const pendula_simulation* simulation, double* inputs);
 
 /* Goes on from another motion, at the time of that: after an impact, say. */
 pendula_status pendula_restart(pendula_simulation* simulation, double time, const double* q, const double* v);
@@ -169,6 +179,32 @@ typedef struct pendula_ensemble {
  * it came to. `energy_errors`, relative, and `how` may be NULL. Who fails stops nobody else. */
 pendula_status pendula_propagate(const pendula_ensemble* ensemble, double* ends, pendula_status* how,
                                  double* energy_errors);
+
+/* --- Lyapunov exponents --- */
+
+typedef struct pendula_tangents {
+  const pendula_model* model;
+  double time;                    /* s; where the motion starts, from q and v */
+  const double *q, *v;            /* v may be NULL: at rest */
+  double duration;                /* s */
+  const pendula_options* options; /* or NULL; methods with derivatives alone: gauss in momentum form, radau */
+  size_t count;                   /* how many of the leading exponents, at most 2 pendula_coordinates() */
+  int (*stop)(void* context);     /* or NULL; asked after every step */
+  void* context;
+} pendula_tangents;
+
+typedef struct pendula_spectrum {
+  double sum;      /* 1/s, of the exponents; of all of them the mean divergence */
+  double duration; /* s, that was run */
+  double ftle;     /* 1/s, finite-time exponent of one tangent */
+  double megno;    /* 2 where motion is regular, exponent * duration / 2 in chaos */
+} pendula_spectrum;
+
+/* The leading exponents of a motion, (count) in descending order, 1/s, and the error of each, infinite where the run
+ * was too short to tell. `errors` and `rest` may be NULL. Where it was stopped they are those of the time until then.
+ */
+pendula_status pendula_lyapunov(const pendula_tangents* tangents, double* exponents, double* errors,
+                                pendula_spectrum* rest);
 
 #ifdef __cplusplus
 }

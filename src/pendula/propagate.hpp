@@ -51,7 +51,6 @@ inline Ends propagate(std::span<const Model> models, const Eigen::Ref<const Eige
   all.reserve(models.size());
   for (const Model& model : models) all.push_back(model.get());
   const pendula_options plain = detail::plain(options.run);
-  const auto asked = [](void* token) { return static_cast<std::stop_token*>(token)->stop_requested() ? 1 : 0; };
   std::stop_token stop = options.stop;
   pendula_ensemble ensemble{};
   ensemble.models = all.data();
@@ -62,7 +61,7 @@ inline Ends propagate(std::span<const Model> models, const Eigen::Ref<const Eige
   ensemble.duration = options.duration;
   ensemble.options = &plain;
   ensemble.threads = options.threads;
-  ensemble.stop = stop.stop_possible() ? static_cast<int (*)(void*)>(asked) : nullptr;
+  ensemble.stop = detail::stop_function(stop);
   ensemble.context = &stop;
   Ends found;
   found.how.resize(ensemble.members);

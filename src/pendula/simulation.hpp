@@ -56,6 +56,12 @@ inline pendula_options plain(const SimulationOptions& options) {
           options.remember ? 0 : 1};
 }
 
+/// What asks `token`, its context, whether to stop; none where nobody can request that.
+inline auto stop_function(const std::stop_token& token) -> int (*)(void* token) {
+  if (!token.stop_possible()) return nullptr;
+  return [](void* context) { return static_cast<const std::stop_token*>(context)->stop_requested() ? 1 : 0; };
+}
+
 /// What callbacks throw does not go through C: it is kept, stops the run, and is thrown where C is left.
 struct Guard {
   std::exception_ptr failure = nullptr;
@@ -141,7 +147,31 @@ class Simulation {
 
   /// A number of the row that the motion is, by the name of its column: "x_2", "energy". Throws std::invalid_argument
   /// where there is none of that name.
-  double operator[](std::string_view column) const { return model_.number(column, motion()); }
+  double operator[](std::string_view column) const {
+    const std::size_t place = detail::place_of("column", column, model_.columns());
+    std::vector<double> numbers(pendula_columns(model_.get()));
+    detail::require(pendula_simulation_row(get(), numbers.data()));
+    return numbers[place];
+  }
+
+  /// Holds an input from now on, until another value is held; drives are added to it. Copies and what is saved have it,
+  /// too. Throws std::invalid_argument where there is none of that name, on a value that is not finite, and in
+  /// callbacks.
+  void hold(std::string_view input, double value) {
+    Eigen::VectorXd all = held();
+    all[static_cast<Eigen::Index>(detail::place_of("input", input, model_.input_names()))] = value;
+    hold(all);
+  }
+  /// The same of all, in the order of Model::input_names.
+  void hold(const Eigen::VectorXd& inputs) {
+    detail::require(pendula_hold(get(), inputs.data(), static_cast<std::size_t>(inputs.size())));
+  }
+  /// What is held: at first the constant inputs of the model.
+  Eigen::VectorXd held() const {
+    Eigen::VectorXd inputs(static_cast<Eigen::Index>(model_.inputs()));
+    pendula_held(get(), inputs.data());
+    return inputs;
+  }
 
   /// Goes on from another motion: after an impact, say.
   void restart(const Motion& motion) {

@@ -22,6 +22,9 @@ class Viewer {
   Viewer(const Subject& subject, Observer& observer, RowTimes times)
       : subject_(&subject), observer_(&observer), times_(std::move(times)) {}
 
+  /// Rows are of this subject from now on, which has the same columns.
+  void show(const Subject& subject) { subject_ = &subject; }
+
   /// A run of which rows are counted from the time `start` begins in this state, or goes on from it.
   void begin(const Motion& state, double start) {
     start_ = start;

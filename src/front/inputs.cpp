@@ -1,0 +1,85 @@
+#include "front/inputs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <pendula/chain/chain.hpp>
+#include <pendula/numeric/number_text.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "front/subject_kinds.hpp"
+
+namespace pendula::front {
+namespace {
+
+std::vector<std::string> names(const SystemSubject& system) {
+  return {system.info().inputs.begin(), system.info().inputs.end()};
+}
+
+template <class Space>
+std::vector<std::string> names(const ChainSubject<Space>& chain) {
+  std::vector<std::string> names;
+  for (int link = 1; link <= chain.chain().links(); ++link) {
+    for (int axis = 0; axis < Space::torque_components; ++axis) {
+      const std::string of = Space::torque_components == 1 ? "" : std::string(1, "xyz"[axis]) + '_';
+      names.push_back("torque_" + of + std::to_string(link));
+    }
+  }
+  return names;
+}
+
+std::vector<double> inputs(const SystemSubject& system) {
+  return system.numbers().inputs;
+}
+
+template <class Space>
+std::vector<double> inputs(const ChainSubject<Space>& chain) {
+  const auto& torque = chain.chain().constant_torque();
+  return {torque.data(), torque.data() + torque.size()};
+}
+
+std::shared_ptr<const Subject> with(const SystemSubject& system, const std::shared_ptr<const Subject>& owner,
+                                    std::span<const double> inputs) {
+  SystemNumbers numbers = system.numbers();
+  numbers.inputs.assign(inputs.begin(), inputs.end());
+  return std::make_shared<SystemSubject>(std::shared_ptr<const SystemTable>(owner, &system.table()),
+                                         std::move(numbers));
+}
+
+template <class Space>
+std::shared_ptr<const Subject> with(const ChainSubject<Space>& subject, const std::shared_ptr<const Subject>& /*owner*/,
+                                    std::span<const double> inputs) {
+  const Chain<Space>& chain = subject.chain();
+  ChainParameters<Space> parameters{chain.masses(), chain.lengths(), chain.gravity(), chain.damping()};
+  parameters.torque.resize(Space::torque_components, chain.links());
+  std::ranges::copy(inputs, parameters.torque.data());
+  parameters.drives = chain.drives();
+  return std::make_shared<ChainSubject<Space>>(Chain<Space>(std::move(parameters)));
+}
+
+}  // namespace
+
+std::vector<std::string> input_names(const Subject& subject) {
+  return as_its_kind(subject, [](const auto& kind) { return names(kind); });
+}
+
+std::vector<double> inputs_of(const Subject& subject) {
+  return as_its_kind(subject, [](const auto& kind) { return inputs(kind); });
+}
+
+std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
+                                           std::span<const double> inputs) {
+  const std::vector<std::string> known = input_names(*subject);
+  if (inputs.size() != known.size()) {
+    throw std::invalid_argument("inputs: expected " + std::to_string(known.size()) + " numbers, got " +
+                                std::to_string(inputs.size()));
+  }
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    if (std::isfinite(inputs[k])) continue;
+    throw std::invalid_argument(known[k] + ": expected a finite number, got " + shortest(inputs[k]));
+  }
+  return as_its_kind(*subject, [&](const auto& kind) { return with(kind, subject, inputs); });
+}
+
+}  // namespace pendula::front

@@ -1,0 +1,195 @@
+#include <pendula/run/lyapunov.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <pendula/run/library.hpp>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+namespace {
+
+constexpr double smallest = std::numeric_limits<double>::min();
+// How much more the fastest tangent may have grown than the slowest: what QR tells has as many digits less.
+constexpr double parted = 1e3;
+
+/// What tangents are measured by, of a motion's start and all along: Σ (m ω² δq² + δp²/m)/ω, an energy, so that neither
+/// units nor the sizes of masses matter, and pairs of exponents stay pairs.
+struct TangentScale {
+  Eigen::VectorXd rows;  ///< that each is multiplied with
+  double rate = 1;       ///< that the motion changes by where it starts, or what is beside it  [1/s]
+};
+
+/// From the derivative of a step that is next to nothing, which `integrator` then has taken; none where it cannot.
+/// `rows` as Integrator::linearize tells.
+std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& start, int rows, double duration) {
+  const double h = std::max(1e-10 * duration, 1e-12 * std::abs(start.time));
+  TangentScale scale{Eigen::VectorXd::Ones(rows), 1};
+  integrator.start(start);
+  if (!(h > 0) || !integrator.step(h)) return {};
+  const Eigen::Index half = rows / 2;
+  // Of a momentum's unit, what coordinates are moved by: the inverse mass; then the pushes of coordinates, which
+  // compare by that. In space there are three a link, of which the one along it moves nothing.
+  const Eigen::Index group = rows == 2 * start.q.size() ? 1 : 3;
+  Eigen::VectorXd mobility(half), kept(half);
+  const auto pushed_columns = [&](Eigen::Index begin, Eigen::Index end, auto take) {
+    constexpr Eigen::Index at_once = 64;
+    for (Eigen::Index first = begin; first < end; first += at_once) {
+      Directions<> units = Directions<>::Zero(rows, std::min(at_once, end - first));
+      for (Eigen::Index k = 0; k < units.cols(); ++k) units(first + k, k) = 1;
+      integrator.push(units);
+      for (Eigen::Index k = 0; k < units.cols(); ++k) take(first - begin + k, units.col(k));
+    }
+  };
+  pushed_columns(half, rows, [&](Eigen::Index of, const auto& column) {
+    mobility[of] = std::abs(column[of]) / h;
+    kept[of] = column[half + of];
+  });
+  double loss = 0;  // of momenta, by damping; how many directions of a group there are, their sum tells
+  for (Eigen::Index first = 0; first < half; first += group) {
+    mobility.segment(first, group).setConstant(mobility.segment(first, group).maxCoeff());
+    const double sum = kept.segment(first, group).sum(), whole = std::max(1.0, std::round(sum));
+    loss = std::max(loss, std::abs(whole - sum) / (whole * h));
+  }
+  const Eigen::VectorXd lightness = mobility.cwiseSqrt();
+  double swing = 0;  // squared, of one coordinate by another's push
+  pushed_columns(0, half, [&](Eigen::Index of, const auto& column) {
+    const double push = column.tail(half).cwiseAbs().cwiseProduct(lightness).maxCoeff();
+    swing = std::max(swing, push * lightness[of] / h);
+  });
+  // Beside a radian; lengths that are larger beside themselves.
+  const Eigen::ArrayXd sizes = start.q.array().abs().max(1);
+  const Motion moved = integrator.state();
+  const double turning = (start.v.array().abs() / sizes).maxCoeff();
+  const double pushed = ((moved.v - start.v).array().abs() / sizes).maxCoeff() / h;
+  const double squared = std::max({swing, pushed, turning * turning, loss * loss});
+  if (std::isfinite(squared) && squared > 0) scale.rate = std::sqrt(squared);
+  if (mobility.allFinite() && (mobility.array() > 0).all()) {
+    scale.rows << (scale.rate / mobility.array()).sqrt(), (mobility.array() / scale.rate).sqrt();
+  }
+  return scale;
+}
+
+void sort(LyapunovSpectrum& spectrum) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(spectrum.exponents.size()));
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<Eigen::Index>(k);
+  std::ranges::sort(order, std::greater<>(), [&](Eigen::Index k) { return std::pair(spectrum.exponents[k], -k); });
+  spectrum.exponents = spectrum.exponents(order).eval();
+  spectrum.errors = spectrum.errors(order).eval();
+}
+
+}  // namespace
+
+LyapunovTangents::LyapunovTangents(int rows, int count, unsigned seed) : tangents_(rows, count), history_(count) {
+  std::mt19937 random(seed);
+  for (Eigen::Index i = 0; i < tangents_.size(); ++i) {
+    tangents_.data()[i] = static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 0.5;
+  }
+}
+
+void LyapunovTangents::begin(Integrator& integrator, const Eigen::VectorXd& scale) {
+  scale_ = scale;
+  push(integrator);
+  Eigen::VectorXd grown(tangents_.cols());
+  library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+  has_begun_ = true;
+}
+
+bool LyapunovTangents::follow(Integrator& integrator, double time) {
+  push(integrator);
+  const double grown = std::log(tangents_.col(0).norm());
+  if (has_begun_ || time_ > 0) first_.follow(grown - grown_, time_, time);
+  grown_ = grown;
+  time_ = time;
+  if (time - history_.last_time() < interval_ && std::abs(grown_) < std::log(parted) / 2) return false;
+  make_orthonormal();
+  return counted() > 0;
+}
+
+void LyapunovTangents::finish() {
+  if (time_ > history_.last_time()) make_orthonormal();
+}
+
+LyapunovProgress LyapunovTangents::progress() const {
+  return {time_, (history_.sums() / std::max(counted(), smallest)).eval()};
+}
+
+LyapunovSpectrum LyapunovTangents::spectrum() const {
+  LyapunovSpectrum spectrum;
+  spectrum.duration = time_;
+  spectrum.ftle = first_.grown() / std::max(counted(), smallest);
+  spectrum.megno = first_.megno(time_);
+  history_.average(std::max(GrowthHistory::settling * time_, has_begun_ ? 0 : history_.first_time()), spectrum);
+  sort(spectrum);
+  spectrum.sum = spectrum.exponents.sum();
+  return spectrum;
+}
+
+// Of tangents that have not begun only directions are kept of the first step, which takes them into the tangent space.
+double LyapunovTangents::counted() const {
+  if (has_begun_) return time_;
+  return history_.size() < 2 ? 0 : time_ - history_.first_time();
+}
+
+void LyapunovTangents::push(Integrator& integrator) {
+  if (scale_.size() > 0) tangents_.array().colwise() /= scale_.array();
+  integrator.push(tangents_);
+  if (scale_.size() > 0) tangents_.array().colwise() *= scale_.array();
+}
+
+void LyapunovTangents::make_orthonormal() {
+  const double span = time_ - history_.last_time();
+  Eigen::VectorXd grown(tangents_.cols());
+  library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+  grown = grown.array().max(smallest).log().matrix().eval();
+  if (has_begun_ || history_.size() > 1) {
+    const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());
+    interval_ = span * std::clamp(std::log(parted) / std::max(parting, smallest), 0.25, 2.0);
+  } else {
+    grown.setZero();
+  }
+  history_.add(time_, grown);
+  grown_ = 0;
+}
+
+LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, double step, double duration, int count,
+                                   const std::function<void(const LyapunovProgress&)>& on_way,
+                                   const std::function<bool()>& stop) {
+  const int all = 2 * static_cast<int>(start.q.size());
+  if (count < 0 || count > all) {
+    throw std::invalid_argument("count: expected 1 to " + std::to_string(all) + " exponents, got " +
+                                std::to_string(count));
+  }
+  const int rows = integrator.linearize();
+  LyapunovTangents tangents(rows, count == 0 ? all : count);
+  const std::optional<TangentScale> scale = tangent_scale(integrator, start, rows, duration);
+  if (scale) tangents.begin(integrator, scale->rows);
+  Schedule schedule;
+  // Steps that follow the motion are as long as they like where that has come to rest; tangents have not.
+  if (scale && std::isinf(step)) step = std::min(2.0, integrator.resolved_decay(1e-6)) / scale->rate;
+  schedule.step = step;
+  schedule.duration = duration;
+  schedule.every = std::numeric_limits<std::int64_t>::max();
+  double before = start.time;
+  const auto follow = [&] {
+    if (integrator.time() != before && tangents.follow(integrator, integrator.time() - start.time)) {
+      on_way(tangents.progress());
+    }
+    before = integrator.time();
+    return stop();
+  };
+  const RunResult result = simulate(
+      integrator, start, schedule, [](const Motion&) {}, follow);
+  tangents.finish();
+  return {tangents.spectrum(), result};
+}
+
+}  // namespace pendula
