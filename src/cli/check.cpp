@@ -22,14 +22,16 @@
 
 #include "cli/commands.hpp"
 #include "cli/motion_check.hpp"
+#include "io/generator.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
+#include "io/toolchain.hpp"
 
 namespace pendula::cli {
 namespace {
 
-/// Links of unequal masses and lengths, whose fastest small oscillation does not depend much on their number.
+/// Links of unequal masses and lengths; the fastest small oscillation hardly depends on their number.
 template <class Space>
 Chain<Space> test_chain(int links) {
   ChainParameters<Space> parameters;
@@ -42,7 +44,7 @@ Chain<Space> test_chain(int links) {
   return Chain<Space>(parameters);
 }
 
-/// Links spread out, away from the poles and turning around the vertical, so that (θ, φ) serves well.
+/// Spread-out links, turning around the vertical away from the poles, where (θ, φ) serve well.
 template <class Space>
 State<Space> test_start(int links) {
   const Eigen::VectorXd number = Eigen::VectorXd::LinSpaced(links, 0, links - 1);
@@ -57,8 +59,7 @@ State<Space> test_start(int links) {
   }
 }
 
-/// A start for a system of which nothing is known: angles and lengths that differ, slow rates. Later ones are nearer to
-/// where nothing is.
+/// A start for an unknown system: different angles and lengths, slow rates. Later attempts are nearer to zero.
 Motion any_start(const SystemInfo& info, int number) {
   const auto count = static_cast<Eigen::Index>(info.coordinates.size());
   Motion start(0, Eigen::VectorXd(count), Eigen::VectorXd(count));
@@ -77,7 +78,7 @@ void print(const CheckLine& line) {
             << rounded(line.limit, 3) << (line.ok() ? "ok" : "FAILED") << '\n';
 }
 
-/// What came of all lines so far.
+/// The result of all lines so far.
 struct Tally {
   int lines = 0, failures = 0;
 
@@ -124,7 +125,7 @@ void check_space(const CheckOptions& options, Tally& tally) {
   }
 }
 
-/// A model, the system that it is, and where its motion starts.
+/// A model, its system, and a start.
 struct ModelToCheck {
   std::string model;  ///< as find_kernel takes it
   std::optional<int> links;
@@ -133,7 +134,7 @@ struct ModelToCheck {
   Motion start;
 };
 
-/// A kernel that does not compute what its model says is not moved, too.
+/// Compares the kernel with its model; moves it only if they agree.
 void check_system(const ModelToCheck& checked, const io::Toolchain& toolchain, Tally& tally) {
   const SystemInfo& info = checked.system->info();
   const std::vector<double> said = io::written_values(checked.model, checked.links, checked.folder, toolchain,
@@ -145,7 +146,7 @@ void check_system(const ModelToCheck& checked, const io::Toolchain& toolchain, T
   add(MotionCheck(info.name, *checked.system, checked.start, units, comparison.energy_rounding()), info.name, tally);
 }
 
-/// A system with its defaults, 1 where it has none.
+/// A system with default parameters; 1 for those without a default.
 SystemNumbers usual_numbers(const SystemInfo& info) {
   SystemNumbers numbers;
   for (std::size_t k = 0; k < info.parameters.size(); ++k) {
@@ -157,7 +158,7 @@ SystemNumbers usual_numbers(const SystemInfo& info) {
   return numbers;
 }
 
-/// The first start that has an energy.
+/// The first start with a finite energy.
 Motion usual_start(const SystemSubject& system) {
   constexpr int most = 40;
   for (int number = 0; number < most; ++number) {

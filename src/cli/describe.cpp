@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "io/generator.hpp"
 #include "io/input_error.hpp"
-#include "io/kernel_cache.hpp"
+#include "io/toolchain.hpp"
 
 namespace pendula::cli {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using TableRow = std::vector<std::string>;
 
-/// What the generator says of a model. Throws io::InputError.
+/// Asks the generator about a model. Throws io::InputError.
 template <class Ask>
 Json answer(const char* command, Ask ask) {
   try {
@@ -31,7 +32,7 @@ std::string text(const Json& object, const char* key) {
   return object[key].get<std::string>();
 }
 
-/// Rows in columns, the first of them headings.
+/// Prints rows in columns; the first row has headings.
 void print(const std::vector<TableRow>& rows) {
   constexpr std::size_t gap = 2;
   std::vector<std::size_t> widths(rows.front().size());
@@ -45,7 +46,7 @@ void print(const std::vector<TableRow>& rows) {
   }
 }
 
-/// A list of the model, if it has any of that: row_of(entry) are the cells before the remark.
+/// Prints a list of the model, unless it is empty; row_of(entry) gives the cells before the remark.
 template <class RowOf>
 void print_list(const Json& model, const char* list, TableRow head, RowOf row_of) {
   head.emplace_back();
@@ -59,7 +60,7 @@ void print_list(const Json& model, const char* list, TableRow head, RowOf row_of
   print(rows);
 }
 
-/// 9.81, or what the scenario has to say.
+/// The default of a parameter, or "must be given".
 std::string default_of(const Json& parameter) {
   const Json& value = parameter["default"];
   return value.is_null() ? "must be given" : shortest(value.get<double>());

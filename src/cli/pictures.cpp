@@ -5,13 +5,13 @@
 
 #include "cli/commands.hpp"
 #include "io/input_error.hpp"
-#include "io/kernel_cache.hpp"
 #include "io/process.hpp"
+#include "io/toolchain.hpp"
 
 namespace pendula::cli {
 namespace {
 
-/// Runs the Python package pendula_plot, which says itself what is wrong.
+/// Runs the Python package pendula_plot, which prints its own errors.
 ExitStatus draw(const std::vector<std::string>& arguments) {
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
   std::vector<std::string> command = toolchain.module(toolchain.plotting, "pendula_plot");

@@ -27,13 +27,13 @@ namespace {
 
 using hdf5::Type;
 
-/// Where a data set of one number a member lies in its file.
+/// The position of a data set in its file; it has one number for each member.
 struct Stored {
   std::uint64_t offset = 0;
   Type type = Type::real;
 };
 
-/// A file of the system, that is written at places.
+/// A file that is written at given positions.
 class Bytes {
  public:
   Bytes(const std::string& file, const std::string& name)
@@ -68,7 +68,7 @@ class Bytes {
   int descriptor_;
 };
 
-/// One column of a chunk into its place.
+/// Writes one column of a chunk.
 class Columns {
  public:
   Columns(const Bytes& bytes, const EnsembleHead& head) : bytes_(bytes), width_(head.width()) {}
@@ -103,13 +103,13 @@ class Columns {
   std::vector<char> packed_;
 };
 
-/// What the journals have, without the numbers.
+/// Which chunks the journals have, and their messages.
 struct Found {
   EnsembleTally tally;
   std::vector<DoneChunk::Message> messages;  // by member
 };
 
-/// Calls take(chunk) once for each that is done.
+/// Calls take(chunk) once for each chunk that is done.
 template <class Take>
 void for_each_done(const std::string& folder, const EnsembleHead& head, Take take) {
   std::vector<bool> seen(static_cast<std::size_t>(head.chunks()));
@@ -145,7 +145,7 @@ Found look_through(const std::string& folder, const EnsembleHead& head) {
   return found;
 }
 
-/// Names of data sets, out of what was typed: letters, digits and single underscores, and none of them twice.
+/// Names of data sets for the names as typed: letters, digits and single underscores; each name occurs once.
 class Words {
  public:
   std::string of(const std::string& typed) {
@@ -183,14 +183,15 @@ void write_origin(const hdf5::Handle& file, const EnsembleHead& head, const Ense
   hdf5::write_attribute(file, "complete", std::int64_t{tally.done == head.plan.count});
 }
 
-/// What a number is in words, and its unit where it is known.
+/// Writes the long name of a data set, and its unit if known.
 void describe(const hdf5::Handle& array, const std::string& meaning, const EnsembleHead& head,
               const std::string& unit) {
   hdf5::write_attribute(array, "long_name", meaning);
   if (!unit.empty()) write_unit(array, head.natural, unit);
 }
 
-/// Scales of the axes; or of the members, whose numbers are written later: there may be more than fit into memory.
+/// Makes the scales of the axes, or of the members; numbers of members are written later, since they may not fit into
+/// memory.
 std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleHead& head, Words& words) {
   const EnsemblePlan& plan = head.plan;
   std::vector<hdf5::Handle> scales;
@@ -209,7 +210,7 @@ std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleH
   return scales;
 }
 
-/// The data sets, empty, and where each lies: of the flags, the columns; of members at random their numbers and keys.
+/// Makes empty data sets, and notes their positions: flags, columns, and for random members their numbers and keys.
 std::vector<Stored> create_columns(const hdf5::Handle& file, const EnsembleHead& head) {
   Words words;
   const std::vector<hdf5::Handle> scales = write_scales(file, head, words);
@@ -256,7 +257,7 @@ void write_failures(const hdf5::Handle& file, const std::vector<DoneChunk::Messa
   hdf5::attach_scale(hdf5::create_texts(file, "message", texts), scale, 0);
 }
 
-/// Numbers of members at random, and the keys that are drawn for each.
+/// Writes the numbers of random members, and the values drawn for each.
 void write_draws(const Bytes& bytes, const EnsembleHead& head, std::span<const Stored> places) {
   if (places.empty()) return;
   std::vector<std::int64_t> numbers;
@@ -293,7 +294,7 @@ Chunk EnsembleHead::members_of(std::int64_t k) const {
 JournalKind EnsembleHead::kind() const {
   std::string text = origin.version + '\n' + origin.instruction_set + '\n' + origin.scenario + '\n' + origin.model;
   for (const std::string& change : origin.overrides) text += '\n' + change;
-  text += '\n' + std::to_string(chunk) + " trusted";  // which files of old have not
+  text += '\n' + std::to_string(chunk) + " trusted";  // older files lack it
   return {fingerprint(text), width()};
 }
 

@@ -67,7 +67,7 @@ std::int64_t product(const Section& ensemble, const std::vector<EnsembleAxis>& a
   return count;
 }
 
-/// Uniform in (0, 1), 53 bits.
+/// Uniform in (0, 1), with 53 bits.
 double uniform(std::uint64_t bits) {
   return (static_cast<double>(bits >> 11) + 0.5) * 0x1p-53;
 }
@@ -76,7 +76,7 @@ double drawn(const EnsembleDraw& draw, std::uint64_t seed, std::uint64_t key, st
   const r123::Philox4x64 generate;
   const r123::Philox4x64::ctr_type words = generate({{member, key, 0, 0}}, {{seed, 0}});
   if (!draw.normal) return std::lerp(draw.first, draw.second, uniform(words[0]));
-  // Box and Muller.
+  // Box–Muller transform.
   const double radius = std::sqrt(-2 * std::log(uniform(words[0])));
   return draw.first + draw.second * radius * std::cos(2 * std::numbers::pi * uniform(words[1]));
 }

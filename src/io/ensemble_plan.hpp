@@ -8,7 +8,7 @@
 
 namespace pendula::io {
 
-/// Values of one key of a scenario, evenly from `from` to `to`: a direction of a grid of members.
+/// One axis of a grid of members: a key of the scenario takes evenly spaced values `from` … `to`.
 struct EnsembleAxis {
   std::string key;
   double from = 0, to = 0;
@@ -17,37 +17,37 @@ struct EnsembleAxis {
   double at(std::int64_t k) const;
 };
 
-/// A key that is drawn for every member.
+/// A key whose value is drawn at random for every member.
 struct EnsembleDraw {
   std::string key;
   bool normal = false;           ///< else uniform
   double first = 0, second = 1;  ///< from and to, or mean and standard deviation
 };
 
-/// Which members an ensemble has, and what is kept of each.
+/// The members of an ensemble, and what is kept of each.
 struct EnsemblePlan {
   std::vector<EnsembleAxis> axes;   ///< either these, the first one slowest,
   std::vector<EnsembleDraw> draws;  ///< or these
   std::int64_t count = 0;           ///< of members
   std::uint64_t seed = 0;
-  bool chooses_method = false;    ///< by what takes least, in place of that of [run]
+  bool chooses_method = false;    ///< the fastest one is used, whatever [run] says
   std::vector<std::string> keep;  ///< as in the scenario; empty for what is usual
   std::string keep_place;         ///< `where: key`
 
-  /// Of data sets, one number an axis.
+  /// Shape of the data sets: one number for each axis.
   std::vector<std::int64_t> shape() const;
   std::vector<std::string> keys() const;
-  /// Of each key, for a member from 0 on; it depends on the seed and on these numbers alone (Philox: Salmon et al.
-  /// 2011).
+  /// The value of each key for a member, counted from 0. It depends on the seed and on that number alone (Philox:
+  /// Salmon et al. 2011).
   std::vector<double> values(std::int64_t member) const;
-  /// The same as overrides of the scenario, `key=value`, each telling the same double.
+  /// The same as overrides of the scenario, `key=value`; each reads back as the same double.
   std::vector<std::string> overrides(std::int64_t member) const;
 };
 
-/// Of the numbers of a scenario's key, in SI; empty where that is not known.
+/// SI unit of a scenario's key; empty if unknown.
 std::string unit_of_key(std::string_view key);
 
-/// The tables [ensemble], [[ensemble.axis]] and [[ensemble.random]] of a scenario's text. Throws InputError.
+/// Reads the tables [ensemble], [[ensemble.axis]] and [[ensemble.random]] from a scenario's text. Throws InputError.
 EnsemblePlan parse_ensemble(std::string_view text, const std::string& name, std::span<const std::string> overrides);
 
 }  // namespace pendula::io

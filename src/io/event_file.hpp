@@ -11,17 +11,17 @@
 
 namespace pendula::io {
 
-/// The events of a run as a CSV file: name, time, direction, and what else the trajectory has at that instant.
+/// The events of a run as a CSV file: name, time, direction, then the other columns of the trajectory at that instant.
 class EventFile : public Observer {
  public:
-  /// `columns` of the trajectory, the first of which is the time. Throws InputError where the file cannot be opened.
+  /// `columns` are those of the trajectory; the first is the time. Throws InputError if the file cannot be opened.
   EventFile(const std::string& file, std::span<const std::string> columns) : file_(file) {
     std::vector<std::string> header = {"name", "t", "direction"};
     header.insert(header.end(), columns.begin() + 1, columns.end());
     append_header(file_.pending(), header);
   }
 
-  /// Rows are what the trajectory has.
+  /// `row` has the columns of the trajectory.
   void take(const Row&) override { file_.flush_if_due(); }
 
   /// Throws OutputError where lines cannot be written.

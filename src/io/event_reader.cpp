@@ -12,7 +12,7 @@
 namespace pendula::io {
 namespace {
 
-/// What can be a cell of a table and a part of a key.
+/// Whether a text can be a cell of a CSV table and a part of a key.
 bool is_name(std::string_view text) {
   return std::ranges::all_of(text, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
@@ -32,13 +32,13 @@ EventPlan read_event(const Section& table) {
   return plan;
 }
 
-/// A function of the motion that evaluates an expression in the columns of its row.
+/// A function of the motion: an expression in the columns of its row.
 class RowFunction : public Formula {
  public:
   RowFunction(std::shared_ptr<const Subject> subject, std::shared_ptr<Expression> expression, const Motion& start)
       : subject_(std::move(subject)), expression_(std::move(expression)), numbers_(columns().size()) {
     subject_->append_row(start, {}, row_);
-    const std::size_t of_motion = row_.size() - 1;  // without points; the last is the energy
+    const std::size_t of_motion = row_.size() - 1;  // columns other than points and energy
     const auto is_observed = [&](std::size_t column) { return column >= of_motion; };
     observes_ = std::ranges::any_of(columns(), is_observed);
     has_time_ = std::ranges::find(columns(), time_column) != columns().end();
@@ -88,9 +88,9 @@ class RowFunction : public Formula {
 
   std::shared_ptr<const Subject> subject_;
   std::shared_ptr<Expression> expression_;
-  std::vector<double> row_, numbers_;  // all columns of a row; those of the expression
+  std::vector<double> row_, numbers_;  // all columns of a row; the columns of the expression
   std::vector<Reach> reaches_;
-  bool observes_ = false;  // energy or points, which cost more than what the motion has
+  bool observes_ = false;  // whether the expression needs energy or points, which cost more
   bool has_time_ = false;
 };
 

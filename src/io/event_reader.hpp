@@ -13,7 +13,7 @@
 
 namespace pendula::io {
 
-/// An event as a scenario describes it; what its expression may name is known when what is moved is.
+/// An event as a scenario describes it. Its expression is read later, once the columns of the rows are known.
 struct EventPlan {
   std::string name, when;
   Direction direction = Direction::both;
@@ -21,19 +21,19 @@ struct EventPlan {
   std::string place;  ///< `where: key` of `when`
 };
 
-/// The tables [[event]] of a document. Throws InputError.
+/// Reads the tables [[event]] of a document. Throws InputError.
 std::vector<EventPlan> read_events(const Section& root);
 
 class Expression;
 
-/// Expressions that events of many runs share, one thread's.
+/// Parsed expressions, shared by the events of many runs in one thread.
 using SharedExpressions = std::map<std::pair<std::string, std::vector<std::string>>, std::shared_ptr<Expression>>;
 
-/// Those of a run of `subject` that begins at `start`. Throws InputError where an expression is none, names what no row
-/// has, or has no finite value at the start.
+/// The events of a run of `subject` that begins at `start`. Throws InputError if an expression cannot be read, names an
+/// unknown column, or is not finite at the start.
 std::vector<Event> events_of(const std::vector<EventPlan>& plans, const std::shared_ptr<const Subject>& subject,
                              const Motion& start);
-/// The same of one of many runs.
+/// The same for one of many runs.
 std::vector<Event> events_of(const std::vector<EventPlan>& plans, const std::shared_ptr<const Subject>& subject,
                              const Motion& start, SharedExpressions& shared);
 

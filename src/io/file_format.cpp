@@ -20,7 +20,7 @@ bool has_ending_of(const std::string& file, FileFormat format) {
   return std::ranges::any_of(hdf5_endings, [&](std::string_view ending) { return file.ends_with(ending); });
 }
 
-/// A device, a pipe: rows go there as they come, whatever it is called.
+/// A device or a pipe: rows go there as they come, whatever its name.
 bool is_stream(const std::string& file) {
   std::error_code unknown;
   const fs::file_status status = fs::status(file, unknown);

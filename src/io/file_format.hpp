@@ -4,14 +4,14 @@
 
 namespace pendula::io {
 
-/// What a file of numbers is, by the ending of its name.
+/// Formats of files of numbers.
 enum class FileFormat { csv, hdf5 };
 
-/// CSV of names that end in .csv, of "-", and of what is there and is no regular file, as /dev/stdout; HDF5 of .h5,
-/// .hdf5 and .nc. Throws InputError on any other name, with the list.
+/// The format by the ending of the name: CSV for .csv, for "-", and for anything that is no regular file, as
+/// /dev/stdout; HDF5 for .h5, .hdf5 and .nc. Throws InputError with the list on any other name.
 FileFormat format_of(const std::string& file);
 
-/// Throws InputError where a file is not of the only format that `what` is written in.
+/// Throws InputError unless a file has the only format in which `what` can be written.
 void require_format(const std::string& file, FileFormat format, const std::string& what);
 
 }  // namespace pendula::io

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace pendula::io {
@@ -13,6 +15,21 @@ constexpr std::uint64_t fingerprint(std::string_view text, std::uint64_t before 
   std::uint64_t hash = before;
   for (const char byte : text) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
   return hash;
+}
+
+/// The same of numbers, to the last bit.
+constexpr std::uint64_t fingerprint(std::span<const double> numbers, std::uint64_t before = empty_fingerprint) {
+  std::uint64_t hash = before;
+  for (const double number : numbers) {
+    hash = (hash ^ std::bit_cast<std::uint64_t>(number)) * 0x100000001b3U;
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+/// The leading 52 bits, which a double holds exactly.
+constexpr double as_number(std::uint64_t fingerprint) {
+  return static_cast<double>(fingerprint >> 12);
 }
 
 }  // namespace pendula::io

@@ -11,7 +11,7 @@
 /// HDF5 files with errors as exceptions, identifiers that close themselves, and no word on standard error.
 namespace pendula::io::hdf5 {
 
-/// What the library says of a call that failed; its deepest reason.
+/// A call to HDF5 failed; the message is that of the deepest failing call.
 class Error : public std::runtime_error {
  public:
   Error();
@@ -24,7 +24,7 @@ Status require(Status status) {
   return status;
 }
 
-/// An identifier of the library, closed when it goes.
+/// An HDF5 identifier, closed by the destructor.
 class Handle {
  public:
   using Id = std::int64_t;
@@ -42,9 +42,9 @@ class Handle {
   }
 
   Id get() const { return id_; }
-  /// Leaves it open for good: closing would write, and cannot.
+  /// Never closes it: closing would write, which has failed.
   void abandon() { id_ = -1; }
-  /// Whether closing it went well.
+  /// Closes it; false if that failed.
   bool close() { return id_ < 0 || close_(std::exchange(id_, -1)) >= 0; }
 
  private:
@@ -52,29 +52,29 @@ class Handle {
   Close close_ = nullptr;
 };
 
-/// Keeps the library silent, and lets this program close its files itself. To be called before anything else.
+/// Silences the error output of HDF5, and leaves closing files to this program. To be called before anything else.
 void begin();
 
 Handle create_file(const std::string& file);
-/// To be read, also while it is written.
+/// Opens a file for reading, even while another process writes it.
 Handle open_file(const std::string& file);
 
-/// From here on others may read the file while it is written; objects can no longer be added to it.
+/// From now on others may read the file while it is written; no objects can be added any more.
 void let_others_read(const Handle& file);
 
-/// Writes what the library holds back, and marks the file as one that is not open: otherwise what a killed program
-/// leaves could be opened only by those who know that it may be incomplete. It is not: in this way of writing, whatever
-/// is in the file leads only to what was there before.
+/// Writes what HDF5 has buffered, and marks the file as closed. Without the mark, the file of a killed program would be
+/// refused as incomplete. It is complete: in this way of writing (SWMR), a part is written only after what it points
+/// to.
 void flush(const Handle& file, const std::string& name);
 
-/// Takes that mark off a file that some program was killed with, which ends where it ends.
+/// Marks the file of a killed program as closed, and sets its recorded end to its size.
 void mark_as_closed(const std::string& file);
 
 Handle create_group(const Handle& where, const std::string& name);
 Handle open_group(const Handle& where, const std::string& name);
 bool has(const Handle& where, const std::string& name);
 
-/// In place of one that is there.
+/// Replaces an attribute of the same name.
 void write_attribute(const Handle& object, const std::string& name, const std::string& text);
 void write_attribute(const Handle& object, const std::string& name, std::int64_t number);
 bool has_attribute(const Handle& object, const std::string& name);
@@ -96,21 +96,22 @@ Handle create_texts(const Handle& where, const std::string& name, std::span<cons
 
 /// What an array holds: doubles, integers of 64 bits or of 8.
 enum class Type { real, whole, byte };
-/// An array that lies in one piece in its file, filled with NaN, or −1; and the byte of the file that it begins at.
+/// An array that is contiguous in its file, filled with NaN or −1. offset_of is the byte of the file at which it
+/// begins.
 Handle create_array(const Handle& where, const std::string& name, std::span<const std::int64_t> extent, Type type);
 std::uint64_t offset_of(const Handle& array);
 
-/// What the values first, first + 1, … of an array mean, as CF has it: `flag_values`, of its own type, and
-/// `flag_meanings`, a word each.
+/// Says what the values first, first + 1, … of an array mean, by the CF attributes `flag_values` and `flag_meanings`
+/// (one word each).
 void write_flags(const Handle& array, Type type, int first, std::span<const std::string> meanings);
 
 /// A table of rows of `size` numbers each (a vector where `size` is 0) that grows by chunks of `chunk_rows`.
 Handle create_rows(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows);
-/// The same of any type, whose rows are written in place, and not packed.
+/// The same for any type; rows are written in place and not compressed.
 Handle create_list(const Handle& where, const std::string& name, std::size_t size, std::size_t chunk_rows, Type type);
-/// One that neither grows nor moves: it can be written in place.
+/// A table of fixed size that can be written in place.
 Handle create_table(const Handle& where, const std::string& name, std::size_t rows, std::size_t columns);
-/// Makes a vector the scale of an axis of others, as netCDF has it.
+/// Makes a vector a dimension scale, as in netCDF.
 void make_scale(const Handle& dataset, const std::string& name);
 void attach_scale(const Handle& dataset, const Handle& scale, unsigned axis);
 
@@ -119,15 +120,15 @@ Handle open_dataset(const Handle& where, const std::string& name);
 std::vector<std::size_t> extent(const Handle& dataset);
 void set_rows(const Handle& dataset, std::size_t rows);
 
-/// Writes the chunk that begins with `row`; a whole one as the dataset's filters would, if it is `packed`.
+/// Writes the chunk that begins with `row`, compressed as by the filters of the data set if `packed`.
 void write_chunk(const Handle& dataset, std::size_t row, std::span<const double> numbers, bool packed);
 std::vector<double> read_rows(const Handle& dataset, std::size_t first, std::size_t rows);
 /// Writes whole rows from the row `first` on.
 void write_rows(const Handle& table, std::size_t first, std::span<const double> numbers);
 
-/// A text of up to `room` bytes that can be written while others read the file; none yet.
+/// Reserves `room` bytes for a text that can be written while others read the file.
 Handle create_late_text(const Handle& where, const std::string& name, std::size_t room);
-/// Writes it, or leaves it as it is where there is no room.
+/// Writes that text; nothing if it is too long.
 void write_late_text(const Handle& dataset, const std::string& text);
 
 }  // namespace pendula::io::hdf5

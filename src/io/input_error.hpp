@@ -5,8 +5,8 @@
 
 namespace pendula::io {
 
-/// The user's input is wrong: a file, a key, a value. The message says where, what was expected and what was got.
-/// The program ends with exit status 2.
+/// The user's input is wrong: a file, a key, a value. The message says where, what was expected and what was found. The
+/// program ends with exit status 2.
 class InputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -16,7 +16,7 @@ class InputError : public std::runtime_error {
       : std::runtime_error(where + ": " + key + ": expected " + expected + ", got " + got) {}
 };
 
-/// The same of the model that a scenario or a command line names; whoever knows the place adds it.
+/// The same for the model that a scenario or a command line names. The caller adds where it is named.
 class ModelError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

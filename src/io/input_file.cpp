@@ -37,8 +37,8 @@ InputFile read_all(int descriptor, std::size_t most) {
   }
 }
 
-/// Whether somebody has opened a pipe to write, as soon as that is known: a read without waiting finds nothing there,
-/// else it finds an end. What it reads is put into `text`.
+/// Waits until somebody has opened a pipe for writing; false if nobody does in time. A non-blocking read finds an end
+/// until then. What it reads is put into `text`.
 bool has_writer(int pipe, std::string& text) {
   using namespace std::chrono_literals;
   for (const auto end = std::chrono::steady_clock::now() + 2s; std::chrono::steady_clock::now() < end;) {

@@ -6,14 +6,14 @@
 
 namespace pendula::io {
 
-/// What a file holds, or why it cannot be read.
+/// The contents of a file, or why it cannot be read.
 struct InputFile {
   std::string text;
   std::string problem;  ///< empty where it was read
 };
 
-/// Reads a file of at most `most` bytes. A device, or a pipe that never ends, is read so far and no further; a pipe
-/// that nobody opens for writing is given two seconds.
+/// Reads a file of at most `most` bytes; no more is read of an endless device or pipe. A pipe that nobody opens for
+/// writing is given two seconds.
 InputFile read_input_file(const std::filesystem::path& file, std::size_t most);
 
 /// Reads standard input in the same way.

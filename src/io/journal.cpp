@@ -36,7 +36,7 @@ std::string head_of(const JournalKind& kind) {
   return head;
 }
 
-/// Words: first member, after the last, bytes of messages. Then numbers, messages, a hash of it all.
+/// A record: first member, one after the last, bytes of messages; then numbers, messages, and a hash of all that.
 std::string record_of(const DoneChunk& chunk) {
   std::string messages;
   for (const DoneChunk::Message& message : chunk.messages) {
@@ -56,7 +56,7 @@ std::string record_of(const DoneChunk& chunk) {
   return record;
 }
 
-/// A file that is read from its beginning.
+/// Reads a file from its beginning.
 class Reader {
  public:
   explicit Reader(const fs::path& file) : stream_(file, std::ios::binary) {
@@ -67,7 +67,7 @@ class Reader {
 
   std::uint64_t left() const { return left_; }
 
-  /// Empty where there are not so many.
+  /// Empty if fewer bytes are left.
   std::string take(std::uint64_t bytes) {
     if (bytes > left_) return {};
     std::string text(bytes, '\0');
@@ -109,13 +109,13 @@ std::vector<DoneChunk::Message> messages_of(std::string_view bytes) {
   return messages;
 }
 
-/// The next record; false where there is none that is whole.
+/// Reads the next record; false if no complete one follows.
 bool read_record(Reader& reader, const JournalKind& kind, DoneChunk& chunk) {
   constexpr std::size_t words = 24;
   std::string record = reader.take(words);
   if (record.empty()) return false;
   const std::uint64_t first = word_at(record, 0), last = word_at(record, 8), text = word_at(record, 16);
-  constexpr std::uint64_t most = std::uint64_t{1} << 40;  // of anything, so that sums below do not overflow
+  constexpr std::uint64_t most = std::uint64_t{1} << 40;  // an upper limit of all counts, so that sums do not overflow
   if (last < first || last - first > most || text > most || kind.width > 0xffff'ffff) return false;
   if (kind.width > 0 && last - first > most / kind.width) return false;
   const std::uint64_t numbers = (last - first) * kind.width * sizeof(double);
@@ -178,7 +178,7 @@ void Journal::sync() {
 FolderLock::FolderLock(const std::string& folder) {
   const std::string file = folder + "/lock";
   descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (descriptor_ < 0 && errno == ENOENT) return;  // whoever had it last has removed the folder
+  if (descriptor_ < 0 && errno == ENOENT) return;  // the last holder has removed the folder
   if (descriptor_ < 0) reject_output(file, file, errno);
   struct flock whole {};
   whole.l_type = F_WRLCK;

@@ -11,7 +11,7 @@
 
 namespace pendula::io {
 
-/// Members of an ensemble that are done: rows of numbers, and what there is to say of some.
+/// Results of a range of members: rows of numbers, and messages of some members.
 struct DoneChunk {
   struct Message {
     std::int64_t member;
@@ -23,19 +23,17 @@ struct DoneChunk {
   std::vector<Message> messages;
 };
 
-/// What all journals of one ensemble have in common; those of another are not read.
+/// The kind of a journal. Journals of one ensemble have the same; others are not read.
 struct JournalKind {
-  std::uint64_t ensemble = 0;  ///< that tells it from others: of scenario, program and instruction set
+  std::uint64_t ensemble = 0;  ///< fingerprint of scenario, program and instruction set
   std::uint64_t width = 0;     ///< numbers of a member
 };
 
-/// A file that chunks are appended to by several threads. What `add` returned from is there after a `kill -9`; after a
-/// loss of power what `sync` was called for, which `add` does once a second at most. A record that was cut short is
-/// noticed when it is read.
+/// A file to which several threads append chunks. A chunk survives a `kill -9` once `add` has returned, and a loss of
+/// power once `sync` has, which `add` calls at most once a second. A truncated record is noticed on reading.
 class Journal {
  public:
-  /// Begins a file of its own in the folder, which is made where it is not there. Throws InputError where it cannot be
-  /// written.
+  /// Begins a new file in the folder, which is made if needed. Throws InputError if it cannot be written.
   Journal(const std::string& folder, const JournalKind& kind);
   ~Journal();
   Journal(const Journal&) = delete;
@@ -43,7 +41,7 @@ class Journal {
 
   /// Throws OutputError.
   void add(const DoneChunk& chunk);
-  /// To the disk. Throws OutputError.
+  /// Writes everything to the disk. Throws OutputError.
   void sync();
 
  private:
@@ -57,7 +55,7 @@ class Journal {
   Clock::time_point synced_ = Clock::now();
 };
 
-/// Held by one process at a time: the others wait where they make it. The folder may be gone when they get it.
+/// A lock on a folder, held by one process at a time; the constructor waits for it. The folder may be gone by then.
 class FolderLock {
  public:
   /// Throws InputError where the folder cannot be written.
@@ -70,11 +68,10 @@ class FolderLock {
   int descriptor_ = -1;
 };
 
-/// Whether any journal in the folder is of that kind, or none of another: one that was cut short before it says what it
-/// is of counts for nothing.
+/// Whether the journals in the folder are of that kind. A journal that was truncated within its head does not count.
 bool journals_are_of(const std::string& folder, const JournalKind& kind);
 
-/// Calls take(chunk) for every whole record of all journals in the folder, in any order, some perhaps twice.
+/// Calls take(chunk) for every complete record of all journals in the folder, in any order, possibly twice for some.
 void read_journals(const std::string& folder, const JournalKind& kind,
                    const std::function<void(const DoneChunk&)>& take);
 

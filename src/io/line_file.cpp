@@ -17,7 +17,7 @@ bool is_regular(int descriptor) {
   return fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
 }
 
-/// Empties a regular file, unless another run is writing it.
+/// Empties a regular file, unless another run writes it.
 void take_over(int descriptor, const std::string& name) {
   if (!is_regular(descriptor)) return;
   if (flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
@@ -58,8 +58,8 @@ void LineFile::flush() {
   if (written != wanted) throw OutputError(name_, error);
 }
 
-/// Writes the pending lines, or as many of them as can be written, and forgets them. Returns the bytes written; errno
-/// tells why they are not all.
+/// Writes as many of the pending lines as possible, and clears them. Returns the bytes written; errno says why they are
+/// not all.
 std::size_t LineFile::write_pending() {
   std::size_t written = 0;
   while (written < pending_.size()) {
@@ -77,7 +77,7 @@ std::size_t LineFile::write_pending() {
   return written;
 }
 
-/// Takes a piece of a line off the end of the file, where that is possible: not off a pipe.
+/// Removes an incomplete line from the end of the file, if that is no pipe.
 void LineFile::cut_off(std::size_t bytes) const {
   if (bytes == 0 || !is_regular(descriptor_)) return;
   const off_t end = lseek(descriptor_, 0, SEEK_CUR);

@@ -9,31 +9,30 @@
 
 namespace pendula::io {
 
-/// A file that grows by whole lines, so that it can be read at any time. Lines are collected and written in large
-/// blocks, or once a second where they come slowly; `close` writes the rest and tells whether all went well, the
-/// destructor does so silently, so that lines survive whatever ends the run.
+/// A file that grows by whole lines, so that it can be read at any time. Lines are written in large blocks, or once a
+/// second if they come slowly. `close` writes the rest and throws if that fails; the destructor writes it, too, and
+/// does not throw.
 class LineFile {
  public:
-  /// Opens a file, replacing one that is there; "-" is standard output. Throws InputError where it cannot be opened or
-  /// is just being written by somebody else.
+  /// Opens a file, replacing an existing one; "-" is standard output. Throws InputError if it cannot be opened, or
+  /// another process writes it.
   explicit LineFile(const std::string& name);
   ~LineFile();
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
 
-  /// Lines yet to be written: where to append the next ones, each ended by a newline.
+  /// Lines yet to be written; append new ones here, each ended by a newline.
   std::string& pending() { return pending_; }
 
-  /// Writes the pending lines if there are many, or if it is time: asking for it takes 30 ns, a row with two bobs 800.
-  /// Throws OutputError.
+  /// Writes the pending lines if there are many, or if a second has passed. Throws OutputError.
   void flush_if_due() {
     if (pending_.size() >= block_size || Clock::now() - flushed_ >= std::chrono::seconds(1)) flush();
   }
 
-  /// Writes what is left and closes the file. Throws OutputError.
+  /// Writes the rest and closes the file. Throws OutputError.
   void close();
 
-  /// Lines that are in the file, whole.
+  /// Complete lines in the file.
   std::int64_t lines() const { return lines_; }
 
  private:
@@ -47,7 +46,7 @@ class LineFile {
   std::string name_;
   int descriptor_ = -1;
   std::string pending_;
-  Clock::time_point flushed_;  // never: the first line is written at once
+  Clock::time_point flushed_;  // initially the epoch, so that the first line is written at once
   std::int64_t lines_ = 0;
 };
 

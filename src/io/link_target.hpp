@@ -4,7 +4,7 @@
 
 namespace pendula::io {
 
-/// The file that a name leads to by links, whether it is there or not.
+/// Follows symbolic links; the file need not exist.
 std::string link_target(const std::string& name);
 
 }  // namespace pendula::io

@@ -8,8 +8,8 @@
 
 namespace pendula::io {
 
-/// The units of a nondimensional scenario (paper §3.1), each given in SI: lengths in l_1, masses in the total mass M_1,
-/// times in sqrt(l_1/g). Two links are then told by m = m_2/(m_1+m_2) and l = l_2/l_1 alone.
+/// The units of a nondimensional scenario (paper §3.1) in SI: lengths in l_1, masses in the total mass M_1, times in
+/// sqrt(l_1/g). Two links then depend on m = m_2/(m_1+m_2) and l = l_2/l_1 alone.
 struct NaturalUnits {
   double length = 1;  ///< l_1  [m]
   double mass = 1;    ///< M_1  [kg]
@@ -26,8 +26,8 @@ NaturalUnits natural_units(const ChainParameters<Space>& parameters) {
   return {length, parameters.masses.sum(), std::sqrt(length / parameters.gravity)};
 }
 
-/// Masses, lengths, gravity, damping and constant torque in `units`. Drives are left as they are: a scenario gives
-/// them in its own units.
+/// Masses, lengths, gravity, damping and constant torque in `units`. Drives are not changed: a scenario gives them in
+/// its own units.
 template <class Space>
 ChainParameters<Space> in_units(const NaturalUnits& units, ChainParameters<Space> parameters) {
   parameters.masses /= units.mass;
@@ -38,7 +38,7 @@ ChainParameters<Space> in_units(const NaturalUnits& units, ChainParameters<Space
   return parameters;
 }
 
-/// Names of units, as summaries show them.
+/// Names of the natural units, as in summaries.
 struct UnitNames {
   std::string_view length, mass, time, energy;
 };
@@ -47,7 +47,7 @@ inline UnitNames unit_names(const std::optional<NaturalUnits>& natural) {
   return natural ? UnitNames{" l_1", " M_1", " sqrt(l_1/g)", " M_1 g l_1"} : UnitNames{" m", " kg", " s", " J"};
 }
 
-/// The unit, in SI as quantities have it, as the scenario's own.
+/// The scenario's own unit for an SI unit.
 std::string in_units(const std::optional<NaturalUnits>& natural, const std::string& unit);
 
 }  // namespace pendula::io

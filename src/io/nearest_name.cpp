@@ -7,7 +7,7 @@
 namespace pendula::io {
 namespace {
 
-/// Edits that turn `a` into `b`, a swap of two neighbours counting as one.
+/// Number of edits that turn `a` into `b`; a swap of two neighbours counts as one.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -24,7 +24,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-/// The candidate that `name` is the beginning of: masses of mass.
+/// The candidate that begins with `name`: "masses" for "mass".
 std::string_view begun_name(std::string_view name, std::span<const std::string_view> candidates) {
   constexpr std::size_t fewest_letters = 3;
   if (name.size() < fewest_letters) return {};
@@ -36,7 +36,7 @@ std::string_view begun_name(std::string_view name, std::span<const std::string_v
 }  // namespace
 
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> candidates) {
-  constexpr std::size_t longest_name = 64;  // a longer one is no misspelling, and would cost its square
+  constexpr std::size_t longest_name = 64;  // the cost is quadratic in the length, and a longer name is no misspelling
   if (name.empty() || name.size() > longest_name) return {};
   std::size_t best = std::max<std::size_t>(1, (name.size() + 1) / 3) + 1;
   std::string_view nearest;

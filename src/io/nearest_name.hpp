@@ -12,7 +12,7 @@ namespace pendula::io {
 /// is none, the one that begins with `name`.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> candidates);
 
-/// `" (did you mean NAME?)"`, or nothing for an empty name.
+/// `" (did you mean NAME?)"`; empty for an empty name.
 std::string did_you_mean(std::string_view name);
 
 }  // namespace pendula::io

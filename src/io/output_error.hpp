@@ -5,7 +5,7 @@
 
 namespace pendula::io {
 
-/// What was to be written could not be, although the file could be opened: the disk is full, say.
+/// An opened file cannot be written: the disk is full, say.
 class OutputError : public std::runtime_error {
  public:
   /// `error` is errno.
@@ -14,11 +14,10 @@ class OutputError : public std::runtime_error {
   OutputError(const std::string& file, const std::string& why);
 };
 
-/// Throws InputError: the file cannot be written, `why`.
+/// Throws InputError: the file cannot be written, because `why`.
 [[noreturn]] void reject_output(const std::string& file, const std::string& why);
 
-/// The same for what errno said when the file was opened; a missing folder is named. `name` is what the message calls
-/// it.
+/// The same for the errno of opening the file; a missing folder is named. Messages call the file `name`.
 [[noreturn]] void reject_output(const std::string& name, const std::string& file, int error);
 
 }  // namespace pendula::io

@@ -41,7 +41,7 @@ int wait_for(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-/// Starts a program; its process, and errno where it could not be started.
+/// Starts a program. Returns its process, and an errno if it could not be started.
 std::pair<pid_t, int> spawn(std::vector<std::string> arguments, const posix_spawn_file_actions_t* actions) {
   pid_t child = 0;
   const int error =
@@ -50,6 +50,14 @@ std::pair<pid_t, int> spawn(std::vector<std::string> arguments, const posix_spaw
 }
 
 }  // namespace
+
+std::string last_line(const std::string& output) {
+  const std::size_t end = output.find_last_not_of('\n');
+  if (end == std::string::npos) return "";
+  const std::size_t begin = output.find_last_of('\n', end);
+  return output.substr(begin == std::string::npos ? 0 : begin + 1,
+                       end - (begin == std::string::npos ? 0 : begin + 1) + 1);
+}
 
 Ended run_process(const std::vector<std::string>& command) {
   std::array<int, 2> ends{};
@@ -78,7 +86,7 @@ int run_attached(const std::vector<std::string>& command) {
 
 bool comes_to_an_end(const std::function<void()>& action) {
   const pid_t child = fork();
-  if (child < 0) return true;  // then it is left to chance
+  if (child < 0) return true;  // no child process: not checked
   if (child > 0) return wait_for(child) == 0;
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
@@ -86,7 +94,7 @@ bool comes_to_an_end(const std::function<void()>& action) {
   setitimer(ITIMER_PROF, &half_a_second, nullptr);
   try {
     action();
-  } catch (...) {  // whoever does it next will be told
+  } catch (...) {  // the caller will meet the same exception
   }
   _exit(0);
 }

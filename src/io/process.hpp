@@ -12,14 +12,17 @@ struct Ended {
   std::string output;  ///< standard output and standard error
 };
 
+/// The last line of a program's output; empty if there is none.
+std::string last_line(const std::string& output);
+
 /// Runs a program and waits for it.
 Ended run_process(const std::vector<std::string>& command);
 
-/// The same with this program's standard streams; its exit status.
+/// Runs a program with this program's standard streams. Returns its exit status.
 int run_attached(const std::vector<std::string>& command);
 
-/// Whether `action` ends, however it ends, in a copy of this process, within half a second of processor time. For what
-/// other people's libraries do with damaged files. No other thread may run.
+/// Whether `action` ends in a child process within half a second of processor time, in whatever way. Guards against
+/// libraries that loop forever on damaged files. No other thread may run.
 bool comes_to_an_end(const std::function<void()>& action);
 
 }  // namespace pendula::io

@@ -11,7 +11,7 @@
 namespace pendula::io {
 namespace {
 
-/// A word of a command line without folders from the root on: `/home/me/run.h5`, `--output=/home/me/run.h5`.
+/// The public form of a word of a command line, such as `/home/me/run.h5` or `--output=/home/me/run.h5`.
 std::string public_word(std::string word) {
   const std::size_t equals = word.find("=/");
   const std::size_t begin = word.starts_with('/') ? 0 : word.starts_with("-o/") ? 2 : equals + 1;

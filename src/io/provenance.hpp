@@ -5,16 +5,16 @@
 
 namespace pendula::io {
 
-/// A file as other people may be told of it: without its folders where they were given from the root on.
+/// The public name of a file: an absolute path without its folders.
 std::string public_name(const std::string& file);
 
-/// A text in which `file` is named so.
+/// Replaces `file` in a text by its public name.
 std::string with_public_name(std::string text, const std::string& file);
 
-/// A command line as it was typed, words quoted where a shell wants it; files by public names.
+/// A command line as typed, quoted for a shell; files have their public names.
 std::string command_line(std::span<char* const> words);
 
-/// A line of the attribute `history`, as CF has it: the time, and the command.
+/// A line of the CF attribute `history`: the time and the command.
 std::string history_line(const std::string& command);
 
 }  // namespace pendula::io

@@ -10,14 +10,14 @@ namespace pendula::io {
 inline constexpr double degree = std::numbers::pi / 180;
 inline constexpr std::string_view degree_sign = "\u00b0";
 
-/// A unit that a number may be given in, by a string such as "90 deg".
+/// A unit in a string such as "90 deg".
 struct Unit {
   std::string_view name;
-  double size;  ///< in the unit of numbers without one
+  double size;  ///< relative to the unit of plain numbers
 };
 using Units = std::span<const Unit>;
 
-/// A number and whatever stands behind it, as in "90 deg".
+/// A number and the text after it, as in "90 deg".
 struct TextWithUnit {
   double value = 0;
   std::string_view unit;

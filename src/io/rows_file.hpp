@@ -5,10 +5,10 @@
 
 namespace pendula::io {
 
-/// A file that takes the rows of a run.
+/// A file to which the rows of a run are written.
 class RowsFile : public Observer {
  public:
-  /// Rows that are in the file.
+  /// Rows in the file.
   virtual std::int64_t rows() const = 0;
 };
 

@@ -22,14 +22,14 @@ constexpr std::array<std::string_view, 2> angle_keys = {"theta", "phi"};
 constexpr std::array<std::string_view, 2> rate_keys = {"theta_dot", "phi_dot"};
 constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 
-/// The sections of a document that every scenario has.
+/// The tables of a document that every scenario has.
 struct RunSections {
   explicit RunSections(const toml::table& document) : root(document), run(root, "run"), output(root, "output") {}
 
   Section root, run, output;
 };
 
-/// The same of a chain.
+/// The tables of a chain's document.
 struct Sections : RunSections {
   explicit Sections(const toml::table& document) : RunSections(document), chain(root, "chain"), start(root, "start") {}
 
@@ -159,7 +159,7 @@ Coordinates<Space, Eigen::Dynamic> read_coordinates(const Section& start, Names 
   return values;
 }
 
-/// The first key of [start] out of `keys` that is there.
+/// The first of `keys` that [start] has.
 std::optional<Entry> first_of(const Section& start, Names keys) {
   for (const std::string_view key : keys) {
     if (std::optional<Entry> entry = start.find(key)) return entry;
@@ -182,7 +182,7 @@ Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Section& start, cons
   }
 }
 
-/// time_unit  what rates without a unit are in  [s]
+/// time_unit the unit of time of plain rates [s]
 template <class Space>
 State<Space> read_start(const Section& start, const LinkCount& count, const Chain<Space>& chain, double time_unit) {
   if (Space::dof == 1) {
@@ -196,7 +196,7 @@ State<Space> read_start(const Section& start, const LinkCount& count, const Chai
   return {0, q, read_coordinates<Space>(start, rate_keys, count, rates)};
 }
 
-/// Of each key once.
+/// Names each key once.
 std::vector<std::string> degree_warnings(const Section& start) {
   std::vector<std::string> warnings;
   for (const std::string_view key : angle_keys) {
@@ -226,8 +226,8 @@ RunOptions read_run(const Section& run) {
   return options;
 }
 
-/// Of the program's own choice where nothing says how long steps are. Throws InputError beside a tolerance, which
-/// follows from it.
+/// The accuracy, or a default if nothing says how long steps are. Throws InputError if there is a tolerance, too, which
+/// would follow from it.
 Accuracy read_accuracy(const Section& run, const RunOptions& options) {
   const auto accuracy = run.find("accuracy");
   if (accuracy && run.find("tolerance")) accuracy->fail("nothing beside run.tolerance, which follows from it");
@@ -244,8 +244,8 @@ double read_duration(const Section& run, const RunOptions& options) {
   (step ? *step : *run.find("duration")).fail(expected);
 }
 
-/// Keys of [run] that are there and mean nothing to the method: a warning, since a scenario may keep the settings of
-/// several methods side by side.
+/// Warns of keys of [run] that the method does not use. They are no errors, since a scenario may keep the settings of
+/// several methods.
 std::vector<std::string> unused_keys(const Section& run, const RunOptions& options) {
   const Method method = options.method;
   std::vector<std::string> warnings;
@@ -272,7 +272,7 @@ Chain<Space> build_chain(const Section& section, ChainParameters<Space> paramete
   }
 }
 
-/// Times of [output].
+/// Reads the times of [output].
 RowTimes read_row_times(const Section& section, double duration) {
   const auto interval = section.find("interval"), listed = section.find("times");
   if (interval && listed) listed->fail("nothing beside output.interval");
@@ -294,7 +294,7 @@ RowTimes read_row_times(const Section& section, double duration) {
   return rows;
 }
 
-/// What [run] and [output] say.
+/// Reads [run] and [output].
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
   plan.accuracy = read_accuracy(sections.run, plan.run);
@@ -328,7 +328,7 @@ Scenario<Space> read(const Sections& sections) {
   return scenario;
 }
 
-/// Longest scenario that is read: ten numbers for each of `max_links` fit in, a device that never ends does not.
+/// Longest scenario that is read: ten numbers for each of `max_links` fit in.
 constexpr std::size_t max_text = std::size_t{256} << 20;
 
 [[noreturn]] void reject_file(const std::string& name, const std::string& why) {

@@ -27,23 +27,23 @@
 
 namespace pendula::io {
 
-/// Most steps that a run may have: beyond 2⁵³ a step no longer changes the time.
+/// Most steps of a run: beyond 2⁵³ a step no longer changes the time.
 inline constexpr double max_steps = 9e15;
 
-/// How a run goes, as its file describes it, checked.
+/// What a scenario says about a run, checked.
 struct RunPlan {
   RunOptions run;
   Accuracy accuracy;
-  bool estimate = true;  ///< whether to look how far the rows can be trusted
+  bool estimate = true;  ///< whether to estimate how far the rows can be trusted
   double duration = 0;
   std::int64_t every = 1;  ///< steps from row to row
   std::vector<EventPlan> events;
-  RowTimes rows;                        ///< where there are any, in place of that
+  RowTimes rows;                        ///< if there are any, in place of `every`
   double checkpoint = 0;                ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
-  std::vector<std::string> warnings;    ///< what is odd but no error, one sentence each
-  /// `where: key` of what [run] sets, by key, and of what tells the number of links, by "links": for errors yet to
-  /// come.
+  std::vector<std::string> warnings;    ///< one sentence each
+  /// Where keys stand, as `where: key`, for later errors: the keys of [run] by name, and by "links" what tells the
+  /// number of links.
   std::map<std::string, std::string, std::less<>> places;
 };
 
@@ -64,12 +64,12 @@ struct SystemScenario : RunPlan {
 
 using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>, SystemScenario>;
 
-/// Finds the kernel of the system that a scenario names: a model file, relative to the scenario's folder, or the name
-/// of a built-in model; links are none where the scenario says nothing of them. Throws InputError without a place.
+/// Finds the kernel of the model that a scenario names: a file, relative to the scenario's folder, or a built-in model.
+/// `links` is empty if the scenario does not say. Throws ModelError.
 using FindSystem = std::function<std::shared_ptr<const SystemTable>(const std::string& model, std::optional<int> links,
                                                                     const std::filesystem::path& folder)>;
 
-/// One that knows the kernels of this build only.
+/// Finds kernels of this build only.
 std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std::optional<int> links,
                                                    const std::filesystem::path& folder);
 
@@ -79,7 +79,7 @@ std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
                            const FindSystem& find = built_in_system);
 
-/// A scenario's text that is read once, and from which others are made that differ in a few numbers.
+/// A scenario that is parsed once and read many times with other numbers.
 class ScenarioDocument {
  public:
   /// As parse_scenario.
@@ -88,8 +88,8 @@ class ScenarioDocument {
   ScenarioDocument(const ScenarioDocument&) = delete;
   ScenarioDocument& operator=(const ScenarioDocument&) = delete;
 
-  /// The scenario with numbers[k] in place of what the text has for keys[k]. Its places, and those of the InputError
-  /// that it throws, are not known: parse_scenario knows them.
+  /// The scenario with numbers[k] as the value of keys[k]. Neither it nor the InputError that it throws knows places in
+  /// the file; parse_scenario does.
   AnyScenario with(std::span<const std::string> keys, std::span<const double> numbers, const FindSystem& find) const;
 
  private:
@@ -97,7 +97,7 @@ class ScenarioDocument {
   std::unique_ptr<const Document> document_;
 };
 
-/// The text of a scenario, and what stands for its file in messages.
+/// The text of a scenario, and the name of its file in messages.
 struct ScenarioText {
   std::string name, text;
 };
@@ -105,7 +105,7 @@ struct ScenarioText {
 /// Reads a file, "-" being standard input. Throws InputError where it cannot be read.
 ScenarioText read_scenario_text(const std::filesystem::path& file);
 
-/// The same from a file, "-" being standard input; a file that cannot be read is an InputError too.
+/// Reads a scenario from a file; "-" is standard input. Throws InputError, too, if the file cannot be read.
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides = {},
                           const FindSystem& find = built_in_system);
 

@@ -38,7 +38,7 @@ constexpr ScenarioKey another(std::string_view name, KeyType type, Otherwise oth
   return {.name = name, .type = type, .otherwise = otherwise, .hint = hint};
 }
 
-/// One that a run that goes on may have anew.
+/// A key that a resumed run may change.
 constexpr ScenarioKey changeable(ScenarioKey key) {
   key.may_change = true;
   return key;
@@ -105,7 +105,7 @@ constexpr std::array<ScenarioKey, 6> start = {
     each_link("p_phi", "N m s", any_number, InWords{"rates are given"}, "conjugate momenta of phi, in space only"),
 };
 
-/// No method tells smaller errors from rounding.
+/// Smaller errors cannot be told from rounding.
 constexpr Bound errors{1e-16, false};
 
 constexpr std::array<ScenarioKey, 10> run = {
@@ -217,7 +217,7 @@ std::string bounded(const ScenarioKey& key) {
   return (key.bound.is_excluded ? "number > " : "number >= ") + shortest(key.bound.least);
 }
 
-/// A number that is seen to be no integer: 10.0.
+/// Writes a number as a float, 10.0.
 std::string with_point(double value) {
   const std::string text = shortest(value);
   return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
@@ -242,7 +242,7 @@ const ScenarioTable& table_named(std::string_view name) {
 
 std::string without_elements(std::string_view key) {
   std::string name;
-  int depth = 0;  // of brackets
+  int depth = 0;  // depth of brackets
   for (const char c : key) {
     depth += c == '[' ? 1 : 0;
     if (depth == 0) name += c;

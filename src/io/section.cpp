@@ -35,7 +35,7 @@ bool is_known(std::span<const ScenarioKey> keys, std::string_view key) {
   return std::ranges::find(keys, key, &ScenarioKey::name) != keys.end();
 }
 
-/// The key of this table that may have been meant, or the table that has this key.
+/// A hint: the key of this table that may have been meant, or the table that has this key.
 std::string hint_at_key(std::string_view key, Names known, Names elsewhere) {
   const auto ends_in_key = [&](std::string_view name) { return name.ends_with("." + std::string(key)); };
   const auto found = std::ranges::find_if(elsewhere, ends_in_key);

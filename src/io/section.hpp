@@ -18,20 +18,21 @@
 
 namespace pendula::io {
 
-/// Number of links, and what told it.
+/// The number of links, and the key that it follows from.
 struct LinkCount {
   int links = 0;
   std::string told_by;  ///< key
   std::string place;    ///< `where: key`
 };
 
-/// One value of the scenario: converts to what its key takes, or throws InputError with place, key, expected and got.
+/// One value of a scenario. It converts to the type of its key, or throws InputError with place, key, what was expected
+/// and what was found.
 class Entry {
  public:
   Entry(const toml::node& node, std::string name, const ScenarioKey& key)
       : node_(&node), name_(std::move(name)), key_(&key) {}
 
-  /// Its key with all tables and elements before it.
+  /// Its key with all tables and elements.
   const std::string& name() const { return name_; }
   bool is_array() const { return node_->is_array(); }
   bool is_number() const { return node_->is_number(); }
@@ -40,17 +41,17 @@ class Entry {
   std::string place() const { return where() + ": " + name_; }
 
   std::size_t size() const { return node_->is_array() ? node_->as_array()->size() : 0; }
-  /// Element of an array, counted from 0 here and from 1 in messages, as links are.
+  /// Element of an array, counted from 0 here, and from 1 in messages.
   Entry element(std::size_t index) const;
 
-  /// A number; where there are `units`, also a string of a number and one of them.
+  /// A number, or, if there are `units`, a string with a number and a unit.
   double number(Units units = {}) const;
   bool truth() const;
   std::int64_t integer() const { return integer(key_->least, key_->most); }
   std::int64_t integer(std::int64_t least, std::int64_t most) const;
-  /// Any string but an empty one.
+  /// A string that is not empty.
   std::string text() const;
-  /// A string out of those of the key, or out of `choices`, as its index there.
+  /// The index of a string among those of the key, or among `choices`.
   std::size_t choice() const { return choice(key_->choices); }
   std::size_t choice(std::span<const std::string_view> choices) const;
   /// One number a link; a single number stands for every link.  (n)
@@ -66,23 +67,23 @@ class Entry {
   const ScenarioKey* key_;
 };
 
-/// A table of the scenario whose keys are all known; without a table it has no keys at all.
+/// A table of a scenario, all of whose keys must be known. It may be missing; then it has no keys.
 class Section {
  public:
   /// A whole document.
   explicit Section(const toml::table& document);
-  /// The table of this key of `parent`, which need not be there.
+  /// The table at this key of `parent`, which may be missing.
   Section(const Section& parent, std::string_view key);
-  /// A table with keys of its own, as those of a model. Throws InputError, as all do, where `entry` is no table, or has
-  /// a key that is not among them.
+  /// A table with the keys of a model, say. Like the others it throws InputError if `entry` is no table, or has an
+  /// unknown key.
   Section(const Entry& entry, std::span<const ScenarioKey> keys);
   Section(const Section& parent, std::string_view key, std::span<const ScenarioKey> keys);
 
-  /// The tables of an array of them, [[name.key]].
+  /// The tables of the array [[name.key]].
   std::vector<Section> each(std::string_view key) const;
 
   std::optional<Entry> find(std::string_view key) const;
-  /// The value of a key, which has to be there.
+  /// The value of a key that must be given.
   Entry require(std::string_view key) const;
   Entry require(std::string_view key, const std::string& expected) const;
 
@@ -103,7 +104,7 @@ class Section {
   const std::string& where() const { return where_; }
 
  private:
-  /// `elsewhere` are the dotted names of all keys, to hint at those that were put into the wrong table.
+  /// `elsewhere` has the dotted names of all keys, for hints at keys in the wrong table.
   void read(const Entry& entry, std::span<const std::string_view> elsewhere);
   void require_known(std::span<const std::string_view> elsewhere) const;
   const ScenarioKey& key_named(std::string_view key) const;
@@ -111,7 +112,7 @@ class Section {
 
   const toml::table* table_ = nullptr;
   std::string name_;
-  std::string where_;  // of the table, or of its parent where there is none
+  std::string where_;  // place of the table, or of its parent if it is missing
   std::span<const ScenarioKey> keys_;
 };
 

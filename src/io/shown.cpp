@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t longest_shown = 60;
 
-/// A float always looks like one, so that `expected an integer, got 3.0` makes sense.
+/// Floats keep their point, so that `expected an integer, got 3.0` makes sense.
 std::string shown_float(double value) {
   const std::string text = shortest(value);
   return text.find_first_not_of("-0123456789") == std::string::npos ? text + ".0" : text;
@@ -44,7 +44,7 @@ std::string cut(std::string_view text) {
 std::string printable(std::string_view text) {
   std::string shown = cut(text);
   for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';  // nothing that steers a terminal
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';  // no control characters
   }
   return shown;
 }

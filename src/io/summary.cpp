@@ -31,7 +31,7 @@ std::string line(const std::string& label, const std::string& value) {
   return padded(label, label_width) + value + "\n";
 }
 
-/// A value that stands in a column of values, and a remark on it.
+/// A value in the column of values, and a remark.
 std::string line(const std::string& label, const std::string& value, const std::string& remark) {
   return line(label, remark.empty() ? value : padded(value, value_width) + "  " + remark);
 }
@@ -103,13 +103,13 @@ std::string settings(const Summary& summary) {
   return text;
 }
 
-/// Energy is conserved unless there are loads.
+/// A line about energy, which is conserved unless there are loads.
 std::string error_name(const Summary& summary) {
   return summary.model.loaded ? "change" : "error";
 }
 
 std::string table(const Summary& summary) {
-  constexpr std::size_t width = 15;  // of a number of nine digits with its sign and its exponent
+  constexpr std::size_t width = 15;  // width of nine digits with sign and exponent
   const auto cell = [](const std::string& text) { return std::string(" ").append(right(text, width)); };
   std::string text = right("t", value_width);
   for (const std::string& column : summary.shown) text += cell(column);
@@ -150,7 +150,7 @@ std::string energies(const Summary& summary) {
               of + ", over " + plural(summary.rows, "row"));
 }
 
-/// How far rows can be trusted.
+/// Lines about how far rows can be trusted.
 std::string trust(const Summary& summary) {
   const Trust& trust = summary.trust;
   std::string text;
@@ -164,7 +164,7 @@ std::string trust(const Summary& summary) {
   return text;
 }
 
-/// Where the last bob is, or of a system what its table shows.
+/// The last bob, or the shown columns of a system.
 std::string place(const Summary& summary) {
   constexpr std::string_view axes = "xyz";
   const UnitNames unit = unit_names(summary.model.natural);

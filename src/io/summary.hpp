@@ -21,28 +21,28 @@
 
 namespace pendula::io {
 
-/// What was moved.
+/// The chain or system of a run.
 struct ModelSummary {
   std::string scenario;  ///< the file, as it was named
   std::string space;     ///< "planar" or "spatial"; empty for systems that are no chains
-  std::string model;     ///< of such a system
-  std::vector<std::pair<std::string, std::vector<double>>> parameters;  ///< of such a system
+  std::string model;     ///< of a system that is no chain
+  std::vector<std::pair<std::string, std::vector<double>>> parameters;  ///< of a system that is no chain
   int links = 0;
   double mass = 0;    ///< Σ m_i
   double length = 0;  ///< Σ l_i
   double gravity = 0;
   bool loaded = false;                  ///< damping, torque or a drive
-  std::optional<NaturalUnits> natural;  ///< units of all numbers; empty for SI
+  std::optional<NaturalUnits> natural;  ///< units of all numbers; SI if empty
 };
 
-/// A state with the bobs, in a form that serves both spaces.
+/// A state of a chain with its bobs.
 struct Snapshot {
   double time = 0;
   Eigen::VectorXd theta, phi, theta_dot, phi_dot;  ///< (n); phi and phi_dot are empty in the plane
   Eigen::MatrixXd bobs, velocities;                ///< (dimension x n)
 };
 
-/// A state of a system that is no chain.
+/// A state of another system.
 struct SystemSnapshot {
   double time = 0;
   std::vector<std::pair<std::string, double>> q, v;
@@ -51,42 +51,42 @@ struct SystemSnapshot {
 
 /// How a run ended.
 struct Ending {
-  std::string status = "ok";  ///< a word for programs
-  std::string message;        ///< a sentence for people; empty for "ok"
-  Outcome step;               ///< the step that failed, where one did
-  std::string coordinate;     ///< that it failed in, of a system that is no chain
-  /// That ended it, where one did.
+  std::string status = "ok";  ///< one word
+  std::string message;        ///< a sentence; empty for "ok"
+  Outcome step;               ///< the failed step, if one failed
+  std::string coordinate;     ///< the coordinate that it failed in
+  /// The event that ended it, if one did.
   std::string event = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
 
   bool ok() const { return message.empty(); }
 };
 
-/// Everything that is told about a run; the text leaves warnings out, since they were told as they came.
+/// The summary of a run. Its text has no warnings, since those were printed as they came.
 struct Summary : RunReport {
   ModelSummary model;
   double accuracy = 0;  ///< as asked for
   double duration = 0;  ///< as asked for
   std::int64_t every = 0;
   std::string kernel_by = "build";  ///< ModelKernel::by, where there is a kernel
-  RowTimes at;                      ///< rows are there, where there are any
+  RowTimes at;                      ///< times of rows, if they are given
   Ending ending;
-  std::vector<std::string> shown;         ///< columns of the table
+  std::vector<std::string> shown;         ///< columns of the table that is shown
   Snapshot final;                         ///< the last state reached, of a chain
   SystemSnapshot system;                  ///< of any other system
-  std::optional<std::string> trajectory;  ///< the file that rows were written to; "-" is standard output
-  std::int64_t rows_written = 0;          ///< that are in this file: fewer, where the disk is full
+  std::optional<std::string> trajectory;  ///< the file of rows; "-" is standard output
+  std::int64_t rows_written = 0;          ///< rows in this file; fewer if the disk is full
   std::optional<std::string> view;        ///< the page
   std::vector<std::string> event_names;   ///< of the events that were looked for
   std::optional<std::string> event_file;
 };
 
-/// Whether its steps have stages that are solved for.
+/// Whether its steps are implicit.
 inline bool has_stages(const Summary& summary) {
   return !is_explicit(summary.options.method);
 }
 
-/// How a run ended; `coordinates` as pendula::message takes them. What an observer threw is thrown again, but for
-/// OutputError. `events` are their names.
+/// How a run ended. `coordinates` is as for pendula::message, `events` are the names of the events. Throws again what
+/// an observer threw, except OutputError.
 Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates = {},
                  std::span<const std::string> events = {});
 
@@ -121,29 +121,29 @@ Snapshot snapshot(const Chain<Space>& chain, const Motion& motion) {
 
 SystemSnapshot snapshot(const SystemSubject& system, const Motion& motion);
 
-/// The summary as one JSON object, ended by a newline. Numbers are read back as the same doubles; what does not apply
-/// is null (the stages of "rk4", say), as is a number that is not finite.
+/// The summary as one JSON object, ended by a newline. Numbers read back as the same doubles. What does not apply is
+/// null (the stages of "rk4", say), and so is a number that is not finite.
 std::string to_json(const Summary& summary);
 
-/// The same for the run file, on one line: without the last state, which it has, and with public names of files.
+/// The same for the run file, on one line: without the last state, which the file has, and with public names of files.
 std::string to_json_of_file(const Summary& summary);
 
-/// Which summaries have a key.
+/// The summaries that have a key.
 enum class Moved { anything, chains, systems };
 
 // A key of the JSON object. NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct SummaryKey {
   std::string_view name;
-  std::string_view type;  ///< of JSON, several with blanks between, or a JSON Schema
+  std::string_view type;  ///< JSON types, separated by blanks, or a JSON Schema
   std::string_view hint;
-  std::string_view unit = {};  ///< in natural units that of their kind
+  std::string_view unit = {};  ///< SI; natural units have the same dimension
   Moved of = Moved::anything;
   std::span<const std::string_view> choices = {};
 };  // NOLINTEND(readability-redundant-member-init)
 
 std::vector<SummaryKey> summary_keys();
 
-/// What every such object is, as a JSON Schema.
+/// The JSON Schema of summaries.
 std::string summary_schema();
 
 /// The summary for people.

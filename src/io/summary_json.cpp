@@ -45,7 +45,7 @@ void add_named(Json& json, const std::string& name, const Eigen::VectorXd& value
   for (Eigen::Index i = 0; i < values.size(); ++i) json[name + "_" + std::to_string(i + 1)] = values[i];
 }
 
-/// As every system has it, and the same in arrays of one element a link.
+/// The final state of a chain, by name, and in arrays with one element for each link.
 Json to_json(const Snapshot& snapshot) {
   const bool planar = snapshot.phi.size() == 0;
   Json q = Json::object(), v = Json::object(), points = Json::object();
@@ -99,7 +99,7 @@ Json to_json(const Ending& ending) {
   return json;
 }
 
-/// NaN, of what never happened, becomes null.
+/// A time; null if the event never happened.
 Json events_json(const Summary& summary) {
   Json json = Json::array();
   for (std::size_t k = 0; k < summary.events.size(); ++k) {
@@ -230,7 +230,7 @@ Json json_of(const Summary& summary) {
   return json;
 }
 
-/// What the value of a key is.
+/// Types of values.
 Json schema_of(const SummaryKey& key) {
   Json schema;
   if (key.type.starts_with('{')) {

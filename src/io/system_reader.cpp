@@ -14,7 +14,7 @@
 namespace pendula::io {
 namespace {
 
-/// Names as a message lists them.
+/// Names, separated by commas, for messages.
 std::string listed(std::span<const std::string_view> names) {
   std::string text;
   for (const std::string_view name : names) text += (text.empty() ? "" : ", ") + std::string(name);
@@ -33,7 +33,7 @@ std::vector<ScenarioKey> parameter_keys(const SystemInfo& info) {
   return keys;
 }
 
-/// Parameters by name, from the table or from what the model says.
+/// Parameters by name, from the table or from the model's defaults.
 std::vector<double> read_parameters(const Section& system, const SystemInfo& info) {
   const std::vector<ScenarioKey> keys = parameter_keys(info);
   const Section given(system, "parameters", keys);
@@ -67,13 +67,13 @@ SystemNumbers read_numbers(const Section& system, const SystemInfo& info) {
   return numbers;
 }
 
-/// theta of theta_1; empty where a name has no index.
+/// A name without its index, theta for theta_1; empty if it has none.
 std::string_view family(std::string_view name) {
   const std::size_t index = index_of(name).size();
   return index == 0 ? std::string_view() : name.substr(0, name.size() - index);
 }
 
-/// The keys of [start]: coordinates, rates and momenta, by name, and theta for theta_1, theta_2, … together.
+/// The keys of [start]: coordinates, rates and momenta by name, and theta for the array theta_1, theta_2, ….
 class StartTable {
  public:
   StartTable(const Section& root, const SystemInfo& info) : info_(info) {
@@ -90,7 +90,7 @@ class StartTable {
     table_.emplace(root, "start", keys_);
   }
 
-  /// The coordinates; what is not there is 0.
+  /// The coordinates; those not given are 0.
   Eigen::VectorXd positions() const {
     return read([](std::string_view stem) { return std::string(stem); }, "");
   }
@@ -101,7 +101,7 @@ class StartTable {
   std::optional<Entry> first_rate() const { return first(rate_name); }
   const std::string& where() const { return table_->where(); }
 
-  /// The entry of coordinate k, its own or one for all like it.
+  /// The entry of coordinate k: its own, or that of its array.
   std::optional<Entry> entry_of(std::size_t k) const {
     if (const auto own = table_->find(info_.coordinates[k])) return own;
     const std::string_view stem = family(info_.coordinates[k]);
@@ -111,7 +111,7 @@ class StartTable {
  private:
   static std::string momentum_of(std::string_view stem) { return std::string("p_").append(stem); }
 
-  /// Rates have their names of old, too.
+  /// Rates may also have their older names.
   template <class Name>
   std::optional<Entry> find(Name name, const std::string& stem) const {
     const std::string key = name(stem), old = stem + "_dot";
@@ -166,8 +166,8 @@ class StartTable {
   std::optional<Section> table_;
 };
 
-/// Throws InputError where some momenta have no rates: where the mass matrix is singular. Infinite is the rate of the
-/// coordinate that has no inertia; of those that hang together with it they are no numbers.
+/// Throws InputError if the mass matrix is singular, so that momenta have no rates. The rate of the coordinate without
+/// inertia is infinite then, those of coupled ones are NaN.
 void require_inertia(const StartTable& table, const SystemSubject& system, const Eigen::VectorXd& q) {
   const Eigen::VectorXd rates = system.rates(0, q, Eigen::VectorXd::Ones(q.size()));
   if (rates.allFinite()) return;
@@ -191,7 +191,7 @@ Motion read_start(const Section& root, const SystemSubject& system) {
   return start;
 }
 
-/// Of each key once.
+/// Names each key once.
 std::vector<std::string> degree_warnings(const Section& root, const SystemInfo& info) {
   const StartTable table(root, info);
   std::vector<std::string> warnings;
@@ -216,7 +216,7 @@ std::optional<std::string> warning_of_degrees(const Entry& entry) {
   if (!entry.is_number()) return std::nullopt;
   const double angle = entry.number();
   const std::string text = shortest(angle);
-  constexpr std::size_t most_typed = 6;  // characters; longer ones are multiples of pi, or where another run ended
+  constexpr std::size_t most_typed = 6;  // characters; longer numbers are multiples of pi, or the end of another run
   if (std::abs(angle) <= 2 * std::numbers::pi || text.size() > most_typed) return std::nullopt;
   return entry.place() + ": " + text + " rad is more than a turn; did you mean \"" + text + " deg\"?";
 }

@@ -9,11 +9,11 @@
 
 namespace pendula::io {
 
-/// What to say of an angle of [start], or of an array of them, that is given as a plain number of few digits and beyond
-/// a turn: degrees, most likely.
+/// A warning of an angle of [start], or of an array of angles, that is a short plain number beyond one turn, and
+/// probably meant in degrees.
 std::optional<std::string> warning_of_degrees(const Entry& entry);
 
-/// What the tables [system] and [start] say of a system that is no chain; `root` is the document. Throws InputError.
+/// Reads the tables [system] and [start] of the document `root`. Throws InputError.
 SystemScenario read_system(const Section& root, const std::filesystem::path& folder, const FindSystem& find);
 
 }  // namespace pendula::io

@@ -6,14 +6,14 @@
 namespace pendula::io {
 namespace {
 
-/// Where a string ends that begins at `begin`, one behind its last quote; the end of the text where it does not.
+/// One past the last quote of the string that begins at `begin`; the end of the text if it does not end.
 std::size_t string_end(std::string_view text, std::size_t begin) {
   const char quote = text[begin];
   const std::string_view three = text.substr(begin, 3);
   const bool multi_line = three.size() == 3 && three[1] == quote && three[2] == quote;
   for (std::size_t i = begin + (multi_line ? 3 : 1); i < text.size(); ++i) {
     if (text[i] == '\\' && quote == '"') {
-      ++i;  // whatever follows does not end the string
+      ++i;  // an escaped character does not end the string
     } else if (multi_line && text.substr(i, 3) == three) {
       return i + 3;
     } else if (!multi_line && (text[i] == quote || text[i] == '\n')) {

@@ -4,11 +4,11 @@
 
 namespace pendula::io {
 
-/// Deepest that keys and values may be nested in a scenario, which needs no more than four of either.
+/// Greatest depth of nested keys and values; a scenario needs four.
 inline constexpr int max_nesting = 16;
 
-/// First line of TOML text, from 1, in which a key has more than `max_nesting` parts, or a value is nested deeper than
-/// that; 0 for none. A parser that recurses would run out of stack on such text, so it is asked before one sees it.
+/// The first line, from 1, of TOML text in which a key has more than `max_nesting` parts, or a value is nested deeper;
+/// 0 if there is none. To be asked before parsing: a recursive parser would exhaust the stack on such text.
 int line_nested_too_deep(std::string_view text);
 
 }  // namespace pendula::io

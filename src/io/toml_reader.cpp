@@ -26,13 +26,13 @@ bool is_key_character(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
 }
 
-/// A part of a key between dots, `torque[2][3]`: its name, and elements from 1 on.
+/// A part of a key, `torque[2][3]`: its name, and elements, counted from 1.
 struct KeyPart {
   std::string_view name;
   std::vector<std::size_t> elements;
 };
 
-/// `masses[2]` and the like; nothing where it is none.
+/// Parses a part such as `masses[2]`; empty if it is wrong.
 std::optional<KeyPart> key_part(std::string_view text) {
   KeyPart part;
   part.name = text.substr(0, text.find('['));
@@ -49,7 +49,7 @@ std::optional<KeyPart> key_part(std::string_view text) {
   return part;
 }
 
-/// The parts of `a.b[2].c`; none where one of them is wrong.
+/// Parses a key such as `a.b[2].c`; empty if a part is wrong.
 std::vector<KeyPart> key_path(std::string_view key) {
   std::vector<KeyPart> path;
   for (std::size_t begin = 0; begin <= key.size();) {
@@ -62,7 +62,7 @@ std::vector<KeyPart> key_path(std::string_view key) {
   return path;
 }
 
-/// What is wrong with a number that C++ has no room for; empty where nothing is.
+/// Why a number does not fit into a C++ type; empty if it does.
 std::string number_problem(std::string token) {
   std::erase(token, '_');
   const bool is_integer = token.find_first_not_of("+-0123456789") == std::string::npos;
@@ -76,7 +76,7 @@ std::string number_problem(std::string token) {
   return std::abs(std::strtod(first, nullptr)) > 1 ? "too large for a double" : "too small for a double";
 }
 
-/// The first number in a line of text that C++ has no room for, and why: `1e400, too large for a double`; empty where
+/// The first number in a line that does not fit into a C++ type, and why: `1e400, too large for a double`; empty if
 /// there is none.
 std::string impossible_number(std::string_view line) {
   constexpr std::string_view digits = "0123456789", in_a_number = "0123456789+-._eE";
@@ -96,7 +96,7 @@ std::string_view line_of(std::string_view text, std::int64_t number) {
   return text.substr(0, text.find('\n'));
 }
 
-/// Throws InputError on text that would exhaust the parser's stack.
+/// Throws InputError if the text would exhaust the parser's stack.
 void require_shallow(std::string_view text, const std::string& name) {
   const int line = line_nested_too_deep(text);
   if (line == 0) return;
@@ -116,14 +116,14 @@ toml::table parse(std::string_view text, const std::string& name) {
   }
 }
 
-/// A word that a shell user types for a string: begins with a letter, and holds nothing that TOML gives a meaning to.
+/// A bare word that stands for a string: it begins with a letter, and has no characters that TOML uses.
 bool is_bare_word(std::string_view text) {
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   return !text.empty() && is_letter(text.front()) &&
          std::ranges::all_of(text, [](char c) { return is_key_character(c) || c == '.'; });
 }
 
-/// What a shell user types for a string: a word, or a number with a unit, whose quotes the shell takes.
+/// What stands for a string without quotes: a bare word, or a number with a unit, whose quotes the shell has removed.
 bool is_bare_string(std::string_view text) {
   if (is_bare_word(text)) return true;
   const auto in_a_unit = [](char c) {
@@ -147,13 +147,13 @@ toml::table parse_value(std::string_view value, const std::string& where) {
                    (number.empty() ? "a TOML value after '=', got " + toml_string(value) : "a number, got " + number));
 }
 
-/// Where a value is to be put.
+/// The place where a value is to be put.
 struct KeyPlace {
   const std::string& where;
   std::string_view key;
 };
 
-/// The array that has an element of this number.
+/// The array with an element of this number.
 toml::array& array_with(toml::node* node, std::size_t element, const KeyPlace& place) {
   toml::array* const array = node == nullptr ? nullptr : node->as_array();
   if (array == nullptr || array->size() < element) {
@@ -163,9 +163,9 @@ toml::array& array_with(toml::node* node, std::size_t element, const KeyPlace& p
   return *array;
 }
 
-/// The table that a part names which others come after.
+/// The table of a part that is not the last one.
 toml::table& table_of(toml::table& table, const KeyPart& part, const KeyPlace& place) {
-  // A table made here takes the override as its place; one that stands in the file keeps its own.
+  // A new table has the override as its place; an existing one keeps its own.
   if (part.elements.empty() && !table.contains(part.name)) {
     table.insert(part.name, std::move(*parse("t = {}", place.where).get("t")));
   }
@@ -178,14 +178,14 @@ toml::table& table_of(toml::table& table, const KeyPart& part, const KeyPlace& p
   return *next->as_table();
 }
 
-/// The table that the last part of a key is in.
+/// The table that holds the last part of a key.
 toml::table& last_table(toml::table& root, std::span<const KeyPart> path, const KeyPlace& place) {
   toml::table* table = &root;
   for (const KeyPart& part : path.first(path.size() - 1)) table = &table_of(*table, part, place);
   return *table;
 }
 
-/// The array that a part's last element is in.
+/// The array that holds the last element of a part.
 toml::array& last_array(toml::table& table, const KeyPart& part, const KeyPlace& place) {
   toml::node* node = table.get(part.name);
   for (std::size_t k = 0; k + 1 < part.elements.size(); ++k) {
@@ -194,7 +194,7 @@ toml::array& last_array(toml::table& table, const KeyPart& part, const KeyPlace&
   return array_with(node, part.elements.back(), place);
 }
 
-/// Puts a value in the place of what `key` names.
+/// Sets the value of `key`.
 void put(toml::table& root, std::string_view key, toml::node& value, const std::string& where) {
   const std::vector<KeyPart> path = key_path(key);
   const KeyPlace place{where, key};
@@ -208,7 +208,7 @@ void put(toml::table& root, std::string_view key, toml::node& value, const std::
   array.replace(array.cbegin() + static_cast<std::ptrdiff_t>(elements.back() - 1), std::move(value));
 }
 
-/// Takes out what `key` names.
+/// Removes `key`.
 void take_out(toml::table& root, std::string_view key, const std::string& where) {
   const std::vector<KeyPart> path = key_path(key);
   const KeyPlace place{where, key};
@@ -224,7 +224,7 @@ void take_out(toml::table& root, std::string_view key, const std::string& where)
   }
 }
 
-/// What a key may look like, for those who count from 0.
+/// A hint at the form of keys, in which elements count from 1.
 std::string counting_hint(std::string_view key) {
   return key.find("[0]") == std::string_view::npos ? "" : " (elements of arrays count from 1)";
 }

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether a group is its user's own, as some systems give one to each: called like the user, and nobody else in it.
+/// Whether a group is a user's private group: it has the user's name and no other members.
 bool is_group_of_one(gid_t id) {
   const group* const found = getgrgid(id);
   const passwd* const user = getpwuid(geteuid());
@@ -26,7 +26,7 @@ bool is_group_of_one(gid_t id) {
   return true;
 }
 
-/// `is_on_way` is said of all but the last, where what comes after it is looked at by itself.
+/// `is_on_way` is true for all but the last folder of a path.
 std::string problem_of(const fs::path& folder, bool is_on_way) {
   struct stat status {};
   if (lstat(folder.c_str(), &status) != 0) return folder.string() + ": " + std::strerror(errno);
@@ -41,7 +41,7 @@ std::string problem_of(const fs::path& folder, bool is_on_way) {
   return by_all || by_some ? folder.string() + ", which others may write to" : "";
 }
 
-/// Gives errno of the folder that could not be made; 0 where all are there.
+/// Returns the errno of the folder that could not be made; 0 if all exist.
 int make(const fs::path& folder) {
   fs::path way;
   int error = 0;

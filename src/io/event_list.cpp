@@ -1,0 +1,115 @@
+#include "io/event_list.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "io/changed_file.hpp"
+
+namespace pendula::io {
+namespace {
+
+/// Arrays of an event, before those of its row.
+constexpr std::array<const char*, 3> told = {"event_number", "event_name", "event_direction"};
+
+}  // namespace
+
+void EventList::create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links) {
+  if (contents.events.empty() || contents.quantities.empty()) return;
+  using hdf5::Type;
+  const hdf5::Handle group = hdf5::create_group(file, "events");
+  quantities_ = contents.quantities;
+  constexpr std::size_t block = std::size_t{1} << 13, most_rows = 256;
+  const std::size_t rows = std::clamp<std::size_t>(block / columns_in(quantities_), 1, most_rows);
+  const auto add = [&](const std::string& name, std::size_t size, Type type, const std::string& meaning) {
+    datasets_.push_back(hdf5::create_list(group, name, size, rows, type));
+    hdf5::write_attribute(datasets_.back(), "long_name", meaning);
+    if (datasets_.size() == 1) hdf5::make_scale(datasets_[0], "event_number");
+    if (datasets_.size() > 1) hdf5::attach_scale(datasets_.back(), datasets_[0], 0);
+    if (size > 0) hdf5::attach_scale(datasets_.back(), links, 1);
+  };
+  add(told[0], 0, Type::whole, "number of the event, in order of time");
+  add(told[1], 0, Type::whole, "which event it is");
+  hdf5::write_flags(datasets_.back(), Type::whole, 1, contents.events);
+  add(told[2], 0, Type::byte, "whether its expression went up or down through zero");
+  hdf5::write_flags(datasets_.back(), Type::byte, 0, std::vector<std::string>{"down", "up"});
+  for (const Quantity& quantity : quantities_) {
+    add(quantity.name, quantity.links, Type::real, quantity.meaning);
+    write_unit(datasets_.back(), contents.natural, quantity.unit);
+  }
+  names_ = contents.events;
+}
+
+void EventList::take_over(const hdf5::Handle& file, std::size_t count) {
+  if (!is_there()) return;
+  const hdf5::Handle group = hdf5::open_group(file, "events");
+  const std::size_t columns = columns_in(quantities_);
+  constexpr std::size_t at_once = 1024;
+  for (std::size_t first = 0; first < count; first += at_once) {
+    const std::size_t rows = std::min(at_once, count - first);
+    const std::vector<double> block = read_block(group, quantities_, first, rows);
+    std::vector<std::vector<double>> events(rows);
+    for (const char* name : told) {
+      const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(group, name), first, rows);
+      if (read.size() != rows) throw ChangedFile("one whose events are not those of its scenario");
+      for (std::size_t k = 0; k < rows; ++k) events[k].push_back(read[k]);
+    }
+    for (std::size_t k = 0; k < rows; ++k) {
+      const auto begin = block.begin() + static_cast<std::ptrdiff_t>(k * columns);
+      events[k].insert(events[k].end(), begin, begin + static_cast<std::ptrdiff_t>(columns));
+      add(std::move(events[k]));
+    }
+    write();
+  }
+}
+
+void EventList::add(const EventRow& happened) {
+  if (!is_there()) return;
+  const auto which = std::ranges::find(names_, happened.event.name) - names_.begin();
+  std::vector<double> row{static_cast<double>(count() + 1), static_cast<double>(which + 1), happened.up ? 1.0 : 0.0};
+  row.insert(row.end(), happened.row.numbers.begin(), happened.row.numbers.end());
+  add(std::move(row));
+}
+
+void EventList::add(std::vector<double> row) {
+  hash_ = fingerprint(row, hash_);
+  pending_.push_back(std::move(row));
+}
+
+double EventList::check() const {
+  return as_number(hash_);
+}
+
+void EventList::append(std::size_t dataset, const std::vector<double>& numbers) {
+  hdf5::set_rows(datasets_[dataset], count());
+  hdf5::write_rows(datasets_[dataset], written_, numbers);
+}
+
+void EventList::write() {
+  if (pending_.empty()) return;
+  constexpr std::size_t before = told.size();
+  for (std::size_t k = 0; k < datasets_.size(); ++k) {
+    std::vector<double> numbers;
+    for (const std::vector<double>& row : pending_) {
+      if (k < before) {
+        numbers.push_back(row[k]);
+        continue;
+      }
+      const Quantity& quantity = quantities_[k - before];
+      for (std::size_t i = 0; i < quantity.size(); ++i) numbers.push_back(row[before + quantity.column(i)]);
+    }
+    append(k, numbers);
+  }
+  written_ = count();
+  pending_.clear();
+}
+
+void EventList::close() {
+  for (hdf5::Handle& dataset : datasets_) dataset.close();
+}
+
+void EventList::abandon() {
+  for (hdf5::Handle& dataset : datasets_) dataset.abandon();
+}
+
+}  // namespace pendula::io

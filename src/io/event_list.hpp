@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <pendula/run/observer.hpp>
+#include <pendula/run/quantity.hpp>
+#include <string>
+#include <vector>
+
+#include "io/fingerprint.hpp"
+#include "io/hdf5.hpp"
+#include "io/quantity_arrays.hpp"
+
+namespace pendula::io {
+
+/// The group `events` of a run file: one row for each event, written in place as it happens.
+class EventList {
+ public:
+  /// Makes the group; nothing is written if the run looks for no events.
+  void create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links);
+  /// Copies the first `count` events of another file.
+  void take_over(const hdf5::Handle& file, std::size_t count);
+
+  void add(const EventRow& happened);
+  bool is_there() const { return !datasets_.empty(); }
+  std::size_t count() const { return written_ + pending_.size(); }
+  /// Their checksum.
+  double check() const;
+  void write();
+  void close();
+  void abandon();
+
+ private:
+  void add(std::vector<double> row);
+  void append(std::size_t dataset, const std::vector<double>& numbers);
+
+  std::vector<Quantity> quantities_;
+  std::vector<std::string> names_;
+  std::vector<hdf5::Handle> datasets_;  // number, event, direction, quantities
+  std::vector<std::vector<double>> pending_;
+  std::size_t written_ = 0;
+  std::uint64_t hash_ = empty_fingerprint;
+};
+
+}  // namespace pendula::io

@@ -1,0 +1,117 @@
+#include "io/kernel_maker.hpp"
+
+#include <algorithm>
+#include <future>
+#include <initializer_list>
+#include <iterator>
+#include <pendula/run/library.hpp>
+#include <thread>
+
+#include "io/generator.hpp"
+#include "io/input_error.hpp"
+#include "io/kernel_file.hpp"
+#include "io/process.hpp"
+
+namespace pendula::io {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Flags for the instruction set that the library runs with, as in cmake/PendulaLibrary.cmake.
+std::vector<std::string> architecture_flags() {
+  const std::string_view set = library().instruction_set;
+  if (set == "sse2") return {"-march=x86-64", "-mno-sse3"};
+  if (set == "avx2") return {"-march=x86-64", "-mavx2", "-mfma"};
+  if (set == "avx512") {
+    return {"-march=x86-64", "-mavx2", "-mfma", "-mavx512f", "-mavx512cd", "-mavx512dq", "-mavx512bw", "-mavx512vl"};
+  }
+  return {};
+}
+
+constexpr const char* flags_of_kernels[] = {
+    "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=fast", "-fno-math-errno", "-w"};
+
+/// The first error of a compiler, in one line.
+std::string first_error(const std::string& output) {
+  return last_line(output.substr(0, output.find('\n', output.find("error"))));
+}
+
+/// Throws ModelError if a compiler has failed.
+void require_compiled(const Ended& ended, const std::string& compiler, const std::string& name) {
+  if (ended.status == 127) {
+    throw ModelError("models take a C compiler; " + compiler + ": " + ended.output + " (CC names another one)");
+  }
+  if (ended.status != 0) {
+    throw ModelError("the compiler " + compiler + " refuses the kernel of " + name + ": " + first_error(ended.output) +
+                     " (PENDULA_KERNELS_BY=interpreter does without)");
+  }
+}
+
+/// Runs compiler commands in parallel. Throws ModelError if one fails.
+void run_compilers(const std::vector<std::vector<std::string>>& commands, const std::string& name) {
+  std::vector<std::future<Ended>> running(commands.size());
+  std::ranges::transform(commands, running.begin(), [](const std::vector<std::string>& command) {
+    return std::async(std::launch::async, [&command] { return run_process(command); });
+  });
+  for (std::future<Ended>& one : running) require_compiled(one.get(), commands.front().front(), name);
+}
+
+/// Compiles a kernel. Returns the shared object, beside the text.
+fs::path compile(const std::string& name, const fs::path& text, const Toolchain& toolchain) {
+  std::vector<std::string> compiler{toolchain.compiler};
+  compiler.insert(compiler.end(), std::begin(flags_of_kernels), std::end(flags_of_kernels));
+  for (const std::string& flag : architecture_flags()) compiler.push_back(flag);
+  for (const std::string& flag : toolchain.flags) compiler.push_back(flag);
+  const auto with = [&](std::initializer_list<std::string> more) {
+    std::vector<std::string> command = compiler;
+    command.insert(command.end(), more);
+    return command;
+  };
+  // Functions of several widths are compiled in parallel.
+  const unsigned processors = std::thread::hardware_concurrency();
+  std::vector<int> shares{1 + 2 + 4 + 8};
+  if (processors > 1) shares = {1 + 8, 2 + 4};
+  if (processors > 3) shares = {1, 2, 4, 8};
+  std::vector<std::vector<std::string>> commands;
+  const fs::path made = fs::path(text).replace_extension(".so");
+  std::vector<std::string> link = with({"-shared", "-o", made.string()});
+  for (const int share : shares) {
+    const std::string widths = std::to_string(share);
+    const std::string object = fs::path(text).replace_extension(widths + ".o").string();
+    commands.push_back(with({"-DWIDTHS=" + widths, "-c", text.string(), "-o", object}));
+    link.push_back(object);
+  }
+  link.emplace_back("-lm");
+  run_compilers(commands, name);
+  run_compilers({link}, name);
+  return made;
+}
+
+}  // namespace
+
+const char* kind_of_kernels(const Toolchain& toolchain) {
+  const std::string& by = toolchain.kernels_by;
+  if (by == "interpreter" || (by == "auto" && toolchain.compiler.empty())) return interpreted_kernel;
+  if (by != "compiler" && by != "auto") {
+    throw ModelError("PENDULA_KERNELS_BY: expected compiler, interpreter or auto, got " + by);
+  }
+  if (toolchain.compiler.empty()) throw ModelError("models take a C compiler, got no cc, gcc or clang (CC names one)");
+  return compiled_kernel;
+}
+
+std::string how_made(std::string_view kind, const Toolchain& toolchain) {
+  if (kind == compiled_kernel) return "compiled by " + toolchain.compiler;
+  return toolchain.kernels_by == "auto" ? "interpreted: no C compiler was found (CC names one)" : "interpreted";
+}
+
+fs::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
+                     const fs::path& folder, const Toolchain& toolchain) {
+  const bool compiles = kind == compiled_kernel;
+  const fs::path text = folder / (compiles ? "kernel.c" : "kernel.program");
+  arguments.insert(arguments.end(), {"--as", compiles ? "c" : "bytecode", "--output", text.string()});
+  run_generator(arguments, toolchain);
+  return compiles ? compile(name, text, toolchain) : text;
+}
+
+}  // namespace pendula::io

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/toolchain.hpp"
+
+/// Makes kernels of models: the generator derives them, and a compiler compiles them, unless they are interpreted.
+/// Failures throw ModelError.
+namespace pendula::io {
+
+/// The extension of kernels that are made here, as the environment asks. Fails if it asks for something unknown.
+const char* kind_of_kernels(const Toolchain& toolchain);
+
+/// A description of such kernels.
+std::string how_made(std::string_view kind, const Toolchain& toolchain);
+
+/// Makes a kernel in `folder` by the generator with these arguments. Returns its file.
+std::filesystem::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
+                                  const std::filesystem::path& folder, const Toolchain& toolchain);
+
+}  // namespace pendula::io

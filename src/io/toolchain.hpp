@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace pendula::io {
+
+/// The programs and folders that pendula uses: Python, the C compiler, the Python packages, the cache of kernels.
+struct Toolchain {
+  std::string python;              ///< a Python with the packages of the generator
+  std::string compiler;            ///< C compiler; empty if there is none
+  std::string kernels_by;          ///< "compiler", "interpreter", or "auto": the compiler if there is one
+  std::vector<std::string> flags;  ///< further compiler flags of the user
+  std::filesystem::path codegen;   ///< folder of the Python package pendula_codegen
+  std::filesystem::path plotting;  ///< folder of the Python package pendula_plot
+  std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
+  std::filesystem::path cache;     ///< folder of kernels; empty if there is none
+
+  /// Those of this program: of its build, if the file pendula.toolchain is beside it, else of its installation. The
+  /// environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS; PENDULA_KERNELS_BY. The cache is
+  /// $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  static Toolchain of_this_program();
+
+  /// The command line that runs a Python package of `folder`; it imports nothing from the working folder or PYTHONPATH.
+  std::vector<std::string> module(const std::filesystem::path& folder, const std::string& name) const;
+  /// The command that installs the Python packages.
+  std::filesystem::path setup() const;
+};
+
+/// The executable of this program.
+std::filesystem::path this_program();
+
+}  // namespace pendula::io
