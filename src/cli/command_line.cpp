@@ -16,7 +16,7 @@
 namespace pendula::cli {
 namespace {
 
-/// A check of an option's text: what is expected where `accept` says no.
+/// A check of an option's text; `expected` is for the message if `accept` says no.
 CLI::Validator expect(const std::string& expected, bool (*accept)(const std::string&)) {
   return {[=](const std::string& text) {
             return accept(text) ? "" : "expected " + expected + ", got " + (text.empty() ? "an empty text" : text);
@@ -24,7 +24,7 @@ CLI::Validator expect(const std::string& expected, bool (*accept)(const std::str
           ""};
 }
 
-/// I/N with 1 ≤ I ≤ N; none for any other text.
+/// Parses I/N with 1 ≤ I ≤ N; empty for any other text.
 std::optional<Shard> shard_of(const std::string& text) {
   Shard shard;
   const char* const end = text.data() + text.size();
@@ -39,7 +39,7 @@ bool is_shard(const std::string& text) {
   return shard_of(text).has_value();
 }
 
-/// A whole text that is a number; none for any other.
+/// Parses a number; empty if the text is anything else.
 template <class Number>
 std::optional<Number> read_number(std::string_view text) {
   Number number{};
@@ -90,7 +90,7 @@ CommandLine::CommandLine()
       [this](const CLI::App* asked, const std::string&, CLI::AppFormatMode) { return help_text(*this, *asked); });
   app.set_version_flag("--version", version_text, "Print the version and the instruction set in use, and end");
   app.set_help_flag("-h,--help", "Print this help and end");
-  app.require_subcommand(0, 1);  // help simulate has one
+  app.require_subcommand(0, 1);  // `help simulate` has a subcommand
   add_simulate();
   add_ensemble();
   add_lyapunov();

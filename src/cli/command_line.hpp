@@ -11,8 +11,8 @@
 
 namespace pendula::cli {
 
-/// What a word of the command line may be, for completion: a file of some endings, where there are any, one of some
-/// words, or a key of the scenario.
+/// What a word of the command line may be, for completion: a file with one of these endings (any, if there are none),
+/// one of these words, or a key of the scenario.
 // NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct Expected {
   std::vector<std::string_view> endings = {};
@@ -21,19 +21,19 @@ struct Expected {
   bool is_key = false;
 };  // NOLINTEND(readability-redundant-member-init)
 
-/// What else can be asked for help on, beside commands.
+/// Topics of help besides commands.
 inline constexpr std::string_view scenario_topic = "scenario", summary_topic = "summary";
 
 struct HelpOptions {
-  std::string topic;  ///< a command, or one of the topics; empty for the program
+  std::string topic;  ///< a command or a topic; empty for the program
   bool json = false;  ///< the topic as a JSON Schema
   bool man = false;   ///< all of it as a manual page
 };
 
-/// The command line: what can be asked for, and what was.
+/// The definition of the command line, and its parsed options.
 struct CommandLine {
   CommandLine();
-  CommandLine(const CommandLine&) = delete;  // options know where their values are
+  CommandLine(const CommandLine&) = delete;  // options have pointers to their values
   CommandLine& operator=(const CommandLine&) = delete;
 
   CLI::App app;
@@ -81,7 +81,7 @@ struct CommandLine {
   void add_links(CLI::App* command, std::optional<int>& links);
 };
 
-/// What an unknown word may have been meant for, ` (did you mean …?)`: an option of `app`, or a command.
+/// ` (did you mean …?)` with an option of `app` or a command that is near to an unknown word.
 std::string likely_meant(const CLI::App& app, const std::string& word);
 
 /// Throws io::InputError on `--set KEY VALUE`, which is one word, KEY=VALUE.

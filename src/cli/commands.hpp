@@ -6,32 +6,31 @@
 
 namespace pendula::cli {
 
-/// How the program ends.
+/// Exit statuses of the program.
 enum ExitStatus {
   done = 0,
   failed = 1,       ///< the computation failed; what was computed is kept
   wrong_input = 2,  ///< file, key, value, command or option
-  unfinished = 3,   ///< members of an ensemble are missing; what is there is kept, and --resume goes on
+  unfinished = 3,   ///< members of an ensemble are missing; --resume goes on
 };
 
 struct SimulateOptions {
-  std::string command;                 ///< as it was typed, for files to tell
-  std::string scenario;                ///< the file; empty where a run goes on
-  std::optional<std::string> resume;   ///< run file that it goes on with
+  std::string command;                 ///< as typed, for files
+  std::string scenario;                ///< the file; empty if a run is resumed
+  std::optional<std::string> resume;   ///< run file to resume
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::optional<std::string> output;   ///< trajectory file, CSV or HDF5 by its ending; "-" is standard output
-  std::optional<std::string> events;   ///< file for its events, CSV
-  std::optional<std::string> view;     ///< page to look at the run
+  std::optional<std::string> events;   ///< CSV file of events
+  std::optional<std::string> view;     ///< page of the run
   std::optional<std::string> video;    ///< film of the run
-  int copies = 0;                      ///< further runs in the page, from starts that differ
-  double apart = 1e-9;                 ///< by this, in the first coordinate, from one to the next
+  int copies = 0;                      ///< further runs in the page, from other starts
+  double apart = 1e-9;                 ///< distance of neighbouring starts, in the first coordinate
   bool json = false;                   ///< summary as JSON
   bool quiet = false;                  ///< no summary and no progress; warnings, errors and the JSON object remain
 };
 
-/// Runs a scenario: trajectory to the file, summary to standard output (or to standard error where that is the file),
-/// progress and warnings to standard error.
-/// Throws io::InputError.
+/// Runs a scenario. The trajectory goes to the file, the summary to standard output (to standard error if standard
+/// output is the file), progress and warnings to standard error. Throws io::InputError.
 ExitStatus simulate(const SimulateOptions& options);
 
 struct CheckOptions {
@@ -40,57 +39,57 @@ struct CheckOptions {
   std::optional<int> links;
 };
 
-/// The self-test of this build, or of one model: kernels, order, energy; a table to standard output. Throws
-/// io::InputError where no kernel is chosen.
+/// The self-test of this build, or of one model: a table of kernels, orders, energies on standard output. Throws
+/// io::InputError if no kernel is chosen.
 ExitStatus check(const CheckOptions& options);
 
 struct BuildOptions {
   std::string model;         ///< a model file, or a built-in model
-  std::optional<int> links;  ///< where the model has some
+  std::optional<int> links;  ///< if the model has links
 };
 
-/// Makes the kernel of a model, or finds it made; says where it is on standard output. Throws io::InputError.
+/// Makes the kernel of a model, unless it exists; prints where it is. Throws io::InputError.
 ExitStatus build(const BuildOptions& options);
 
 struct DescribeOptions {
   std::string model;         ///< a model file, or a built-in model
-  std::optional<int> links;  ///< where the model has some
+  std::optional<int> links;  ///< if the model has links
   bool json = false;
 };
 
-/// Tells on standard output what a model has: coordinates, parameters, inputs, points. Throws io::InputError.
+/// Prints coordinates, parameters, inputs and points of a model. Throws io::InputError.
 ExitStatus describe(const DescribeOptions& options);
 
-/// Lists the built-in models on standard output. Throws io::InputError.
+/// Prints a list of the built-in models. Throws io::InputError.
 ExitStatus models(bool json);
 
-/// Writes NAME.py, a model to start from. Throws io::InputError where that cannot be.
+/// Writes NAME.py, a model to start from. Throws io::InputError if it cannot be written.
 ExitStatus new_model(const std::string& name);
 
 struct PlotOptions {
   std::vector<std::string> runs;  ///< files of trajectories, of events, or of Lyapunov exponents
   std::string output;             ///< .svg, .png or .pdf
-  std::string show;               ///< panels of trajectories, with commas; empty for what there is
-  std::string coordinates;        ///< by name, with commas; empty for a few
+  std::string show;               ///< panels, separated by commas; empty for all
+  std::string coordinates;        ///< names, separated by commas; empty for a few
   std::optional<double> from, to;
   bool wrapped = false;  ///< angles within one turn
 };
 
-/// Draws runs, by the Python package pendula_plot; its complaints go to standard error.
+/// Draws runs by the Python package pendula_plot; its errors go to standard error.
 ExitStatus plot(const PlotOptions& options);
 
 struct MapOptions {
   std::string file;     ///< of an ensemble
   std::string key;      ///< what is kept of every member
   std::string output;   ///< .svg, .png or .pdf
-  std::string scale;    ///< "log" or "linear"; empty for what the numbers ask for
-  std::string contour;  ///< `key=value`, a line where what is kept has that value; empty for none
+  std::string scale;    ///< "log" or "linear"; if empty, chosen by the numbers
+  std::string contour;  ///< `key=value`, a contour line; empty for none
 };
 
-/// Draws an ensemble over its axes, as plot does.
+/// Draws an ensemble over its axes, by pendula_plot.
 ExitStatus map(const MapOptions& options);
 
-/// Whether a film of that name can be made here; says why not on standard error.
+/// Whether a film of that name can be made here; if not, prints why to standard error.
 ExitStatus check_film(const std::string& output);
 
 /// Makes a film of a run file.
@@ -107,29 +106,29 @@ struct LyapunovOptions {
   bool json = false;
 };
 
-/// Runs a scenario and tells its Lyapunov exponents on standard output. Throws io::InputError.
+/// Runs a scenario and prints its Lyapunov exponents. Throws io::InputError.
 ExitStatus lyapunov(const LyapunovOptions& options);
 
-/// One of several parts of an ensemble that run by themselves.
+/// A part of an ensemble that runs by itself.
 struct Shard {
   int number = 1, of = 1;
 };
 
 struct EnsembleOptions {
-  std::string command;                 ///< as it was typed, for the file to tell
+  std::string command;                 ///< as typed, for the file
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::string output;                  ///< HDF5 file
-  int threads = 0;                     ///< of each process; 0 for as many as there are cores, of several ranks for one
+  int threads = 0;  ///< of each process; 0 for the number of cores, or one if there are several ranks
   std::optional<Shard> shard;
-  bool resume = false;  ///< goes on with what is beside the output
+  bool resume = false;  ///< goes on with the journals beside the output
   bool json = false;
 };
 
-/// Moves the members of a scenario with [ensemble]; a summary to standard output. Throws io::InputError.
+/// Runs the members of a scenario with [ensemble], and prints a summary. Throws io::InputError.
 ExitStatus ensemble(const EnsembleOptions& options);
 
-/// Lists the fixed-n kernels of this build on standard output.
+/// Prints a list of the fixed-n kernels of this build.
 ExitStatus kernels();
 
 }  // namespace pendula::cli

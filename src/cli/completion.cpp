@@ -110,7 +110,7 @@ std::string one_line(std::string_view word, std::string_view what) {
   return std::string(word) + (what.empty() ? "" : '\t' + std::string(what)) + '\n';
 }
 
-/// The option that a word begins with or is.
+/// The option that a word is, or begins with (--option=…).
 const CLI::Option* option_named(const CLI::App& app, std::string_view word) {
   for (const CLI::Option* option : options_of(app)) {
     for (const std::string& name : option->get_lnames()) {
@@ -127,7 +127,7 @@ bool takes_value(const CLI::Option* option) {
   return option != nullptr && option->get_type_size() != 0;
 }
 
-/// Keys of the scenario that the command looks at; behind a key its values, where there are few.
+/// Keys of the scenario that the command reads; after a key its values, if there are few.
 std::string key_lines(std::string_view command, std::string_view begin, const std::string& before) {
   std::string text;
   const auto add = [&](const std::string& word, std::string_view what) {
@@ -152,7 +152,7 @@ std::string key_lines(std::string_view command, std::string_view begin, const st
   return text;
 }
 
-/// What may stand where an option or an argument takes a value that begins so.
+/// Candidates for the value of an option or argument that begins so.
 std::string value_lines(const CommandLine& line, const CLI::App& command, const CLI::Option* option,
                         std::string_view begin, const std::string& before = "") {
   const auto found = line.expected.find(option);
@@ -189,7 +189,7 @@ std::string command_lines(const CLI::App& app, std::string_view begin) {
   return text;
 }
 
-/// The argument that comes after so many.
+/// The argument after so many given ones.
 const CLI::Option* next_argument(const CLI::App& command, std::size_t given) {
   const std::vector<const CLI::Option*> arguments = arguments_of(command);
   if (given < arguments.size()) return arguments[given];
@@ -201,8 +201,8 @@ const CLI::Option* next_argument(const CLI::App& command, std::size_t given) {
 std::string candidates(const CommandLine& line, std::span<const std::string> words) {
   const std::string_view current = words.back();
   const CLI::App* command = nullptr;
-  const CLI::Option* waiting = nullptr;  // for its value
-  std::size_t given = 0;                 // arguments
+  const CLI::Option* waiting = nullptr;  // an option without its value yet
+  std::size_t given = 0;                 // number of arguments so far
   for (const std::string& word : words.first(words.size() - 1)) {
     if (command == nullptr) {
       const auto is_named = [&](const CLI::App* app) { return app->get_name() == word; };

@@ -46,13 +46,13 @@ namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
 
-/// A line on standard error that shows how many members are done, how fast, and how long the others will take.
+/// A progress line on standard error: members done, rate, remaining time.
 class EnsembleProgress {
  public:
   EnsembleProgress(std::int64_t members, std::int64_t done, bool wanted)
       : members_(members), before_(done), done_(done), line_(wanted) {}
 
-  /// From any thread.
+  /// May be called by any thread.
   void add(std::int64_t members) {
     const std::scoped_lock lock(guard_);
     done_ += members;
@@ -69,7 +69,7 @@ class EnsembleProgress {
   std::mutex guard_;
 };
 
-/// Of the ensemble alone, so that whoever goes on has the same ones: a few members for each lane, where they go there.
+/// Members in a chunk. It depends on the ensemble alone, so that a resumed one has the same; a few for each lane.
 std::int64_t chunk_of(std::int64_t members, bool in_lanes) {
   return std::clamp<std::int64_t>(members / 128, in_lanes ? 32 : 1, 512);
 }
@@ -101,7 +101,7 @@ class EnsembleSession {
     const auto began = Clock::now();
     work(missing);
     seconds_ = std::chrono::duration<double>(Clock::now() - began).count();
-    ranks_.all(true);  // all have written what they have
+    ranks_.all(true);  // all ranks have written their members
     return ranks_.rank() == 0 ? finish() : done;
   }
 
@@ -132,7 +132,7 @@ class EnsembleSession {
     return origin;
   }
 
-  /// Throws io::InputError where no file could take the output's place.
+  /// Throws io::InputError if the output could not be written.
   void require_output() const {
     std::error_code unknown;
     if (options_.output == "-") io::reject_output(options_.output, "standard output");
@@ -149,14 +149,14 @@ class EnsembleSession {
     }
   }
 
-  /// Nothing of a file that shards share, or that an interrupted ensemble has left.
+  /// Says that a file is replaced, unless shards share it, or an interrupted ensemble has left it.
   void tell_what_is_replaced() const {
     std::error_code unknown;
     if (ranks_.rank() != 0 || options_.resume || options_.shard || !fs::exists(options_.output, unknown)) return;
     std::cerr << "pendula: replacing " << options_.output << '\n';
   }
 
-  /// The file is complete: of several that end at once, one has written it, or it was there before.
+  /// The file is complete already: another shard has just written it, or it was there before.
   ExitStatus leave_alone() const {
     if (ranks_.rank() != 0) return done;
     std::cerr << "pendula: " << options_.output << ": has all members already\n";
@@ -165,8 +165,8 @@ class EnsembleSession {
     return done;
   }
 
-  /// Throws io::InputError where none of some members, evenly among all, has a scenario that can be read: a key is
-  /// wrong, not a number.
+  /// Throws io::InputError if none of some evenly chosen members has a valid scenario: then a key is wrong, not a
+  /// number.
   void require_members() {
     constexpr std::int64_t most = 64;
     const std::int64_t count = std::min(most, plan_.count);
@@ -183,8 +183,8 @@ class EnsembleSession {
     throw io::InputError(first);
   }
 
-  /// Chunks that nobody has done yet, of this shard. Throws io::InputError where journals are there unasked for, or are
-  /// of something else.
+  /// Chunks of this shard that are not done. Throws io::InputError if there are journals without --resume, or of
+  /// another ensemble.
   std::vector<std::int64_t> find_missing() {
     std::error_code unknown;
     const bool is_begun = fs::is_directory(folder_, unknown) && !fs::is_empty(folder_, unknown);
@@ -215,7 +215,7 @@ class EnsembleSession {
 
   void work(const std::vector<std::int64_t>& missing) {
     io::Journal journal(folder_, head_.kind());
-    ranks_.all(true);  // nobody looks for what is missing any more
+    ranks_.all(true);  // no rank reads the journals any more
     const MemberRuns members(scenarios_, plan_, kept_, guard_);
     EnsembleProgress progress(plan_.count, already_, !options_.json && ranks_.size() == 1);
     const auto claim = [&]() -> std::optional<Chunk> {
@@ -229,7 +229,7 @@ class EnsembleSession {
         progress.add(chunk.size());
       });
     } catch (const Interrupted&) {
-      // what is done is in the journal
+      // the journal has what is done
     }
     journal.sync();
   }
@@ -239,7 +239,7 @@ class EnsembleSession {
     return ranks_.size() > 1 ? 1 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   }
 
-  /// What a second look at some members has told.
+  /// A line about the second look at some members.
   void doubt() {
     if (tally_.untrusted == 0) return;
     const std::int64_t first = tally_.first_untrusted;
@@ -252,7 +252,7 @@ class EnsembleSession {
                         std::to_string(first) + ": " + numbers + "; " + std::visit(advice, scenarios_.base()));
   }
 
-  /// Of shards that end at once, one after the other.
+  /// Shards that end at the same time write one after the other.
   bool write() {
     const io::FolderLock lock(folder_);
     if (options_.shard && io::is_complete(options_.output, head_)) return false;

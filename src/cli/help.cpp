@@ -50,7 +50,7 @@ constexpr std::array<Example, 23> examples = {{
 
 constexpr std::size_t width = 80;
 
-/// Text in lines that begin at a column, the first behind what is there.
+/// Wraps text into lines that begin at a column; the first one continues a line.
 std::string wrapped(std::string line, std::size_t column, std::string_view text) {
   std::string all;
   if (!line.empty() && line.size() >= column) {
@@ -73,7 +73,7 @@ std::string paragraph(std::string_view title, std::string_view text) {
   return "\n" + std::string(title) + ":\n" + wrapped("", 2, text);
 }
 
-/// Names and what they are, in two columns.
+/// Names and descriptions, in two columns.
 template <class List, class Name, class What>
 std::string columns(std::string_view title, const List& list, Name name, What what) {
   constexpr std::size_t widest = 24;
@@ -85,7 +85,7 @@ std::string columns(std::string_view title, const List& list, Name name, What wh
   return text;
 }
 
-/// Keys of the scenario by table.
+/// Keys of the scenario, by table.
 std::string key_names(std::string_view command) {
   std::vector<const io::ScenarioTable*> tables = tables_of(command);
   std::erase_if(tables, [](const io::ScenarioTable* table) { return table->name.empty(); });
@@ -134,7 +134,7 @@ std::string typed(const CLI::Option& option) {
   for (const std::string& name : option.get_snames()) text += (text.empty() ? "-" : ", -") + name;
   for (const std::string& name : option.get_lnames()) text += (text.empty() ? "--" : ", --") + name;
   if (text.empty()) return option.get_name(true, false);
-  const std::string type = option.get_type_name();  // and, behind a colon, what CLI11 says of its checks
+  const std::string type = option.get_type_name();  // CLI11 adds its checks after a colon
   return option.get_type_size() == 0 ? text : text + ' ' + type.substr(0, type.find(':'));
 }
 

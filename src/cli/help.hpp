@@ -12,17 +12,17 @@ namespace pendula::cli {
 
 struct CommandLine;
 
-/// A call that somebody may want, and what it does.
+/// An example: a command line, and what it does.
 struct Example {
   std::string_view command;  ///< empty for the program as a whole
   std::string_view call;
   std::string_view what;
 };
 
-/// Of a command, in an order in which they can be typed.
+/// Examples of a command, in an order in which they can be run.
 std::vector<Example> examples_of(std::string_view command);
 
-/// The version, and where it runs.
+/// The version and the instruction set.
 std::string version_text();
 
 /// How an option or argument is typed: `-o, --output FILE`.
@@ -38,7 +38,7 @@ std::string usage(const CLI::App& command);
 /// How a table is written: `[chain]`, `[[event]]`.
 std::string heading(const io::ScenarioTable& table);
 
-/// Tables of a scenario that a command looks at.
+/// Tables of a scenario that a command reads.
 std::vector<const io::ScenarioTable*> tables_of(std::string_view command);
 
 /// What a key takes, its unit and its default: `number > 0; s; must be given`.

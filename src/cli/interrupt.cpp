@@ -8,7 +8,7 @@ namespace {
 
 #ifdef __ELF__
 struct sigaction inherited_hang_up = {};
-bool is_known = false;  // not every system runs code that early
+bool is_known = false;  // not all systems run the function below
 
 // Run before the libraries' own code; sanitizers may not yet be ready.
 __attribute__((no_sanitize("address", "undefined"))) void note_inherited() {
@@ -36,7 +36,7 @@ InterruptGuard::InterruptGuard() {
   noted = 0;
   struct sigaction action {};
   action.sa_handler = note;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second one does what it does by default
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second signal has its default effect
   sigemptyset(&action.sa_mask);
   for (std::size_t i = 0; i < signals.size(); ++i) {
     sigaction(signals[i], nullptr, &before_[i]);

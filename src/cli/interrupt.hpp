@@ -5,12 +5,12 @@
 
 namespace pendula::cli {
 
-/// A hang-up does again what it did when the program began. Libraries may have changed that before main: UCX, which
-/// comes with Open MPI 5, takes SIGHUP for itself, even where nohup had it ignored.
+/// Restores the effect of SIGHUP that it had when the program began. Libraries may have changed it before main: UCX,
+/// which comes with Open MPI 5, takes SIGHUP even if nohup had it ignored.
 void restore_hang_up();
 
-/// While it lives, the first interrupt (Ctrl-C), hang-up or request to end is noted, so that the run can stop at its
-/// next step and keep what it has; the second ends the program at once.
+/// While it lives, the first SIGINT (Ctrl-C), SIGHUP or SIGTERM is noted, so that a run can stop at its next step and
+/// keep its results. The second one ends the program at once.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -15,14 +15,14 @@ namespace pendula::cli {
 /// What is kept of every member of an ensemble.
 class Kept {
  public:
-  /// Throws io::InputError where the ensemble asks for what there is not.
+  /// Throws io::InputError if the ensemble asks for an unknown quantity.
   Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events);
 
   std::vector<io::EnsembleColumn> columns() const;
-  /// Whether anything is kept that tangents tell.
+  /// Whether anything is kept that needs tangents.
   bool chaos() const;
 
-  /// Appends the numbers of a member; `spectrum` is looked at where `chaos`.
+  /// Appends the numbers of a member; `spectrum` is used only if chaos().
   void append(const Subject& subject, const RunReport& report, const LyapunovSpectrum& spectrum,
               std::vector<double>& row) const;
 
@@ -43,7 +43,7 @@ class Kept {
   struct Column {
     io::EnsembleColumn column;
     Source source;
-    std::size_t index = 0;  // of a row's number, or of an event
+    std::size_t index = 0;  // of a column of the row, or of an event
   };
 
   void add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,

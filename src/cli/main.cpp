@@ -65,7 +65,7 @@ ExitStatus help(const CommandLine& line) {
 ExitStatus dispatch(CommandLine& line, const std::string& command) {
   if (*line.help) return help(line);
   if (*line.completion) return print(completion_script(line.shell));
-  version_text();  // whether the instruction set is wrong, before anything else is
+  version_text();  // throws if PENDULA_ARCH is wrong, before anything else happens
   line.simulate_options.command = line.ensemble_options.command = command;
   if (*line.simulate) return simulate(line.simulate_options);
   if (*line.check) return check(line.check_options);
@@ -85,21 +85,21 @@ ExitStatus dispatch(CommandLine& line, const std::string& command) {
   return wrong_input;
 }
 
-/// The status, unless what was printed could not be written.
+/// The given status, or `failed` if standard output could not be written.
 ExitStatus flushed(ExitStatus status) {
   if (std::cout.flush()) return status;
   std::cerr << "pendula: standard output could not be written\n";
   return failed;
 }
 
-/// Standard streams that are closed: a file opened later must not become one of them. They stay unwritable.
+/// Opens closed standard streams as unwritable ones, so that no file opened later becomes one of them.
 void keep_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(stream, F_GETFD) < 0) static_cast<void>(open("/dev/null", O_RDONLY));  // takes the lowest free number
   }
 }
 
-/// Messages leave a line at a time: ranks, and mpirun itself, write to the same stream.
+/// Writes messages line by line, since ranks and mpirun share the stream.
 void write_messages_by_line() {
   std::setvbuf(stderr, nullptr, _IOLBF, BUFSIZ);
   std::cerr << std::nounitbuf;
@@ -108,7 +108,8 @@ void write_messages_by_line() {
 ExitStatus run(int argc, char** argv) {
   keep_standard_streams();
   write_messages_by_line();
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is a full disk: writing fails, the run ends in order
+  std::signal(SIGXFSZ,
+              SIG_IGN);  // a limit on file sizes acts like a full disk: writing fails, and the run ends in order
   CommandLine line;
   std::vector<std::string> words(argv + 1, argv + std::max(argc, 1));
   if (words.size() > 2 && words[0] == "completion" && words[1] == candidates_flag) {
@@ -116,7 +117,7 @@ ExitStatus run(int argc, char** argv) {
   }
   require_one_word(words);
   try {
-    std::ranges::reverse(words);  // as CLI11 takes them
+    std::ranges::reverse(words);  // the order that CLI11 expects
     line.app.parse(std::move(words));
   } catch (const CLI::Success& asked) {  // --help, --version
     line.app.exit(asked);

@@ -10,7 +10,7 @@
 namespace pendula::cli {
 namespace {
 
-/// Text in which nothing is a request or an escape of roff; hyphens are those that can be typed.
+/// Escapes text for roff; hyphens stay ASCII.
 std::string plain(std::string_view text) {
   std::string roff;
   for (const char c : text) {
@@ -38,7 +38,7 @@ std::string entry(std::string_view tag, std::string_view text) {
   return ".TP\n.B \"" + plain(tag) + "\"\n" + plain(text) + '\n';
 }
 
-/// Arguments and options; that a command has help is said once.
+/// Arguments and options, without --help, which all commands have.
 std::string options(const CLI::App& command) {
   std::string text;
   const auto add = [&](const CLI::Option* option) { text += entry(typed(*option), option->get_description()); };

@@ -25,10 +25,10 @@
 
 namespace pendula::cli {
 
-/// Thrown out of a member that was under way.
+/// Thrown when the user interrupts a member.
 struct Interrupted {};
 
-/// The run of a member, but for events. Trials for an accuracy are made where one is asked for, and not otherwise.
+/// The setup of a member's run, without events. Trials for an accuracy are made only if one is asked for.
 template <class Scenario>
 RunSetup member_setup(const Scenario& scenario) {
   return {.subject = subject_of(scenario),
@@ -41,21 +41,21 @@ RunSetup member_setup(const Scenario& scenario) {
           .estimate = scenario.estimate};
 }
 
-/// The scenario of an ensemble, and those of its members: the same with other numbers.
+/// The scenario of an ensemble, and those of its members, which have other numbers.
 class MemberScenarios {
  public:
-  /// Reads the file; `quiet` says nothing on standard error where a model's kernel is made. Throws io::InputError.
+  /// Reads the file. Unless `quiet`, it says on standard error that a model's kernel is made. Throws io::InputError.
   MemberScenarios(const std::string& file, std::vector<std::string> overrides, bool quiet);
 
   const io::ScenarioText& text() const { return text_; }
   const std::vector<std::string>& overrides() const { return overrides_; }
-  /// Text of the model's file, once a scenario was read; empty where there is none.
+  /// The text of the model's file, once a scenario was read; empty if there is none.
   const std::string& model() const { return model_; }
 
   io::AnyScenario base() { return parse(overrides_); }
 
-  /// Several threads may ask at once. Throws io::InputError. Quickly means without places in the file
-  /// (io::ScenarioDocument).
+  /// The scenario of a member; "quickly" is without places in the file (io::ScenarioDocument). Several threads may call
+  /// them. Throws io::InputError.
   io::AnyScenario of_member(const io::EnsemblePlan& plan, std::int64_t member);
   io::AnyScenario quickly_of_member(const io::EnsemblePlan& plan, std::int64_t member);
 
@@ -79,12 +79,12 @@ class MemberScenarios {
   std::string model_;
 };
 
-/// Moves members. Several threads may share it.
+/// Runs members. Several threads may share it.
 class MemberRuns {
  public:
   MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan, const Kept& kept, const InterruptGuard& guard);
 
-  /// What came of them, and whether a second look at some of them agrees; one that cannot be moved says so. Throws
+  /// Runs a chunk of members, some of them again as a second look. A member that cannot be run has a message. Throws
   /// Interrupted.
   io::DoneChunk run(const Chunk& members) const;
 

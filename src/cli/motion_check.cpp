@@ -16,8 +16,8 @@ namespace {
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-// Of distances in roundings, what was measured at most is 1.5: of the committed kernels, the built-in models, and those
-// of examples and tests, with parameters over four decades.
+// Largest measured distance in roundings: 1.5, over the committed kernels, the built-in models, and those of examples
+// and tests, with parameters over four decades.
 constexpr double most_roundings = 30;
 
 std::string label(const std::string& what, int stages, Form form) {
@@ -27,8 +27,8 @@ std::string label(const std::string& what, int stages, Form form) {
 
 }  // namespace
 
-// From a picosecond to thirty thousand years, by twos, up to the first time that is not followed: what acts for a
-// moment only, longer ones may step over. What is checked is checked over half of it, and less where that is not short
+// Doubles the time from a picosecond up to thirty thousand years until eight steps no longer follow the motion; longer
+// times might step over what acts for a moment only. Checks run over half that time, or less if that is not short
 // enough.
 MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
                          double energy_rounding)
@@ -74,7 +74,7 @@ CheckLine MotionCheck::dense_to_chain(Iteration iteration) const {
   });
 }
 
-/// Of the first span that is short enough, or of the one that comes nearest to it.
+/// The line of the first span that passes, or the best line.
 CheckLine MotionCheck::best(const std::function<CheckLine(const Span&)>& line) const {
   CheckLine best;
   for (const Span& span : spans_) {
@@ -108,13 +108,13 @@ double MotionCheck::distance(const std::optional<Motion>& a, const std::optional
                   ((a->v - b->v).array() / span.v.array()).abs().maxCoeff());
 }
 
-/// In what a rounding in each of some steps grows to.
+/// The distance, in units of what a rounding in each of 32 steps grows to.
 double MotionCheck::roundings(const std::optional<Motion>& a, const std::optional<Motion>& b, const Span& span) {
   return distance(a, b, span) / (32 * epsilon * span.growth);
 }
 
-/// The state after `steps` steps over `time`, which is negative on the way back; nothing where a step failed, or was
-/// taken in parts.
+/// The state after `steps` steps over `time`, which is negative on the way back; empty if a step failed, or was
+/// divided.
 std::optional<MotionCheck::End> MotionCheck::run(const RunOptions& options, const Motion& start, int steps,
                                                  double time) const {
   const auto integrator = subject_.make_integrator(options);
@@ -132,7 +132,7 @@ std::optional<Motion> MotionCheck::end(const RunOptions& options, int steps, con
   return end ? std::optional(end->motion) : std::nullopt;
 }
 
-/// By steps of the program's own choice, which see what acts for less than a step.
+/// The end by adaptive steps, which notice what acts for less than a step.
 std::optional<Motion> MotionCheck::own_steps(double time) const {
   RunSetup setup;
   setup.subject = {std::shared_ptr<void>(), &subject_};
@@ -147,7 +147,7 @@ std::optional<Motion> MotionCheck::own_steps(double time) const {
   return report.end == RunEnd::complete ? std::optional(report.last) : std::nullopt;
 }
 
-/// A span with its sizes alone.
+/// A span with nothing but its sizes.
 std::optional<MotionCheck::Span> MotionCheck::sized(double time) const {
   constexpr int steps = 16;
   const auto integrator = subject_.make_integrator(options(8, Form::momentum));
@@ -175,7 +175,7 @@ std::optional<MotionCheck::Span> MotionCheck::sized(double time) const {
   return span;
 }
 
-/// Whether eight stages, by steps of several sizes, agree on where it comes to.
+/// Whether eight stages with steps of several sizes agree on the end.
 bool MotionCheck::follows(double time) const {
   const std::optional<Span> span = sized(time);
   if (!span) return false;
@@ -189,7 +189,7 @@ bool MotionCheck::follows(double time) const {
   return !subject_.loaded() || distance(fine, own_steps(time), *span) < 1e-7;
 }
 
-/// One that is not chaos.
+/// A span; empty if the motion is chaotic within it.
 std::optional<MotionCheck::Span> MotionCheck::span(double time) const {
   std::optional<Span> span = sized(time);
   if (!span) return std::nullopt;
@@ -215,8 +215,8 @@ double MotionCheck::growth(const Motion& from, double time, const Span& span) co
   return there && nearby ? distance(there->motion, nearby->motion, span) / change : none;
 }
 
-/// Order from three errors that are no noise, of steps of half the size each: where these ratios are most nearly that
-/// of the method. Where steps of any size are right but for noise, the error.
+/// The order from three successive errors above the noise, each for half the step: the best of them. If errors are
+/// noise for steps of any size, the error itself.
 CheckLine MotionCheck::order(int stages, Form form, const Span& span) const {
   std::vector<double> errors;
   double error = none, order = none;
@@ -234,7 +234,7 @@ CheckLine MotionCheck::order(int stages, Form form, const Span& span) const {
   return at_least(label("order", stages, form), order, 2 * stages - 0.5);
 }
 
-/// Of the balance of energy and what loads brought, in roundings of the energy.
+/// The error of the balance of energy with the work of loads, in roundings of the energy.
 CheckLine MotionCheck::energy(Form form, const Span& span) const {
   double roundings = none;
   if (const std::optional<End> end = run(options(6, form), start_, 32, span.time)) {
@@ -269,7 +269,7 @@ CheckLine MotionCheck::iterations(const Span& span) const {
   return at_most("newton = fixed point, 6 stages", roundings(end(newton, 16, span), end(fixed_point, 16, span), span));
 }
 
-/// Of states within one step by `find`, from those where shorter steps end.
+/// The largest distance of states within a step, as `find` gives them, from the ends of shorter steps.
 template <class Find>
 double MotionCheck::farthest_within(double step, const Span& span, Find find) const {
   double farthest = 0;
@@ -298,7 +298,7 @@ CheckLine MotionCheck::look(const Span& span) const {
   return at_most("looks into a step, 6 stages", off / (32 * epsilon * span.growth));
 }
 
-/// They are of the order that rates have among the stages.
+/// Glances: their order is that of rates among the stages.
 CheckLine MotionCheck::glance(const Span& span) const {
   const auto glance = [](Integrator& integrator, double time) { return integrator.glance(time); };
   const double step = span.time / 8;
@@ -307,7 +307,7 @@ CheckLine MotionCheck::glance(const Span& span) const {
   return at_least("order of glances into a step, 6 stages", nearer < span.noise ? none : std::log2(off / nearer), 5);
 }
 
-/// The event is that the fastest coordinate comes by where it is after a while.
+/// An event: the fastest coordinate passes the value that it has after a while.
 CheckLine MotionCheck::event(const Span& span) const {
   const double duration = span.time / 4, when = 0.37 * duration;
   const std::string what = "where an event happens, 6 stages";
@@ -315,7 +315,7 @@ CheckLine MotionCheck::event(const Span& span) const {
   if (!there) return at_most(what, none);
   Eigen::Index fastest = 0;
   const double speed = (there->motion.v.array() / span.v.array()).abs().maxCoeff(&fastest);
-  if (speed < 1e-6) return at_most(what, 0);  // it does not come by anywhere
+  if (speed < 1e-6) return at_most(what, 0);  // nothing moves
   RunSetup setup;
   setup.subject = {std::shared_ptr<void>(), &subject_};
   setup.start = start_;
@@ -331,7 +331,7 @@ CheckLine MotionCheck::event(const Span& span) const {
   return at_most(what, moved / (32 * epsilon * span.growth));
 }
 
-/// Of the derivative of a step, in coordinates and momenta: relative to what cancels.
+/// How far the derivative of a step, in coordinates and momenta, is from symplectic, relative to what cancels.
 CheckLine MotionCheck::tangents(const Span& span) const {
   const std::string what = "tangents: D'JD = J, 4 stages";
   const auto integrator = subject_.make_integrator(options(4, Form::momentum));

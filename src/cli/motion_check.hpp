@@ -12,32 +12,31 @@
 
 namespace pendula::cli {
 
-/// One line of the table: what was measured, and what it may be.
+/// A line of the table: the measured value and its limit.
 struct CheckLine {
   std::string_view kernel;
   std::string what;
   double measured = 0;
   double limit = 0;
-  bool at_least = false;  ///< the limit is a lower one
+  bool at_least = false;  ///< the limit is a lower bound
 
-  bool ok() const { return at_least ? measured >= limit : measured <= limit; }  // false for NaN
+  bool ok() const { return at_least ? measured >= limit : measured <= limit; }  // false if NaN
 };
 
-/// Checks of anything that moves by its integrators, through the same door as every run: over times that follow from
-/// its motion, in units of what one rounding a step grows to.
+/// Checks the integrators of a subject on its own motion, over times that follow from the motion, in units of what one
+/// rounding a step grows to.
 class MotionCheck {
  public:
-  /// `units` are those of the coordinates; `energy_rounding` is what energies are off by, 0 where that is not known
-  /// [J].
+  /// `units` are those of the coordinates; `energy_rounding` is the error of energies, 0 if unknown [J].
   MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
               double energy_rounding);
 
-  /// How long eight steps of eight stages follow it; 0 where they do not even for a moment  [s].
+  /// How long eight steps of eight stages follow the motion; 0 if they never do [s].
   double time() const { return time_; }
 
   std::vector<CheckLine> lines() const;
 
-  /// How far the ends of runs by the dense kernel and by the chain solver are apart.
+  /// The distance of the ends by the dense kernel and by the chain solver.
   CheckLine dense_to_chain(Iteration iteration) const;
 
  private:
@@ -47,13 +46,13 @@ class MotionCheck {
     double work = 0;  // that loads brought  [J]
   };
 
-  /// A part of the motion, from its start on.
+  /// The beginning of the motion, up to a time.
   struct Span {
     double time = 0;
-    Eigen::VectorXd q, v;  // sizes that coordinates of each unit, and their rates, reach
-    double growth = 1;     // of a small change
+    Eigen::VectorXd q, v;  // largest coordinates and rates, by unit
+    double growth = 1;     // growth of a small change
     Motion exact;          // the end
-    double noise = 0;      // of ends, relative to the sizes
+    double noise = 0;      // of the end, relative to the sizes
   };
 
   static RunOptions options(int stages, Form form, Solver solver = Solver::dense);

@@ -12,8 +12,8 @@
 
 namespace pendula::cli {
 
-/// A line on standard error that shows how far a run is, how fast, how long it will take and how far its energy is off;
-/// nothing at all where that is no terminal.
+/// A progress line on standard error: share done, rate, remaining time, energy error. Nothing is printed if that is no
+/// terminal.
 class Progress : public Observer {
  public:
   Progress(const RunSetup& setup, bool wanted)
@@ -34,7 +34,7 @@ class Progress : public Observer {
   void finish() override { line_.erase(); }
 
  private:
-  // As the summary compares energies, as far as the run is known.
+  // The energy error as in the summary, for the rows so far.
   void follow(const Observation& seen) {
     if (rows_++ == 0) first_energy_ = seen.energy;
     if (!(scale_ > 0)) largest_ = std::max(largest_, std::abs(seen.kinetic) + std::abs(seen.potential()));
@@ -60,12 +60,12 @@ class Progress : public Observer {
   }
 
   double start_time_, duration_;
-  std::int64_t every_;  // steps from row to row; 0: rows are wanted at times
+  std::int64_t every_;  // steps from row to row; 0 if rows are wanted at times
   double scale_;
   bool conserves_;
   TerminalLine line_;
   std::int64_t rows_ = 0;
-  double first_share_ = 0;                 // of a run that goes on, what was there already
+  double first_share_ = 0;                 // of a resumed run: the share that was done before
   double first_energy_ = 0, largest_ = 0;  // J
 };
 

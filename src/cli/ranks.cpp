@@ -17,7 +17,7 @@ namespace pendula::cli {
 
 #ifdef PENDULA_MPI
 
-/// A number that all ranks add to: rank 0 has it, the others reach into its memory.
+/// A counter shared by all ranks, in the memory of rank 0.
 struct Ranks::Shared {
   std::int64_t* number = nullptr;
   MPI_Win window = MPI_WIN_NULL;
@@ -26,7 +26,7 @@ struct Ranks::Shared {
 
 namespace {
 
-/// Whether a launcher of MPI has started this process: Open MPI, Slurm's, MPICH and those that come from it.
+/// Whether an MPI launcher has started this process: that of Open MPI, Slurm, MPICH or its descendants.
 bool is_launched() {
   for (const char* const name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE"}) {
     if (std::getenv(name) != nullptr) return true;
@@ -87,7 +87,7 @@ struct Ranks::Shared {};
 
 namespace {
 
-/// The first of some variables that a launcher has set to a number, and to at least so much; empty where none is.
+/// The first of some environment variables that is a number of at least so much; empty if there is none.
 std::string variable_of_at_least(int least, std::initializer_list<const char*> names) {
   for (const char* const name : names) {
     const char* const value = std::getenv(name);
@@ -96,8 +96,7 @@ std::string variable_of_at_least(int least, std::initializer_list<const char*> n
   return {};
 }
 
-/// What tells that this process is one of several. How many tasks Slurm has for a job says nothing of a program that
-/// its script calls without srun.
+/// The variable that shows that this process is one of several. Slurm's number of tasks counts only under srun.
 std::string sign_of_others() {
   std::string size =
       variable_of_at_least(2, {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS"});

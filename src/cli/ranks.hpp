@@ -6,11 +6,11 @@
 
 namespace pendula::cli {
 
-/// The processes that share one job: those that mpirun has started, where this build knows MPI, or this one alone.
+/// The processes of a job: those of mpirun, if this build has MPI, else this one alone.
 class Ranks {
  public:
-  /// Throws io::InputError where a launcher has started several processes and this build does not know MPI: each would
-  /// think itself alone. That is right for those that have a shard of their own.
+  /// Throws io::InputError if a launcher has started several processes, and this build has no MPI: each would run the
+  /// whole job. Processes with shards of their own may do so.
   explicit Ranks(bool has_shard);
   ~Ranks();
   Ranks(const Ranks&) = delete;
@@ -19,21 +19,21 @@ class Ranks {
   int rank() const { return rank_; }
   int size() const { return size_; }
 
-  /// 0, 1, 2, …, each handed out once, to whichever thread of whichever rank asks first.
+  /// Returns 0, 1, 2, …, each once over all threads of all ranks.
   std::int64_t claim();
 
-  /// Ends the job, the other ranks too, which may wait for this one.
+  /// Ends the job on all ranks, which may be waiting for this one.
   [[noreturn]] void abort(int status);
 
-  /// Waits for all ranks; gives whether `mine` holds on every one.
+  /// Waits for all ranks. Returns whether `mine` is true on all.
   bool all(bool mine);
 
  private:
   struct Shared;
 
   int rank_ = 0, size_ = 1;
-  std::atomic<std::int64_t> next_ = 0;  // of one process
-  std::unique_ptr<Shared> shared_;      // of several
+  std::atomic<std::int64_t> next_ = 0;  // for one process
+  std::unique_ptr<Shared> shared_;      // for several ranks
 };
 
 }  // namespace pendula::cli

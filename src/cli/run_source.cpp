@@ -19,7 +19,7 @@ std::string key_of(const std::string& change) {
   return change.substr(0, change.find_first_of("= "));
 }
 
-/// Throws io::InputError where what decides how the run has come to where it is would be another.
+/// Throws io::InputError if overrides change a key that must stay the same in a resumed run.
 void require_free(const std::vector<std::string>& overrides) {
   const auto may_change = [](std::string_view key) {
     const io::ScenarioKey* const known = io::find_key(key);
@@ -40,7 +40,7 @@ void require_same(const std::string& file, const std::string& what, const std::s
   throw io::InputError(file + ": expected a run of " + what + " " + here + ", got one of " + got);
 }
 
-/// Whose numbers a checkpoint has: which of them runs may hang on the kernels of a build.
+/// Throws io::InputError unless the solver is the one of the checkpoint: it may depend on the kernels of a build.
 void require_same_solver(const io::RunOrigin& began, const io::RunOrigin& here) {
   if (began.solver == here.solver && began.kernel == here.kernel) return;
   const auto told = [](const io::RunOrigin& origin) {

@@ -12,29 +12,29 @@
 
 namespace pendula::cli {
 
-/// Where a run comes from: a scenario, or a run file that it goes on with.
+/// The source of a run: a scenario, or a run file to resume.
 struct RunSource {
   io::ScenarioText text;
-  std::vector<std::string> overrides;  ///< all that were ever asked for
-  std::optional<io::SavedRun> saved;   ///< of a run file
+  std::vector<std::string> overrides;  ///< those of the file and of the command line
+  std::optional<io::SavedRun> saved;   ///< the run to resume
 };
 
-/// Reads it. Throws io::InputError, also where this program cannot go on with what a run file has.
+/// Reads the source of a run. Throws io::InputError, too, if this program cannot resume the run.
 RunSource read_run_source(const SimulateOptions& options);
 
-/// Throws io::ModelError where a saved run is of another model; `model` is the text of its file.
+/// Throws io::ModelError if a saved run has another model; `model` is the text of the model's file.
 void require_same_model(const RunSource& source, const std::string& model);
 
-/// Where the model's file of a run that goes on is looked for: in `folder`, as the scenario named it, from where the
-/// program is called, or from where the run file lies.
+/// The folder in which the model file of a resumed run is found: `folder` as named by the scenario, relative to the
+/// working folder or to the run file.
 std::filesystem::path model_folder(const std::string& run_file, const std::string& model,
                                    const std::filesystem::path& folder);
 
-/// What a run file is to say of the run.
+/// The origin of a run, for its file.
 io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
                         const std::string& command, const std::string& title);
 
-/// What a run goes on from, of a scenario that was checked. Throws io::InputError where it ends before that.
+/// The checkpoint to resume from, for a checked scenario. Throws io::InputError if the scenario ends before it.
 std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end);
 
 }  // namespace pendula::cli

@@ -14,7 +14,7 @@
 
 namespace pendula::cli {
 
-/// What a scenario moves.
+/// The subject of a scenario.
 template <class Space>
 std::shared_ptr<const Subject> subject_of(const io::Scenario<Space>& scenario) {
   return std::make_shared<ChainSubject<Space>>(scenario.chain);
@@ -23,7 +23,7 @@ inline std::shared_ptr<const Subject> subject_of(const io::SystemScenario& scena
   return scenario.system;
 }
 
-/// Does it. What the runtime says of an option, `key: …`, is said at the place of that key. Throws io::InputError.
+/// Calls act(). Errors of the runtime about an option, `key: …`, become io::InputError with the place of that key.
 template <class Do>
 auto told_at_keys(const io::RunPlan& plan, const std::string& file, Do it) {
   try {

@@ -22,26 +22,25 @@
 
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/output_files.hpp"
 #include "cli/progress.hpp"
 #include "cli/run_source.hpp"
 #include "cli/scenario_subject.hpp"
 #include "io/event_file.hpp"
 #include "io/event_reader.hpp"
-#include "io/file_format.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/natural_units.hpp"
 #include "io/run_file.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"
-#include "io/trajectory.hpp"
 #include "view/page.hpp"
 #include "view/scene.hpp"
 
 namespace pendula::cli {
 namespace {
 
-/// What a page shows of it.
+/// The description of a subject for a page.
 template <class Space>
 view::Scene page_scene(const io::Scenario<Space>& scenario) {
   return view::scene_of(ChainSubject<Space>(scenario.chain));
@@ -50,7 +49,7 @@ view::Scene page_scene(const io::SystemScenario& scenario) {
   return view::scene_of(*scenario.system);
 }
 
-/// What a summary says of it.
+/// The description of a subject for a summary.
 template <class Space>
 void describe(const io::Scenario<Space>& scenario, const std::string& file, const Motion& last, io::Summary& summary) {
   summary.model = io::model_summary(file, scenario.chain, scenario.natural);
@@ -61,80 +60,6 @@ void describe(const io::SystemScenario& scenario, const std::string& file, const
   summary.system = io::snapshot(*scenario.system, last);
 }
 
-bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code none_there;
-  const auto whole = [](const std::filesystem::path& path) {
-    return std::filesystem::absolute(path).lexically_normal();
-  };
-  return whole(a) == whole(b) || std::filesystem::equivalent(a, b, none_there);
-}
-
-/// Throws io::InputError where writing `file` would destroy the scenario.
-void spare_scenario(const std::string& file, const char* what, const SimulateOptions& options) {
-  if (file == "-" || options.resume || !is_same_file(file, options.scenario)) return;
-  throw io::InputError(file + ": expected a file for the " + what + ", got the scenario itself");
-}
-
-/// Whether rows go to a run file: to what a run goes on with, whatever it is called, or by the ending of the name.
-bool is_run_file(const std::string& file, const SimulateOptions& options) {
-  return file == options.resume || io::format_of(file) == io::FileFormat::hdf5;
-}
-
-/// Throws io::InputError where the names of files are wrong, before anything takes long.
-void check_names(const SimulateOptions& options) {
-  if (options.output) {
-    spare_scenario(*options.output, "trajectory", options);
-    is_run_file(*options.output, options);
-  }
-  if (!options.events) return;
-  spare_scenario(*options.events, "events", options);
-  if (*options.events == "-") throw io::InputError("-: expected a file of its own for the events");
-  io::require_format(*options.events, io::FileFormat::csv, "events (a run file, -o run.h5, has them, too)");
-}
-
-/// The file for the rows: of a run that goes on the one that it goes on with, unless that has no rows. Throws
-/// io::InputError.
-std::optional<std::string> output_of(const RunSource& source, const SimulateOptions& options) {
-  const bool without_rows = source.saved && !source.saved->has_rows;
-  if (!options.output) return without_rows ? std::nullopt : options.resume;
-  if (without_rows && is_run_file(*options.output, options)) {
-    throw io::InputError(*options.output + ": expected a CSV file, got a run file, which begins with rows that " +
-                         *options.resume + " does not have");
-  }
-  return options.output;
-}
-
-/// Opens the file for the rows; a run file that goes on begins with those that are there. Throws io::InputError.
-std::unique_ptr<io::RowsFile> open_rows(const std::string& file, const SimulateOptions& options,
-                                        const io::RunOrigin& origin, const std::optional<io::SavedRun>& saved,
-                                        const io::RunContents& contents) {
-  if (!is_run_file(file, options)) return std::make_unique<io::TrajectoryFile>(file, columns_of(contents.quantities));
-  if (!saved) return std::make_unique<io::RunFile>(file, origin, contents);
-  return std::make_unique<io::RunFile>(file, *options.resume, *saved, origin, contents);
-}
-
-/// The same where one is asked for, and says what it replaces.
-template <class... Rest>
-std::unique_ptr<io::RowsFile> open_rows(const std::optional<std::string>& file, const SimulateOptions& options,
-                                        const Rest&... rest) {
-  if (!file) return nullptr;
-  std::error_code unknown;
-  const bool replaces = file != options.resume && std::filesystem::is_regular_file(*file, unknown);
-  auto opened = open_rows(*file, options, rest...);
-  if (replaces && !options.quiet) std::cerr << "pendula: replacing " << *file << '\n';
-  return opened;
-}
-
-/// Opens the page where one is asked for. Throws io::InputError.
-std::unique_ptr<view::Page> open_page(const SimulateOptions& options, const view::Scene& scene) {
-  if (!options.view) return nullptr;
-  spare_scenario(*options.view, "page", options);
-  if (*options.view == "-" || (options.output && is_same_file(*options.view, *options.output))) {
-    throw io::InputError(*options.view + ": expected a file of its own for the page");
-  }
-  return std::make_unique<view::Page>(*options.view, scene, 1 + static_cast<std::size_t>(options.copies));
-}
-
 std::vector<std::string> event_names(const RunSetup& setup) {
   std::vector<std::string> names;
   names.reserve(setup.events.size());
@@ -142,25 +67,7 @@ std::vector<std::string> event_names(const RunSetup& setup) {
   return names;
 }
 
-/// Throws io::InputError where there can be no file for events.
-void check_events(const SimulateOptions& options, const RunSetup& setup) {
-  if (!options.events) return;
-  const auto is_taken = [&](const std::optional<std::string>& file) {
-    return file && is_same_file(*options.events, *file);
-  };
-  if (is_taken(options.output) || is_taken(options.view) || is_taken(options.resume)) {
-    throw io::InputError(*options.events + ": expected a file of its own for the events");
-  }
-  if (!setup.events.empty()) return;
-  throw io::InputError("--events " + *options.events + ": expected a scenario with [[event]], got one without");
-}
-
-std::unique_ptr<io::EventFile> open_events(const SimulateOptions& options, const RunSetup& setup) {
-  if (!options.events) return nullptr;
-  return std::make_unique<io::EventFile>(*options.events, setup.subject->columns());
-}
-
-/// What a page shows of a scenario.
+/// The contents of a page for a scenario.
 template <class Scenario>
 view::Scene scene_of(const Scenario& scenario, const RunSource& source) {
   view::Scene scene = page_scene(scenario);
@@ -173,16 +80,16 @@ view::Scene scene_of(const Scenario& scenario, const RunSource& source) {
   return scene;
 }
 
-/// What a run file has of a run. Quantities of a file are those that it begins with: events only where they are wanted.
+/// The contents of a run file; with events if `with_events`.
 io::RunContents contents_of(const RunSetup& setup, const io::RunPlan& plan, bool with_events = true) {
   return {setup.subject->quantities(), setup.subject->constants(),
           with_events ? event_names(setup) : std::vector<std::string>(), plan.natural};
 }
 
-/// Rows of a film: four to each frame of pendula_plot, so that traces are smooth between them.
+/// Rows of a film: four for each frame of pendula_plot, so that traces are smooth.
 const RowTimes film_times{1.0 / 120, {}};
 
-/// The last place that a run may go on from.
+/// Keeps the last checkpoint of a run.
 class LastCheckpoint : public Observer {
  public:
   void take(const Row&) override {}
@@ -191,7 +98,7 @@ class LastCheckpoint : public Observer {
   std::optional<Checkpoint> kept;
 };
 
-/// Runs a scenario and says what came out, but for what was moved.
+/// Runs a scenario and reports the results.
 class RunSession {
  public:
   RunSession(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const RunSource& source,
@@ -245,7 +152,7 @@ class RunSession {
     return summary;
   }
 
-  /// Puts the summary into the run file, which is closed then. Where that cannot be, the summary says so.
+  /// Writes the summary into the run file and closes it. If that fails, the summary says so.
   void conclude(io::Summary& summary) {
     auto* const file = dynamic_cast<io::RunFile*>(file_.get());
     if (file == nullptr) return;
@@ -257,7 +164,7 @@ class RunSession {
   }
 
  private:
-  /// Throws io::InputError where what the file was left with is not what these steps go on from.
+  /// Throws io::InputError if the checkpoint of the file does not fit this run.
   RunReport go_on(const std::function<bool()>& stop) {
     try {
       return run_.go_on(*from_, stop);
@@ -268,7 +175,7 @@ class RunSession {
     }
   }
 
-  /// Runs the copies, and writes the page.
+  /// Runs the copies and writes the page.
   void finish_page(const std::function<bool()>& interrupted, io::Summary& summary) {
     page_->end_run(summary.energy_error);
     for (int copy = 1; copy <= options_.copies && !interrupted(); ++copy) run_copy(copy, summary.options, interrupted);
@@ -282,8 +189,8 @@ class RunSession {
     }
   }
 
-  /// A film is made of a run file that goes again, with rows for each frame; one of a run that goes on, of that run's,
-  /// which has the rows of before.
+  /// A film is made from a temporary run file with rows for each frame; for a resumed run from its own file, which has
+  /// the earlier rows.
   std::unique_ptr<io::RunFile> open_film_rows(const io::RunContents& contents) const {
     if (!options_.video || (from_ && keeps_run_file())) return nullptr;
     return std::make_unique<io::RunFile>(film_rows_name(), origin_, contents);
@@ -302,7 +209,7 @@ class RunSession {
     if (film_rows_) std::filesystem::remove(rows, unknown);
   }
 
-  /// In the run file, or in one that has nothing else.
+  /// Keeps the checkpoint in the run file, or in a file of its own.
   void tell_how_to_go_on(io::Summary& summary) {
     if (!last_.kept) return;
     std::string file = keeps_run_file() ? *output_ : "";
@@ -337,7 +244,7 @@ class RunSession {
     }
   }
 
-  /// Each is told on standard error as it comes and kept for the summary.
+  /// Prints a warning on standard error, and keeps it for the summary.
   void warn(const std::vector<std::string>& sentences) {
     for (const std::string& sentence : sentences) {
       std::cerr << "pendula: warning: " << sentence << '\n';
@@ -351,7 +258,7 @@ class RunSession {
   Run run_;
   io::RunOrigin origin_;
   std::optional<std::string> output_;
-  std::unique_ptr<view::Page> page_;  // opened first: that leaves what is there as it is
+  std::unique_ptr<view::Page> page_;  // opened first; an existing file stays until it is written
   std::unique_ptr<io::RowsFile> file_;
   std::unique_ptr<io::EventFile> events_;
   std::unique_ptr<io::RunFile> film_rows_;

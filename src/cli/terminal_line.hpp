@@ -11,7 +11,7 @@
 
 namespace pendula::cli {
 
-/// How long a rest will take, as people say it.
+/// A remaining time in words.
 inline std::string rest_text(double seconds) {
   const auto whole = static_cast<std::int64_t>(std::min(std::ceil(seconds), 1e15));
   if (whole < 60) return std::to_string(whole) + " s";
@@ -19,7 +19,7 @@ inline std::string rest_text(double seconds) {
   return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
 }
 
-/// A line on standard error that is drawn over and over, and is gone in the end; nothing where that is no terminal.
+/// A line on standard error that is redrawn, and removed in the end; nothing if that is no terminal.
 class TerminalLine {
   using Clock = std::chrono::steady_clock;
 
@@ -29,10 +29,10 @@ class TerminalLine {
   TerminalLine(const TerminalLine&) = delete;
   TerminalLine& operator=(const TerminalLine&) = delete;
 
-  /// Whether anything would be shown at all.
+  /// Whether anything is shown.
   bool is_shown() const { return shown_; }
 
-  /// Draws text_of(seconds since the beginning), where a tenth of a second has passed since it was last drawn.
+  /// Draws text_of(seconds since the beginning), at most ten times a second.
   template <class TextOf>
   void draw(TextOf&& text_of) {
     const auto now = Clock::now();
