@@ -191,6 +191,17 @@ TEST(Simulation, WritesRowsWhateverTheStepsAre) {
   EXPECT_THROW(run.write_csv("/nowhere/rows.csv", every(0.1)), std::runtime_error);
 }
 
+TEST(Simulation, RowsThatAreNotAskedForRightLeaveTheFileAsItWas) {
+  const std::string file = testing::TempDir() + "simulation_kept.csv";
+  std::ofstream(file) << "precious\n";
+  Simulation run(equal_chain<Planar>(2), let_go());
+  EXPECT_THROW(run.write_csv(file, every(0)), std::invalid_argument);
+  std::string line;
+  std::getline(std::ifstream(file), line);
+  EXPECT_EQ(line, "precious");
+  std::remove(file.c_str());
+}
+
 TEST(Simulation, StopsWhereThatIsRequested) {
   std::stop_source source;
   Simulation run(equal_chain<Planar>(2), let_go());

@@ -187,7 +187,6 @@ void Mover::replace(std::vector<Event> events, std::vector<Happened> happened) {
 }
 
 void Mover::add(std::unique_ptr<Observer> observer, const RowTimes& times) {
-  if (!times.any()) throw std::invalid_argument("rows: expected an interval > 0 or times");
   viewers_.emplace_back(*subject_, *observer, times).begin(motion_, motion_.time);
   observers_.push_back(std::move(observer));
 }

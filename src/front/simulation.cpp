@@ -47,6 +47,12 @@ Mover::Happened happened_of(const pendula_event& given) {
   };
 }
 
+RowTimes rows_every(double interval) {
+  const RowTimes times{interval, {}};
+  if (!times.any()) throw std::invalid_argument("rows: expected an interval > 0");
+  return times;
+}
+
 /// Hands rows on.
 class Rows : public Observer {
  public:
@@ -203,7 +209,8 @@ int pendula_stopped_by(const pendula_simulation* simulation) {
 
 pendula_status pendula_write_csv(pendula_simulation* simulation, const char* file, double interval) {
   return guarded([&] {
-    simulation->mover.add(std::make_unique<io::TrajectoryFile>(file, simulation->model.names), {interval, {}});
+    const RowTimes times = rows_every(interval);  // before the file is there, or is no longer what it was
+    simulation->mover.add(std::make_unique<io::TrajectoryFile>(file, simulation->model.names), times);
     return PENDULA_OK;
   });
 }
@@ -211,7 +218,7 @@ pendula_status pendula_write_csv(pendula_simulation* simulation, const char* fil
 pendula_status pendula_on_rows(pendula_simulation* simulation, double interval,
                                int (*row)(void* context, const double* numbers, size_t count), void* context) {
   return guarded([&] {
-    simulation->mover.add(std::make_unique<Rows>(row, context, simulation->asked_to_stop), {interval, {}});
+    simulation->mover.add(std::make_unique<Rows>(row, context, simulation->asked_to_stop), rows_every(interval));
     return PENDULA_OK;
   });
 }
