@@ -32,4 +32,15 @@ int main() {
   Simulation hanging(chain, State<Planar>::from_angles(Eigen::Vector2d::Zero()));
   const auto [A, B] = hanging.linearize();
   std::cout << "at rest A is\n" << A << '\n';
+
+  // A control loop: an input is held until another value is, here a torque that damps the first link.
+  for (int k = 1; k <= 100; ++k) {
+    hanging.hold("torque_1", 0.1 - 2 * hanging.motion().v[0]);
+    hanging.advance_to(0.01 * k);
+  }
+  std::cout << "after a second theta_1 is " << hanging["theta_1"] << '\n';
+
+  // How fast neighbouring motions part: the leading Lyapunov exponent.
+  const LyapunovSpectrum chaos = lyapunov(chain, start, {.duration = 100, .count = 1});
+  std::cout << "by e in " << 1 / chaos.exponents[0] << " s\n";
 }

@@ -16,6 +16,7 @@ file(WRITE "${BUILD}/lint.txt" "${lines}\n")
 # cannot read another compiler's precompiled headers.
 file(READ "${BUILD}/compile_commands.json" database)
 string(REPLACE " -fno-gnu-unique" "" database "${database}")
+string(REPLACE " -Wno-shadow" "" database "${database}")
 string(REGEX REPLACE " -Winvalid-pch -include [^ ]+" "" database "${database}")
 string(REGEX REPLACE " -Winvalid-pch (-Xclang )?-include-pch -Xclang [^ ]+ -Xclang -include -Xclang [^ ]+" "" database
        "${database}")
