@@ -12,7 +12,7 @@ endif()
 option(PENDULA_NATIVE "Compile tests and benchmarks for this machine's processor (-march=native)"
        ${_pendula_native_default})
 option(PENDULA_WARNINGS_AS_ERRORS "Treat warnings in pendula's own sources as errors" ${PROJECT_IS_TOP_LEVEL})
-option(PENDULA_JOIN_SOURCES "Compile sources of the program many at once: sooner in all, later for who changes one" ON)
+option(PENDULA_JOIN_SOURCES "Compile the program's sources ten at once: a whole build is quicker, one after a small change slower" ON)
 option(PENDULA_CHECKED "Sanitizers (address, undefined), library assertions, new Eigen storage filled with NaN" OFF)
 
 if(PROJECT_IS_TOP_LEVEL)
@@ -71,7 +71,7 @@ function(pendula_own_target target)
   target_compile_options(${target} PRIVATE ${_pendula_warnings} $<$<BOOL:${arg_NATIVE}>:${_pendula_native_flags}>)
   if(arg_JOINED AND PENDULA_JOIN_SOURCES)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
-    # What other sources declare is shadowed by none; tests/lint.cmake looks at each of them alone.
+    # There a name of one source may hide one of another; tests/lint.cmake looks at each source alone.
     target_compile_options(${target} PRIVATE -Wno-shadow)
   endif()
   if(PENDULA_CHECKED)

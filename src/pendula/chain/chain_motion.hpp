@@ -156,7 +156,7 @@ class ChainMotion {
     if (is_batch<Num> || !all(cold)) {  // to the last bit, a member's step does not depend on its neighbours
       columns_.predict_at(select(kind.again, C(0.0), C(1.0)), ratio, kind.depth);
       known_ = pasts - 1;
-      if constexpr (!is_batch<Num>) known_ = std::min(known_, static_cast<std::size_t>(kind.depth));
+      if constexpr (!is_batch<Num>) known_ = std::min(known_, static_cast<std::size_t>(kind.known));
       predict(kind.follows & !differs);
     }
     scale_ = scale_ * (ratio * ratio);

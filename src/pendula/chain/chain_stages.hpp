@@ -14,6 +14,7 @@
 #include <pendula/chain/rod_state.hpp>
 #include <pendula/chain/stage_change.hpp>
 #include <pendula/chain/state.hpp>
+#include <pendula/gauss/prediction_depth.hpp>
 #include <pendula/gauss/stage_layout.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -129,6 +130,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
 
   void start(const State& state) {
     forget();
+    depth_ = {};
     steps_ = 0;
     fastest_ = 0;
     using Wide = typename Base::Rods::Wide;
@@ -148,8 +150,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// Predicts the stages of a step of size h: from the last steps', or cold where there was none like it.
   void prepare(double time, double h) {
     const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
-    depth_ = alike && h == last_h_ ? std::min(depth_ + 1, Base::Columns::most_depth) : 0;
-    predict(time, h, alike ? h / last_h_ : 1, {alike, false, !alike, Real(depth_)});
+    const int depth = depth_.next(alike && h == last_h_, S, Base::Columns::most_depth);
+    predict(time, h, alike ? h / last_h_ : 1, {alike, false, !alike, Real(depth), Real(depth_.known())});
     last_h_ = 0;  // what was predicted from is gone until the step is accepted
   }
 
@@ -157,14 +159,14 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// one's.
   void prepare_again(double time, double h) {
     if (!is_finished_) finish();
-    depth_ = 0;
+    depth_.forget();
     const double from = last_h_ != 0 ? last_h_ : step_;
-    predict(time, h, h / from, {false, true, false, Real(0)});
+    predict(time, h, h / from, {false, true, false, Real(0), Real(0)});
   }
 
   void start_cold() {
     Base::start_cold(true);
-    depth_ = 0;
+    depth_.forget();
   }
 
   /// One fixed-point iteration; what it changes, relative to the size of the step. visit(i, change of link i, squared,
@@ -180,6 +182,9 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   double iterate() {
     return iterate([](int, const L&) {});
   }
+
+  /// The first of these changes in a step.
+  void see_first(double change) { depth_.saw(change); }
 
   /// The link where one more iteration changes most.
   int worst_link() {
@@ -229,7 +234,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// How much larger the error of a prediction is than that defect, at least. Predictions from many steps are better
   /// than that: some of these steps are looked at whatever they show (0).
   double predictor_gain() const {
-    if (depth_ > S && steps_ % looked_at == 0) return 0;
+    if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;
     return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1;
   }
 
@@ -292,7 +297,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// The next step starts cold.
   void forget() {
     last_h_ = 0;
-    depth_ = 0;
+    depth_.forget();
   }
 
  private:
@@ -388,7 +393,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   typename Base::Rods::Place trial_{links()};
   double fastest_ = 0;  // bob, squared  [m²/s²]
   bool torque_is_set_ = false, is_predicted_ = false, is_finished_ = false, is_first_ = true;
-  int depth_ = 0;    // steps of this size that a step follows
+  PredictionDepth depth_;
   double step_ = 0;  // of the stages
   std::int64_t steps_ = 0;
 };

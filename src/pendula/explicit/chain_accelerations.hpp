@@ -237,8 +237,8 @@ class ChainAccelerations {
     });
   }
 
-  /// The same of rods that are kept in twice the digits: how long they are does not round where they point. They are
-  /// changed as copies: in place, Clang 14 reads for AVX2 rods of before, and errs by 1e-10.
+  /// The same of rods that are kept in twice the digits: how long they are does not round where they point. Rods are
+  /// copied and written back: changed in place, Clang 14's loop for AVX2 reads them as they were, an error of 1e-10.
   [[gnu::always_inline]] void restore(Parts& rods, Parts& low) const {
     for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       const LinkConstants<L>& link = at(constants_, i);

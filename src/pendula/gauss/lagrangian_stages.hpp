@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <pendula/gauss/prediction_depth.hpp>
 #include <pendula/gauss/stage_dynamics.hpp>
 #include <pendula/gauss/stage_layout.hpp>
 #include <pendula/gauss/step_shape.hpp>
@@ -54,6 +55,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     forget();
     fastest_ = fastest_here_ = most_kinetic_ = 0;
     steps_ = 0;
+    depth_ = {};
     const SystemAt<1>& here = dynamics_.at(time);
     pace_.start(here, q, v);
     masses_.start(here, q);
@@ -119,24 +121,24 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// Predicts the stages of a step of size h: from the last steps', or cold where there was none like it.
   void prepare(double time, double h) {
     const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
-    depth_ = alike && h == last_h_ ? std::min(depth_ + 1, columns_.deepest()) : 0;
+    const int depth = depth_.next(alike && h == last_h_, stages(), columns_.deepest());
     is_predicted_ = alike;
-    predict(time, h, alike ? h / last_h_ : 1, {alike, false, !alike, static_cast<double>(depth_)});
+    predict(time, h, alike ? h / last_h_ : 1,
+            {alike, false, !alike, static_cast<double>(depth), static_cast<double>(depth_.known())});
     last_h_ = 0;  // what was predicted from is gone until the step is accepted
   }
 
   /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
   /// one's.
   void prepare_again(double time, double h) {
-    depth_ = 0;
-    predict(time, h, h / (last_h_ != 0 ? last_h_ : step_), {false, true, false, 0});
+    depth_.forget();
+    predict(time, h, h / (last_h_ != 0 ? last_h_ : step_), {false, true, false, 0, 0});
   }
 
   /// Stages of a motion that goes on as at the start of the step.
   void start_cold() {
     Base::start_cold(true);
-    last_h_ = 0;
-    depth_ = 0;
+    forget();
   }
 
   /// Replaces the increments by a fixed-point iteration once; its change is relative to the size of the step.
@@ -146,6 +148,9 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
         StageIteration{columns_.m(), columns_.each_hb(), state_.data(), weights_.data(), U_.front().numbers()});
     return found.change == 0 ? 0 : found.change / std::max(found.size, floor());
   }
+
+  /// The first of these changes in a step.
+  void see_first(double change) { depth_.saw(change); }
 
   /// The coordinate that one more iteration changes most.
   int most_changing_coordinate() {
@@ -240,7 +245,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// How much larger the error of a prediction is than that defect, at least. Predictions from many steps are better
   /// than that: some of these steps are looked at whatever they show (0).
   double predictor_gain() const {
-    if (depth_ > stages() && steps_ % looked_at == 0) return 0;
+    if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;
     return is_predicted_ ? columns_.predictor_gain() : 1;
   }
 
@@ -320,7 +325,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
   void forget() {
     last_h_ = 0;
-    depth_ = 0;
+    depth_.forget();
   }
 
  private:
@@ -382,7 +387,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   double floor_ = 0, step_ = 0, last_h_ = 0;
   double most_kinetic_ = 0;
   std::int64_t steps_ = 0;
-  int depth_ = 0;  // steps of one size that are known
+  PredictionDepth depth_;
   bool is_predicted_ = false;
 };
 

@@ -90,7 +90,7 @@ class MembersStepper {
     const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
     depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(0.0));
-    chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_});
+    chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_, depth_});
     Mask found = iterate(wanted, stop_, chain_.scale(), [&](const Mask& active) { return chain_.iterate(active); });
     if constexpr (solves_tangents_after) {
       found = iterate(found, tangent_stop_, chain_.start_tangents(),

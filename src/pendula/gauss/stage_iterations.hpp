@@ -65,6 +65,7 @@ class StageIterations {
     choice_.count_iteration();
     if (!is_by_newton()) {
       const double change = stages_.iterate();
+      if (count_ == 1) stages_.see_first(change);
       if (!choice_.is_automatic() ||
           !diverges(change, last_.relative, count_, usual_rounding(parts, epsilon), epsilon)) {
         return last_ = {change};

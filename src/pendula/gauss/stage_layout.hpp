@@ -81,6 +81,8 @@ struct StagesInLanes {
       ratio_ = ratio;
       depth_ = static_cast<int>(depth);
       if (is_deep()) {
+        if (depth_ == weighed_) return;
+        weighed_ = depth_;
         Real weight(-1);  // of a polynomial of degree depth − 1: ±binomial coefficients
         for (int d = 0; d < depth_; ++d) {
           weight = weight * Real(d - depth_) / Real(d + 1);
@@ -164,7 +166,7 @@ struct StagesInLanes {
     bool is_deep() const { return most_depth > 1 && depth_ > (is_fixed ? S : Base::stages()); }
 
     Real from_{1}, made_for_{1}, ratio_{1};
-    int depth_ = 1;
+    int depth_ = 1, weighed_ = 0;  // steps that predictions are made of, and that `across_` is for
     std::array<L, static_cast<std::size_t>(most_depth)> across_;
     alignas(pack_alignment) Real weights_[Z]{};
     alignas(pack_alignment) Real inverse_weights_[Z]{};

@@ -8,7 +8,8 @@ namespace pendula {
 template <class C>
 struct StagePrediction {
   MaskOf<C> follows, again, cold;
-  C depth;  ///< how many steps of this size a step follows
+  C depth;  ///< how many steps of this size they are predicted from
+  C known;  ///< how many there are
 };
 
 }  // namespace pendula

@@ -20,7 +20,8 @@ namespace pendula {
 
 /// Coordinates, momenta and stages of any system that moves by Gauss steps in momentum form, q̇ = v(q, p), ṗ = f(q, v);
 /// of one motion (StagesInLanes) or of several members (MembersInLanes): what both share. `DynamicsType` calls the
-/// functions of the system: here(time, function, numbers…) where motions are, and call(times, function, numbers…).
+/// functions of the system: here(time, function, numbers…) where motions are, and call(times, function, numbers…) at
+/// stages.
 ///
 /// Stages are held as increments, h b v of a coordinate and h b f of its momentum; the state carries what it has lost
 /// to rounding:
@@ -187,7 +188,7 @@ class SystemMotion {
   }
   Num rate(std::size_t k) const { return from_row<Num>(room(2, k)); }
 
-  // Where the rates were found.
+  // Of the state that is in room(0) and room(2).
   Energies energies(const Num& time) const {
     dynamics_.here(time, &SystemFunctions::energies, room(0), room(2), room(4), room(4, 1));
     return {from_row<Num>(room(4)), from_row<Num>(room(4, 1))};
@@ -276,7 +277,7 @@ class SystemMotion {
     }
   }
 
-  /// How fast the stages are: √(Σ M_kk v_k²), and Σ v_k⁸ of the angles in the middle.
+  /// Of the stages the largest Σ M_kk v_k², and R² in the middle of the step.
   void find_speeds() {
     Row speeds;
     Cell eighth_powers(Num(0.0));
