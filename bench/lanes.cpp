@@ -12,9 +12,12 @@
 #include <type_traits>
 #include <vector>
 
+#include "../tests/support/members.hpp"
+
 namespace {
 
 using namespace pendula;
+using test::ChainMember, test::plain_members;
 
 double processor_time() {
   timespec time;
@@ -34,10 +37,10 @@ Chain<Planar, N> equal_chain(int links) {
 
 // At rest, from random angles.
 template <int N>
-std::vector<QueueMember<Planar, N>> members_of(int links, int count, double end, double widest = std::numbers::pi) {
+std::vector<ChainMember<Planar, N>> members_of(int links, int count, double end, double widest = std::numbers::pi) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> angle(-widest, widest);
-  std::vector<QueueMember<Planar, N>> members(static_cast<std::size_t>(count));
+  std::vector<ChainMember<Planar, N>> members(static_cast<std::size_t>(count));
   for (auto& member : members) {
     member.start = Motion(0, Eigen::VectorXd(links), Eigen::VectorXd::Zero(links));
     for (double& q : member.start.q) q = angle(random);
@@ -47,12 +50,12 @@ std::vector<QueueMember<Planar, N>> members_of(int links, int count, double end,
 }
 
 // Of nine runs, a member's, sorted.
-template <class Queue, class Members>
-std::vector<double> times_of(Queue& queue, const Members& members, std::vector<MemberEnd>& ends) {
+template <class Queue>
+std::vector<double> times_of(Queue& queue, const std::vector<PlainMember<PlainChain>>& members, MemberEnds& ends) {
   std::vector<double> times;
   for (int run = 0; run < 9; ++run) {
     const double start = processor_time();
-    queue.run(members, ends);
+    queue.run(members, ends.all());
     times.push_back((processor_time() - start) / static_cast<double>(members.size()));
   }
   std::sort(times.begin(), times.end());
@@ -61,21 +64,22 @@ std::vector<double> times_of(Queue& queue, const Members& members, std::vector<M
 
 // Medians over runs; energy errors are of one more run, relative to Σ M g l.
 template <class Queue, int N>
-void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<QueueMember<Planar, N>>& members,
+void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<ChainMember<Planar, N>>& members,
              QueueOptions options) {
-  std::vector<MemberEnd> ends(members.size());
-  Queue queue(chain, options);
-  const std::vector<double> times = times_of(queue, members, ends);
+  MemberEnds ends(chain.links(), members.size());
+  const std::vector<PlainMember<PlainChain>> given = plain_members(chain, members);
+  Queue queue(chain.links(), options);
+  const std::vector<double> times = times_of(queue, given, ends);
   double steps = 0, failed = 0;
-  for (const MemberEnd& end : ends) {
+  for (const MemberEnd& end : ends.all()) {
     steps += static_cast<double>(end.steps);
     failed += end.status == Status::ok ? 0 : 1;
   }
   options.energy_every = 1;
-  Queue watching(chain, options);
-  watching.run(members, ends);
+  Queue watching(chain.links(), options);
+  watching.run(given, ends.all());
   double energy = 0;
-  for (const MemberEnd& end : ends) energy = std::max(energy, end.energy_error / energy_scale(chain));
+  for (const MemberEnd& end : ends.all()) energy = std::max(energy, end.energy_error / energy_scale(chain));
   const auto count = static_cast<double>(members.size());
   std::printf("%-34s %8.2f us a member (best %8.2f), %7.0f steps, %9.3g member-steps/s, energy %.1e, failed %.0f", what,
               times[4] * 1e6, times[0] * 1e6, steps / count, steps / (times[4] * count), energy, failed);
@@ -91,8 +95,8 @@ void measure(const char* what, const Chain<Planar, N>& chain, const std::vector<
 // --- Against heyoka ---
 
 // At rest, from angles that fill the square evenly.
-std::vector<QueueMember<Planar, 2>> spread_members(int count) {
-  std::vector<QueueMember<Planar, 2>> members(static_cast<std::size_t>(count));
+std::vector<ChainMember<Planar, 2>> spread_members(int count) {
+  std::vector<ChainMember<Planar, 2>> members(static_cast<std::size_t>(count));
   const auto angle = [](double x) { return (2 * (x - std::floor(x)) - 1) * std::numbers::pi; };
   for (int k = 0; k < count; ++k) {
     auto& member = members[static_cast<std::size_t>(k)];
@@ -103,11 +107,12 @@ std::vector<QueueMember<Planar, 2>> spread_members(int count) {
   return members;
 }
 
-void write(const char* file, const std::vector<QueueMember<Planar, 2>>& members, const std::vector<MemberEnd>& ends) {
+void write(const char* file, const std::vector<ChainMember<Planar, 2>>& members, const MemberEnds& ends) {
   std::FILE* const out = std::fopen(file, "w");
   if (out == nullptr) return std::perror(file);
   for (std::size_t k = 0; k < members.size(); ++k) {
-    for (const Eigen::VectorXd* numbers : {&members[k].start.q, &ends[k].motion.q, &ends[k].motion.v}) {
+    const Motion end = ends.motion(k);
+    for (const Eigen::VectorXd* numbers : {&members[k].start.q, &end.q, &end.v}) {
       for (const double x : *numbers) std::fprintf(out, "%.17g ", x);
     }
     std::fprintf(out, "\n");
@@ -116,10 +121,10 @@ void write(const char* file, const std::vector<QueueMember<Planar, 2>>& members,
 }
 
 // The error that half of the members have at most: distance in angles and rates from the reference.
-double median_error(const std::vector<MemberEnd>& ends, const std::vector<MemberEnd>& reference) {
+double median_error(MemberEnds& ends, const MemberEnds& reference) {
   std::vector<double> errors;
-  for (std::size_t k = 0; k < ends.size(); ++k) {
-    const Motion &a = ends[k].motion, &b = reference[k].motion;
+  for (std::size_t k = 0; k < ends.all().size(); ++k) {
+    const Motion a = ends.motion(k), b = reference.motion(k);
     errors.push_back(std::max((a.q - b.q).cwiseAbs().maxCoeff(), (a.v - b.v).cwiseAbs().maxCoeff()));
   }
   std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
@@ -127,11 +132,11 @@ double median_error(const std::vector<MemberEnd>& ends, const std::vector<Member
 }
 
 template <class Queue>
-void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<QueueMember<Planar, 2>>& members,
-          const std::vector<MemberEnd>& reference, const QueueOptions& options) {
-  std::vector<MemberEnd> ends(members.size());
-  Queue queue(chain, options);
-  const std::vector<double> times = times_of(queue, members, ends);
+void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<ChainMember<Planar, 2>>& members,
+          const MemberEnds& reference, const QueueOptions& options) {
+  MemberEnds ends(2, members.size());
+  Queue queue(2, options);
+  const std::vector<double> times = times_of(queue, plain_members(chain, members), ends);
   std::printf("%-10s %s %-6.0e %7.2f us a member (best %7.2f), error %.1e\n", what,
               options.step > 0 ? "step     " : "tolerance", options.step > 0 ? options.step : options.tolerance,
               times[4] * 1e6, times[0] * 1e6, median_error(ends, reference));
@@ -140,8 +145,8 @@ void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<Que
 void race_all(const char* file) {
   const auto chain = equal_chain<2>(2);
   const auto members = spread_members(1024);
-  std::vector<MemberEnd> reference(members.size());
-  GaussLanes<Planar, 8, 2>(chain, {.step = 1.0 / 512}).run(members, reference);
+  MemberEnds reference(2, members.size());
+  GaussLanes<Planar, 8, 2>(2, {.step = 1.0 / 512}).run(plain_members(chain, members), reference.all());
   write(file, members, reference);
   const auto go = [&](auto queue, const char* what, const QueueOptions& options) {
     race<typename decltype(queue)::type>(what, chain, members, reference, options);

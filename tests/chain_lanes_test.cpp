@@ -13,9 +13,12 @@
 #include <vector>
 
 #include "support/growths.hpp"
+#include "support/members.hpp"
 
 namespace pendula {
 namespace {
+
+using test::ChainMember, test::ReachedEnd, test::ends_by, test::plain_members;
 
 template <class Space, int N = Eigen::Dynamic>
 Chain<Space, N> drawn_chain(std::mt19937& random, int links) {
@@ -42,9 +45,9 @@ Chain<Space> of_any_size(const Chain<Space, N>& chain) {
 }
 
 template <class Space, int N>
-std::vector<QueueMember<Space, N>> drawn_members(std::mt19937& random, int links, std::size_t count, double end) {
+std::vector<ChainMember<Space, N>> drawn_members(std::mt19937& random, int links, std::size_t count, double end) {
   std::uniform_real_distribution<double> angle(-3, 3), rate(-2, 2);
-  std::vector<QueueMember<Space, N>> members(count);
+  std::vector<ChainMember<Space, N>> members(count);
   for (auto& member : members) {
     member.start = Motion(0, Eigen::VectorXd(Space::dof * links), Eigen::VectorXd(Space::dof * links));
     for (double& q : member.start.q) q = angle(random);
@@ -55,12 +58,10 @@ std::vector<QueueMember<Space, N>> drawn_members(std::mt19937& random, int links
 }
 
 template <class Queue, class Space, int N>
-std::vector<MemberEnd> ends_of(const Chain<Space, N>& chain, const std::vector<QueueMember<Space, N>>& members,
-                               const QueueOptions& options) {
-  std::vector<MemberEnd> ends(members.size());
-  Queue queue(chain, options);
-  queue.run(members, ends);
-  return ends;
+std::vector<ReachedEnd> ends_of(const Chain<Space, N>& chain, const std::vector<ChainMember<Space, N>>& members,
+                                const QueueOptions& options) {
+  Queue queue(chain.links(), options);
+  return ends_by(queue, Space::dof * chain.links(), plain_members(chain, members));
 }
 
 template <class Space>
@@ -76,7 +77,7 @@ Motion scalar_end(const Chain<Space>& chain, const Motion& start, double end, co
   return integrator->state();
 }
 
-bool same_bits(const MemberEnd& a, const MemberEnd& b) {
+bool same_bits(const ReachedEnd& a, const ReachedEnd& b) {
   const auto bytes = sizeof(double) * static_cast<std::size_t>(a.motion.q.size());
   return a.status == b.status && a.steps == b.steps && a.motion.q.size() == b.motion.q.size() &&
          std::memcmp(a.motion.q.data(), b.motion.q.data(), bytes) == 0 &&
@@ -147,7 +148,7 @@ TYPED_TEST(EnsembleLanes, ChosenStepsAreThoseOfTheScalarController) {
 // A member alone, among others, elsewhere in the queue, beside one that fails: the same bits.
 TYPED_TEST(EnsembleLanes, AMemberDependsOnItselfAlone) {
   using Space = typename TypeParam::Space;
-  using Member = QueueMember<Space, TypeParam::known>;
+  using Member = ChainMember<Space, TypeParam::known>;
   using Queue = typename TypeParam::Queue;
   std::mt19937 random(3);
   const auto chain = drawn_chain<Space, TypeParam::known>(random, TypeParam::links);
@@ -229,8 +230,8 @@ TEST(EnsembleLanesTest, AnglesAreContinued) {
 }
 
 template <class Queue>
-double error_at(double h, const Chain<Planar, 2>& chain, const std::vector<QueueMember<Planar, 2>>& members,
-                const std::vector<MemberEnd>& reference) {
+double error_at(double h, const Chain<Planar, 2>& chain, const std::vector<ChainMember<Planar, 2>>& members,
+                const std::vector<ReachedEnd>& reference) {
   const auto ends = ends_of<Queue>(chain, members, {.step = h});
   double error = 0;
   for (std::size_t k = 0; k < ends.size(); ++k) {
@@ -271,7 +272,7 @@ TEST(EnsembleLanesTest, EnergyStaysToTheLastDigits) {
   const auto chain = drawn_chain<Planar, 2>(random, 2);
   const auto members = drawn_members<Planar, 2>(random, 2, 8, 100);
   const auto ends = ends_of<GaussLanes<Planar, 8, 2>>(chain, members, {.step = 1.0 / 200, .energy_every = 1});
-  for (const MemberEnd& end : ends) EXPECT_LT(end.energy_error / energy_scale(chain), 4e-15);  // measured 1e-15
+  for (const ReachedEnd& end : ends) EXPECT_LT(end.energy_error / energy_scale(chain), 4e-15);  // measured 1e-15
 }
 
 // By few stages, stages are predicted from the steps that there were: from a cold start on, each more of them helps.
@@ -391,17 +392,16 @@ TEST(EnsembleLanesTest, TangentsChangeNothing) {
   const auto members = drawn_members<Spatial, 2>(random, 2, 19, 2);
   const QueueOptions options{.tolerance = 1e-8};
   const auto expected = ends_of<ExplicitLanes<Spatial, DormandPrince5, 2>>(chain, members, options);
-  std::vector<MemberEnd> ends(members.size());
-  TangentLanes<Spatial, DormandPrince5, 2> queue(chain, options);
+  TangentLanes<Spatial, DormandPrince5, 2> queue(2, options);
   test::Growths all(members.size());
   queue.set_watch(all);
-  queue.run(members, ends);
+  const auto ends = ends_by(queue, 4, plain_members(chain, members));
   for (std::size_t k = 0; k < members.size(); ++k) {
     EXPECT_TRUE(same_bits(ends[k], expected[k])) << k;
-    TangentLanes<Spatial, DormandPrince5, 2> lonely(chain, options);
+    TangentLanes<Spatial, DormandPrince5, 2> lonely(2, options);
     test::Growths alone(1);
     lonely.set_watch(alone);
-    lonely.run({&members[k], 1}, {&ends[k], 1});
+    ends_by(lonely, 4, std::vector{plain_members(chain, members)[k]});
     EXPECT_EQ(alone.grown[0], all.grown[k]) << k;
     EXPECT_GT(std::abs(alone.grown[0]), 1e-3);
   }
@@ -411,12 +411,11 @@ TEST(EnsembleLanesTest, MembersThatDoNotFitAreRefused) {
   std::mt19937 random(11);
   const auto chain = drawn_chain<Planar>(random, 3);
   auto members = drawn_members<Planar, any>(random, 2, 1, 1);
-  std::vector<MemberEnd> ends(1);
-  GaussLanes<Planar, 1> queue(chain, {.step = 1e-3});
-  EXPECT_THROW(queue.run(members, ends), std::invalid_argument);
-  EXPECT_THROW(queue.run({}, ends), std::invalid_argument);
-  const auto two = drawn_chain<Planar, 2>(random, 2);
-  EXPECT_THROW((ExplicitLanes<Planar, ClassicalRungeKutta, 2>(two, {})), std::invalid_argument);
+  MemberEnds ends(3, 1);
+  GaussLanes<Planar, 1> queue(2, {.step = 1e-3});
+  EXPECT_THROW(queue.run(plain_members(chain, members), ends.all()), std::invalid_argument);
+  EXPECT_THROW(queue.run({}, ends.all()), std::invalid_argument);
+  EXPECT_THROW((ExplicitLanes<Planar, ClassicalRungeKutta, 2>(2, {})), std::invalid_argument);
 }
 
 }  // namespace

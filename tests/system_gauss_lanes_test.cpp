@@ -25,15 +25,13 @@ namespace {
 
 using Kernel = kernels::Planar2;
 using Atwood = kernels::SwingingAtwood;
-using Members = std::vector<QueueSystemMember>;
+using Members = std::vector<SystemMember>;
 
 template <class System, int S = 4, class Register = MemberRegister>
-std::vector<MemberEnd> ends_of(const Members& members, const QueueOptions& options) {
+std::vector<ReachedEnd> ends_of(const Members& members, const QueueOptions& options) {
   MemberSystems<LanePack<Register>> dynamics(system_table<System>);
-  std::vector<MemberEnd> ends(members.size());
   GaussSystemLanes<S, Register> queue(dynamics, options);
-  queue.run(members, ends);
-  return ends;
+  return ends_by(queue, dynamics.coordinates(), plain_members(members));
 }
 
 double distance(const Motion& a, const Motion& b) {
@@ -42,7 +40,7 @@ double distance(const Motion& a, const Motion& b) {
 
 /// By the scalar stepper; a step of 0: by the tolerance.
 template <class System>
-Motion alone(const QueueSystemMember& member, int stages, double step, double tolerance = 0) {
+Motion alone(const SystemMember& member, int stages, double step, double tolerance = 0) {
   GaussStepper<LagrangianSolver<>> stepper(SystemModel(system_table<System>, member.system), stages,
                                            {.tolerance = tolerance}, Iteration::fixed_point);
   EXPECT_TRUE(stepper.start(member.start));
@@ -76,7 +74,7 @@ struct Machines {
 
 template <class System, int S>
 double largest_distance(const Members& members, const QueueOptions& options, double tolerance = 0) {
-  const std::vector<MemberEnd> ends = ends_of<System, S>(members, options);
+  const std::vector<ReachedEnd> ends = ends_of<System, S>(members, options);
   double largest = 0;
   for (std::size_t k = 0; k < ends.size(); ++k) {
     EXPECT_EQ(ends[k].status, Status::ok) << k;
@@ -111,9 +109,9 @@ TEST_P(SystemGaussLanesTest, AMemberDependsOnItselfAlone) {
   ChainSystems systems(23, GetParam(), 1);
   systems.members[4].start.q[0] += 2e6 * std::numbers::pi;
   for (const QueueOptions& options : {QueueOptions{.tolerance = 1e-8, .energy_every = 3}, QueueOptions{.step = 0.02}}) {
-    const std::vector<MemberEnd> together = ends_of<Kernel, 6>(systems.members, options);
+    const std::vector<ReachedEnd> together = ends_of<Kernel, 6>(systems.members, options);
     for (std::size_t k = 0; k < together.size(); ++k) {
-      const MemberEnd one = ends_of<Kernel, 6>({systems.members[k]}, options)[0];
+      const ReachedEnd one = ends_of<Kernel, 6>({systems.members[k]}, options)[0];
       EXPECT_EQ(one.status, together[k].status) << k;
       EXPECT_EQ(one.motion.q, together[k].motion.q) << k;
       EXPECT_EQ(one.motion.v, together[k].motion.v) << k;
@@ -128,8 +126,8 @@ TEST_P(SystemGaussLanesTest, AMemberDependsOnItselfAlone) {
 TEST_P(SystemGaussLanesTest, WidthsAgree) {
   const ChainSystems systems(13, GetParam(), 1);
   const QueueOptions options{.tolerance = 1e-8, .energy_every = 1};
-  const std::vector<MemberEnd> wide = ends_of<Kernel, 4>(systems.members, options);
-  const std::vector<MemberEnd> narrow = ends_of<Kernel, 4, RegisterFor<2>>(systems.members, options);
+  const std::vector<ReachedEnd> wide = ends_of<Kernel, 4>(systems.members, options);
+  const std::vector<ReachedEnd> narrow = ends_of<Kernel, 4, RegisterFor<2>>(systems.members, options);
   for (std::size_t k = 0; k < wide.size(); ++k) {
     EXPECT_EQ(wide[k].motion.q, narrow[k].motion.q) << k;
     EXPECT_EQ(wide[k].motion.v, narrow[k].motion.v) << k;
@@ -158,7 +156,7 @@ TEST(SystemGaussLanes, MachinesKeepTheirTolerance) {
 TEST(SystemGaussLanes, HaveTheirOrder) {
   const Machines machines(8, 0.64, false);
   const auto error = [&]<int S>(std::integral_constant<int, S>, double step) {
-    const std::vector<MemberEnd> ends = ends_of<Atwood, S>(machines.members, {.step = step});
+    const std::vector<ReachedEnd> ends = ends_of<Atwood, S>(machines.members, {.step = step});
     double sum = 0;
     for (std::size_t k = 0; k < ends.size(); ++k) {
       sum += distance(ends[k].motion, alone<Atwood>(machines.members[k], 8, 0, 1e-15));
@@ -176,12 +174,11 @@ TEST(SystemGaussLanes, HaveTheirOrder) {
 template <class Queue, class System>
 std::vector<double> growths_of(const Members& members, const QueueOptions& options) {
   MemberSystems<typename Queue::L> dynamics(system_table<System>);
-  std::vector<MemberEnd> ends(members.size());
   Growths growths(members.size());
   Queue queue(dynamics, options);
   queue.set_watch(growths);
-  queue.run(members, ends);
-  for (const MemberEnd& end : ends) EXPECT_EQ(end.status, Status::ok);
+  for (const ReachedEnd& end : ends_by(queue, dynamics.coordinates(), plain_members(members)))
+    EXPECT_EQ(end.status, Status::ok);
   return growths.grown;
 }
 
@@ -214,7 +211,7 @@ TEST(SystemGaussLanes, EnergyStaysWhatItIs) {
   const auto error = [](double end, const QueueOptions& options) {
     const Machines machines(16, end);
     std::vector<double> errors;
-    for (const MemberEnd& reached : ends_of<Atwood, 2>(machines.members, options)) {
+    for (const ReachedEnd& reached : ends_of<Atwood, 2>(machines.members, options)) {
       EXPECT_EQ(reached.status, Status::ok);
       errors.push_back(reached.energy_error / reached.energy_sum);
     }
@@ -230,7 +227,7 @@ TEST(SystemGaussLanes, EnergyStaysWhatItIs) {
 
 TEST(SystemGaussLanes, FullTurnsAreCounted) {
   ChainSystems systems(9, false, 3);
-  for (QueueSystemMember& member : systems.members) member.start.v = Eigen::Vector2d(30, 31);
+  for (SystemMember& member : systems.members) member.start.v = Eigen::Vector2d(30, 31);
   const QueueOptions options{.step = 0.002};
   EXPECT_GT((ends_of<Kernel, 6>(systems.members, options)[0].motion.q[0]), 50);
   EXPECT_LT((largest_distance<Kernel, 6>(systems.members, options)), 5e-11);  // 7.6e-12, of 16 turns
@@ -240,10 +237,10 @@ TEST(SystemGaussLanes, FullTurnsAreCounted) {
 TEST(SystemGaussLanes, AMemberThatFailsStopsNobodyElse) {
   ChainSystems systems(11, false, 1);
   const QueueOptions options{.step = 0.05};
-  const std::vector<MemberEnd> expected = ends_of<Kernel, 4>(systems.members, options);
+  const std::vector<ReachedEnd> expected = ends_of<Kernel, 4>(systems.members, options);
   systems.members[2].start.v[1] = std::numeric_limits<double>::quiet_NaN();
   systems.members[6].start.v[0] = 300;
-  const std::vector<MemberEnd> found = ends_of<Kernel, 4>(systems.members, options);
+  const std::vector<ReachedEnd> found = ends_of<Kernel, 4>(systems.members, options);
   for (std::size_t k = 0; k < found.size(); ++k) {
     EXPECT_EQ(found[k].status == expected[k].status, k != 2 && k != 6) << k;
     if (k != 2 && k != 6) {

@@ -28,19 +28,17 @@ namespace {
 using Kernel = kernels::Planar2;
 
 template <class Register = MemberRegister>
-std::vector<MemberEnd> ends_of(const std::vector<QueueSystemMember>& members, const QueueOptions& options) {
+std::vector<ReachedEnd> ends_of(const std::vector<SystemMember>& members, const QueueOptions& options) {
   MemberSystems<LanePack<Register>> dynamics(system_table<Kernel>);
-  std::vector<MemberEnd> ends(members.size());
   SystemLanes<DormandPrince5, Register> queue(dynamics, options);
-  queue.run(members, ends);
-  return ends;
+  return ends_by(queue, dynamics.coordinates(), plain_members(members));
 }
 
 double distance(const Motion& a, const Motion& b) {
   return std::max((a.q - b.q).cwiseAbs().maxCoeff(), (a.v - b.v).cwiseAbs().maxCoeff());
 }
 
-Motion alone(const Chain<Planar>& chain, const QueueSystemMember& member) {
+Motion alone(const Chain<Planar>& chain, const SystemMember& member) {
   RunOptions options{.stages = 8, .solver = Solver::chain, .step = 0};
   options.tolerance = 1e-13;
   const auto integrator = make_integrator(chain, options);
@@ -55,7 +53,7 @@ class SystemLanesTest : public testing::TestWithParam<bool> {};
 // Largest differences seen: 3e-10 free, 3e-10 loaded.
 TEST_P(SystemLanesTest, MembersEndWhereTheChainSolverSays) {
   const ChainSystems systems(19, GetParam(), 1.5);
-  const std::vector<MemberEnd> ends = ends_of(systems.members, {.tolerance = 1e-12});
+  const std::vector<ReachedEnd> ends = ends_of(systems.members, {.tolerance = 1e-12});
   for (std::size_t k = 0; k < ends.size(); ++k) {
     ASSERT_EQ(ends[k].status, Status::ok) << k;
     EXPECT_EQ(ends[k].motion.time, 1.5);
@@ -68,9 +66,9 @@ TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
   ChainSystems systems(23, GetParam(), 1);
   systems.members[4].start.q[0] += 2e6 * std::numbers::pi;
   const QueueOptions options{.tolerance = 1e-8, .energy_every = 3};
-  const std::vector<MemberEnd> together = ends_of(systems.members, options);
+  const std::vector<ReachedEnd> together = ends_of(systems.members, options);
   for (std::size_t k = 0; k < together.size(); ++k) {
-    const MemberEnd one = ends_of({systems.members[k]}, options)[0];
+    const ReachedEnd one = ends_of({systems.members[k]}, options)[0];
     EXPECT_EQ(one.motion.q, together[k].motion.q) << k;
     EXPECT_EQ(one.motion.v, together[k].motion.v) << k;
     EXPECT_EQ(one.steps, together[k].steps) << k;
@@ -86,8 +84,8 @@ TEST_P(SystemLanesTest, AMemberDependsOnItselfAlone) {
 TEST_P(SystemLanesTest, WidthsAgree) {
   const ChainSystems systems(13, GetParam(), 1);
   const QueueOptions options{.tolerance = 1e-8, .energy_every = 1};
-  const std::vector<MemberEnd> wide = ends_of(systems.members, options);
-  const std::vector<MemberEnd> narrow = ends_of<RegisterFor<2>>(systems.members, options);
+  const std::vector<ReachedEnd> wide = ends_of(systems.members, options);
+  const std::vector<ReachedEnd> narrow = ends_of<RegisterFor<2>>(systems.members, options);
   for (std::size_t k = 0; k < wide.size(); ++k) {
     EXPECT_EQ(wide[k].motion.q, narrow[k].motion.q) << k;
     EXPECT_EQ(wide[k].motion.v, narrow[k].motion.v) << k;
@@ -100,10 +98,10 @@ INSTANTIATE_TEST_SUITE_P(Loads, SystemLanesTest, testing::Bool(),
 
 TEST(SystemLanes, AMemberThatIsNoNumberStopsNobodyElse) {
   ChainSystems systems(11, false, 1);
-  const std::vector<MemberEnd> expected = ends_of(systems.members, {.tolerance = 1e-8});
+  const std::vector<ReachedEnd> expected = ends_of(systems.members, {.tolerance = 1e-8});
   systems.members[2].start.v[1] = std::numeric_limits<double>::quiet_NaN();
   systems.members[6].start.q[0] = std::numeric_limits<double>::infinity();
-  const std::vector<MemberEnd> found = ends_of(systems.members, {.tolerance = 1e-8});
+  const std::vector<ReachedEnd> found = ends_of(systems.members, {.tolerance = 1e-8});
   for (std::size_t k = 0; k < found.size(); ++k) {
     EXPECT_EQ(found[k].status == Status::ok, k != 2 && k != 6) << k;
     if (found[k].status == Status::ok) {

@@ -10,38 +10,18 @@
 
 namespace pendula {
 
-/// Members and their chains, which they point to.
-template <class Space, int N>
-struct GivenMembers {
-  explicit GivenMembers(std::span<const PlainMember> members) {
-    chains.reserve(members.size());  // so that pointers to them stay
-    starts.reserve(members.size());
-    for (const PlainMember& member : members) {
-      const auto numbers = [&](const double* from) {
-        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(from, Space::dof * member.chain.links));
-      };
-      chains.push_back(chain_of<Space, N>(member.chain));
-      starts.push_back({Motion(member.start, numbers(member.q), numbers(member.v)), member.end, &chains.back()});
-    }
-  }
-
-  std::vector<Chain<Space, N>> chains;
-  std::vector<QueueMember<Space, N>> starts;
-};
-
 template <class Space, class Queue>
-bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
-                  std::span<PlainMemberEnd> ends, MemberWatch& watch) {
+bool move_members(const RunOptions& options, std::int64_t every, std::span<const PlainMember<PlainChain>> members,
+                  std::span<MemberEnd> ends, MemberWatch& watch) {
   if (members.empty()) return true;
-  const GivenMembers<Space, Queue::Member::links_known> given(members);
-  return detail::move_plainly<Queue>(given.chains.front(), options, every, given.starts, ends, watch);
+  return detail::move_by<Queue>(members[0].model.links, options, every, members, ends, watch);
 }
 
 /// Series of short chains are summed up in registers.
 template <class Space>
-bool move_by_series(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
-                    std::span<PlainMemberEnd> ends, MemberWatch& watch) {
-  [[maybe_unused]] const int links = members.empty() ? 0 : members[0].chain.links;
+bool move_by_series(const RunOptions& options, std::int64_t every, std::span<const PlainMember<PlainChain>> members,
+                    std::span<MemberEnd> ends, MemberWatch& watch) {
+  [[maybe_unused]] const int links = members.empty() ? 0 : members[0].model.links;
 #ifndef PENDULA_FEW_LANES
   if (links == 1) return move_members<Space, TaylorLanes<Space, 1>>(options, every, members, ends, watch);
   if (links == 2) return move_members<Space, TaylorLanes<Space, 2>>(options, every, members, ends, watch);

@@ -2,9 +2,9 @@
 
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/ensemble/system_seats.hpp>
 #include <vector>
 
+#include "support/members.hpp"
 #include "support/random_chain.hpp"
 
 namespace pendula::test {
@@ -47,7 +47,7 @@ struct ChainSystems {
   std::vector<Chain<Planar>> chains;
   std::vector<std::vector<PlainChain::Drive>> drives;
   std::vector<ChainSystem> numbers;
-  std::vector<QueueSystemMember> members;
+  std::vector<SystemMember> members;
 };
 
 }  // namespace pendula::test

@@ -1,13 +1,17 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/ensemble/member_view.hpp>
-#include <pendula/ensemble/queue_member.hpp>
 #include <pendula/ensemble/turn_counter.hpp>
+#include <pendula/run/plain_members.hpp>
+#include <stdexcept>
+#include <string>
 
 namespace pendula {
 
@@ -19,56 +23,51 @@ class ChainSeats {
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
   using Turns = TurnCounter<Space, N, L>;
-  using Links = ChainLinks<Space, N, double>;
 
  public:
-  using Common = const Chain<Space, N>&;  ///< the chain of members who have none of their own
-  using Member = QueueMember<Space, N>;
+  using MemberType = PlainMember<PlainChain>;
   using Sight = MemberView<Stepper, Turns>;
 
-  ChainSeats(Common chain, Stepper& stepper) : chain_(chain), links_(chain), stepper_(stepper), turns_(chain.links()) {}
+  explicit ChainSeats(Stepper& stepper) : stepper_(stepper), turns_(links()) {}
 
-  /// What a stepper of such members is made from.
-  static int subject_of(Common chain) { return chain.links(); }
   void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }
 
-  /// Coordinates of a member that fits.
-  Eigen::Index coordinates() const { return static_cast<Eigen::Index>(Space::dof) * chain_.links(); }
-  bool fits(const Member& member) const { return member.chain == nullptr || member.chain->links() == chain_.links(); }
+  int coordinates() const { return Space::dof * links(); }
+  /// Throws std::invalid_argument if a member, with its number from 0 on, has another number of links.
+  void require(const MemberType& member, std::size_t number) const {
+    if (member.model.links == links()) return;
+    throw std::invalid_argument("ensemble: member " + std::to_string(number + 1) + ": expected " +
+                                std::to_string(links()) + " links, got " + std::to_string(member.model.links));
+  }
 
-  void take(int lane, const Member& next) {
-    const bool own = next.chain != nullptr;
-    const double* q = next.start.q.data();
-    stepper_.start(lane, next.start.time, own ? *next.chain : chain_, own ? Links(*next.chain) : links_, q,
-                   next.start.v.data());
-    turns_.start(lane, q, [this](int i) -> decltype(auto) { return stepper_.chain().along(i); });
+  void take(int lane, const MemberType& next) {
+    const Chain<Space, N> chain = chain_of<Space, N>(next.model);
+    stepper_.start(lane, next.start, chain, ChainLinks<Space, N, double>(chain), next.q, next.v);
+    turns_.start(lane, next.q, [this](int i) -> decltype(auto) { return stepper_.chain().along(i); });
   }
 
   /// These members have taken steps; `far` are those that may have turned far and come back.
   void follow(const Mask& which, const Mask& far) { turns_.follow(which, far, stepper_); }
 
   /// Where the member in a lane is.
-  void read(int lane, Motion& motion) {
+  void read(int lane, double* q, double* v) {
     auto& chain = stepper_.chain();
-    const int links = chain_.links();
     chain.find_rates();
-    motion.q.resize(coordinates());
-    motion.v.resize(coordinates());
-    for (int i = 0; i < links; ++i) {
+    for (int i = 0; i < links(); ++i) {
       std::array<long double, Space::dof> near;
       for (std::size_t a = 0; a < near.size(); ++a) near[a] = turns_.angles(lane, i)[a];
       const auto angles = user_angles(chain.heading(lane, i), near);
       for (std::size_t a = 0; a < near.size(); ++a) {
-        const auto entry = static_cast<Eigen::Index>(a) * links + i;
-        motion.q[entry] = static_cast<double>(angles.q[a]);
-        motion.v[entry] = static_cast<double>(angles.v[a]);
+        const std::size_t entry = a * static_cast<std::size_t>(links()) + static_cast<std::size_t>(i);
+        q[entry] = static_cast<double>(angles.q[a]);
+        v[entry] = static_cast<double>(angles.v[a]);
       }
     }
   }
 
  private:
-  Chain<Space, N> chain_;
-  Links links_;
+  int links() const { return stepper_.chain().links(); }
+
   Stepper& stepper_;
   Turns turns_;
 };

@@ -78,7 +78,7 @@ class LaneExponents : private MemberWatch {
     const Subject& subject = *setup.subject;
     const bool is_tried = options_.method != setup.options.method && has_to_be_tried(subject);
     if (!is_tried || subject.loaded()) return true;
-    const Observation before = subject.observe(setup.start), after = subject.observe(members_.last(k));
+    const Observation before = subject.observe(setup.start), after = subject.observe(members_.motion(k));
     const double scale = energy_scale(subject, before, after, 0);
     return std::abs(after.energy - before.energy) <= setup.options.tolerance * scale;
   }

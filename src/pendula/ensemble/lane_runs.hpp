@@ -13,6 +13,7 @@
 #include <optional>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/ensemble/lane_kind.hpp>
+#include <pendula/ensemble/member_ends.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
@@ -36,35 +37,12 @@ inline double energy_scale(const Subject& subject, const Observation& before, co
   return std::max({sum, sizes(before), sizes(after)});
 }
 
-/// The ends of members, as the compiled library writes them.
-class PlainEnds {
- public:
-  explicit PlainEnds(std::span<const RunSetup* const> setups)
-      : q_(setups[0]->start.q.size(), static_cast<Eigen::Index>(setups.size())), v_(q_.rows(), q_.cols()) {
-    for (Eigen::Index k = 0; k < q_.cols(); ++k)
-      ends_.push_back({q_.col(k).data(), v_.col(k).data(), 0, {}, 0, 0, 0, 0});
-  }
-
-  const PlainMemberEnd& end(std::size_t k) const { return ends_[k]; }
-  Motion last(std::size_t k) const {
-    const auto column = static_cast<Eigen::Index>(k);
-    return {ends_[k].time, q_.col(column), v_.col(column)};
-  }
-
- protected:
-  std::span<PlainMemberEnd> ends() { return ends_; }
-
- private:
-  Eigen::MatrixXd q_, v_;
-  std::vector<PlainMemberEnd> ends_;
-};
-
 /// The members of runs of one kind, chains, as the compiled library takes them, and what becomes of them.
 template <class Space>
-class PlainChains : public PlainEnds {
+class PlainChains : public MemberEnds {
  public:
   /// `setups` must outlive it.
-  explicit PlainChains(std::span<const RunSetup* const> setups) : PlainEnds(setups) {
+  explicit PlainChains(std::span<const RunSetup* const> setups) : MemberEnds(setups[0]->start.q.size(), setups.size()) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const Chain<Space>& chain = static_cast<const ChainSubject<Space>&>(*setup->subject).chain();
@@ -76,10 +54,10 @@ class PlainChains : public PlainEnds {
 
   /// False where `watch` made it leave off.
   bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
-    return library_of<Space>().lanes(options)(options, every, members_, ends(), watch);
+    return library_of<Space>().lanes(options)(options, every, members_, all(), watch);
   }
   bool move_with_tangents(const RunOptions& options, MemberWatch& watch) {
-    return library_of<Space>().tangent_lanes(options)(options, 0, members_, ends(), watch);
+    return library_of<Space>().tangent_lanes(options)(options, 0, members_, all(), watch);
   }
 
   /// What solves the stage equations, and how scalar runs are told to.
@@ -88,15 +66,15 @@ class PlainChains : public PlainEnds {
 
  private:
   std::deque<std::vector<PlainChain::Drive>> drives_;  // which stay where they are
-  std::vector<PlainMember> members_;
+  std::vector<PlainMember<PlainChain>> members_;
 };
 
 /// The same of what generated kernels move.
-class PlainSystems : public PlainEnds {
+class PlainSystems : public MemberEnds {
  public:
   /// `setups` must outlive it.
   explicit PlainSystems(std::span<const RunSetup* const> setups)
-      : PlainEnds(setups), table_(system(*setups[0]).table()) {
+      : MemberEnds(setups[0]->start.q.size(), setups.size()), table_(system(*setups[0]).table()) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const double end = start.time + setup->duration;
@@ -105,10 +83,10 @@ class PlainSystems : public PlainEnds {
   }
 
   bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
-    return library().system_lanes(options)(table_, options, every, members_, ends(), watch);
+    return library().system_lanes(options)(table_, options, every, members_, all(), watch);
   }
   bool move_with_tangents(const RunOptions& options, MemberWatch& watch) {
-    return library().system_tangent_lanes(options)(table_, options, 0, members_, ends(), watch);
+    return library().system_tangent_lanes(options)(table_, options, 0, members_, all(), watch);
   }
 
   static constexpr Solver solver = Solver::dense;
@@ -122,7 +100,7 @@ class PlainSystems : public PlainEnds {
   }
 
   const SystemTable& table_;
-  std::vector<PlainSystemMember> members_;
+  std::vector<PlainMember<PlainSystem>> members_;
 };
 
 }  // namespace detail
@@ -170,14 +148,14 @@ class LaneRuns : private MemberWatch {
   void move() {
     stopped_ = !members_.move(options_, setups_[0]->every, *this);
     for (std::size_t k = 0; k < setups_.size(); ++k) {
-      if (reports_[k].end != RunEnd::event) reports_[k].last = members_.last(k);
+      if (reports_[k].end != RunEnd::event) reports_[k].last = members_.motion(k);
     }
   }
 
   /// What a run would report; false where it did not come to its end.
   bool finish(std::size_t k) {
     const RunSetup& setup = *setups_[k];
-    const PlainMemberEnd& end = members_.end(k);
+    const MemberEnd& end = members_.end(k);
     RunReport& report = reports_[k];
     const Subject& subject = *setup.subject;
     const Observation before = subject.observe(setup.start), after = subject.observe(report.last);

@@ -1,22 +1,31 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <pendula/chain/chain_members.hpp>
 #include <pendula/ensemble/chain_seats.hpp>
-#include <pendula/ensemble/queue_member.hpp>
 #include <pendula/ensemble/system_seats.hpp>
 #include <pendula/explicit/chain_accelerations.hpp>
 #include <pendula/explicit/explicit_steps.hpp>
 #include <pendula/explicit/system_accelerations.hpp>
 #include <pendula/gauss/members_stepper.hpp>
 #include <pendula/gauss/system_members.hpp>
+#include <pendula/run/plain_members.hpp>
 #include <pendula/taylor/taylor_steps.hpp>
 #include <span>
 #include <stdexcept>
-#include <string>
 
 namespace pendula {
+
+/// How members are moved.
+struct QueueOptions {
+  double step = 0;          ///< s; 0: of each member's own choice, by tolerance
+  double tolerance = 1e-9;  ///< of the motion, relative to its size, as RunOptions::tolerance
+  double enough = 0;  ///< MembersStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
+  std::int64_t energy_every = 0;  ///< steps from one look at the energy to the next; 0: it is not looked at
+};
 
 /// Moves the members of an ensemble to their ends by steps of a MembersStepper or ExplicitSteps, as many at once as a
 /// register has lanes; `Seats` brings them into lanes and out of them. A lane whose member has come to its end takes
@@ -29,17 +38,17 @@ class MemberQueue {
  public:
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
-  using Member = typename Seats::Member;
-  using Common = typename Seats::Common;
+  using MemberType = typename Seats::MemberType;
+  using Subject = typename Stepper::Subject;
   static constexpr int lanes = L::size, stages = Stepper::stages;
 
-  /// `common`: what members share. Throws std::invalid_argument where they cannot sit in lanes, and where an explicit
-  /// method is not told its step.
-  MemberQueue(Common common, const QueueOptions& options)
+  /// `subject`: what members share, of chains their number of links, of systems the functions of their kernel. Throws
+  /// std::invalid_argument where an explicit method is not told its step.
+  MemberQueue(Subject subject, const QueueOptions& options)
       : options_(options),
-        stepper_(Seats::subject_of(common), stepper_options(options)),
+        stepper_(subject, stepper_options(options)),
         controller_(options.tolerance),
-        seats_(common, stepper_) {}
+        seats_(stepper_) {}
   MemberQueue(const MemberQueue&) = delete;
   MemberQueue& operator=(const MemberQueue&) = delete;
 
@@ -50,8 +59,8 @@ class MemberQueue {
   }
 
   /// Moves all members; ends[i] is what becomes of members[i]; false where the watch made it leave off. Throws
-  /// std::invalid_argument on another number of links or coordinates, and unless there is an end for each member.
-  bool run(std::span<const Member> members, std::span<MemberEnd> ends) {
+  /// std::invalid_argument on another number of links, and unless there is an end for each member.
+  bool run(std::span<const MemberType> members, std::span<MemberEnd> ends) {
     if (ends.size() != members.size()) throw std::invalid_argument("ensemble: expected an end for each member");
     members_ = members;
     ends_ = ends;
@@ -219,8 +228,8 @@ class MemberQueue {
     end.rejected_steps = static_cast<std::int64_t>(rejected_[lane]);
     end.energy_error = energy_error_[lane];
     end.energy_sum = energy_sum_[lane];
-    end.motion.time = status == Status::ok ? end_[lane] : time_.value[lane];
-    seats_.read(lane, end.motion);
+    end.time = status == Status::ok ? end_[lane] : time_.value[lane];
+    seats_.read(lane, end.q, end.v);
   }
 
   // The next member comes into a lane that is free; members that are at their end already stay what they are.
@@ -228,10 +237,12 @@ class MemberQueue {
     running_.set(lane, 0);
     while (next_ < members_.size()) {
       const std::size_t member = next_++;
-      const Member& next = members_[member];
-      require(next, member);
-      if (!(next.end > next.start.time)) {
-        ends_[member] = {.motion = next.start};
+      const MemberType& next = members_[member];
+      seats_.require(next, member);
+      ends_[member] = {.q = ends_[member].q, .v = ends_[member].v, .time = next.start};
+      if (!(next.end > next.start)) {
+        std::copy_n(next.q, seats_.coordinates(), ends_[member].q);
+        std::copy_n(next.v, seats_.coordinates(), ends_[member].v);
         continue;
       }
       take(lane, member, next);
@@ -239,10 +250,10 @@ class MemberQueue {
     }
   }
 
-  void take(int lane, std::size_t member, const Member& next) {
+  void take(int lane, std::size_t member, const MemberType& next) {
     seats_.take(lane, next);
     member_[lane] = static_cast<std::ptrdiff_t>(member);
-    time_.value.set(lane, next.start.time);
+    time_.value.set(lane, next.start);
     end_.set(lane, next.end);
     for (L* zero :
          {&time_.low, &steps_, &rejected_, &unsolved_, &attempts_, &since_look_, &energy_error_, &energy_sum_})
@@ -262,22 +273,11 @@ class MemberQueue {
     watch_energy_sum(begins);
   }
 
-  void require(const Member& member, std::size_t number) const {
-    const Eigen::Index coordinates = seats_.coordinates();
-    const bool fits =
-        member.start.q.size() == coordinates && member.start.v.size() == coordinates && seats_.fits(member);
-    if (fits) return;
-    throw std::invalid_argument("ensemble: member " + std::to_string(number + 1) + ": expected " +
-                                std::to_string(coordinates) + " coordinates and rates, got " +
-                                std::to_string(member.start.q.size()) + " and " +
-                                std::to_string(member.start.v.size()));
-  }
-
   QueueOptions options_;
   Stepper stepper_;
   typename Stepper::Controller controller_;
   Seats seats_;
-  std::span<const Member> members_;
+  std::span<const MemberType> members_;
   std::span<MemberEnd> ends_;
   std::size_t next_ = 0;
   std::ptrdiff_t member_[L::width] = {};

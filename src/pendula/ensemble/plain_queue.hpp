@@ -1,14 +1,11 @@
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <pendula/ensemble/member_queue.hpp>
 #include <pendula/explicit/explicit_tableau.hpp>
 #include <pendula/run/plain_members.hpp>
 #include <pendula/system/options.hpp>
 #include <span>
-#include <vector>
 
 namespace pendula::detail {
 
@@ -22,31 +19,13 @@ inline QueueOptions lane_options(const RunOptions& options, std::int64_t every) 
   return asked;
 }
 
-inline void tell_ends(std::span<const MemberEnd> reached, std::span<PlainMemberEnd> ends) {
-  for (std::size_t k = 0; k < reached.size(); ++k) {
-    const MemberEnd& from = reached[k];
-    PlainMemberEnd& to = ends[k];
-    std::copy_n(from.motion.q.data(), from.motion.q.size(), to.q);
-    std::copy_n(from.motion.v.data(), from.motion.v.size(), to.v);
-    to.time = from.motion.time;
-    to.status = from.status;
-    to.steps = from.steps;
-    to.rejected_steps = from.rejected_steps;
-    to.energy_error = from.energy_error;
-    to.energy_sum = from.energy_sum;
-  }
-}
-
 /// Moves members by a Queue, as MoveMembers and MoveSystemMembers tell.
 template <class Queue>
-bool move_plainly(typename Queue::Common common, const RunOptions& options, std::int64_t every,
-                  std::span<const typename Queue::Member> members, std::span<PlainMemberEnd> ends, MemberWatch& watch) {
-  Queue queue(common, lane_options(options, every));
+bool move_by(typename Queue::Subject subject, const RunOptions& options, std::int64_t every,
+             std::span<const typename Queue::MemberType> members, std::span<MemberEnd> ends, MemberWatch& watch) {
+  Queue queue(subject, lane_options(options, every));
   queue.set_watch(watch);
-  std::vector<MemberEnd> reached(members.size());
-  const bool is_done = queue.run(members, reached);
-  tell_ends(reached, ends);
-  return is_done;
+  return queue.run(members, ends);
 }
 
 /// What moves members by an explicit method, of Moves::by<Method>() and Moves::by_series(); nullptr for others.

@@ -34,6 +34,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   /// Of the quadrature that is as good.
   static constexpr int nodes = (Method::error_order + 2) / 2;
   using Chain = ExplicitSteps;
+  using Subject = typename Dynamics::Subject;
   using typename State::L;
   using typename State::Mask;
   using typename State::Vector;
@@ -43,7 +44,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   using Controller = ErrorController<L, Method::error_order>;
 
   struct Options {};
-  explicit ExplicitSteps(typename Dynamics::Subject subject, Options = {})
+  explicit ExplicitSteps(Subject subject, Options = {})
       : State(subject),
         slopes_(parts_),
         trial_(parts_, low_),

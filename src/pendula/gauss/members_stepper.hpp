@@ -28,6 +28,7 @@ template <class Moved>
 class MembersStepper {
  public:
   using Chain = Moved;
+  using Subject = typename Moved::Subject;
   using L = typename Chain::L;
   using Mask = typename L::Mask;
   using Options = MembersStepperOptions;
@@ -61,7 +62,7 @@ class MembersStepper {
     L longest_{std::numeric_limits<double>::infinity()};  // that shows what depends on time
   };
 
-  explicit MembersStepper(typename Chain::Subject subject, MembersStepperOptions options = {})
+  explicit MembersStepper(Subject subject, MembersStepperOptions options = {})
       : chain_(subject),
         options_(options),
         stop_({.enough = options.enough}),

@@ -56,40 +56,37 @@ class MemberWatch {
   virtual bool stops() = 0;
 };
 
-/// One of many chains as plain numbers, which is how members cross from a program to the compiled library
-/// (library.hpp): where it starts, and when it ends. Everything pointed at belongs to the caller.
+/// A member of an ensemble: a chain (PlainChain) or a system of a generated kernel (PlainSystem), where it starts, and
+/// when it ends. Plain numbers cross from a program to the compiled library (library.hpp); the caller owns what is
+/// pointed at.
+template <class Model>
 struct PlainMember {
-  PlainChain chain;
-  double start, end;    ///< s
-  const double *q, *v;  ///< (dof·links)
-};
-
-/// A system of a generated kernel as such a member.
-struct PlainSystemMember {
-  PlainSystem system;
+  Model model;
   double start, end;    ///< s
   const double *q, *v;  ///< (coordinates)
 };
 
 /// What became of it.
-struct PlainMemberEnd {
-  double *q, *v;  ///< (coordinates), of the caller, written
-  double time;    ///< s
-  Status status;  ///< otherwise the member came no further than here
-  std::int64_t steps, rejected_steps;
-  double energy_error;  ///< the largest |H − H_0| at every so many steps  [J]
-  double energy_sum;    ///< of systems, the largest |T| + |U| there  [J]
+struct MemberEnd {
+  double *q, *v;               ///< (coordinates), of the caller, written
+  double time = 0;             ///< s
+  Status status = Status::ok;  ///< otherwise the last accepted step ended here, and a stepper of one motion may go on
+  std::int64_t steps = 0;      ///< accepted ones
+  std::int64_t rejected_steps = 0;
+  double energy_error = 0;  ///< the largest |H − H_0| at every so many steps  [J]
+  double energy_sum = 0;    ///< of systems, the largest |T| + |U| there  [J]
 };
 
 /// Moves chains of one number of links, a member in each lane; `every` how many steps from one look at the energy to
 /// the next. What becomes of a member depends on that member alone, to the last bit. False where `watch` made it leave
 /// off.
-using MoveMembers = bool(const RunOptions& options, std::int64_t every, std::span<const PlainMember> members,
-                         std::span<PlainMemberEnd> ends, MemberWatch& watch);
+using MoveMembers = bool(const RunOptions& options, std::int64_t every,
+                         std::span<const PlainMember<PlainChain>> members, std::span<MemberEnd> ends,
+                         MemberWatch& watch);
 
 /// The same of systems of one kernel.
 using MoveSystemMembers = bool(const SystemTable& table, const RunOptions& options, std::int64_t every,
-                               std::span<const PlainSystemMember> members, std::span<PlainMemberEnd> ends,
+                               std::span<const PlainMember<PlainSystem>> members, std::span<MemberEnd> ends,
                                MemberWatch& watch);
 
 }  // namespace pendula

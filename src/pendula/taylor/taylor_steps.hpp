@@ -59,6 +59,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   static constexpr int stages = 1;
   static constexpr bool can_choose = true;
   using Chain = TaylorSteps;
+  using Subject = typename Rods::Subject;
   using typename State::L;
   using typename State::Mask;
   static constexpr bool has_tangent = State::has_tangent;
@@ -68,7 +69,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   struct Options {
     double tolerance = 1e-9;  ///< of a step's error, relative to the size of the motion
   };
-  explicit TaylorSteps(typename Rods::Subject subject, Options options = {})
+  explicit TaylorSteps(Subject subject, Options options = {})
       : State(subject), series_(dynamics_, order_for(options.tolerance)), trial_(parts_), terms_(parts_) {
     log_reach_ = std::log(std::max(options.tolerance, finest)) / series_.order();
   }
