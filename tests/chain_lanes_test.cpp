@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "support/growths.hpp"
+#include "support/looks.hpp"
 #include "support/members.hpp"
 
 namespace pendula {
@@ -298,6 +299,32 @@ TEST(EnsembleLanesTest, EveryStepOfOneSizeHelpsThePrediction) {
   }
   for (std::size_t step = 2; step < iterations.size(); ++step) EXPECT_LE(iterations[step], iterations[1]) << step;
   EXPECT_LE(iterations.back(), iterations[1] - 2);  // measured 4 and 2
+}
+
+// Within a step: as accurate as its end where members look, which steps do not see; glances have the polynomial's
+// errors.
+TEST(EnsembleLanesTest, LooksHaveTheFullOrder) {
+  std::mt19937 random(14);
+  const auto chain = drawn_chain<Spatial, 2>(random, 2);
+  const auto members = drawn_members<Spatial, 2>(random, 2, 11, 0.5);
+  const QueueOptions options{.step = 0.02};
+  const auto expected = ends_of<GaussLanes<Spatial, 4, 2>>(chain, members, options);
+  GaussLanes<Spatial, 4, 2> queue(2, options);
+  test::Looks looks(members.size(), 4, 0.3);
+  queue.set_watch(looks);
+  const auto ends = ends_by(queue, 4, plain_members(chain, members));
+  EXPECT_EQ(looks.failed, 0);
+  double look = 0, glance = 0;
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    EXPECT_TRUE(same_bits(ends[k], expected[k])) << k;
+    const Motion& looked = looks.looked[k];
+    const Motion exact = scalar_end(of_any_size(chain), members[k].start, looked.time,
+                                    {.stages = 8, .solver = Solver::chain, .step = 0.01});
+    look = std::max(look, distance(looked, exact));
+    glance = std::max(glance, distance(looks.glanced[k], exact));
+  }
+  EXPECT_LT(look, 1e-7);    // measured 1.8e-8
+  EXPECT_GT(glance, 5e-6);  // measured 1.2e-5
 }
 
 // Steps so large that a fixed point does not contract: reported, and left where they were.

@@ -265,6 +265,7 @@ TYPED_TEST(RunsInLanes, ExplicitMethodsGoThereToo) {
       for (Eigen::Index k = 0; k < 2; ++k) {
         setup.events.push_back({"x", [&, k](const Motion& motion) { return subject.observe(motion).points[k]; }});
       }
+      for (Event& event : crossings<TypeParam>()) setup.events.push_back(std::move(event));  // of angles, by poles, too
     }
     if (method != Method::dopri5 && !lane_kind(setups[0])) continue;  // sanitized lanes have few
     const std::vector<RunReport> found = run_members(setups);
@@ -287,6 +288,34 @@ TYPED_TEST(RunsInLanes, ExplicitMethodsGoThereToo) {
     }
     EXPECT_GT(happened, 10) << name_of(method);
   }
+}
+
+// Links come by a pole within a step: angles inside it are followed on the way, and go round it as those at its ends
+// do.
+TEST(RunsInLanesInSpace, FollowAnglesByPolesWithinSteps) {
+  const auto subject = std::make_shared<ChainSubject<Spatial>>(equal_chain<Spatial>(2));
+  std::vector<RunSetup> setups;
+  for (int k = 0; k < 16; ++k) {
+    setups.push_back(
+        {.subject = subject,
+         .start = Motion(0, Eigen::Vector4d(-1.5 + 0.2 * k, 0.5, 0.3, 1), Eigen::Vector4d(0.5, -0.3, 0.02, 0.1)),
+         .options = {.method = Method::taylor, .step = 0, .tolerance = 1e-10},
+         .duration = 5,
+         .doubted = false,
+         .events = crossings<Spatial>()});
+  }
+  ASSERT_TRUE(lane_kind(setups[0]));
+  const std::vector<RunReport> found = run_members(setups);
+  std::int64_t happened = 0;
+  for (std::size_t k = 0; k < setups.size(); ++k) {
+    setups[k].options = {.stages = 8, .solver = Solver::chain, .step = 0, .tolerance = 1e-13};
+    const RunReport expected = pendula::Run(setups[k]).go();
+    for (std::size_t e = 0; e < setups[k].events.size(); ++e) {
+      EXPECT_EQ(found[k].events[e].count, expected.events[e].count) << k << ", " << setups[k].events[e].name;
+      happened += found[k].events[e].count;
+    }
+  }
+  EXPECT_GT(happened, 200);
 }
 
 // Whose steps are too long for a fixed point is run alone, and reports what it would.

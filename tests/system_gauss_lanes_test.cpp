@@ -19,6 +19,7 @@
 
 #include "support/chain_systems.hpp"
 #include "support/growths.hpp"
+#include "support/looks.hpp"
 
 namespace pendula::test {
 namespace {
@@ -223,6 +224,30 @@ TEST(SystemGaussLanes, EnergyStaysWhatItIs) {
     EXPECT_LT(early, 1e-5);        // seen: 1.1e-7, 2.0e-6
     EXPECT_LT(late, 1.5 * early);  // 1.01, 1.09 times
   }
+}
+
+// Within a step: as accurate as its end where members look, which steps do not see.
+TEST(SystemGaussLanes, LooksHaveTheFullOrder) {
+  const ChainSystems systems(11, true, 1);
+  const QueueOptions options{.step = 0.02};
+  const std::vector<ReachedEnd> expected = ends_of<Kernel>(systems.members, options);
+  MemberSystems<LanePack<MemberRegister>> dynamics(system_table<Kernel>);
+  GaussSystemLanes<4> queue(dynamics, options);
+  Looks looks(systems.members.size(), 2, 0.3);
+  queue.set_watch(looks);
+  const std::vector<ReachedEnd> ends = ends_by(queue, 2, plain_members(systems.members));
+  EXPECT_EQ(looks.failed, 0);
+  double look = 0, glance = 0;
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    EXPECT_EQ(ends[k].motion.q, expected[k].motion.q) << k;
+    SystemMember member = systems.members[k];
+    member.end = looks.looked[k].time;
+    const Motion exact = alone<Kernel>(member, 8, 0.01);
+    look = std::max(look, distance(looks.looked[k], exact));
+    glance = std::max(glance, distance(looks.glanced[k], exact));
+  }
+  EXPECT_LT(look, 1e-9);    // seen: 5.0e-11
+  EXPECT_GT(glance, 1e-7);  // seen: 2.2e-7
 }
 
 TEST(SystemGaussLanes, FullTurnsAreCounted) {

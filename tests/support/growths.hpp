@@ -12,6 +12,7 @@ class Growths : public MemberWatch {
   explicit Growths(std::size_t members) : grown(members) {}
 
   bool wants_steps() const override { return true; }
+  bool wants_looks() const override { return false; }
   void after_step(MemberSteps& steps) override {
     for (int lane = 0; lane < steps.lanes(); ++lane) {
       if (steps.took_step(lane)) grown[steps.member(lane)] += steps.growth(lane);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <pendula/chain/space.hpp>
@@ -150,6 +151,19 @@ LinkAngles<Spatial, Real> user_angles(const Heading<Spatial, Real>& heading, con
   return angles;
 }
 
+/// Direction of the rod of one member in a lane.
+template <class L, std::size_t D>
+std::array<double, D> direction_of(const std::array<L, D>& rod, int lane) {
+  std::array<double, D> u;
+  double squared = 0;
+  for (std::size_t k = 0; k < D; ++k) {
+    u[k] = rod[k][lane];
+    squared += u[k] * u[k];
+  }
+  for (double& x : u) x /= std::sqrt(squared);
+  return u;
+}
+
 /// A direction whose angles are known, from which those of later directions are counted on: full turns, and through
 /// which side of a pole, only the motion tells.
 template <class Space, class Real = double>
@@ -167,6 +181,13 @@ class AngleAnchor {
   /// The link has moved on to u, not far from where it was last followed to.
   void follow(const Cartesian& u) {
     if (leaves(u)) move_to(u);
+  }
+
+  /// Whether u is so far from where the link was last followed to that angles near its own may not be the only ones.
+  bool leaves(const Cartesian& u) const {
+    Real squared(0);
+    for (std::size_t k = 0; k < u.size(); ++k) squared += (u[k] - u_[k]) * (u[k] - u_[k]);
+    return squared > reach_squared_;
   }
 
   /// The link has moved on through these directions, component after component. False, and it is where it was, where
@@ -228,12 +249,6 @@ class AngleAnchor {
  private:
   // Of a path: a pole that is passed within less of it is passed through.
   static constexpr double shortest_part = 1.0 / (1 << 20);
-
-  bool leaves(const Cartesian& u) const {
-    Real squared(0);
-    for (std::size_t k = 0; k < u.size(); ++k) squared += (u[k] - u_[k]) * (u[k] - u_[k]);
-    return squared > reach_squared_;
-  }
 
   void move_to(const Cartesian& u) {
     Heading<Space, Real> heading;

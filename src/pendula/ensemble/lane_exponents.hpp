@@ -84,6 +84,7 @@ class LaneExponents : private MemberWatch {
   }
 
   bool wants_steps() const override { return true; }
+  bool wants_looks() const override { return false; }
   bool stops() override { return stop_(); }
 
   void after_step(MemberSteps& steps) override {

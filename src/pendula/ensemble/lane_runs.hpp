@@ -7,9 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <limits>
 #include <map>
-#include <memory>
 #include <optional>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/ensemble/lane_kind.hpp>
@@ -60,8 +58,7 @@ class PlainChains : public MemberEnds {
     return library_of<Space>().tangent_lanes(options)(options, 0, members_, all(), watch);
   }
 
-  /// What solves the stage equations, and how scalar runs are told to.
-  static constexpr Solver solver = Solver::chain;
+  /// What solves the stage equations.
   static Description description(const RunSetup& /*setup*/) { return {"chain", "fixed-point", ""}; }
 
  private:
@@ -89,7 +86,6 @@ class PlainSystems : public MemberEnds {
     return library().system_tangent_lanes(options)(table_, options, 0, members_, all(), watch);
   }
 
-  static constexpr Solver solver = Solver::dense;
   static Description description(const RunSetup& setup) {
     return {"dense", "fixed-point", std::string(system(setup).info().name)};
   }
@@ -119,6 +115,7 @@ class LaneRuns : private MemberWatch {
       const RunSetup& setup = *setups[k];
       watches_.emplace_back(setup.events, detail::glance_degree(options));
       if (!setup.events.empty()) watches_.back().start(setup.start);
+      wants_looks_ |= !setup.events.empty();
       if (tracks[k] != nullptr) tracks[k]->begin(setup.start);
       wants_steps_ |= !setup.events.empty() || is_tried(setup) || tracks[k] != nullptr;
     }
@@ -193,34 +190,11 @@ class LaneRuns : private MemberWatch {
 
   // --- While they are moved ---
 
-  /// The scalar stepper of one member, for what lanes do not show: it takes the last step again.
-  struct Alone {
-    std::size_t member = static_cast<std::size_t>(-1);
-    std::unique_ptr<Integrator> integrator = nullptr;
-    double begin = std::numeric_limits<double>::quiet_NaN();  // of the step that it has taken
-
-    bool take(std::size_t of, const RunSetup& setup, RunOptions options, const Motion& from, double end) {
-      if (of != member) {
-        options.step = 1;  // of the size that it is told
-        options.solver = Members::solver;
-        options.iteration = Iteration::fixed_point;
-        integrator = setup.subject->make_integrator(options);
-        integrator->remember_steps(true);
-        begin = std::numeric_limits<double>::quiet_NaN();
-        member = of;
-      }
-      if (begin == from.time) return true;
-      if (!integrator->start(from) || !integrator->step(end - from.time)) return false;
-      begin = from.time;
-      return true;
-    }
-  };
-
   /// The last step of the member in a lane, as an EventWatch looks into it.
   class Step {
    public:
-    Step(MemberSteps& steps, int lane, const RunSetup& setup, const RunOptions& options, Alone& alone)
-        : steps_(steps), lane_(lane), setup_(setup), options_(options), alone_(alone) {}
+    Step(MemberSteps& steps, int lane, Eigen::Index coordinates)
+        : steps_(steps), lane_(lane), coordinates_(coordinates) {}
 
     void state(Motion& motion) const {
       prepare(steps_.end(lane_), motion);
@@ -233,23 +207,19 @@ class LaneRuns : private MemberWatch {
     bool look(const Motion& begin, double time, Motion& motion) {
       prepare(time, motion);
       const double share = (time - begin.time) / (steps_.end(lane_) - begin.time);
-      if (steps_.look(lane_, share, motion.q.data(), motion.v.data())) return true;
-      return alone_.take(steps_.member(lane_), setup_, options_, begin, steps_.end(lane_)) &&
-             alone_.integrator->look(time, motion);
+      return steps_.look(lane_, share, motion.q.data(), motion.v.data());
     }
 
    private:
     void prepare(double time, Motion& motion) const {
       motion.time = time;
-      motion.q.resize(setup_.start.q.size());
-      motion.v.resize(setup_.start.v.size());
+      motion.q.resize(coordinates_);
+      motion.v.resize(coordinates_);
     }
 
     MemberSteps& steps_;
     int lane_;
-    const RunSetup& setup_;
-    const RunOptions& options_;
-    Alone& alone_;
+    Eigen::Index coordinates_;
   };
 
   /// The same as a Track follows it: by the polynomial alone.
@@ -278,10 +248,10 @@ class LaneRuns : private MemberWatch {
   };
 
   bool wants_steps() const override { return wants_steps_; }
+  bool wants_looks() const override { return wants_looks_; }
   bool stops() override { return stop_(); }
 
   void after_step(MemberSteps& steps) override {
-    alone_.resize(static_cast<std::size_t>(steps.lanes()));
     for (int lane = 0; lane < steps.lanes(); ++lane) {
       if (!steps.took_step(lane)) continue;
       const std::size_t k = steps.member(lane);
@@ -297,7 +267,7 @@ class LaneRuns : private MemberWatch {
   void look_into(MemberSteps& steps, int lane) {
     const std::size_t k = steps.member(lane);
     const RunSetup& setup = *setups_[k];
-    Step step(steps, lane, setup, options_, alone_[static_cast<std::size_t>(lane)]);
+    Step step(steps, lane, setup.start.q.size());
     std::optional<Motion> end;
     if (!setup.events.empty()) {
       for (const Occurrence& happened : watches_[k].after_step(step)) {
@@ -321,12 +291,11 @@ class LaneRuns : private MemberWatch {
   std::vector<EventWatch> watches_;
   Members members_;
   std::vector<RunReport> reports_;
-  std::vector<Alone> alone_;  // of each lane
   // Of a method that was not asked for: where it is over soon, or where the energy tells what many steps have lost; and
   // after how many that is looked at for the first time.
   static constexpr int most_unchecked_steps = 2000, most_steps = 20000, tried_steps = 200;
 
-  bool wants_steps_ = false, stopped_ = false;
+  bool wants_steps_ = false, wants_looks_ = false, stopped_ = false;
   std::vector<std::int64_t> steps_;  // that each member has taken
   std::vector<bool> takes_too_long_;
 };

@@ -56,6 +56,7 @@ class MemberQueue {
   void set_watch(MemberWatch& watch) {
     watch_ = &watch;
     if (watch.wants_steps()) seats_.show(sight_);
+    keeps_begin_ = watch.wants_looks();
   }
 
   /// Moves all members; ends[i] is what becomes of members[i]; false where the watch made it leave off. Throws
@@ -145,6 +146,9 @@ class MemberQueue {
   }
 
   void accept(const Mask& good) {
+    if constexpr (Stepper::is_implicit) {
+      if (keeps_begin_) stepper_.chain().save();
+    }
     stepper_.accept(good);
     seats_.follow(good, good & !good);
   }
@@ -286,6 +290,7 @@ class MemberQueue {
   L steps_{0.0}, rejected_{0.0}, unsolved_{0.0}, attempts_{0.0};
   L energy_{0.0}, energy_error_{0.0}, energy_sum_{0.0}, since_look_{0.0};
   MemberWatch* watch_ = nullptr;
+  bool keeps_begin_ = false;  // of the last step, for who looks into it
   std::optional<typename Seats::Sight> sight_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <pendula/chain/heading.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/run/plain_members.hpp>
@@ -21,7 +22,12 @@ class MemberView : public MemberSteps {
   using Vector = typename Stepper::Chain::Vector;
 
   MemberView(Stepper& stepper, const Turns& turns)
-      : chain_(stepper.chain()), turns_(turns), now_(coordinates()), views_(most_views, View(coordinates())) {}
+      : stepper_(stepper),
+        chain_(stepper.chain()),
+        turns_(turns),
+        now_(coordinates()),
+        views_(most_views, View(coordinates())),
+        moving_(D == 3 ? at(stepper.chain().links()) : 0) {}
 
   /// These members have taken steps.
   void set(const Mask& took, const L& begin, const L& end) {
@@ -56,9 +62,20 @@ class MemberView : public MemberSteps {
   }
 
   bool look(int lane, double share, double* q, double* v) override {
-    if constexpr (Stepper::is_implicit) return MemberSteps::look(lane, share, q, v);
     look_now();
-    look_again(share).read(lane, q, v);
+    View& view = views_.back();  // of what was glanced at last
+    view.share = nothing;
+    if constexpr (!Stepper::is_implicit) {
+      write([&](auto visit) { chain_.for_each_look(share, visit); }, share, view);
+    } else if constexpr (!Stepper::has_tangent) {
+      if (!step_again(lane, share)) return false;
+      auto& there = again_->chain();
+      const auto each = [&](auto visit) {
+        there.for_each_rate([&](int i, const Vector& rate, const L&) { visit(i, there.along(i), rate); });
+      };
+      write(each, share, view);
+    }
+    view.read(lane, q, v);
     return true;
   }
 
@@ -86,6 +103,7 @@ class MemberView : public MemberSteps {
     std::vector<Numbers> q, v;
   };
 
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
   std::size_t coordinates() const { return dof * static_cast<std::size_t>(chain_.links()); }
   std::size_t entry(int i, std::size_t a) const {
     return a * static_cast<std::size_t>(chain_.links()) + static_cast<std::size_t>(i);
@@ -102,8 +120,8 @@ class MemberView : public MemberSteps {
         turns_.angles(i).store(now_.q[entry(i, 0)].numbers);
         turning(chain_.along(i), rate).store(now_.v[entry(i, 0)].numbers);
       } else {
-        const auto anchored = [&](int lane) { return turns_.angles(lane, i); };
-        write_angles(i, chain_.along(i), rate, anchored, now_);
+        write_angles(
+            i, chain_.along(i), rate, [&](int lane, const auto&) { return turns_.angles(lane, i); }, now_);
       }
     });
   }
@@ -114,33 +132,43 @@ class MemberView : public MemberSteps {
     View& view = views_[k];
     if (view.share == share) return view;
     view.share = share;
-    chain_.for_each_glance(share, writer(view));
+    write([&](auto visit) { chain_.for_each_glance(share, visit); }, share, view);
     return view;
   }
 
-  const View& look_again(double share) {
-    View& view = views_.back();  // of what was glanced at last
-    view.share = nothing;
-    if constexpr (!Stepper::is_implicit) chain_.for_each_look(share, writer(view));
-    return view;
+  // A share of the last step of one member: a step of its own, from where that one began.
+  bool step_again(int lane, double share) requires Stepper::is_implicit {
+    again_.emplace(stepper_);
+    again_->go_back();
+    L wanted(0.0);
+    wanted.set(lane, 1);
+    const L begin = L::load(begin_), h = share * (L::load(end_) - begin);
+    const Mask found = again_->solve(begin, h, wanted > L(0.0));
+    again_->accept(found);
+    return xsimd::any(found);
   }
 
-  auto writer(View& view) const {
-    return [this, &view](int i, const Vector& rod, const Vector& rate) {
-      const std::size_t first = entry(i, 0);
-      if constexpr (D == 1) {
-        rod[0].store(view.q[first].numbers);
-        rate[0].store(view.v[first].numbers);
-      } else if constexpr (D == 2) {
-        Turns::near(rod, L::load(now_.q[first].numbers)).store(view.q[first].numbers);
-        turning(rod, rate).store(view.v[first].numbers);
-      } else {
-        const auto now = [&](int lane) {
-          return std::array{now_.q[first].numbers[lane], now_.q[entry(i, 1)].numbers[lane]};
-        };
-        write_angles(i, rod, rate, now, view);
+  // Coordinates and rates of each(visit(i, rod, rate)), which are at a share of the step.
+  template <class Each>
+  void write(Each each, double share, View& view) {
+    if constexpr (D == 1) {
+      each([&](int i, const Vector& q, const Vector& v) {
+        q[0].store(view.q[entry(i, 0)].numbers);
+        v[0].store(view.v[entry(i, 0)].numbers);
+      });
+    } else if constexpr (D == 2) {
+      each([&](int i, const Vector& rod, const Vector& rate) {
+        const std::size_t k = entry(i, 0);
+        Turns::near(rod, L::load(now_.q[k].numbers)).store(view.q[k].numbers);
+        turning(rod, rate).store(view.v[k].numbers);
+      });
+    } else {
+      each([&](int i, const Vector& rod, const Vector& rate) { moving_[at(i)] = {rod, rate}; });
+      for (int i = 0; i < chain_.links(); ++i) {
+        const auto near = [&](int lane, const auto& u) { return angles_near(lane, i, u, share); };
+        write_angles(i, moving_[at(i)].rod, moving_[at(i)].rate, near, view);
       }
-    };
+    }
   }
 
   // θ̇ of a rod in the plane.
@@ -166,7 +194,7 @@ class MemberView : public MemberSteps {
         heading.u[k] = along[k][lane];
         heading.u_dot[k] = moving[k][lane];
       }
-      const auto angles = user_angles(heading, near(lane));
+      const auto angles = user_angles(heading, near(lane, heading.u));
       for (std::size_t a = 0; a < dof; ++a) {
         view.q[entry(i, a)].numbers[lane] = angles.q[a];
         view.v[entry(i, a)].numbers[lane] = angles.v[a];
@@ -174,6 +202,30 @@ class MemberView : public MemberSteps {
     }
   }
 
+  // Angles of a moment before u, which a link points to at a share of its step: those at the end of the step, or on the
+  // way back from there, where the link may have come by a pole.
+  std::array<double, 2> angles_near(int lane, int i, const std::array<double, D>& u, double share) requires(D == 3) {
+    AngleAnchor<Space> anchor;
+    anchor.set(direction_of(chain_.along(i), lane),
+               {now_.q[entry(i, 0)].numbers[lane], now_.q[entry(i, 1)].numbers[lane]});
+    if (anchor.leaves(u)) {
+      const auto direction_at = [&](double back) {
+        std::array<double, D> on_the_way;
+        chain_.for_each_glance(1 - back, [&](int link, const Vector& rod, const Vector&) {
+          if (link == i) on_the_way = direction_of(rod, lane);
+        });
+        return on_the_way;
+      };
+      anchor.follow_path(direction_at, 1 - share);
+    }
+    return anchor.angles();
+  }
+
+  struct Moving {
+    Vector rod, rate;
+  };
+
+  Stepper& stepper_;
   typename Stepper::Chain& chain_;
   const Turns& turns_;
   alignas(pack_alignment) double took_[width] = {}, begin_[width] = {}, end_[width] = {}, finished_[width] = {};
@@ -181,6 +233,8 @@ class MemberView : public MemberSteps {
   std::size_t members_[width] = {};
   View now_;  // the state
   std::vector<View> views_;
+  std::vector<Moving> moving_;  // in space, the links where a view is made
+  std::optional<Stepper> again_;
 };
 
 }  // namespace pendula

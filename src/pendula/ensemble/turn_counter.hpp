@@ -28,7 +28,7 @@ class TurnCounter {
       std::array<double, Space::dof> angles;
       for (std::size_t a = 0; a < angles.size(); ++a) angles[a] = q[static_cast<Eigen::Index>(a) * links_ + i];
       Turn& turn = turns_[i];
-      turn.anchors[static_cast<std::size_t>(lane)].set(direction(lane, along(i)), angles);
+      turn.anchors[static_cast<std::size_t>(lane)].set(direction_of(along(i), lane), angles);
       note(turn, lane, along(i));
     }
   }
@@ -84,17 +84,6 @@ class TurnCounter {
     }
   };
 
-  static std::array<double, D> direction(int lane, const std::array<L, D>& rod) {
-    std::array<double, D> u;
-    double squared = 0;
-    for (std::size_t k = 0; k < D; ++k) {
-      u[k] = rod[k][lane];
-      squared += u[k] * u[k];
-    }
-    for (double& x : u) x /= std::sqrt(squared);
-    return u;
-  }
-
   static void note(Turn& turn, int lane, const std::array<L, D>& rod) {
     for (std::size_t k = 0; k < D; ++k) turn.at[k].set(lane, rod[k][lane]);
     turn.reach.set(lane, turn.anchors[static_cast<std::size_t>(lane)].reach_squared());
@@ -131,7 +120,7 @@ class TurnCounter {
       const int lane = static_cast<int>(at);
       if (turn.leaving[lane] == 0) continue;
       AngleAnchor<Space>& anchor = turn.anchors[at];
-      const std::array<double, D> u = direction(lane, chain.along(i));
+      const std::array<double, D> u = direction_of(chain.along(i), lane);
       if (turn.known[lane] != 0) {
         anchor.turn_to(u, turn.turned[lane]);
       } else {
@@ -148,7 +137,7 @@ class TurnCounter {
     const auto direction_at = [&](double share) {
       std::array<double, D> u{};
       chain.for_each_glance(share, [&](int link, const std::array<L, D>& rod, const auto&) {
-        if (link == i) u = direction(lane, rod);
+        if (link == i) u = direction_of(rod, lane);
       });
       return u;
     };

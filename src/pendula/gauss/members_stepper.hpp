@@ -105,6 +105,13 @@ class MembersStepper {
     return found & (chain_.turn() < L(farthest * farthest));
   }
 
+  /// Goes back to where the last step began of all members, which `chain().save()` has kept. Their stages are still
+  /// known: the next steps are predicted from them.
+  void go_back() requires(!Chain::has_tangent) {
+    chain_.restore(L(0.0) == L(0.0));
+    known_ = select(known_ == L(accepted), L(solved), L(cold));
+  }
+
   /// Moves those of the members that were solved to the end of their step.
   void accept(const Mask& which) {
     chain_.accept(which);

@@ -52,8 +52,6 @@ class SystemMotion {
         pace_(info()),
         calls_(static_cast<std::size_t>(Layout::cells) * per_call()),
         room_(4 * count_ + 3) {}
-  SystemMotion(const SystemMotion&) = delete;
-  SystemMotion& operator=(const SystemMotion&) = delete;
 
   const SystemInfo& info() const { return dynamics_.info(); }
   const Columns& columns() const { return columns_; }

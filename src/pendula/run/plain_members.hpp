@@ -33,8 +33,8 @@ class MemberSteps {
   /// Where it was when a share of the step was done, 0 to 1, by the polynomial through the step's stages: cheap where
   /// several lanes ask for the same share.
   virtual void glance(int lane, double share, double* q, double* v) = 0;
-  /// The same at the full order of the method; false where that is for others to find.
-  virtual bool look(int /*lane*/, double /*share*/, double* /*q*/, double* /*v*/) { return false; }
+  /// The same at the full order of the method, for a watch that wants looks; false where such a step is not found.
+  virtual bool look(int lane, double share, double* q, double* v) = 0;
   /// The logarithm of how its tangent has grown in the step; 0 where members are moved without.
   virtual double growth(int lane) const = 0;
   /// Its motion is over, whatever its time.
@@ -51,6 +51,8 @@ class MemberWatch {
 
   /// Whether to look into steps at all: `after_step` is called for those of all lanes together.
   virtual bool wants_steps() const = 0;
+  /// Whether it will ask for states of full order within steps (MemberSteps::look).
+  virtual bool wants_looks() const = 0;
   virtual void after_step(MemberSteps& steps) = 0;
   /// Whether to leave off; asked after every step.
   virtual bool stops() = 0;
