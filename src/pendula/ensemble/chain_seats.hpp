@@ -15,22 +15,22 @@
 
 namespace pendula {
 
-/// How chains come into the lanes of a stepper and out of them: by angles, whose full turns are counted on the way.
+/// Brings chains into the lanes of a stepper and reads them there, as angles; counts full turns on the way.
 template <class Stepper>
 class ChainSeats {
   using Space = typename Stepper::SpaceType;
   static constexpr int N = Stepper::links_known;
   using L = typename Stepper::L;
   using Mask = typename L::Mask;
-  using Turns = TurnCounter<Space, N, L>;
+  using Turns = TurnCounter<Space, L>;
 
  public:
   using MemberType = PlainMember<PlainChain>;
-  using Sight = MemberView<Stepper, Turns>;
+  using View = MemberView<Space, L, Turns>;
 
-  explicit ChainSeats(Stepper& stepper) : stepper_(stepper), turns_(links()) {}
+  explicit ChainSeats(Stepper& stepper) : stepper_(stepper), sight_(stepper), turns_(links()) {}
 
-  void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }
+  void show(std::optional<View>& view) { view.emplace(sight_, turns_); }
 
   int coordinates() const { return Space::dof * links(); }
   /// Throws std::invalid_argument if a member, with its number from 0 on, has another number of links.
@@ -46,8 +46,8 @@ class ChainSeats {
     turns_.start(lane, next.q, [this](int i) -> decltype(auto) { return stepper_.chain().along(i); });
   }
 
-  /// These members have taken steps; `far` are those that may have turned far and come back.
-  void follow(const Mask& which, const Mask& far) { turns_.follow(which, far, stepper_); }
+  /// Counts the turns of members that have taken a step; `far` are those that may have turned far and come back.
+  void follow(const Mask& which, const Mask& far) { turns_.follow(which, far, stepper_.chain(), sight_); }
 
   /// Where the member in a lane is.
   void read(int lane, double* q, double* v) {
@@ -69,6 +69,7 @@ class ChainSeats {
   int links() const { return stepper_.chain().links(); }
 
   Stepper& stepper_;
+  SightOf<Stepper> sight_;
   Turns turns_;
 };
 

@@ -11,7 +11,7 @@
 
 namespace pendula {
 
-/// Members of an ensemble that are moved, and kept, together: from the first to before the last.
+/// Members of an ensemble that one thread moves together: `size` of them from `first` on.
 struct Chunk {
   std::int64_t first = 0, last = 0;
 

@@ -14,7 +14,7 @@ namespace pendula {
 
 namespace detail {
 
-/// What the tangent of a member in a lane tells.
+/// The leading exponent of a member, from the growth of its tangent.
 class LaneExponent {
  public:
   explicit LaneExponent(double duration) : duration_(duration) {}
@@ -61,7 +61,7 @@ class LaneExponents : private MemberWatch {
     for (const RunSetup* setup : setups) exponents_.emplace_back(setup->duration);
   }
 
-  /// None of those that lanes could not move. Empty where it was stopped.
+  /// The exponent of each run; none where lanes could not move it. Empty if it was stopped.
   std::vector<std::optional<LyapunovSpectrum>> go() {
     if (!members_.move_with_tangents(options_, *this)) return {};
     std::vector<std::optional<LyapunovSpectrum>> found(setups_.size());
@@ -72,7 +72,7 @@ class LaneExponents : private MemberWatch {
   }
 
  private:
-  // As LaneRuns: a method that was not asked for has to keep the energy, where it is kept.
+  // As in LaneRuns, a substituted method must keep the energy of a motion that conserves it.
   bool is_good(std::size_t k) const {
     const RunSetup& setup = *setups_[k];
     const Subject& subject = *setup.subject;

@@ -11,12 +11,12 @@ namespace pendula {
 
 namespace {
 
-// What error estimates of few stages look at besides, where there are loads, lanes do not.
+// With loads, error estimates of few stages need what lanes do not look at.
 bool misses_loads(const RunSetup& setup, const RunOptions& options) {
   return is_adaptive(options) && options.stages == StepShape::few_stages && setup.subject->loaded();
 }
 
-// What is moved, where lanes are for it.
+// Names the chain or kernel in `kind`; false if there are no lanes for it.
 template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
@@ -24,7 +24,7 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind
   if (options.method == Method::taylor && setup.subject->loaded()) return false;
   if (!is_explicit(options.method)) {
     if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
-    // By steps that do not resolve a chain fixed points hardly arrive; those that are chosen may become shorter.
+    // Fixed points hardly converge by steps that do not resolve a chain; chosen steps become shorter.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
   kind.dimension = Space::dimension;

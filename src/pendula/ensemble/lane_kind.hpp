@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-/// Runs that members in lanes can take together: all that their steps have in common.
+/// What runs must have in common to go in lanes together.
 struct LaneKind {
   int dimension = 0, links = 0;         // of chains
   const SystemTable* kernel = nullptr;  // of others
@@ -34,8 +34,8 @@ std::optional<LaneKind> lane_kind(const RunSetup& setup);
 
 namespace detail {
 
-/// Of a system, and of chains with loads, nothing is known before but what they do: a method that was not asked for has
-/// to keep the energy, where it is kept, and to be over soon.
+/// Whether only a trial tells that a substituted method serves, as for systems and loaded chains: it must keep the
+/// energy of a motion that conserves it, and finish soon.
 bool has_to_be_tried(const Subject& subject);
 
 }  // namespace detail

@@ -28,14 +28,14 @@ namespace pendula {
 
 namespace detail {
 
-/// What energies of a member are compared with; `sum`: the largest |T| + |U| that was seen on the way.
+/// What energy errors of a member are divided by  [J]; `sum`: the largest |T| + |U| seen on the way.
 inline double energy_scale(const Subject& subject, const Observation& before, const Observation& after, double sum) {
   if (subject.energy_scale()) return compared_with(subject.energy_scale(), before.energy);
   const auto sizes = [](const Observation& seen) { return std::abs(seen.kinetic) + std::abs(seen.potential()); };
   return std::max({sum, sizes(before), sizes(after)});
 }
 
-/// The members of runs of one kind, chains, as the compiled library takes them, and what becomes of them.
+/// Chains of runs of one kind as members for the compiled library, and their ends.
 template <class Space>
 class PlainChains : public MemberEnds {
  public:
@@ -50,7 +50,7 @@ class PlainChains : public MemberEnds {
     }
   }
 
-  /// False where `watch` made it leave off.
+  /// Moves all; false if `watch` stopped it.
   bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
     return library_of<Space>().lanes(options)(options, every, members_, all(), watch);
   }
@@ -62,11 +62,11 @@ class PlainChains : public MemberEnds {
   static Description description(const RunSetup& /*setup*/) { return {"chain", "fixed-point", ""}; }
 
  private:
-  std::deque<std::vector<PlainChain::Drive>> drives_;  // which stay where they are
+  std::deque<std::vector<PlainChain::Drive>> drives_;  // members point to them: a deque does not move its elements
   std::vector<PlainMember<PlainChain>> members_;
 };
 
-/// The same of what generated kernels move.
+/// The same for systems of a generated kernel.
 class PlainSystems : public MemberEnds {
  public:
   /// `setups` must outlive it.
@@ -105,8 +105,8 @@ class PlainSystems : public MemberEnds {
 template <class Members>
 class LaneRuns : private MemberWatch {
  public:
-  /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they are run alone. So
-  /// must `tracks`, one for each or null, that go along with them.
+  /// `setups` are all of one lane_kind by `options`; their own options tell how they would be run alone. `tracks` has a
+  /// track to be filled for each, or null. Both must outlive it.
   LaneRuns(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop,
            std::span<Track* const> tracks)
       : setups_(setups), options_(options), stop_(stop), tracks_(tracks), members_(setups) {
@@ -123,7 +123,7 @@ class LaneRuns : private MemberWatch {
     takes_too_long_.resize(setups.size());
   }
 
-  /// What came of each; none of one that lanes could not move, by steps of their own or at all.
+  /// The report of each run; none where lanes could not move it, by steps of its own choice or at all.
   std::vector<std::optional<RunReport>> go() {
     reports_.assign(setups_.size(), {});
     move();
@@ -149,7 +149,7 @@ class LaneRuns : private MemberWatch {
     }
   }
 
-  /// What a run would report; false where it did not come to its end.
+  /// Fills the report as Run would; false if the member did not come to its end.
   bool finish(std::size_t k) {
     const RunSetup& setup = *setups_[k];
     const MemberEnd& end = members_.end(k);
@@ -180,7 +180,7 @@ class LaneRuns : private MemberWatch {
     const RunSetup& setup = *setups_[k];
     return !takes_too_long_[k] && (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
   }
-  // By how far it has come.
+  // Extrapolated from how far it has come.
   bool takes_too_long(std::size_t k, double time) const {
     const RunSetup& setup = *setups_[k];
     const int most = setup.subject->loaded() ? most_unchecked_steps : most_steps;
@@ -188,7 +188,7 @@ class LaneRuns : private MemberWatch {
     return steps_[k] >= most || (steps_[k] == tried_steps && tried_steps > 2 * share * most);
   }
 
-  // --- While they are moved ---
+  // --- After each step ---
 
   /// The last step of the member in a lane, as an EventWatch looks into it.
   class Step {
@@ -222,7 +222,7 @@ class LaneRuns : private MemberWatch {
     Eigen::Index coordinates_;
   };
 
-  /// The same as a Track follows it: by the polynomial alone.
+  /// The same for a Track, by dense output alone.
   class TrackedStep {
    public:
     TrackedStep(MemberSteps& steps, int lane, const Step& step) : steps_(steps), lane_(lane), step_(step) {}
@@ -291,8 +291,8 @@ class LaneRuns : private MemberWatch {
   std::vector<EventWatch> watches_;
   Members members_;
   std::vector<RunReport> reports_;
-  // Of a method that was not asked for: where it is over soon, or where the energy tells what many steps have lost; and
-  // after how many that is looked at for the first time.
+  // Steps that a substituted method may take: few where nothing checks them, more where the energy does. After
+  // tried_steps they are extrapolated for the first time.
   static constexpr int most_unchecked_steps = 2000, most_steps = 20000, tried_steps = 200;
 
   bool wants_steps_ = false, wants_looks_ = false, stopped_ = false;
@@ -302,7 +302,7 @@ class LaneRuns : private MemberWatch {
 
 namespace detail {
 
-/// Which of some runs can take lanes together.
+/// Numbers of the runs of each kind.
 using RunsByKind = std::map<LaneKind, std::vector<std::size_t>>;
 
 inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, const std::vector<std::size_t>& numbers) {
@@ -312,7 +312,7 @@ inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, con
   return some;
 }
 
-/// As LaneRuns does it.
+/// LaneRuns of one kind.
 inline std::vector<std::optional<RunReport>> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
                                                           const RunOptions& options, const std::function<bool()>& stop,
                                                           std::span<Track* const> tracks) {

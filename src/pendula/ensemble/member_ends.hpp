@@ -9,7 +9,7 @@
 
 namespace pendula {
 
-/// What becomes of members that have as many coordinates each, and room for where they end.
+/// The ends of members, with the storage that they point to.
 class MemberEnds {
  public:
   MemberEnds(Eigen::Index coordinates, std::size_t count)

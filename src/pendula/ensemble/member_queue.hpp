@@ -52,14 +52,14 @@ class MemberQueue {
   MemberQueue(const MemberQueue&) = delete;
   MemberQueue& operator=(const MemberQueue&) = delete;
 
-  /// Who sees every step from now on, and may end a member or all.
+  /// `watch` sees every step from now on, and may end a member or all.
   void set_watch(MemberWatch& watch) {
     watch_ = &watch;
-    if (watch.wants_steps()) seats_.show(sight_);
+    if (watch.wants_steps()) seats_.show(view_);
     keeps_begin_ = watch.wants_looks();
   }
 
-  /// Moves all members; ends[i] is what becomes of members[i]; false where the watch made it leave off. Throws
+  /// Moves all members; ends[i] is the end of members[i]; false if the watch stopped it. Throws
   /// std::invalid_argument on another number of links, and unless there is an end for each member.
   bool run(std::span<const MemberType> members, std::span<MemberEnd> ends) {
     if (ends.size() != members.size()) throw std::invalid_argument("ensemble: expected an end for each member");
@@ -79,15 +79,15 @@ class MemberQueue {
   std::int64_t iterations() const requires(Stepper::is_implicit) { return stepper_.iterations(); }
 
  private:
-  // Of systems nobody knows before what their energies are to be compared with.
+  // The scale of the energy of a system is known only after the run: the largest |T| + |U|.
   static constexpr bool sums_energies = requires(const Stepper& stepper) { stepper.energy_sum(); };
   static constexpr bool may_be_stiff = requires(const Stepper& stepper) { stepper.chain().may_be_stiff(); };
   static constexpr double most_attempts = 40;                        // at one step
-  static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // steps, and those a step that was taken
+  static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // failed steps: in all, and for each accepted step
   static constexpr double largest_energy_defect = 0.02;
   static constexpr double smallest_step = 1e-10;  // of the time that is left
 
-  // What a ten-thousandth of the tolerance leaves out is not seen beside what the steps err by.
+  // An iteration error of a ten-thousandth of the tolerance does not show beside the error of a step.
   static typename Stepper::Options stepper_options(const QueueOptions& options) {
     if constexpr (Stepper::is_implicit) {
       typename Stepper::Options given;
@@ -137,7 +137,7 @@ class MemberQueue {
     steps_ = steps_ + select(good, L(1.0), L(0.0));
     attempts_ = select(good, L(0.0), attempts_);
     const Mask is_finished = show(good, begin, is_cut);
-    if (options_.energy_every > 0) watch_energy(good & !is_finished);  // who is finished is so within the step
+    if (options_.energy_every > 0) watch_energy(good & !is_finished);  // a watch finishes a member within its step
     if (chooses()) controller_.move_on(good, h, stepper_);
     const Mask bad = running() & !good;
     if (xsimd::any(bad)) reject(bad, found & !wrong, h, remaining);
@@ -153,7 +153,7 @@ class MemberQueue {
     seats_.follow(good, good & !good);
   }
 
-  // Whose energy does not balance has come to stages that are not those of the motion.
+  // Stages whose energy does not balance solve the equations, but are not those of the motion.
   Mask accept_doubtful(const Mask& good, const Mask& doubtful) {
     auto& chain = stepper_.chain();
     const L due = chain.energy_due();
@@ -169,13 +169,13 @@ class MemberQueue {
     return wrong;
   }
 
-  // To whoever watches; gives whose motion is over.
+  // Shows the step to the watch; gives the members that it has finished.
   Mask show(const Mask& good, const L& begin, const Mask& is_cut) {
-    if (!sight_ || !xsimd::any(good)) return good & !good;
-    sight_->set(good, begin, select(is_cut, end_, time_.value));
-    if constexpr (Stepper::has_tangent) sight_->set_growth(stepper_.take_growth(good));
-    watch_->after_step(*sight_);
-    return sight_->finished();
+    if (!view_ || !xsimd::any(good)) return good & !good;
+    view_->set(good, begin, select(is_cut, end_, time_.value));
+    if constexpr (Stepper::has_tangent) view_->set_growth(stepper_.take_growth(good));
+    watch_->after_step(*view_);
+    return view_->finished();
   }
 
   void watch_energy(const Mask& good) {
@@ -191,7 +191,7 @@ class MemberQueue {
     if constexpr (sums_energies) energy_sum_ = select(due, max(energy_sum_, stepper_.energy_sum()), energy_sum_);
   }
 
-  // Members whose step was not taken try a shorter one, or give up; those that were solved know already how short.
+  // Rejected members try a shorter step or give up; where the step was solved, its error has set the next one.
   void reject(const Mask& bad, const Mask& solved, const L& h, const L& remaining) {
     attempts_ = attempts_ + select(bad, L(1.0), L(0.0));
     rejected_ = rejected_ + select(bad, L(1.0), L(0.0));
@@ -203,8 +203,8 @@ class MemberQueue {
     if (xsimd::any(lost)) retire(lost, Status::not_converged);
   }
 
-  // Members whose fixed points have failed now as often that steps are short for their sake, not for what they err by:
-  // Newton is faster.
+  // Members whose fixed points have failed so often that convergence limits their steps, not the error: Newton's
+  // iteration is faster.
   Mask is_stiff([[maybe_unused]] const Mask& unsolved) {
     if constexpr (may_be_stiff) {
       const Mask counted = unsolved & stepper_.chain().may_be_stiff();
@@ -236,7 +236,7 @@ class MemberQueue {
     seats_.read(lane, end.q, end.v);
   }
 
-  // The next member comes into a lane that is free; members that are at their end already stay what they are.
+  // Seats the next member in a free lane; members that end where they start are skipped.
   void refill(int lane) {
     running_.set(lane, 0);
     while (next_ < members_.size()) {
@@ -262,12 +262,12 @@ class MemberQueue {
     for (L* zero :
          {&time_.low, &steps_, &rejected_, &unsolved_, &attempts_, &since_look_, &energy_error_, &energy_sum_})
       zero->set(lane, 0);
-    if (sight_) sight_->seat(lane, member);
+    if (view_) view_->seat(lane, member);
     running_.set(lane, 1);
     begins_.set(lane, 1);
   }
 
-  // Members that have come into lanes.
+  // Starts the controller and the energy record of members that were just seated.
   void begin() {
     const Mask begins = begins_ > L(0.0);
     begins_ = L(0.0);
@@ -291,7 +291,7 @@ class MemberQueue {
   L energy_{0.0}, energy_error_{0.0}, energy_sum_{0.0}, since_look_{0.0};
   MemberWatch* watch_ = nullptr;
   bool keeps_begin_ = false;  // of the last step, for who looks into it
-  std::optional<typename Seats::Sight> sight_;
+  std::optional<typename Seats::View> view_;
 };
 
 /// By Gauss steps of S stages, of chains of N links.

@@ -2,32 +2,31 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <pendula/chain/heading.hpp>
+#include <pendula/ensemble/step_sight.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/run/plain_members.hpp>
 #include <vector>
 
 namespace pendula {
 
-/// Looks into the last steps of all members of a MembersStepper or ExplicitSteps at once, and hands out what it sees of
-/// one. What several lanes ask for is found for all of them the first time. `Turns` is as TurnCounter; coordinates of
-/// systems, of one dimension, are what they are.
-template <class Stepper, class Turns>
+/// The last steps of members in lanes in the user's coordinates: angles of chains, coordinates of systems. A state that
+/// several lanes ask for is found for all of them the first time. `Turns` is TurnCounter of chains.
+template <class Space, class L, class Turns>
 class MemberView : public MemberSteps {
- public:
-  using Space = typename Stepper::SpaceType;
-  using L = typename Stepper::L;
-  using Mask = typename L::Mask;
-  using Vector = typename Stepper::Chain::Vector;
+  static constexpr std::size_t D = Space::dimension;
 
-  MemberView(Stepper& stepper, const Turns& turns)
-      : stepper_(stepper),
-        chain_(stepper.chain()),
+ public:
+  using Mask = typename L::Mask;
+  using Sight = StepSight<L, D>;
+
+  MemberView(Sight& sight, const Turns& turns)
+      : sight_(sight),
         turns_(turns),
         now_(coordinates()),
         views_(most_views, View(coordinates())),
-        moving_(D == 3 ? at(stepper.chain().links()) : 0) {}
+        parts_(at(sight.links())),
+        on_the_way_(parts_) {}
 
   /// These members have taken steps.
   void set(const Mask& took, const L& begin, const L& end) {
@@ -38,7 +37,7 @@ class MemberView : public MemberSteps {
     now_.share = nothing;
     for (View& view : views_) view.share = nothing;
   }
-  /// What their tangents have grown by, as logarithms.
+  /// Logarithms of the growth of their tangents.
   void set_growth(const L& growth) { growth.store(growth_); }
   void seat(int lane, std::size_t member) { members_[lane] = member; }
   Mask finished() const { return L::load(finished_) > L(0.0); }
@@ -63,18 +62,11 @@ class MemberView : public MemberSteps {
 
   bool look(int lane, double share, double* q, double* v) override {
     look_now();
-    View& view = views_.back();  // of what was glanced at last
+    const L begin = L::load(begin_);
+    if (!sight_.look(lane, begin, L::load(end_) - begin, share, parts_)) return false;
+    View& view = views_.back();  // the one that was filled last
     view.share = nothing;
-    if constexpr (!Stepper::is_implicit) {
-      write([&](auto visit) { chain_.for_each_look(share, visit); }, share, view);
-    } else if constexpr (!Stepper::has_tangent) {
-      if (!step_again(lane, share)) return false;
-      auto& there = again_->chain();
-      const auto each = [&](auto visit) {
-        there.for_each_rate([&](int i, const Vector& rate, const L&) { visit(i, there.along(i), rate); });
-      };
-      write(each, share, view);
-    }
+    write(share, view);
     view.read(lane, q, v);
     return true;
   }
@@ -83,7 +75,7 @@ class MemberView : public MemberSteps {
   static constexpr double nothing = -1;
   static constexpr std::size_t most_views = 10;
   static constexpr auto width = L::width, dof = static_cast<std::size_t>(Space::dof);
-  static constexpr std::size_t D = Space::dimension;
+  using Vector = std::array<L, D>;
 
   /// Coordinates and rates of all members at one share of their steps, lane after lane.
   struct View {
@@ -104,26 +96,24 @@ class MemberView : public MemberSteps {
   };
 
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
-  std::size_t coordinates() const { return dof * static_cast<std::size_t>(chain_.links()); }
-  std::size_t entry(int i, std::size_t a) const {
-    return a * static_cast<std::size_t>(chain_.links()) + static_cast<std::size_t>(i);
-  }
+  std::size_t coordinates() const { return dof * at(sight_.links()); }
+  std::size_t entry(std::size_t i, std::size_t a) const { return a * at(sight_.links()) + i; }
 
   void look_now() {
     if (now_.share != nothing) return;
     now_.share = 1;
-    chain_.for_each_rate([&](int i, const Vector& rate, const L&) {
+    sight_.now(parts_);
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const auto& [place, rate] = parts_[i];
       if constexpr (D == 1) {
-        chain_.along(i)[0].store(now_.q[entry(i, 0)].numbers);
-        rate[0].store(now_.v[entry(i, 0)].numbers);
+        store(i, place[0], rate[0], now_);
       } else if constexpr (D == 2) {
-        turns_.angles(i).store(now_.q[entry(i, 0)].numbers);
-        turning(chain_.along(i), rate).store(now_.v[entry(i, 0)].numbers);
+        store(i, turns_.angles(static_cast<int>(i)), turning(place, rate), now_);
       } else {
         write_angles(
-            i, chain_.along(i), rate, [&](int lane, const auto&) { return turns_.angles(lane, i); }, now_);
+            i, [&](int lane, const auto&) { return turns_.angles(lane, static_cast<int>(i)); }, now_);
       }
-    });
+    }
   }
 
   const View& view_at(double share) {
@@ -132,43 +122,29 @@ class MemberView : public MemberSteps {
     View& view = views_[k];
     if (view.share == share) return view;
     view.share = share;
-    write([&](auto visit) { chain_.for_each_glance(share, visit); }, share, view);
+    sight_.glance(share, parts_);
+    write(share, view);
     return view;
   }
 
-  // A share of the last step of one member: a step of its own, from where that one began.
-  bool step_again(int lane, double share) requires Stepper::is_implicit {
-    again_.emplace(stepper_);
-    again_->go_back();
-    L wanted(0.0);
-    wanted.set(lane, 1);
-    const L begin = L::load(begin_), h = share * (L::load(end_) - begin);
-    const Mask found = again_->solve(begin, h, wanted > L(0.0));
-    again_->accept(found);
-    return xsimd::any(found);
-  }
-
-  // Coordinates and rates of each(visit(i, rod, rate)), which are at a share of the step.
-  template <class Each>
-  void write(Each each, double share, View& view) {
-    if constexpr (D == 1) {
-      each([&](int i, const Vector& q, const Vector& v) {
-        q[0].store(view.q[entry(i, 0)].numbers);
-        v[0].store(view.v[entry(i, 0)].numbers);
-      });
-    } else if constexpr (D == 2) {
-      each([&](int i, const Vector& rod, const Vector& rate) {
-        const std::size_t k = entry(i, 0);
-        Turns::near(rod, L::load(now_.q[k].numbers)).store(view.q[k].numbers);
-        turning(rod, rate).store(view.v[k].numbers);
-      });
-    } else {
-      each([&](int i, const Vector& rod, const Vector& rate) { moving_[at(i)] = {rod, rate}; });
-      for (int i = 0; i < chain_.links(); ++i) {
-        const auto near = [&](int lane, const auto& u) { return angles_near(lane, i, u, share); };
-        write_angles(i, moving_[at(i)].rod, moving_[at(i)].rate, near, view);
+  // Coordinates of `parts_`, which were found at a share of the step.
+  void write(double share, View& view) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const auto& [place, rate] = parts_[i];
+      if constexpr (D == 1) {
+        store(i, place[0], rate[0], view);
+      } else if constexpr (D == 2) {
+        store(i, Turns::near(place, L::load(now_.q[i].numbers)), turning(place, rate), view);
+      } else {
+        write_angles(
+            i, [&](int lane, const auto& u) { return angles_near(lane, i, u, share); }, view);
       }
     }
+  }
+
+  static void store(std::size_t i, const L& q, const L& v, View& view) {
+    q.store(view.q[i].numbers);
+    v.store(view.v[i].numbers);
   }
 
   // θ̇ of a rod in the plane.
@@ -178,7 +154,8 @@ class MemberView : public MemberSteps {
   }
 
   template <class Near>
-  void write_angles(int i, const Vector& rod, const Vector& rate, Near near, View& view) const {
+  void write_angles(std::size_t i, Near near, View& view) const {
+    const auto& [rod, rate] = parts_[i];
     alignas(pack_alignment) double along[D][width], moving[D][width];
     L square(0.0);
     for (const L& x : rod) square = fma(x, x, square);
@@ -202,39 +179,28 @@ class MemberView : public MemberSteps {
     }
   }
 
-  // Angles of a moment before u, which a link points to at a share of its step: those at the end of the step, or on the
-  // way back from there, where the link may have come by a pole.
-  std::array<double, 2> angles_near(int lane, int i, const std::array<double, D>& u, double share) requires(D == 3) {
+  // Angles near those of u, the direction of a link at a share of its step: the angles at the end of the step or, where
+  // the link may have come by a pole, those found by following it back from there.
+  std::array<double, 2> angles_near(int lane, std::size_t i, const std::array<double, D>& u,
+                                    double share) requires(D == 3) {
+    const auto direction_at = [&](double back) {
+      back == 0 ? sight_.now(on_the_way_) : sight_.glance(1 - back, on_the_way_);
+      return direction_of(on_the_way_[i].place, lane);
+    };
     AngleAnchor<Space> anchor;
-    anchor.set(direction_of(chain_.along(i), lane),
-               {now_.q[entry(i, 0)].numbers[lane], now_.q[entry(i, 1)].numbers[lane]});
-    if (anchor.leaves(u)) {
-      const auto direction_at = [&](double back) {
-        std::array<double, D> on_the_way;
-        chain_.for_each_glance(1 - back, [&](int link, const Vector& rod, const Vector&) {
-          if (link == i) on_the_way = direction_of(rod, lane);
-        });
-        return on_the_way;
-      };
-      anchor.follow_path(direction_at, 1 - share);
-    }
+    anchor.set(direction_at(0), {now_.q[entry(i, 0)].numbers[lane], now_.q[entry(i, 1)].numbers[lane]});
+    if (anchor.leaves(u)) anchor.follow_path(direction_at, 1 - share);
     return anchor.angles();
   }
 
-  struct Moving {
-    Vector rod, rate;
-  };
-
-  Stepper& stepper_;
-  typename Stepper::Chain& chain_;
+  Sight& sight_;
   const Turns& turns_;
   alignas(pack_alignment) double took_[width] = {}, begin_[width] = {}, end_[width] = {}, finished_[width] = {};
   alignas(pack_alignment) double growth_[width] = {};
   std::size_t members_[width] = {};
   View now_;  // the state
   std::vector<View> views_;
-  std::vector<Moving> moving_;  // in space, the links where a view is made
-  std::optional<Stepper> again_;
+  typename Sight::Parts parts_, on_the_way_;
 };
 
 }  // namespace pendula

@@ -14,12 +14,12 @@ inline QueueOptions lane_options(const RunOptions& options, std::int64_t every) 
   asked.step = is_adaptive(options) ? 0 : options.step;
   asked.tolerance = options.tolerance;
   asked.energy_every = every;
-  // Who asks for the iteration of lanes has one that `simulate` takes as well, to round-off.
+  // If fixed points are asked for, they go to round-off, as in `simulate`.
   if (options.iteration == Iteration::fixed_point) asked.enough = MembersStepperOptions{}.enough;
   return asked;
 }
 
-/// Moves members by a Queue, as MoveMembers and MoveSystemMembers tell.
+/// Moves members by a MemberQueue: MoveMembers and MoveSystemMembers.
 template <class Queue>
 bool move_by(typename Queue::Subject subject, const RunOptions& options, std::int64_t every,
              std::span<const typename Queue::MemberType> members, std::span<MemberEnd> ends, MemberWatch& watch) {
@@ -28,7 +28,7 @@ bool move_by(typename Queue::Subject subject, const RunOptions& options, std::in
   return queue.run(members, ends);
 }
 
-/// What moves members by an explicit method, of Moves::by<Method>() and Moves::by_series(); nullptr for others.
+/// Moves::by<Method>() of an explicit method, or Moves::by_series(); nullptr for other methods.
 template <class Moves>
 auto explicit_lanes(Method method) -> decltype(Moves::template by<DormandPrince5>()) {
   switch (method) {
@@ -47,7 +47,7 @@ auto explicit_lanes(Method method) -> decltype(Moves::template by<DormandPrince5
   }
 }
 
-/// What moves members by Gauss steps, of Moves::of<stages>(); nullptr for other numbers of stages.
+/// Moves::of<stages>() of Gauss steps; nullptr for numbers of stages that lanes were not compiled for.
 template <class Moves>
 auto gauss_lanes(int stages) -> decltype(Moves::template of<4>()) {
   switch (stages) {

@@ -19,7 +19,7 @@
 
 namespace pendula {
 
-/// One of many: what is moved, and from where. Members may share a subject.
+/// One motion of an ensemble: a subject, which members may share, and its start.
 struct EnsembleMember {
   std::shared_ptr<const Subject> subject;
   Motion start;
@@ -30,12 +30,12 @@ struct EnsembleSchedule {
   RunOptions options;
   double duration = 10;    ///< s
   std::int64_t every = 1;  ///< steps from one look at the energy to the next
-  /// To look for in each.
+  /// Looked for in each member.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  MemberMethod method = MemberMethod::asked;  ///< by what members move: options', or the quickest that serves
+  MemberMethod method = MemberMethod::asked;  ///< that of `options`, or the quickest that serves
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
-  /// Asked on the way, by several threads at once: true stops all, who then say so.
+  /// Called on the way by several threads at once; if it returns true, all members stop and report that.
   std::function<bool()> stop = [] { return false; };
 };
 

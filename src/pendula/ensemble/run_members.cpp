@@ -16,14 +16,14 @@ namespace pendula {
 namespace detail {
 namespace {
 
-/// Of a chain of one kind; none of others.
+/// Links of a chain in one space; 0 for other subjects.
 template <class Space>
 int links_of(const Subject& subject) {
   const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
   return found == nullptr ? 0 : found->chain().links();
 }
 
-/// About how fast a chain of one kind swings  [1/s]; none of others.
+/// About how fast a chain in one space swings  [1/s]; nothing for other subjects.
 template <class Space>
 std::optional<double> natural_pace_in(const Subject& subject) {
   const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
@@ -32,28 +32,28 @@ std::optional<double> natural_pace_in(const Subject& subject) {
   return chain.links() * std::sqrt(0.15 * std::abs(chain.gravity()) / chain.lengths().sum());
 }
 
-/// About how fast a chain swings  [1/s]; infinite for what is none.
+/// About how fast a chain swings  [1/s]; infinity for other subjects.
 double natural_pace(const Subject& subject) {
   const std::optional<double> planar = natural_pace_in<Planar>(subject);
   return planar ? *planar : natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
 }
 
-// Whether an explicit method loses no more energy in a run, step by step, than the motion's errors are, and how much
-// longer the run is: by what swings, and by what turns where it starts.
+// The length of a run in swings, or in turns where it starts fast. Up to short_run an explicit method loses no more
+// energy than the motion's error.
 constexpr double short_run = 100;
 double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
 }
 
-// Of few links series are summed up in registers (library/lane_methods.hpp); how long such a chain's run is, is known.
+// Series of few links are summed in registers (library/lane_methods.hpp).
 bool goes_by_series(const RunSetup& setup) {
   const bool is_short = links_of<Planar>(*setup.subject) + links_of<Spatial>(*setup.subject) <= 3;
   return setup.options.tolerance >= 1e-13 && is_short && std::isfinite(natural_pace(*setup.subject)) &&
          !setup.subject->loaded();
 }
 
-// Of a tolerance by which no more of the energy is lost than in a short run, a hundredth: what the motion makes of the
-// errors of steps. In powers of ten, so that members whose runs are about as long go in lanes together.
+// A tolerance by which a run loses no more energy than a short one. A hundredth, since the motion amplifies the errors
+// of steps. Rounded to powers of ten, so that runs of about the same length go in lanes together.
 double tolerance_of_steps(const RunSetup& setup, double finest) {
   const double length = run_length(setup);
   const double longer = length > short_run && std::isfinite(length) ? length / short_run : 1;
@@ -95,14 +95,14 @@ RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
 namespace detail {
 namespace {
 
-// The lanes in which a run was tried last, and what came of it, if they moved it.
+// The lanes in which a run was tried last, and its report if they moved it.
 struct Tried {
   std::optional<LaneKind> kind;
   std::optional<RunReport> report;
-  std::optional<Track> track;  // of one that is to be looked at again
+  std::optional<Track> track;  // of a run that gets a second look
 };
 
-// Those of which nothing came yet, if lanes are others than before.
+// Runs without a report, if their lanes are others than before.
 void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const std::function<bool()>& stop,
                   std::vector<Tried>& tried) {
   RunsByKind kinds;
@@ -124,7 +124,7 @@ void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const s
   }
 }
 
-// Those that lanes have moved to their ends.
+// Runs that lanes have moved to their ends.
 void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<bool()>& stop,
                          std::vector<Tried>& tried) {
   std::vector<Doubted> doubted;

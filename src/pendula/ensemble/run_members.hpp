@@ -11,35 +11,35 @@
 
 namespace pendula {
 
-/// The options of a run, or those of an explicit method where lanes come to the same errors sooner by that. Of a Gauss
-/// run by a tolerance those are Taylor series where the chain is short; else Fehlberg's pair, by a tolerance of more
-/// than a few last digits, where nothing is looked for step by step, and the run is over before the energy, which an
-/// explicit method loses step by step, is off by more than the motion.
+/// The options of a run, or of an explicit method that comes to the same error sooner in lanes. A Gauss run by
+/// tolerance goes by Taylor series if it is a short chain; else by Fehlberg's pair, if the tolerance is not extreme,
+/// there are no events, and the run is so short that the energy which an explicit method loses stays below the error of
+/// the motion.
 RunOptions quickest_in_lanes(const RunSetup& setup);
 
-/// The same for the leading exponent of a run, however long that is: the longer, the smaller the tolerance, so that no
-/// more of the energy is lost in all. How much longer is known of chains.
+/// The same for the leading exponent of a run of any length: the longer it is, the smaller the tolerance, so that no
+/// more energy is lost in all. Only of chains the length is known in swings.
 RunOptions quickest_with_tangents(const RunSetup& setup);
 
 /// How members are moved.
 enum class MemberMethod {
   asked,    ///< as their options tell
-  quickest  ///< as quickest_in_lanes tells; who cannot be moved so, as their options tell, in lanes where that goes
+  quickest  ///< by quickest_in_lanes; by their own options where that fails, in lanes where possible
 };
 
 /// The options by which a run goes in lanes.
 RunOptions lane_options(const RunSetup& setup, MemberMethod method);
 
-/// Runs that nobody observes, as `Run` does one: many in lanes where they can go there, the others one by one. Those
-/// that are to be estimated are looked at again, those in lanes by others in lanes. A report depends on its setup
-/// alone, to the last bit; of a run that was stopped it says that and nothing else. Throws as Run.
+/// Runs without observers, each as `Run` does one: in lanes where they can go there, else one by one. Runs that are to
+/// be estimated get second looks, those in lanes in lanes. A report depends on its setup alone, to the last bit; of a
+/// stopped run it tells only that. Throws as Run.
 std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
     MemberMethod method = MemberMethod::asked);
 
-/// The leading Lyapunov exponents of those of the runs that go in lanes, each over the whole of its duration, with one
-/// tangent; of others, and of those that could not be moved so, none. Empty where it was stopped. Who loses too much
-/// energy by a method that was not asked for tries a hundredth of the tolerance, and then goes as its options tell.
+/// The leading Lyapunov exponents of the runs that go in lanes, each over its whole duration; none of the others. Empty
+/// if it was stopped. A member that loses too much energy by a substituted method is moved again by a hundredth of the
+/// tolerance, and then by its own options.
 std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
     MemberMethod method = MemberMethod::asked);

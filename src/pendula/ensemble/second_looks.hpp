@@ -21,17 +21,17 @@
 
 namespace pendula::detail {
 
-/// Whether a run is compared with another one.
+/// Whether a run is to be compared with another one.
 inline bool is_estimated(const RunSetup& setup) {
   return setup.doubted && setup.estimate;
 }
 
-/// States of a run in lanes, of which there may be many at once: 256 kB of them at most.
+/// A track for a run in lanes: of many at once, so at most 256 kB.
 inline Track lane_track() {
   return Track(Track::apart / 2, std::size_t{1} << 15);
 }
 
-/// A run in lanes that is to be looked at again.
+/// A run in lanes that gets a second look.
 struct Doubted {
   const RunSetup& setup;
   RunReport& report;
@@ -39,15 +39,15 @@ struct Doubted {
   Doubt doubt = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// Lanes were compiled for even numbers of stages only. Of the two that are near it is the one that is further away
-/// from the number that the run has.
+/// Lanes are compiled for even numbers of stages only. Of the two nearest it takes the one farther from the number of
+/// the run.
 inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
   if (options.method == Method::gauss && options.stages % 2 != 0)
     options.stages += options.stages < run.stages ? -1 : 1;
   return options;
 }
 
-/// Another run may find other events, or at other times.
+/// A doubt if another run finds other events, or at other times.
 inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunReport& report, const RunReport& other) {
   for (std::size_t k = 0; k < setup.events.size(); ++k) {
     const EventTally &one = report.events[k], &another = other.events[k];
@@ -64,8 +64,8 @@ inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunR
   return {};
 }
 
-/// Between their ends runs in lanes are seen by the polynomials of steps, which err by more than the steps: they tell
-/// whether the motion has gone elsewhere on the way, as chaos does before it comes to rest.
+/// Tracks of runs in lanes are dense output, whose errors are larger than those of steps: they only tell whether the
+/// motion has gone elsewhere on the way. The ends are compared exactly.
 inline Doubt of_other(const Doubted& member, const SecondLook& look, const RunReport& other, const Track& track) {
   static constexpr double elsewhere = 0.5;
   const Separation parted(*member.setup.subject, member.track, track);
@@ -74,7 +74,7 @@ inline Doubt of_other(const Doubted& member, const SecondLook& look, const RunRe
   return doubt ? doubt : of_events(member.setup, look, member.report, other);
 }
 
-/// Where no other run goes in lanes: the run itself alone, which looks at itself again, and is compared.
+/// If no other run goes in lanes: the member is run alone, with a second look, and its end is compared.
 inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& stop) {
   const RunSetup& setup = member.setup;
   const RunReport alone = Run(setup).go(stop);
@@ -88,7 +88,7 @@ inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& st
   return of_events(setup, {setup.options, "alone, not in lanes,", 1, 1}, member.report, alone);
 }
 
-/// Looks at members again, each by the run that `choose(report)` tells; of whom it tells none, what was said stands.
+/// Looks at members again, each by the run that choose(report) gives; if it gives none, the doubt stays as it is.
 template <class Choose>
 void look_by(std::span<Doubted* const> members, Choose choose, const std::function<bool()>& stop) {
   std::vector<Doubted*> looked;
@@ -96,7 +96,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
   std::vector<RunSetup> setups;
   std::vector<Track> tracks;
   RunsByKind kinds;
-  std::vector<std::size_t> others;  // who do not go in lanes so
+  std::vector<std::size_t> others;  // that do not go in lanes
   for (Doubted* const member : members) {
     const RunOptions& run = member->report.options;
     std::optional<SecondLook> look = choose(member->report);
@@ -136,8 +136,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
   }
 }
 
-/// As Run does it: by a run that errs more, and takes less time; where that says that a member cannot be trusted, by
-/// one that errs less.
+/// As Run does: first by a coarser run, which takes less time; if that doubts a member, by a finer one.
 inline void look_again(std::vector<Doubted>& members, const std::function<bool()>& stop) {
   std::vector<Doubted*> left;
   left.reserve(members.size());

@@ -8,7 +8,7 @@
 
 namespace pendula {
 
-/// How systems come into the lanes of a stepper and out of them.
+/// Brings systems into the lanes of a stepper and reads them there.
 template <class Stepper>
 class SystemSeats {
   struct NoTurns {};
@@ -16,11 +16,11 @@ class SystemSeats {
 
  public:
   using MemberType = PlainMember<PlainSystem>;
-  using Sight = MemberView<Stepper, NoTurns>;
+  using View = MemberView<CoordinateSpace, typename Stepper::L, NoTurns>;
 
-  explicit SystemSeats(Stepper& stepper) : stepper_(stepper) {}
+  explicit SystemSeats(Stepper& stepper) : stepper_(stepper), sight_(stepper) {}
 
-  void show(std::optional<Sight>& sight) { sight.emplace(stepper_, turns_); }
+  void show(std::optional<View>& view) { view.emplace(sight_, turns_); }
 
   int coordinates() const { return stepper_.chain().links(); }
   void require(const MemberType& /*member*/, std::size_t /*number*/) const {}
@@ -40,6 +40,7 @@ class SystemSeats {
 
  private:
   Stepper& stepper_;
+  SightOf<Stepper> sight_;
   NoTurns turns_;
 };
 

@@ -2,16 +2,18 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
-#include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
+#include <pendula/ensemble/step_sight.hpp>
 #include <pendula/numeric/lane_pack.hpp>
+#include <vector>
 
 namespace pendula {
 
-/// Counts the full turns of every member's links, for the angles of their ends: AngleAnchor where a link has moved so
-/// far from where it was last followed to.
-template <class Space, int N, class L>
+/// Follows the angles of every member's links through full turns and by poles: moves the AngleAnchor of a link where
+/// the link has gone too far from it.
+template <class Space, class L>
 class TurnCounter {
   static constexpr std::size_t D = Space::dimension;
   static constexpr std::size_t lanes = static_cast<std::size_t>(L::size);
@@ -19,7 +21,9 @@ class TurnCounter {
  public:
   using Mask = typename L::Mask;
 
-  explicit TurnCounter(int links) : links_(links), turns_(links) {}
+  using Sight = StepSight<L, D>;
+
+  explicit TurnCounter(int links) : links_(links), turns_(at(links)), rods_(at(links)) {}
 
   /// A member comes into a lane, at angles q; along(i): the rods.
   template <class Along>
@@ -27,41 +31,42 @@ class TurnCounter {
     for (int i = 0; i < links_; ++i) {
       std::array<double, Space::dof> angles;
       for (std::size_t a = 0; a < angles.size(); ++a) angles[a] = q[static_cast<Eigen::Index>(a) * links_ + i];
-      Turn& turn = turns_[i];
-      turn.anchors[static_cast<std::size_t>(lane)].set(direction_of(along(i), lane), angles);
+      Turn& turn = turns_[at(i)];
+      turn.anchors[at(lane)].set(direction_of(along(i), lane), angles);
       note(turn, lane, along(i));
     }
   }
 
   /// These members have taken a step by which links have turned less than half a turn; `far` are those that may have
   /// gone far and come back.
-  template <class Stepper>
-  void follow(const Mask& which, const Mask& far, Stepper& stepper) {
-    auto& chain = stepper.chain();
+  template <class Chain>
+  void follow(const Mask& which, const Mask& far, const Chain& chain, Sight& sight) {
     Mask any = far;
     for (int i = 0; i < links_; ++i) {
-      const Mask leaving = far | (which & leaves(turns_[i], chain.along(i)));
-      turns_[i].begin(leaving);
+      const Mask leaving = far | (which & leaves(turns_[at(i)], chain.along(i)));
+      turns_[at(i)].begin(leaving);
       any = any | leaving;
     }
     if (!xsimd::any(any)) return;
-    go_through_step(stepper);
-    for (int i = 0; i < links_; ++i) {
-      turns_[i].pass(chain.along(i));
-      end_step(i, chain);
+    for (int k = 0; k < sight.waypoints(); ++k) {
+      sight.waypoint(k, rods_);
+      pass();
     }
+    for (int i = 0; i < links_; ++i) rods_[at(i)].place = chain.along(i);
+    pass();
+    for (int i = 0; i < links_; ++i) end_step(at(i), chain.along(i), sight);
   }
 
-  /// Angles of a member's link, known but for rounding.
-  auto angles(int lane, int i) const { return turns_[i].anchors[static_cast<std::size_t>(lane)].angles(); }
+  /// Angles of a member's link that its own are near.
+  auto angles(int lane, int i) const { return turns_[at(i)].anchors[at(lane)].angles(); }
 
  private:
   struct Turn {
     std::array<AngleAnchor<Space>, lanes> anchors;
     std::array<L, D> at{};  // where they were last followed to
     L reach{0.0};           // how far angles near the anchor's are the only ones, in lengths, squared
-    // Of a step: who leaves; the rod on the way and what it has turned about the axis; whether places on the way were
-    // so close that this is known.
+    // Within a step: which members leave their anchors; the rod on the way and how far it has turned about the axis;
+    // whether the places on the way were close enough to know this.
     L leaving{0.0}, x{0.0}, y{0.0}, turned{0.0}, known{1.0};
 
     void begin(const Mask& leaves) {
@@ -84,9 +89,11 @@ class TurnCounter {
     }
   };
 
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
   static void note(Turn& turn, int lane, const std::array<L, D>& rod) {
     for (std::size_t k = 0; k < D; ++k) turn.at[k].set(lane, rod[k][lane]);
-    turn.reach.set(lane, turn.anchors[static_cast<std::size_t>(lane)].reach_squared());
+    turn.reach.set(lane, turn.anchors[at(lane)].reach_squared());
   }
 
   static Mask leaves(const Turn& turn, const std::array<L, D>& rod) {
@@ -99,67 +106,51 @@ class TurnCounter {
     return squared > turn.reach * length;
   }
 
-  template <class Stepper>
-  void go_through_step(Stepper& stepper) {
-    auto& chain = stepper.chain();
-    if constexpr (Stepper::is_implicit) {
-      for (int j = 0; j < Stepper::stages; ++j) {
-        for (int i = 0; i < links_; ++i) turns_[i].pass(chain.along(i, j));
-      }
-    } else {
-      for (const double share : {0.2, 0.4, 0.6, 0.8}) {
-        chain.for_each_glance(share, [&](int i, const std::array<L, D>& rod, const auto&) { turns_[i].pass(rod); });
-      }
-    }
+  void pass() {
+    for (std::size_t i = 0; i < turns_.size(); ++i) turns_[i].pass(rods_[i].place);
   }
 
-  template <class Chain>
-  void end_step(int i, Chain& chain) {
+  // Moves the anchors of link i, now at `rod`.
+  [[gnu::noinline]] void end_step(std::size_t i, const std::array<L, D>& rod, Sight& sight) {
     Turn& turn = turns_[i];
-    for (std::size_t at = 0; at < lanes; ++at) {
-      const int lane = static_cast<int>(at);
+    for (std::size_t k = 0; k < lanes; ++k) {
+      const int lane = static_cast<int>(k);
       if (turn.leaving[lane] == 0) continue;
-      AngleAnchor<Space>& anchor = turn.anchors[at];
-      const std::array<double, D> u = direction_of(chain.along(i), lane);
+      AngleAnchor<Space>& anchor = turn.anchors[k];
+      const std::array<double, D> u = direction_of(rod, lane);
       if (turn.known[lane] != 0) {
         anchor.turn_to(u, turn.turned[lane]);
-      } else {
-        follow_path(lane, i, chain);
+      } else {  // by a pole: along the polynomial of the member's step
+        const auto direction_at = [&](double share) {
+          sight.glance(share, rods_);
+          return direction_of(rods_[i].place, lane);
+        };
+        anchor.follow_path(direction_at, 1.0);
         anchor.follow(u);
       }
-      note(turn, lane, chain.along(i));
+      note(turn, lane, rod);
     }
-  }
-
-  // By a pole: along the polynomial of the member's step.
-  template <class Chain>
-  [[gnu::noinline]] void follow_path(int lane, int i, Chain& chain) {
-    const auto direction_at = [&](double share) {
-      std::array<double, D> u{};
-      chain.for_each_glance(share, [&](int link, const std::array<L, D>& rod, const auto&) {
-        if (link == i) u = direction_of(rod, lane);
-      });
-      return u;
-    };
-    turns_[i].anchors[static_cast<std::size_t>(lane)].follow_path(direction_at, 1.0);
   }
 
   int links_;
-  detail::PerLink<Turn, N> turns_;
+  std::vector<Turn> turns_;
+  typename Sight::Parts rods_;  // on the way through a step
 };
 
-/// In the plane a link has turned once more where it has passed the upward vertical.
-template <int N, class L>
-class TurnCounter<Planar, N, L> {
+/// In the plane a full turn is a passage through the upward vertical.
+template <class L>
+class TurnCounter<Planar, L> {
  public:
   using Mask = typename L::Mask;
 
-  explicit TurnCounter(int links) : links_(links), turns_(links) {}
+  using Sight = StepSight<L, 2>;
+
+  explicit TurnCounter(int links) : links_(links), turns_(at(links)), rods_(at(links)) {}
 
   template <class Along>
   void start(int lane, const double* q, Along along) {
     for (int i = 0; i < links_; ++i) {
-      Turn& turn = turns_[i];
+      Turn& turn = turns_[at(i)];
       for (std::size_t k = 0; k < 2; ++k) turn.at[k].set(lane, along(i)[k][lane]);
       turn.count.set(lane, std::round((q[i] - angle(lane, turn)) / full_turn));
     }
@@ -167,23 +158,21 @@ class TurnCounter<Planar, N, L> {
 
   /// These members have taken a step by which links have turned less than half a turn; `far` are those whose stages
   /// are looked at, too.
-  template <class Stepper>
-  void follow(const Mask& which, const Mask& far, Stepper& stepper) {
-    auto& chain = stepper.chain();
-    if constexpr (Stepper::is_implicit) {
-      if (xsimd::any(far)) {
-        for (int j = 0; j < Stepper::stages; ++j) pass(far, [&](int i) { return chain.along(i, j); });
-      }
+  template <class Chain>
+  void follow(const Mask& which, const Mask& far, const Chain& chain, Sight& sight) {
+    for (int k = 0; xsimd::any(far) && k < sight.waypoints(); ++k) {
+      sight.waypoint(k, rods_);
+      pass(far, [&](int i) { return rods_[at(i)].place; });
     }
     pass(which, [&](int i) { return chain.along(i); });
   }
 
   std::array<double, 1> angles(int lane, int i) const {
-    return {angle(lane, turns_[i]) + full_turn * turns_[i].count[lane]};
+    return {angle(lane, turns_[at(i)]) + full_turn * turns_[at(i)].count[lane]};
   }
 
-  /// The same of all members.
-  L angles(int i) const { return fma(L(full_turn), turns_[i].count, angle(turns_[i].at)); }
+  /// θ of a link, of all members.
+  L angles(int i) const { return fma(L(full_turn), turns_[at(i)].count, angle(turns_[at(i)].at)); }
 
   /// The angle of a rod that lies nearest to another.
   static L near(const std::array<L, 2>& rod, const L& other) {
@@ -201,7 +190,7 @@ class TurnCounter<Planar, N, L> {
   void pass(const Mask& which, Along along) {
     for (int i = 0; i < links_; ++i) {
       const std::array<L, 2> rod = along(i);
-      Turn& turn = turns_[i];
+      Turn& turn = turns_[at(i)];
       const auto [x, y] = turn.at;
       // Not by ^, which xsimd 8.1 takes for | on the masks of AVX-512.
       const Mask was_left = x < L(0.0), is_left = rod[0] < L(0.0),
@@ -224,8 +213,11 @@ class TurnCounter<Planar, N, L> {
     return q[0];
   }
 
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
   int links_;
-  detail::PerLink<Turn, N> turns_;
+  std::vector<Turn> turns_;
+  typename Sight::Parts rods_;  // on the way through a step
 };
 
 }  // namespace pendula
