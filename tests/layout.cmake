@@ -1,7 +1,7 @@
 # clang-format on every C++ file but the generated ones: cmake -D SOURCE=… -D CLANG_FORMAT=… -P layout.cmake
 cmake_minimum_required(VERSION 3.25)
 set(patterns "")
-foreach(folder IN ITEMS src tests bench examples)
+foreach(folder IN ITEMS src python tests bench examples)
   list(APPEND patterns "${SOURCE}/${folder}/*.hpp" "${SOURCE}/${folder}/*.cpp" "${SOURCE}/${folder}/*.h"
                        "${SOURCE}/${folder}/*.c")
 endforeach()

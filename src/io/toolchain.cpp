@@ -49,8 +49,12 @@ fs::path this_program() {
 }
 
 Toolchain Toolchain::of_this_program() {
+  return of(this_program().parent_path());
+}
+
+Toolchain Toolchain::of(const fs::path& folder) {
   Toolchain toolchain;
-  const fs::path folder = this_program().parent_path(), prefix = folder.parent_path();
+  const fs::path prefix = folder.parent_path();
   // In the build folder this file has lines with the Python, and the folders of generator, plots and scenarios.
   std::ifstream beside(folder / "pendula.toolchain");
   if (beside) {

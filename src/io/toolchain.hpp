@@ -17,9 +17,10 @@ struct Toolchain {
   std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
   std::filesystem::path cache;     ///< folder of kernels; empty if there is none
 
-  /// Those of this program: of its build, if the file pendula.toolchain is beside it, else of its installation. The
-  /// environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS; PENDULA_KERNELS_BY. The cache is
-  /// $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  /// Those that go with a program or Python package in `folder`: of its build, if the file pendula.toolchain is there,
+  /// else of its installation. The environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS;
+  /// PENDULA_KERNELS_BY. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  static Toolchain of(const std::filesystem::path& folder);
   static Toolchain of_this_program();
 
   /// The command line that runs a Python package of `folder`; it imports nothing from the working folder or PYTHONPATH.

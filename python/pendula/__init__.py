@@ -1,0 +1,38 @@
+"""Multiple pendulums and other mechanical systems, moved by symplectic Gauss-Legendre steps.
+
+>>> import pendula
+>>> double = pendula.Chain(masses=[1, 1], lengths=1.0)
+>>> run = double.simulate(1.0, theta="90 deg", step=0.01)
+>>> run.success, run.y.shape[0]
+(True, 4)
+
+Units are SI, angles radians, unless a system says ``units="natural"``.
+"""
+
+from ._core import InputError, instruction_set
+from ._core import version as _version
+from ._runs import RunFailed, Solution, TrustWarning
+from ._simulation import Lyapunov, Simulation, ensemble, linearize, lyapunov
+from ._systems import Chain, Model, Scenario
+
+__version__ = _version()
+InputError.__doc__ = (
+    "An argument is wrong: the message names it, what was expected and what was got. A ValueError."
+)
+
+__all__ = [
+    "Chain",
+    "InputError",
+    "Lyapunov",
+    "Model",
+    "RunFailed",
+    "Scenario",
+    "Simulation",
+    "Solution",
+    "TrustWarning",
+    "__version__",
+    "ensemble",
+    "instruction_set",
+    "linearize",
+    "lyapunov",
+]

@@ -1,0 +1,150 @@
+"""Runs and what comes of them."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+
+if TYPE_CHECKING:
+    import xarray
+    from numpy.typing import NDArray
+
+
+class TrustWarning(UserWarning):
+    """The rows of a run can be trusted less far than was asked for; the sentence says how far, and what helps."""
+
+
+class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
+    """The computation failed. ``partial`` is the solution up to there."""
+
+    def __init__(self, message: str, partial: Solution) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+class Solution:
+    """Rows of a run, with SciPy's names.
+
+    Attributes
+    ----------
+    t : (rows,) array
+        Times, in s.
+    y : (coordinates + rates, rows) array
+        Coordinates, then their rates.
+    t_events, y_events : dict of arrays
+        Times (events,) and states (events, coordinates + rates) of each event, by its name.
+    status : int
+        0: came to its end; 1: an event ended it; -1: it failed.
+    message : str
+    success : bool
+    summary : dict
+        As ``pendula simulate --json``: method, steps, energy error, warnings and more.
+    columns, units : list of str
+        Of all numbers that a row has: ``run["theta_1"]``; ``run["theta"]`` of all links is (links, rows).
+    """
+
+    def __init__(self, result: _core.Result) -> None:
+        self.columns: list[str] = result.columns
+        self.units: list[str] = result.units
+        self.summary: dict[str, Any] = json.loads(result.summary)
+        self._rows: NDArray[np.float64] = result.take_rows()
+        roles = np.array(result.roles)
+        self._state = np.flatnonzero((roles == "coordinate") | (roles == "rate"))
+        order = np.argsort([roles[k] == "rate" for k in self._state], kind="stable")
+        self._state = self._state[order]
+        self.t: NDArray[np.float64] = self._rows[:, 0]
+        self.y: NDArray[np.float64] = self._rows[:, self._state].T
+        events = result.take_event_rows()
+        happened = np.array(result.events, dtype=object)
+        names = [event["name"] for event in self.summary.get("events", [])]
+        self.t_events = {name: events[happened == name, 0] for name in names}
+        self.y_events = {name: events[happened == name][:, self._state] for name in names}
+        outcome = self.summary["outcome"]
+        status = outcome["status"]
+        self.status = 0 if status == "ok" else 1 if status == "stopped_by_event" else -1
+        by_event = f"Event {outcome.get('event')} ended the run."
+        usual = by_event if self.status == 1 else "The run came to its end."
+        self.message: str = outcome.get("message") or usual
+        self.success = self.status >= 0
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """A column by its name; without an index, of all links, (links, rows)."""
+        if name in self.columns:
+            return self._rows[:, self.columns.index(name)]
+        links = [
+            k
+            for k, column in enumerate(self.columns)
+            if column.rpartition("_")[0] == name and column[-1:].isdigit()
+        ]
+        if not links:
+            raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
+        return self._rows[:, links].T
+
+    @property
+    def energy(self) -> NDArray[np.float64]:
+        """T + U of each row, in J."""
+        return self["energy"]
+
+    @property
+    def nsteps(self) -> int:
+        """Steps that were taken."""
+        return int(self.summary["steps"])
+
+    def __repr__(self) -> str:
+        s = self.summary
+        return (
+            f"<Solution: {self.t.size} rows to t = {self.t[-1]:.6g} s, {s['steps']} steps of {s['method']}, "
+            f"energy error {s['energy_error_max']:.2g}: {self.message}>"
+            if self.t.size
+            else f"<Solution: no rows: {self.message}>"
+        )
+
+    def to_xarray(self) -> xarray.Dataset:
+        """All columns by name over ``t``, with their units."""
+        import xarray
+
+        data = {
+            name: ("t", self._rows[:, k], {"units": self.units[k]})
+            for k, name in enumerate(self.columns)
+            if name != "t"
+        }
+        return xarray.Dataset(data, coords={"t": ("t", self.t, {"units": self.units[0]})})
+
+
+@contextmanager
+def plainly() -> Iterator[None]:
+    """Errors about arguments name those, not lines of a text that nobody wrote."""
+    try:
+        yield
+    except _core.InputError as error:
+        raise _core.InputError(_plain(str(error))) from None
+
+
+def _plain(sentence: str) -> str:
+    return re.sub(r"^pendula(:\d+)?: ", "", sentence)
+
+
+def tell(what: str) -> None:
+    print(f"pendula: {what}", file=sys.stderr)
+
+
+def run_text(text: str, name: str = "pendula", overrides: list[str] | None = None) -> Solution:
+    """Runs a scenario's text; ``name`` stands for its file in messages."""
+    with plainly():
+        result = _core.simulate(text, name, overrides or [], str(Path(__file__).parent), tell)
+    solution = Solution(result)
+    for sentence in solution.summary["warnings"]:
+        warnings.warn(_plain(sentence), TrustWarning, stacklevel=3)
+    if solution.status < 0:
+        raise RunFailed(solution.message, solution)
+    return solution

@@ -1,0 +1,240 @@
+"""What moves: chains, models, scenarios."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import _toml
+from ._runs import Solution, run_text
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+Tables = dict[str, "dict[str, object] | list[dict[str, object]]"]
+
+
+class System:
+    """What chains and models have in common: how they are run."""
+
+    def tables(self) -> Tables:
+        """Those of a scenario that say what moves."""
+        raise NotImplementedError
+
+    def at_zero(self) -> dict[str, object]:
+        """The start where all coordinates are 0."""
+        return {}
+
+    def simulate(
+        self,
+        duration: float | None = None,
+        *,
+        t: ArrayLike | None = None,
+        start: Mapping[str, object] | None = None,
+        events: Mapping[str, str | Mapping[str, object]] | None = None,
+        method: str | None = None,
+        stages: int | None = None,
+        form: str | None = None,
+        solver: str | None = None,
+        iteration: str | None = None,
+        step: float | None = None,
+        tolerance: float | None = None,
+        accuracy: float | None = None,
+        estimate: bool | None = None,
+        every: int | None = None,
+        interval: float | None = None,
+        **starts: object,
+    ) -> Solution:
+        """Moves the system from a start.
+
+        Parameters
+        ----------
+        duration : float, optional
+            How long, in s. Left out, the last of the times ``t``.
+        t : array_like, optional
+            Times of the rows, in s, increasing from 0 on. Left out, there is a row every ``every`` steps, or every
+            ``interval`` seconds.
+        start : mapping, optional
+            Coordinates and rates at the start by name, as keyword arguments: ``theta="90 deg"``, ``theta_dot=[0, 1]``.
+            A single number of a chain stands for every link; rates are 0 unless given.
+        events : mapping, optional
+            Expressions of the columns that change their sign where an event happens, by name:
+            ``{"flip": "abs(theta_2) - pi"}``, or mappings with ``when``, ``direction`` ("up", "down", "both") and
+            ``stop``.
+        method, stages, form, solver, iteration, step, tolerance, accuracy, estimate
+            As ``[run]`` of a scenario (``pendula help scenario``). Steps are chosen for an accuracy of 1e-9 unless one
+            of ``accuracy``, ``tolerance`` and ``step`` says otherwise.
+
+        Returns
+        -------
+        Solution
+
+        Raises
+        ------
+        InputError
+            An argument is wrong; the message names it, what was expected and what was got.
+        RunFailed
+            The computation failed; ``partial`` is the solution up to there.
+
+        Warns
+        -----
+        TrustWarning
+            How far the rows can be trusted, where that is less than was asked for.
+        """
+        times = None if t is None else np.asarray(t, dtype=float)
+        if times is not None and (times.ndim != 1 or times.size == 0):
+            raise ValueError(f"t: expected a vector of times, got an array of shape {times.shape}")
+        if duration is None:
+            if times is None:
+                raise TypeError("simulate: expected duration= or t=, got neither")
+            duration = float(times[-1])
+        if not (step or tolerance or accuracy):
+            accuracy = 1e-9
+        tables = self.tables()
+        tables["start"] = {**(start or {}), **starts}
+        tables["run"] = {
+            "duration": duration,
+            "method": method,
+            "stages": stages,
+            "form": form,
+            "solver": solver,
+            "iteration": iteration,
+            "step": step,
+            "tolerance": tolerance,
+            "accuracy": accuracy,
+            "estimate": estimate,
+        }
+        if times is None and every is None and interval is None:
+            every = 1
+        tables["output"] = {
+            "every": every,
+            "interval": interval,
+            "times": None if times is None else times.tolist(),
+        }
+        tables["event"] = [
+            {"name": name, **({"when": event} if isinstance(event, str) else dict(event))}
+            for name, event in (events or {}).items()
+        ]
+        return run_text(_toml.document(tables))
+
+
+class Chain(System):
+    """A chain of rods with a bob at the end of each, in the plane or in space.
+
+    Parameters
+    ----------
+    masses, lengths : float or array_like
+        Of each link, in kg and m; a single number stands for every link.
+    space : {"planar", "spatial"}
+    links : int, optional
+        Needed where no array tells it.
+    gravity : float
+        In m/s².
+    damping, torque : float or array_like, optional
+        Of each link, in N m s and N m.
+    drives : sequence of mappings, optional
+        Torques that depend on time: ``link``, ``amplitude``, ``frequency``, ``phase``.
+    units : {"SI", "natural"}
+    """
+
+    def __init__(
+        self,
+        masses: ArrayLike = 1.0,
+        lengths: ArrayLike = 1.0,
+        *,
+        space: str = "planar",
+        links: int | None = None,
+        gravity: float = 9.81,
+        damping: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        drives: Sequence[Mapping[str, object]] = (),
+        units: str | None = None,
+    ) -> None:
+        self._numbers: dict[str, object] = {
+            "space": space,
+            "links": links,
+            "masses": masses,
+            "lengths": lengths,
+            "gravity": gravity,
+            "damping": damping,
+            "torque": torque,
+            "units": units,
+        }
+        self._drives = [dict(drive) for drive in drives]
+
+    def __repr__(self) -> str:
+        given = ", ".join(f"{key}={one!r}" for key, one in self._numbers.items() if one is not None)
+        return f"Chain({given})"
+
+    def tables(self) -> Tables:
+        return {"chain": dict(self._numbers), "chain.drive": list(self._drives)}
+
+    def at_zero(self) -> dict[str, object]:
+        return {"theta": 0.0, "phi": 0.0} if self._numbers["space"] == "spatial" else {"theta": 0.0}
+
+
+class Model(System):
+    """Any other mechanical system: a built-in model by its name, or a model file.
+
+    Parameters
+    ----------
+    model : str or path
+        ``"furuta"`` (``pendula models`` lists them), or a file that defines ``define(model, links)``.
+    links : int, optional
+        Of models with as many links as asked for.
+    inputs : mapping, optional
+        Constant values of inputs, by name.
+    drives : sequence of mappings, optional
+        Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``.
+    parameters
+        By name; the model has defaults.
+    """
+
+    def __init__(
+        self,
+        model: str | PathLike[str],
+        links: int | None = None,
+        *,
+        inputs: Mapping[str, float] | None = None,
+        drives: Sequence[Mapping[str, object]] = (),
+        **parameters: object,
+    ) -> None:
+        name = str(model)
+        self._name = str(Path(name).resolve()) if name.endswith(".py") else name
+        self._links = links
+        self._parameters = parameters
+        self._drives = [{"input": key, "constant": one} for key, one in (inputs or {}).items()]
+        self._drives += [dict(drive) for drive in drives]
+
+    def __repr__(self) -> str:
+        return f"Model({self._name!r})"
+
+    def tables(self) -> Tables:
+        system = {"model": self._name, "links": self._links, "parameters": self._parameters or None}
+        return {"system": system, "system.drive": list(self._drives)}
+
+
+class Scenario:
+    """A scenario file, as the command line runs it.
+
+    Parameters
+    ----------
+    file : path
+    set : mapping, optional
+        Keys to replace, ``{"run.step": 1e-4}``.
+    """
+
+    def __init__(self, file: str | PathLike[str], set: Mapping[str, object] | None = None) -> None:
+        self.file = Path(file)
+        self._overrides = [f"{key}={_toml.value(one, key)}" for key, one in (set or {}).items()]
+
+    def __repr__(self) -> str:
+        return f"Scenario({str(self.file)!r})"
+
+    def run(self) -> Solution:
+        """Runs it; as :meth:`Chain.simulate`, and to the bit as ``pendula simulate``."""
+        return run_text(self.file.read_text(encoding="utf-8"), str(self.file), self._overrides)

@@ -1,0 +1,51 @@
+"""Scenarios as TOML text: how the arguments of Python reach the reader of scenarios."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+
+def value(given: object, key: str) -> str:
+    """One value in TOML. Raises TypeError, with the key, on what has no form there."""
+    if isinstance(given, (bool, np.bool_)):
+        return "true" if given else "false"
+    if isinstance(given, (int, np.integer)):
+        return str(int(given))
+    if isinstance(given, (float, np.floating)):
+        number = float(given)
+        if math.isnan(number):
+            return "nan"
+        if math.isinf(number):
+            return "inf" if number > 0 else "-inf"
+        return repr(number)
+    if isinstance(given, str):
+        return json.dumps(given)
+    if isinstance(given, Mapping):
+        inside = (f"{json.dumps(str(name))} = {value(one, f'{key}.{name}')}" for name, one in given.items())
+        return "{" + ", ".join(inside) + "}"
+    if isinstance(given, np.ndarray):
+        return value(given.tolist(), key)
+    if isinstance(given, Sequence):
+        return "[" + ", ".join(value(one, key) for one in given) + "]"
+    raise TypeError(f"{key}: expected a number, a string, an array or a mapping, got {type(given).__name__}")
+
+
+def document(tables: Mapping[str, Mapping[str, object] | Sequence[Mapping[str, object]]]) -> str:
+    """A whole document; a sequence of tables becomes ``[[name]]``. What is None is left out."""
+    lines: list[str] = []
+
+    def table(name: str, heading: str, keys: Mapping[str, object]) -> None:
+        lines.append(heading)
+        lines.extend(f"{key} = {value(one, f'{name}.{key}')}" for key, one in keys.items() if one is not None)
+
+    for name, given in tables.items():
+        if isinstance(given, Mapping):
+            table(name, f"[{name}]", given)
+        else:
+            for one in given:
+                table(name, f"[[{name}]]", one)
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,18 @@
+"""Examples of docstrings do what they say."""
+
+import doctest
+
+import pendula
+import pendula._simulation
+import pendula._systems
+import pytest
+
+
+@pytest.mark.parametrize("module", [pendula, pendula._systems, pendula._simulation], ids=lambda m: m.__name__)
+def test_examples_of_docstrings(module):
+    assert doctest.testmod(module).failed == 0
+
+
+def test_everything_public_is_documented():
+    for name in pendula.__all__:
+        assert name.startswith("__") or getattr(pendula, name).__doc__, name

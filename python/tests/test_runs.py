@@ -1,0 +1,144 @@
+"""Runs of the package are those of the command line, with SciPy's names."""
+
+import csv
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pendula
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SCENARIOS = sorted(file.name for file in EXAMPLES.glob("*.toml"))
+
+
+def rows_of(file: Path) -> tuple[list[str], np.ndarray]:
+    with file.open() as lines:
+        header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    return header, np.array(rows, dtype=float)
+
+
+# Long ones are cut: what is compared are bits, of every row that there is.
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_example_is_that_of_the_command_line(name, command_line, tmp_path):
+    few = {"run.duration": 0.5, "run.estimate": False}
+    words = [word for key, one in few.items() for word in ("--set", f"{key}={str(one).lower()}")]
+    if "every" not in (EXAMPLES / name).read_text():
+        words += ["--set", "output.every=1"]
+        few["output.every"] = 1
+    summary = command_line(EXAMPLES / name, tmp_path / "rows.csv", *words)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = pendula.Scenario(EXAMPLES / name, few).run()
+    header, rows = rows_of(tmp_path / "rows.csv")
+    assert run.columns == header
+    assert run.t.size == len(rows) > 1
+    for k, column in enumerate(header):
+        assert np.array_equal(run[column], rows[:, k]), column
+    ignored = ("wall_seconds", "scenario", "trajectory")
+    for key, value in summary.items():
+        assert key in ignored or run.summary[key] == value, key
+    assert [str(one.message) for one in caught] == summary["warnings"]
+    assert all(one.category is pendula.TrustWarning for one in caught)
+
+
+def test_a_solution_has_scipys_names():
+    double = pendula.Chain(masses=[1, 2], lengths=[1, 0.5])
+    run = double.simulate(t=np.linspace(0, 2, 21), theta=[0.5, -0.2], events={"low": "y_2 + 1.49"})
+    assert run.success and run.status == 0 and run.message
+    assert run.y.shape == (4, 21) and np.allclose(run.t, np.linspace(0, 2, 21), atol=1e-15)
+    assert np.array_equal(run.y[:2], run["theta"]) and np.array_equal(run.y[2:], run["theta_dot"])
+    assert run["x"].shape == (2, 21) and run.nsteps > 0
+    assert np.ptp(run.energy) < 1e-8 * 30  # measured 1.4e-9 J, of 29 J
+    assert run.t_events["low"].size == run.y_events["low"].shape[0] > 0
+    assert run.y_events["low"].shape[1] == 4
+    data = run.to_xarray()
+    assert data["theta_1"].attrs["units"] == "rad" and data["t"].attrs["units"] == "s"
+    assert "gauss" in repr(run)
+    with pytest.raises(KeyError, match="thetas: expected one of t, theta_1"):
+        run["thetas"]
+
+
+def test_columns_of_a_model_have_their_names():
+    run = pendula.Model("furuta").simulate(0.5)
+    assert run.y.shape[0] == 4 and run["energy"].shape == run.t.shape
+
+
+def test_an_event_may_end_a_run():
+    run = pendula.Chain(links=1).simulate(10.0, theta=0.5, events={"low": {"when": "theta_1", "stop": True}})
+    assert run.status == 1 and run.success and "low" in run.message
+    assert abs(run.t[-1] - run.t_events["low"][0]) < 1e-15
+    assert abs(run["theta_1"][-1]) < 1e-12  # measured 1e-16
+
+
+def test_a_run_that_fails_keeps_its_rows():
+    stiff = pendula.Chain(links=2, damping=[1e9, 1e9])
+    with pytest.raises(pendula.RunFailed) as failed:
+        stiff.simulate(1.0, theta=[1, 2], theta_dot=[1e3, -1e3], method="rk4", step=0.01)
+    partial = failed.value.partial
+    assert not partial.success and partial.status == -1 and partial.t.size >= 1
+    assert str(failed.value) == partial.message
+
+
+def test_doubts_are_warnings():
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        pendula.Chain(links=3).simulate(30.0, theta=2.5, step=0.02, stages=2, tolerance=1e-9)
+    told = [str(one.message) for one in caught]
+    assert "run.tolerance: has no effect with run.step" in told
+    assert any("cannot be trusted" in sentence for sentence in told)
+    assert all(one.category is pendula.TrustWarning for one in caught)
+    assert all(one.filename == __file__ for one in caught)
+
+
+REFUSED = [
+    ({"theta": [1, 2, 3]}, "start.theta: expected .* got \\[1, 2, 3\\]"),
+    ({"theta": "90 miles"}, "start.theta"),
+    ({"theta": float("nan")}, "start.theta: expected a finite number.* got nan"),
+    ({"theta": [0.1, float("inf")]}, "start.theta"),
+    ({"thet": 1.0}, "unknown key .*did you mean theta"),
+    ({"theta": 1.0, "step": -1.0}, "run.step: expected"),
+    ({"theta": 1.0, "method": "euler"}, 'run.method: expected .* got "euler"'),
+    ({"theta": 1.0, "stages": 99}, "run.stages: expected"),
+    ({"theta": 1.0, "tolerance": -1.0}, "run.tolerance: expected"),
+    ({"theta": 1.0, "events": {"a": "foo + 1"}}, 'event\\[1\\].when: .*unknown name "foo"'),
+    ({"theta": 1.0, "events": {"a": {"direction": "up"}}}, "when"),
+    ({"theta": 1.0, "every": 0}, "output.every: expected"),
+    ({}, "start.theta: expected"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), REFUSED)
+def test_wrong_arguments_are_named(given, message):
+    with pytest.raises(pendula.InputError, match=message) as refused:
+        pendula.Chain(links=2).simulate(1.0, **given)
+    assert isinstance(refused.value, ValueError)
+    assert not str(refused.value).startswith("pendula:")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: pendula.Chain(masses=[1, -1]).simulate(1.0, theta=0), "chain.masses.*: expected"),
+        (lambda: pendula.Chain(masses=[1, 1], lengths=[1, 1, 1]).simulate(1.0, theta=0), "chain.lengths"),
+        (lambda: pendula.Chain(space="plane").simulate(1.0, theta=0), "chain.space: expected"),
+        (lambda: pendula.Chain(drives=[{"link": 3}], links=2).simulate(1.0, theta=0), "chain.drive"),
+        (lambda: pendula.Model("no_such_model").simulate(1.0), "system.model: expected"),
+        (lambda: pendula.Model("no_such_file.py").simulate(1.0), "system.model"),
+        (lambda: pendula.Model("furuta", nothing=1.0).simulate(1.0), "nothing"),
+        (lambda: pendula.Chain(links=1).simulate(-1.0, theta=0), "run.duration: expected"),
+        (lambda: pendula.Chain(links=1).simulate(t=[0, 2, 1], theta=0), "output.times"),
+    ],
+)
+def test_wrong_systems_are_named(make, message):
+    with pytest.raises(pendula.InputError, match=message):
+        make()
+
+
+def test_what_is_no_value_is_a_type_error():
+    with pytest.raises(TypeError, match=r"start\.theta: expected a number, .* got complex"):
+        pendula.Chain(links=1).simulate(1.0, theta=1j)
+    with pytest.raises(TypeError, match="duration= or t=, got neither"):
+        pendula.Chain(links=1).simulate(theta=1.0)
+    with pytest.raises(ValueError, match=r"t: expected a vector of times, got an array of shape \(1, 2\)"):
+        pendula.Chain(links=1).simulate(t=[[0, 1]], theta=1.0)
