@@ -17,14 +17,10 @@ if TYPE_CHECKING:
 
     from ._systems import System
 
-Options = dict[str, Any]
+RUN_OPTIONS = ("method", "stages", "form", "solver", "iteration")
 
 
 def _options(tolerance: float | None, step: float | None, options: Mapping[str, object]) -> dict[str, object]:
-    known = ("method", "stages", "form", "solver", "iteration")
-    for name in options:
-        if name not in known:
-            raise TypeError(f"expected options among tolerance, step, {', '.join(known)}, got {name}")
     if step is None and tolerance is None:
         tolerance = 1e-9
     return {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
@@ -42,10 +38,11 @@ def _prepared(text: str) -> _core.Prepared:
         return _core.prepare(text, str(Path(__file__).parent), tell)
 
 
-def _split(system_starts: Mapping[str, object], options: Mapping[str, object]) -> tuple[dict, dict]:
-    known = ("method", "stages", "form", "solver", "iteration")
-    runs = {name: one for name, one in options.items() if name in known}
-    starts = {**system_starts, **{name: one for name, one in options.items() if name not in known}}
+def _split(
+    system_starts: Mapping[str, object], options: Mapping[str, object]
+) -> tuple[dict[str, object], dict[str, object]]:
+    runs = {name: one for name, one in options.items() if name in RUN_OPTIONS}
+    starts = {**system_starts, **{name: one for name, one in options.items() if name not in RUN_OPTIONS}}
     return starts, runs
 
 
@@ -263,7 +260,7 @@ def ensemble(
     """
     import xarray
 
-    unknown = set(options) - {"method", "stages", "form", "solver", "iteration"}
+    unknown = set(options) - set(RUN_OPTIONS)
     if unknown:
         raise TypeError(f"ensemble: expected the options of a run, got {', '.join(sorted(unknown))}")
     _, made = _prepare(system, system.at_zero(), _options(tolerance, step, options))

@@ -214,7 +214,11 @@ class Model(System):
         return f"Model({self._name!r})"
 
     def tables(self) -> Tables:
-        system = {"model": self._name, "links": self._links, "parameters": self._parameters or None}
+        system: dict[str, object] = {
+            "model": self._name,
+            "links": self._links,
+            "parameters": self._parameters or None,
+        }
         return {"system": system, "system.drive": list(self._drives)}
 
 

@@ -41,6 +41,8 @@ namespace pendula::python {
 namespace {
 
 using Array = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
+using Vector = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
+using Tell = nb::typed<nb::callable, void(const std::string&)>;
 
 /// (rows x columns), which Python owns from now on.
 Array array_of(std::vector<double> numbers, std::size_t columns) {
@@ -169,7 +171,7 @@ void run(const Scenario& scenario, const std::string& name, const std::string& k
 /// `package` is the folder of the Python package, beside which the generator of kernels is found.
 class Models {
  public:
-  Models(std::string package, const nb::callable& tell) : package_(std::move(package)), tell_(tell) {}
+  Models(std::string package, const Tell& tell) : package_(std::move(package)), tell_(tell) {}
 
   io::FindSystem finder() {
     return [this](const std::string& model, std::optional<int> links, const std::filesystem::path& folder) {
@@ -186,13 +188,13 @@ class Models {
 
  private:
   std::string package_, by_ = "build";
-  const nb::callable& tell_;
+  const Tell& tell_;
 };
 
 /// Runs a scenario.
 std::unique_ptr<Result> simulate(const std::string& text, const std::string& name,
                                  const std::vector<std::string>& overrides, const std::string& package,
-                                 const nb::callable& tell) {
+                                 const Tell& tell) {
   auto result = std::make_unique<Result>();
   Interruption interruption;
   {
@@ -226,7 +228,7 @@ struct Prepared {
   SimulationOptions options;
 };
 
-std::unique_ptr<Prepared> prepare(const std::string& text, const std::string& package, const nb::callable& tell) {
+std::unique_ptr<Prepared> prepare(const std::string& text, const std::string& package, const Tell& tell) {
   const nb::gil_scoped_release others_may_go_on;
   Models models(package, tell);
   io::AnyScenario any = io::parse_scenario(text, "pendula", {}, models.finder());
@@ -253,12 +255,12 @@ std::vector<double> state_of(const Motion& motion) {
   return state;
 }
 
-nb::ndarray<nb::numpy, double, nb::ndim<1>> vector_of(std::vector<double> numbers) {
+Vector vector_of(std::vector<double> numbers) {
   auto kept = std::make_unique<std::vector<double>>(std::move(numbers));
   const std::size_t size = kept->size();
   double* const data = kept->data();
   nb::capsule owner(kept.release(), [](void* made) noexcept { delete static_cast<std::vector<double>*>(made); });
-  return nb::ndarray<nb::numpy, double, nb::ndim<1>>(data, {size}, owner);
+  return Vector(data, {size}, owner);
 }
 
 Array array_of(const Eigen::MatrixXd& matrix) {
@@ -378,31 +380,37 @@ NB_MODULE(_core, module) {
         self.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
       });
 
-  module.def("propagate", [](const Prepared& made, const python::Starts& starts, double duration, int threads) {
-    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const Eigen::MatrixXd begins = Eigen::Map<const Rows>(starts.data(), static_cast<Eigen::Index>(starts.shape(0)),
-                                                          static_cast<Eigen::Index>(starts.shape(1)));
-    Ends ends;
-    python::interruptibly([&](const std::stop_token& stop) {
-      ends =
-          propagate(made.model, begins, {.duration = duration, .run = made.options, .threads = threads, .stop = stop});
-    });
-    std::vector<int> how(ends.how.begin(), ends.how.end());
-    const std::vector<double> errors(ends.energy_errors.data(), ends.energy_errors.data() + ends.energy_errors.size());
-    return nb::make_tuple(python::array_of(Eigen::MatrixXd(ends.q)), python::array_of(Eigen::MatrixXd(ends.v)), how,
-                          python::vector_of(errors));
-  });
+  module.def("propagate",
+             [](const Prepared& made, const python::Starts& starts, double duration,
+                int threads) -> nb::typed<nb::tuple, python::Array, python::Array, std::vector<int>, python::Vector> {
+               using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+               const Eigen::MatrixXd begins =
+                   Eigen::Map<const Rows>(starts.data(), static_cast<Eigen::Index>(starts.shape(0)),
+                                          static_cast<Eigen::Index>(starts.shape(1)));
+               Ends ends;
+               python::interruptibly([&](const std::stop_token& stop) {
+                 ends = propagate(made.model, begins,
+                                  {.duration = duration, .run = made.options, .threads = threads, .stop = stop});
+               });
+               std::vector<int> how(ends.how.begin(), ends.how.end());
+               const std::vector<double> errors(ends.energy_errors.data(),
+                                                ends.energy_errors.data() + ends.energy_errors.size());
+               return nb::make_tuple(python::array_of(Eigen::MatrixXd(ends.q)),
+                                     python::array_of(Eigen::MatrixXd(ends.v)), how, python::vector_of(errors));
+             });
 
-  module.def("lyapunov", [](const Prepared& made, double duration, int count) {
-    LyapunovSpectrum found;
-    python::interruptibly([&](const std::stop_token& stop) {
-      found =
-          lyapunov(made.model, made.start, {.duration = duration, .count = count, .run = made.options, .stop = stop});
-    });
-    const auto numbers = [](const Eigen::VectorXd& x) {
-      return python::vector_of(std::vector<double>(x.data(), x.data() + x.size()));
-    };
-    return nb::make_tuple(numbers(found.exponents), numbers(found.errors), found.sum, found.duration, found.ftle,
-                          found.megno);
-  });
+  module.def("lyapunov",
+             [](const Prepared& made, double duration,
+                int count) -> nb::typed<nb::tuple, python::Vector, python::Vector, double, double, double, double> {
+               LyapunovSpectrum found;
+               python::interruptibly([&](const std::stop_token& stop) {
+                 found = lyapunov(made.model, made.start,
+                                  {.duration = duration, .count = count, .run = made.options, .stop = stop});
+               });
+               const auto numbers = [](const Eigen::VectorXd& x) {
+                 return python::vector_of(std::vector<double>(x.data(), x.data() + x.size()));
+               };
+               return nb::make_tuple(numbers(found.exponents), numbers(found.errors), found.sum, found.duration,
+                                     found.ftle, found.megno);
+             });
 }
