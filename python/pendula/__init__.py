@@ -11,6 +11,7 @@ Units are SI, angles radians, unless a system says ``units="natural"``.
 
 from ._core import InputError, instruction_set
 from ._core import version as _version
+from ._functions import ModelFunction, model
 from ._runs import RunFailed, Solution, TrustWarning
 from ._simulation import Lyapunov, Simulation, ensemble, linearize, lyapunov
 from ._systems import Chain, Model, Scenario
@@ -25,6 +26,7 @@ __all__ = [
     "InputError",
     "Lyapunov",
     "Model",
+    "ModelFunction",
     "RunFailed",
     "Scenario",
     "Simulation",
@@ -35,4 +37,5 @@ __all__ = [
     "instruction_set",
     "linearize",
     "lyapunov",
+    "model",
 ]
