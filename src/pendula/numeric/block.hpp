@@ -7,19 +7,20 @@ namespace pendula {
 
 namespace detail {
 
-/// Numbers in a pack that holds a row of `count`: a power of two, or a multiple of four, where there are registers.
+/// Length of a stored row of `count` numbers: rounded up to 1, 2 or a multiple of 4 where Real has SIMD registers.
 template <class Real>
 constexpr std::size_t padded_row(std::size_t count) {
   if (!has_registers<Real>) return count;
   return count <= 2 ? count : (count + 3) / 4 * 4;
 }
 
-/// A small matrix, row by row, its rows padded to packs. Rows are written whole where they are read whole soon after: a
-/// processor hands on what it has just stored, but not a row that was stored in pieces.
+/// A small matrix stored row by row, its rows padded to whole packs. Rows that are read soon are written whole: a
+/// processor forwards a store to a load of the same width, but not several narrower stores to a wider load.
 template <std::size_t Rows, std::size_t Columns, class Real>
 struct Block {
   static constexpr std::size_t stride = padded_row<Real>(Columns);
-  // Small blocks wait for one another, and registers of four hand on quicker than registers of eight.
+  // Operations on small blocks wait for one another, and results in registers of four are ready sooner than in
+  // registers of eight.
   static constexpr int widest = stride <= 8 ? 4 : 8;
   using Row = Pack<static_cast<int>(stride), RegisterFor<static_cast<int>(stride), Real, widest>>;
 
@@ -30,7 +31,7 @@ struct Block {
   Row row(std::size_t i) const { return Row::load(values[i]); }
   void set_row(std::size_t i, const Row& row) { row.store(values[i]); }
 
-  /// x in column k, zero elsewhere.
+  /// The row with x in column k and zero elsewhere.
   static Row unit(std::size_t k, const Real& x) { return Row(x) * Row::load(units.values[k]); }
 
  private:
@@ -43,7 +44,7 @@ struct Block {
   static inline const Units units;
 };
 
-/// The row a times B, added to `start`; two sums side by side, so that one does not wait for the other.
+/// start + a B for the row a. Two partial sums, so that consecutive products do not wait for each other.
 template <std::size_t Inner, std::size_t Columns, class Real>
 auto row_of_product(const Real* a, const Block<Inner, Columns, Real>& b,
                     const typename Block<Inner, Columns, Real>::Row& start) {
@@ -79,8 +80,8 @@ void add_product(const Block<M, Inner, Real>& a, const Block<Inner, Columns, Rea
   for (std::size_t i = 0; i < M; ++i) c.set_row(i, row_of_product(a[i], b, c.row(i)));
 }
 
-/// Replaces the square of S from (k, k) on, of one row or of two, by the negative of its inverse: one division either
-/// way. Tells whether its pivots are positive.
+/// Replaces the 1 x 1 or 2 x 2 diagonal block of S at (k, k) by the negative of its inverse, with one division. Returns
+/// whether its pivots are positive.
 template <std::size_t M, std::size_t Wide, class Real>
 bool invert_negated(Block<M, Wide, Real>& S, std::size_t k) {
   if (k + 1 == M) {
@@ -105,7 +106,7 @@ void add_rows(Block<M, Columns, Real>& Y, std::size_t i, std::size_t k, const Re
   Y.set_row(i, fma(Row(a), Y.row(k), fma(Row(b), Y.row(k + 1), Y.row(i))));
 }
 
-/// Row k of S from the diagonal on, and the row after it: what back substitution needs of them.
+/// Rows k and k + 1 of S from column k on, as back substitution reads them.
 template <std::size_t M, class Real>
 struct PivotRows {
   Real values[2][M];
@@ -118,7 +119,8 @@ struct PivotRows {
   }
 };
 
-/// Y_k from the rows after it, by rows of S whose diagonal squares are negative inverses; of one row or of two.
+/// Back substitution for rows k and k + 1 of Y (row k alone where it is the last); the diagonal blocks of S hold their
+/// negative inverses.
 template <std::size_t M, std::size_t Columns, class Real>
 void substitute_back(const PivotRows<M, Real>& pivot, Block<M, Columns, Real>& Y, std::size_t k) {
   using Row = typename Block<M, Columns, Real>::Row;
@@ -134,9 +136,9 @@ void substitute_back(const PivotRows<M, Real>& pivot, Block<M, Columns, Real>& Y
   Y.set_row(k + 1, fma(Row(S[1][k]), first, Row(S[1][k + 1]) * second));
 }
 
-/// Replaces every Y by −S⁻¹ Y, two rows at a time, and the columns of S behind its square too. No pivoting: S is
-/// positive definite but for terms of the order of the step. Tells whether all pivots are positive, as they are of
-/// steps that are not too large.
+/// Replaces each Y, and the columns of S beyond its square part, by −S⁻¹ Y, by elimination of two rows at a time. It
+/// does not pivot: S is positive definite up to terms of the order of the step size. Returns whether all pivots are
+/// positive, as they are unless the step is too large.
 template <std::size_t M, std::size_t Wide, class Real, std::size_t... Columns>
 bool solve_negated(Block<M, Wide, Real>& S, Block<M, Columns, Real>&... Y) {
   bool positive = true;

@@ -8,11 +8,11 @@
 namespace pendula {
 
 /// A sum carried as value + compensation, so that many small steps lose nothing to rounding (Kahan–Neumaier).
-/// T is a number, or an Eigen vector: every component is its own sum.
+/// T is a number or an Eigen vector; each component of a vector is a sum of its own.
 template <class T>
 struct Compensated {
   T value;
-  T compensation;  ///< what value is short of, below its last bit
+  T compensation;  ///< rounding error of value: the sum is value + compensation
 
   void assign(const T& exact) {
     value = exact;
@@ -20,7 +20,7 @@ struct Compensated {
     compensation -= exact;  // zero of the same size
   }
 
-  /// Adds an increment; what does not fit into value goes into the compensation.
+  /// Adds an increment; its rounding error goes into the compensation.
   void add(const T& increment) {
     const T wanted = compensation + increment;
     const T sum = value + wanted;
@@ -32,8 +32,8 @@ struct Compensated {
 
 namespace detail {
 
-/// x, rounded here and now: the compiler does not fuse the product that x is with a sum that it goes into. Clang fuses
-/// within one expression only.
+/// Returns x, and keeps the compiler from fusing the product x with a sum that it enters. Only GCC needs this: Clang
+/// fuses within one expression only.
 template <class Real>
 Real rounded(Real x) {
 #if defined(__GNUC__) && !defined(__clang__)
@@ -45,12 +45,12 @@ Real rounded(Real x) {
 
 }  // namespace detail
 
-/// A number as the sum of two, with about twice the digits of one.
+/// An unevaluated sum of two numbers, with about twice the digits of one (double-double).
 template <class Real>
 struct Twofold {
   Real value{0}, low{0};
 
-  /// The same sum with low below the last bit of value; |value| ≥ |low| before.
+  /// The same sum, normalised: |low| is at most half a last bit of value. Needs |value| ≥ |low|.
   Twofold settled() const {
     const Real sum = value + low;
     return {sum, low - (sum - value)};
@@ -61,7 +61,7 @@ struct Twofold {
   friend Twofold operator-(const Twofold& x) { return {-x.value, -x.low}; }
 };
 
-/// a + b without loss (Knuth).
+/// a + b without rounding error (two-sum, Knuth).
 template <class Real>
 Twofold<Real> exact_sum(const Real& a, const Real& b) {
   const Real sum = a + b;
@@ -69,7 +69,7 @@ Twofold<Real> exact_sum(const Real& a, const Real& b) {
   return {sum, (a - (sum - kept)) + (b - kept)};
 }
 
-/// a b without loss (Dekker, where the processor has no fused multiply-add).
+/// a b without rounding error (two-product: by fused multiply-add, else by Dekker's splitting).
 template <class Real>
 Twofold<Real> exact_product(const Real& a, const Real& b) {
   const Real product = detail::rounded(Real(a * b));
@@ -110,7 +110,7 @@ Twofold<Real> operator*(const Real& a, const Twofold<Real>& b) {
   return Twofold<Real>{product.value, product.low + a * b.low}.settled();
 }
 
-/// 1/x.
+/// 1/x, to about twice the digits of one number.
 template <class Real>
 Twofold<Real> reciprocal(const Real& x) {
   const Real quotient = 1 / x;

@@ -4,7 +4,7 @@
 
 namespace pendula {
 
-/// Vectors side by side, a column each, stored row by row: tangents, gradients, variations of parameters.
+/// Vectors as the columns of a matrix stored row by row: tangents, gradients, or variations of parameters.
 template <class Real = double>
 using Directions = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

@@ -9,7 +9,7 @@ namespace pendula {
 
 namespace detail {
 
-/// a b + c, rounded once where that is fast.
+/// a b + c, with one rounding where the processor has a fast fused multiply-add.
 template <class L>
 L sum_of_product(const L& a, const L& b, const L& c) {
   if constexpr (std::is_floating_point_v<L>) {
@@ -21,9 +21,9 @@ L sum_of_product(const L& a, const L& b, const L& c) {
 
 }  // namespace detail
 
-/// A number with its derivative along one direction: what is computed in it gives its own, exactly. L: double, or
-/// several numbers, each with its own (Pack, LanePack). What is computed of values is what would be computed without
-/// derivatives: of LanePack, whose products are never fused with sums, to the last bit.
+/// A dual number: a value and its derivative along one direction, for forward-mode differentiation. L is double, or a
+/// pack of numbers with a derivative each (Pack, LanePack). Values are those of the same computation without
+/// derivatives; with LanePack, which never fuses products with sums, they are equal to the last bit.
 template <class L>
 struct Dual {
   L value{0.0}, slope{0.0};
@@ -59,7 +59,7 @@ struct Dual {
 
 namespace detail {
 
-/// What a number is without its derivative.
+/// The value of a number with or without a derivative.
 template <class L>
 const L& value_of(const L& x) {
   return x;
@@ -69,7 +69,7 @@ const L& value_of(const Dual<L>& x) {
   return x.value;
 }
 
-/// What the numbers of a vector are without their derivatives.
+/// The values of a vector of numbers with or without derivatives.
 template <class L, std::size_t D>
 const std::array<L, D>& values_of(const std::array<L, D>& x) {
   return x;

@@ -8,7 +8,7 @@ namespace pendula {
 
 namespace detail {
 
-/// f(x) of value f and slope f'.
+/// f(x) by the chain rule, from the value f and the derivative `slope` of f at x.value.
 template <class L>
 Dual<L> chained(const L& f, const L& slope, const Dual<L>& x) {
   return {f, slope * x.slope};
@@ -16,7 +16,7 @@ Dual<L> chained(const L& f, const L& slope, const Dual<L>& x) {
 
 }  // namespace detail
 
-/// The functions that a generated kernel may hold, with their derivatives.
+/// The functions that a generated kernel may call, with their derivatives.
 template <class L>
 void sincos(const Dual<L>& x, Dual<L>& sine, Dual<L>& cosine) {
   L s, c;
@@ -96,7 +96,7 @@ Dual<L> cbrt(const Dual<L>& x) {
   const L f = cbrt(x.value);
   return detail::chained<L>(f, L(1.0) / (L(3.0) * (f * f)), x);
 }
-/// Of a constant exponent, which is all that kernels have.
+/// For constant exponents only: kernels have no others.
 template <class L>
 Dual<L> pow(const Dual<L>& x, const Dual<L>& exponent) {
   using std::pow;

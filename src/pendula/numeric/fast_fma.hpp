@@ -4,7 +4,7 @@
 
 namespace pendula::detail {
 
-/// Whether std::fma is an instruction. Clang does not say so as the standard has it, by FP_FAST_FMA.
+/// Whether std::fma is one instruction. Clang does not define the standard's FP_FAST_FMA, so __FMA__ is asked, too.
 template <class Real>
 inline constexpr bool has_fast_fma = false;
 #if defined(FP_FAST_FMA) || defined(__FMA__) || defined(__aarch64__)

@@ -5,14 +5,15 @@
 
 namespace pendula::detail {
 
-/// 2π in twice the digits of a double.
+/// 2π as the sum of two doubles.
 inline constexpr double full_turn = 6.283185307179586, full_turn_low = 2.4492935982947064e-16;
 
-/// From where on an angle has full turns to be taken out, and how far a double tells where it is  [rad].
+/// Full turns are taken out of angles beyond `some_turns`. Beyond `unknown_turns` a double no longer tells the angle
+/// within a turn  [rad].
 inline constexpr double some_turns = 8, unknown_turns = 1e15;
 
-/// Takes full turns out of angles that have some, of those `among`, and adds them to `turns`: of ten thousand turns a
-/// double has lost four digits of where it is within one.
+/// Takes the full turns out of the angles in the mask `among` that have some, and adds their number to `turns`. Without
+/// this a double loses digits as turns accumulate: four of them after ten thousand turns.
 template <class Num>
 void take_out_turns(Compensated<Num>& angle, Num& turns, const MaskOf<Num>& among) {
   const Num size = abs(angle.value);
@@ -28,7 +29,7 @@ void take_out_turns(Compensated<Num>& angle, Num& turns, const MaskOf<Num>& amon
   turns = select(has_some, turns + whole, turns);
 }
 
-/// The angle with its turns.
+/// The angle with its turns put back: angle + 2π turns.
 template <class Num>
 Num with_turns(const Compensated<Num>& angle, const Num& turns) {
   const Twofold<Num> gone = exact_product(turns, Num(full_turn));

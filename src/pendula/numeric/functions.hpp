@@ -10,8 +10,8 @@ namespace pendula {
 
 namespace detail {
 
-/// function(x) of every number of a pack, one after the other: what xsimd has of these takes another way for all
-/// numbers of a register where one of them asks for it, so that members of an ensemble would see their neighbours.
+/// function(x) of each number of a pack, computed one by one. xsimd's versions of these functions choose a branch for
+/// the whole register, so that the result for one member of an ensemble would depend on its neighbours.
 template <int Size, class Register, class Function>
 [[gnu::noinline]] Pack<Size, Register> one_by_one(const Pack<Size, Register>& x, Function function) {
   alignas(pack_alignment) typename Pack<Size, Register>::Scalar numbers[static_cast<std::size_t>(Size)];
@@ -22,7 +22,7 @@ template <int Size, class Register, class Function>
 
 }  // namespace detail
 
-/// The functions that a generated kernel may hold, of every number of a pack.
+/// The functions that a generated kernel may call, for packs.
 #define PENDULA_ONE_BY_ONE(function)                             \
   template <int Size, class Register>                            \
   Pack<Size, Register> function(const Pack<Size, Register>& x) { \

@@ -7,8 +7,8 @@
 
 namespace pendula {
 
-/// All numbers from `low` to `high`: what a number that is not known better may be. A function of intervals holds what
-/// the function may be of their numbers, exactly and in doubles.
+/// A closed interval: all numbers from `low` to `high`. Functions of intervals return enclosures of the exact values
+/// and of those computed in doubles.
 struct Interval {
   double low = 0, high = 0;
 
@@ -22,10 +22,11 @@ struct Interval {
   double width() const { return high - low; }
   bool is_number() const { return low == high; }
   bool holds(double number) const { return low <= number && number <= high; }
-  /// The sign that all of them have; 0 where there is none.
+  /// The common sign of all its numbers; 0 where they have none.
   int side() const { return low > 0 ? 1 : high < 0 ? -1 : 0; }
 
-  /// Those of a result whose ends are off by `roundings` of themselves. An end that is no number is unknown.
+  /// The interval from low to high, each end moved outward by `roundings` epsilons of itself. A NaN end becomes
+  /// infinite.
   static Interval rounded(double low, double high, double roundings = 1) {
     constexpr double largest = std::numeric_limits<double>::max();
     const double part = roundings * std::numeric_limits<double>::epsilon();
@@ -41,7 +42,7 @@ inline Interval hull(const Interval& a, const Interval& b) {
   return {std::min(a.low, b.low), std::max(a.high, b.high)};
 }
 
-/// What both hold, which must be something.
+/// The intersection, which must not be empty.
 inline Interval common(const Interval& a, const Interval& b) {
   return {std::max(a.low, b.low), std::min(a.high, b.high)};
 }
@@ -76,19 +77,19 @@ inline Interval abs(const Interval& x) {
 
 namespace detail {
 
-/// Of a function that rises all through, of the library.
+/// Enclosure of a monotonically increasing function of the standard library.
 template <class Function>
 Interval rising(const Interval& x, Function function) {
   return Interval::rounded(function(x.low), function(x.high), 4);
 }
 
-/// Whether one of the numbers start + k period is in it, to rounding.
+/// Whether x contains a number start + k period, up to rounding.
 inline bool holds_one_of(const Interval& x, double start, double period) {
   const double rounding = 4 * std::numeric_limits<double>::epsilon() * (std::max(-x.low, x.high) + period);
   return std::floor((x.high + rounding - start) / period) >= std::ceil((x.low - rounding - start) / period);
 }
 
-/// Of a function with a period 2 pi, −1 to 1, that is 1 at `top` and -1 half a period after it.
+/// Enclosure of a function of period 2π between −1 and 1, which is 1 at `top` and −1 half a period later.
 template <class Function>
 Interval waving(const Interval& x, double top, Function function) {
   constexpr double period = 2 * std::numbers::pi;
@@ -127,14 +128,14 @@ inline Interval tanh(const Interval& x) {
 inline Interval exp(const Interval& x) {
   return detail::rising(x, [](double at) { return std::exp(at); });
 }
-/// Of the numbers that are not negative; there must be some.
+/// Of the non-negative part of x, which must not be empty.
 inline Interval sqrt(const Interval& x) {
   return detail::rising({std::max(x.low, 0.0), x.high}, [](double at) { return std::sqrt(at); });
 }
 inline Interval log(const Interval& x) {
   return detail::rising({std::max(x.low, 0.0), x.high}, [](double at) { return std::log(at); });
 }
-/// Of the numbers from −1 to 1; there must be some.
+/// Of the part of x in [−1, 1], which must not be empty.
 inline Interval asin(const Interval& x) {
   return detail::rising(common(x, {-1, 1}), [](double at) { return std::asin(at); });
 }
@@ -142,7 +143,7 @@ inline Interval acos(const Interval& x) {
   return -detail::rising(common(x, {-1, 1}), [](double at) { return -std::acos(at); });
 }
 
-/// A power of which the exponent is a number. That is a whole number, or x is not negative.
+/// x to a constant exponent. Either the exponent is a whole number, or x is not negative.
 inline Interval pow(const Interval& x, double exponent) {
   const auto power = [=](double at) { return std::pow(at, exponent); };
   if (exponent == 0) return 1;

@@ -10,17 +10,17 @@
 
 namespace pendula {
 
-/// One number of several members of an ensemble, a member in each lane of a SIMD register; what becomes of a lane
-/// depends on that lane alone, to the last bit.
+/// A number for each of several members of an ensemble, one member in each lane of a SIMD register. The result in a
+/// lane depends on that lane alone, to the last bit.
 ///
-/// A product is rounded where it is written and never fused with a sum that it goes into, so that code that a compiler
-/// has copied and arranged in two ways still gives one result. What is to be rounded once says so: fma.
+/// A product is rounded where it is written and never fused with a sum. So code that the compiler has copied and
+/// optimised in two ways still gives one result. Where one rounding is wanted, the code says fma.
 template <class Register>
 class LanePack {
  public:
   static constexpr std::size_t width = Register::size;
   static constexpr int size = static_cast<int>(width);
-  using Mask = typename Register::batch_bool_type;  ///< a yes or no for every member
+  using Mask = typename Register::batch_bool_type;  ///< a bool for every member
 
   LanePack() = default;
   explicit LanePack(double value) : held_(value) {}
@@ -30,7 +30,7 @@ class LanePack {
   void store(double* to) const { held_.store_aligned(to); }
   const Register& held() const { return held_; }
 
-  /// One member's; for what happens seldom.
+  /// The number of one member; slow, for rare use.
   double operator[](int lane) const {
     alignas(pack_alignment) double values[width];
     store(values);
@@ -78,7 +78,7 @@ class LanePack {
   friend LanePack select(const Mask& which, const LanePack& yes, const LanePack& no) {
     return LanePack(Register(xsimd::select(which, yes.held_, no.held_)));
   }
-  /// The same number, of which GCC forgets where it was loaded from: it would load it anew for each product.
+  /// The same number, kept in a register: otherwise GCC would load it again from memory for each product.
   friend LanePack in_register(const LanePack& a) { return LanePack(kept(a.held_)); }
 
  private:
@@ -104,10 +104,10 @@ class LanePack {
   Register held_;
 };
 
-/// The members that a register of this processor has room for.
+/// The widest register of members on this processor, of at most eight.
 using MemberRegister = RegisterFor<8>;
 
-// A number that goes into all lanes.
+// A number times that of every lane.
 template <class Register>
 LanePack<Register> operator*(double a, const LanePack<Register>& b) {
   return LanePack<Register>(a) * b;

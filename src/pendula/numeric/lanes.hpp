@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <xsimd/xsimd.hpp>
 
-/// Before a function that carries packs through a loop: everything it calls is inlined, so that they stay in registers.
-/// Not where a sanitizer would have all of that instrumented.
+/// Written before a function that carries packs through a loop: all its calls are inlined, so that packs stay in
+/// registers. Not with the address sanitizer, which would instrument all of the inlined code.
 #if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__)
 #define PENDULA_IN_REGISTERS [[gnu::flatten]]
 #else
@@ -19,11 +19,11 @@ namespace pendula {
 
 namespace detail {
 
-// Numbers that processors have registers for; all others go one by one.
+// Types that SIMD registers exist for; numbers of any other type are computed one by one.
 template <class Real>
 inline constexpr bool has_registers = std::is_same_v<Real, double> || std::is_same_v<Real, float>;
 
-// The widest register that divides a pack of `Size` numbers; Real itself where there is none.
+// The widest register whose size divides `Size`; Real itself where there is none.
 template <int Size, class Real, std::size_t Width = 8>
 auto widest_register() {
   if constexpr (Width == 1 || !has_registers<Real>) {
@@ -36,7 +36,7 @@ auto widest_register() {
   }
 }
 
-// What is true of a register of one number, the number itself.
+// A plain number counts as a register of one.
 template <class Register>
 struct RegisterTraits {
   using Scalar = Register;
@@ -76,9 +76,9 @@ void store(Real* to, const xsimd::batch<Real, Arch>& from) {
   from.store_aligned(to);
 }
 
-// x y + z, rounded once where the processor can. The one place with intrinsics: xsimd's rounds twice in registers of
-// two, in those of four where the processor has AVX-VNNI and, before version 11, in those of eight (its issue 884), and
-// what a product loses to rounding could not be told.
+// x y + z, rounded once where the processor can. Intrinsics are needed here, and only here: xsimd's fma rounds twice in
+// registers of two, in those of four where the processor has AVX-VNNI and, before version 11, in those of eight (xsimd
+// issue 884). Then exact_product would return a wrong error term.
 template <class Real>
 Real fused(const Real& x, const Real& y, const Real& z) {
   if constexpr (has_fast_fma<Real>) {
@@ -106,14 +106,14 @@ xsimd::batch<Real, Arch> fused(const xsimd::batch<Real, Arch>& x, const xsimd::b
 
 }  // namespace detail
 
-/// The register that a pack of `Size` numbers is made of. It is a parameter of everything that is made of packs, so
-/// that code compiled for different processors has different names and cannot be mixed by a linker.
+/// The register that a pack of `Size` numbers consists of. It is a template parameter of everything made of packs, so
+/// that code compiled for different processors has different names and a linker cannot mix them up.
 template <int Size, class Real = double, int Widest = 8>
 using RegisterFor = typename decltype(detail::widest_register<Size, Real, Widest>())::type;
 
-/// `Size` numbers in SIMD registers that the compiler's target decides on; arithmetic goes number by number.
-/// Loads and stores need addresses aligned to `pack_alignment`. More than one register is two packs, not an array:
-/// compilers keep those in registers.
+/// `Size` numbers in SIMD registers of the compiler's target; arithmetic is elementwise. Loads and stores need
+/// addresses aligned to `pack_alignment`. A pack of more than one register is two packs, not an array: compilers keep
+/// those in registers.
 template <int Size, class Register = RegisterFor<Size>>
 class Pack {
   static constexpr int width = detail::register_size<Register>;
@@ -182,7 +182,7 @@ class Pack {
     return each([](const auto& x) { return -x; }, a);
   }
 
-  /// operation(x, a, b) on every register: two results of one argument.
+  /// operation(x, a, b) on every register, where a and b are two results of x.
   template <class Operation>
   friend void for_each_register(Operation operation, const Pack& x, Pack& a, Pack& b) {
     if constexpr (split) {
@@ -199,7 +199,7 @@ class Pack {
                 c);
   }
 
-  /// operation(x) of every register.
+  /// operation(x) on every register.
   template <class Operation>
   friend Pack mapped(Operation operation, const Pack& a) {
     return each(operation, a);
@@ -240,7 +240,7 @@ class Pack {
   std::conditional_t<split, Halves, Register> held_;
 };
 
-/// In bytes; enough for any register that xsimd knows.
+/// In bytes; enough for every register that xsimd has.
 inline constexpr std::size_t pack_alignment = 64;
 
 namespace detail {
@@ -256,19 +256,19 @@ struct ScalarOf<Pack<Size, Register>> {
 
 }  // namespace detail
 
-/// The type of one number of a pack; of a number, the number's own.
+/// The type of one number of a pack; of a plain number, its own type.
 template <class Number>
 using ScalarOf = typename detail::ScalarOf<Number>::type;
 
-/// Numbers in a pack that holds all `stages` of one quantity: the next power of two where there are registers. The
-/// numbers after the last stage are computed like the others and never looked at.
+/// Size of a pack that holds one quantity at all `stages`: the next power of two where there are registers. The numbers
+/// after the last stage are computed like the others and never used.
 template <class Real = double>
 constexpr int lanes_for(int stages) {
   if (!detail::has_registers<Real>) return stages;
   return stages <= 2 ? stages : stages <= 4 ? 4 : 8;
 }
 
-/// All stages of one quantity of one link.
+/// One quantity of one link at all stages.
 template <int S, class Real = double>
 using Lanes = Pack<lanes_for<Real>(S), RegisterFor<lanes_for<Real>(S), Real>>;
 

@@ -6,10 +6,10 @@
 
 namespace pendula {
 
-/// A square linear system, solved by LU with partial pivoting in a workspace that is made once.
+/// A square linear system, solved by LU with partial pivoting in a workspace allocated once.
 ///
-/// Our own because it is small: the systems of few coordinates and stages that come here take Eigen's blocked LU twice
-/// the time up to 32 unknowns and more up to 64, and every kernel five seconds of compilation.
+/// Not Eigen's, because the systems of few coordinates and stages solved here are small: Eigen's blocked LU takes twice
+/// the time up to 32 unknowns, more up to 64, and five seconds of compilation per kernel.
 class LinearSystem {
  public:
   using Index = Eigen::Index;
@@ -23,7 +23,7 @@ class LinearSystem {
     solve(solution.data(), 1);
   }
 
-  /// The same for `count` right-hand sides, (size x count) column by column, each replaced by its solution.
+  /// Solves for `count` right-hand sides, (size x count) column by column, each replaced by its solution.
   void solve(double* columns, Index count) {
     for (Index k = 0; k < size(); ++k) {
       bring_up_pivot(k, columns, count);
@@ -39,7 +39,7 @@ class LinearSystem {
   Index size() const { return matrix.rows(); }
   double* column(Index j) { return matrix.data() + j * size(); }
 
-  // A NaN stays where it is, and spreads.
+  // A NaN pivot is not exchanged, and spreads to the solution.
   void bring_up_pivot(Index k, double* columns, Index count) {
     const double* const pivots = column(k);
     Index largest = k;
@@ -51,7 +51,7 @@ class LinearSystem {
     for (Index j = 0; j < count; ++j) std::swap(columns[j * size() + k], columns[j * size() + largest]);
   }
 
-  // Two columns at a time: each reads the multipliers once.
+  // Two columns at a time, so that the multipliers are read once for both.
   void eliminate(Index k, double* columns, Index count) {
     double* const multipliers = column(k);
     const double inverse = 1 / multipliers[k];

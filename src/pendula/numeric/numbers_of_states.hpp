@@ -5,7 +5,7 @@
 
 namespace pendula {
 
-/// One number of each of W states, side by side in memory: a pack, or of one state the number itself.
+/// One quantity of W states, side by side in memory: a pack, or the plain number where W is 1.
 template <int W, class Register = RegisterFor<W>>
 struct NumbersOfStates {
   using L = std::conditional_t<W == 1, double, Pack<W, Register>>;

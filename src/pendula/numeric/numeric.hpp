@@ -4,14 +4,14 @@
 #include <concepts>
 #include <pendula/numeric/fast_fma.hpp>
 
-/// What text needs that is written once for a number of one motion, a plain one, and for a number of several members,
-/// a LanePack: a plain number is a pack of one. Of packs the same names are friends, found by their arguments.
+/// What makes one text serve both a plain number (one motion) and a LanePack (several members): a plain number is
+/// treated as a pack of one. For packs the same names are friend functions, found by argument-dependent lookup.
 namespace pendula {
 
 template <class L>
 struct Dual;
 
-/// What belongs to a number: of several members a yes or no for each; of one motion a bool.
+/// Types that belong to a number. Mask: a bool for each member; for one motion a plain bool.
 template <class Num>
 struct Numeric {
   using Mask = typename Num::Mask;
@@ -27,7 +27,7 @@ struct Numeric<Real> {
 template <class L>
 struct Numeric<Dual<L>> : Numeric<L> {};
 
-/// MaskOf<Num>(true): all of them.
+/// MaskOf<Num>(true) is true for all members.
 template <class Num>
 using MaskOf = typename Numeric<Num>::Mask;
 template <class Num>
@@ -47,7 +47,7 @@ Real select(bool which, const Real& yes, const Real& no) {
   return which ? yes : no;
 }
 
-// As registers do it: the second where either is no number.
+// As SIMD registers do it: b where either is NaN.
 template <std::floating_point Real>
 Real max(const Real& a, const Real& b) {
   return a > b ? a : b;
@@ -57,7 +57,7 @@ Real min(const Real& a, const Real& b) {
   return a < b ? a : b;
 }
 
-/// a b + c, rounded once where the processor does that fast.
+/// a b + c, with one rounding where the processor has a fast fused multiply-add.
 template <std::floating_point Real>
 Real fma(const Real& a, const Real& b, const Real& c) {
   if constexpr (detail::has_fast_fma<Real>) {
@@ -73,7 +73,7 @@ using std::floor;
 using std::log;
 using std::sqrt;
 
-/// One member's number; of one motion there is but one.
+/// The number of one member; a plain number has but one.
 template <std::floating_point Real>
 Real get(const Real& x, int /*member*/) {
   return x;

@@ -4,7 +4,7 @@
 
 namespace pendula {
 
-/// a + b without loss where |a| ≥ |b|; else within a last bit of b (Dekker).
+/// a + b without rounding error where |a| ≥ |b| (fast two-sum, Dekker); else to within a last bit of b.
 template <class Number>
 Twofold<Number> ordered_sum(const Number& a, const Number& b) {
   const Number sum = a + b;

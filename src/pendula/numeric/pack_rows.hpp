@@ -10,7 +10,7 @@ namespace pendula {
 
 namespace detail {
 
-/// Memory that packs may be loaded from.
+/// Allocates memory aligned for loads and stores of packs.
 template <class Number>
 struct PackAllocator {
   using value_type = Number;
@@ -30,7 +30,7 @@ struct PackAllocator {
 
 }  // namespace detail
 
-/// Rows of `Width` numbers each, one after the other, that are loaded as packs: zero at first.
+/// Rows of `Width` numbers each, contiguous and aligned so that each row loads as a pack; initially zero.
 template <std::size_t Width>
 class PackRows {
  public:

@@ -7,8 +7,8 @@
 
 namespace pendula {
 
-/// What a function of time is, and its derivative, over a stretch of time: all that they may be. Functions of reaches
-/// are reaches; where a function may jump, its derivative may be anything.
+/// Enclosures of a function of time and of its derivative over an interval of time. Functions of reaches return
+/// reaches; where a function may jump, its derivative is unbounded.
 struct Reach {
   /// Where the function has a value.
   enum class Defined { everywhere, partly, nowhere };
@@ -22,7 +22,7 @@ struct Reach {
 
   bool is_number() const { return value.is_number() && slope.is_number() && defined == Defined::everywhere; }
 
-  /// What has a value where all of these have one.
+  /// This one, defined only where all of `given` are defined, too.
   template <class... Reaches>
   Reach where(const Reaches&... given) const {
     Reach reach = *this;
@@ -39,12 +39,12 @@ struct Reach {
 
 namespace detail {
 
-/// f(x), of f over the values of x and its derivative there.
+/// f(x) by the chain rule, from the enclosures of f and of its derivative over the values of x.
 inline Reach composed(const Interval& f, const Interval& derivative, const Reach& x) {
   return Reach(f, derivative * x.slope).where(x);
 }
 
-/// f(x), of an f that has values from `least` to `most` alone.
+/// f(x) for an f that is defined from `least` to `most` only.
 template <class Function>
 Reach within(double least, double most, const Reach& x, Function function) {
   if (x.value.high < least || x.value.low > most) return Reach::unknown(Reach::Defined::nowhere).where(x);
@@ -52,7 +52,7 @@ Reach within(double least, double most, const Reach& x, Function function) {
   return function();
 }
 
-/// Of a function that is constant but where it jumps, upwards.
+/// A step function: piecewise constant, non-decreasing.
 template <class Function>
 Reach stairs(const Reach& x, Function function) {
   const Interval values{function(x.value.low), function(x.value.high)};
@@ -63,7 +63,7 @@ inline bool has_value(const Reach& x) {
   return x.defined == Reach::Defined::everywhere;
 }
 
-/// 0, 1, or one of these.
+/// The reach of a condition: 0, 1, or either.
 inline Reach truth(bool may_be, bool must_be) {
   return Reach({must_be ? 1.0 : 0.0, may_be ? 1.0 : 0.0}, may_be == must_be ? Interval(0) : Interval::all());
 }
@@ -170,7 +170,7 @@ inline Reach sign(const Reach& x) {
   return detail::stairs(x, [](double at) { return at > 0 ? 1.0 : at < 0 ? -1.0 : 0.0; });
 }
 
-/// Exact between jumps of the remainder, where the divisor is a number.
+/// Exact where the divisor is a number and the remainder does not jump.
 inline Reach fmod(const Reach& x, const Reach& divisor) {
   const double size = std::max(std::abs(divisor.value.low), std::abs(divisor.value.high));
   if (size == 0) return Reach::unknown(Reach::Defined::nowhere).where(x, divisor);
@@ -184,7 +184,7 @@ inline Reach fmod(const Reach& x, const Reach& divisor) {
 inline Reach atan2(const Reach& y, const Reach& x) {
   const bool is_cut = y.value.holds(0) && x.value.low <= 0;
   if (is_cut) return Reach({-std::numbers::pi, std::numbers::pi}, Interval::all()).where(y, x);
-  // Monotone in each: what lies furthest round is at corners.
+  // It is monotone in x and in y: its extremes are at corners.
   const auto [low, high] = std::minmax({std::atan2(y.value.low, x.value.low), std::atan2(y.value.low, x.value.high),
                                         std::atan2(y.value.high, x.value.low), std::atan2(y.value.high, x.value.high)});
   const Interval slope = (x.value * y.slope - y.value * x.slope) / (pow(x.value, 2) + pow(y.value, 2));
@@ -200,7 +200,7 @@ inline Reach pow(const Reach& x, const Reach& exponent) {
   return n == std::floor(n) ? power() : detail::within(0, Interval::infinity, x, power);
 }
 
-// --- What is true: 1, and not: 0, as what has no value is when it is compared ---
+// --- Conditions: 1 where true, 0 where false; comparisons with an undefined value are false ---
 
 inline Reach less(const Reach& a, const Reach& b) {
   return detail::compared(a, b, a.value.low < b.value.high, a.value.high < b.value.low);

@@ -5,7 +5,7 @@
 
 namespace pendula::detail {
 
-/// y_i += Σ_j entry(i, j) x_j for rows x, y of packs: many right-hand sides at once, four rows of y in registers.
+/// y_i += Σ_j entry(i, j) x_j for rows x, y of packs: many right-hand sides at once, four rows of y kept in registers.
 template <std::size_t Rows, std::size_t Columns, class Row, class Entry>
 void add_product_of(Entry entry, const Row* x, Row* y) {
   constexpr std::size_t together = 4;

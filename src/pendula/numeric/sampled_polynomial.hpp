@@ -11,15 +11,15 @@
 
 namespace pendula {
 
-/// The place of a sample, 0 to 8, between 0 and 1: Chebyshev points, both ends among them. Those of even number are the
-/// places of five samples.
+/// Position in [0, 1] of sample 0 to 8: Chebyshev points including both ends. The even samples are the Chebyshev points
+/// of five samples.
 inline double sample_place(std::size_t sample) {
   if (sample == 4) return 0.5;
   return (1 - std::cos(std::numbers::pi * static_cast<double>(sample) / 8)) / 2;
 }
 
-/// Sizes |c_k| of the Chebyshev coefficients of the polynomial through values at Chebyshev points, one after the other.
-/// The sum of those after the first is how far it goes from the first, at most.
+/// Absolute values |c_k| of the Chebyshev coefficients of the polynomial through `values` at Chebyshev points in order.
+/// The sum of those after the first bounds how far the polynomial goes from the first.
 template <std::size_t points>
 std::array<double, points> chebyshev_sizes(const std::array<double, points>& values) {
   using Table = std::array<std::array<double, points>, points>;
@@ -42,11 +42,11 @@ std::array<double, points> chebyshev_sizes(const std::array<double, points>& val
   return sizes;
 }
 
-/// A place that is none of five samples: what turns by less than 125 radians on [0, 1] is not the same there as at
-/// them.
+/// A place off the five samples, to detect aliasing: a sinusoid that turns by less than 125 radians on [0, 1] differs
+/// there from what its samples suggest.
 inline constexpr double odd_place = 0.315;
 
-/// What the polynomial through five samples is at the odd place, by the barycentric formula.
+/// The value at `odd_place` of the polynomial through five samples, by the barycentric formula.
 inline double expected_at_odd_place(const std::array<double, 5>& seen) {
   double sum = 0, weights = 0;
   for (std::size_t k = 0; k < seen.size(); ++k) {
@@ -57,8 +57,8 @@ inline double expected_at_odd_place(const std::array<double, 5>& seen) {
   return sum / weights;
 }
 
-/// A polynomial of degree 8 on [0, 1] by its Bernstein coefficients, between the smallest and the largest of which it
-/// stays.
+/// A polynomial of degree 8 on [0, 1] in Bernstein form: its values stay between its smallest and its largest
+/// coefficient.
 class BernsteinPolynomial {
  public:
   static constexpr std::size_t size = 9;
@@ -66,7 +66,7 @@ class BernsteinPolynomial {
 
   explicit BernsteinPolynomial(const Numbers& coefficients) : b_(coefficients) {}
 
-  /// The one through values at the places of samples.
+  /// The polynomial through `values` at the nine sample places.
   static BernsteinPolynomial through(const Numbers& values) {
     Numbers coefficients{};
     for (std::size_t j = 0; j < size; ++j) {
@@ -91,13 +91,13 @@ class BernsteinPolynomial {
     return static_cast<double>(size - 1) * (b[1] - b[0]);
   }
 
-  /// 1 where it is surely above `band`, −1 where it is surely below −band, else 0.
+  /// 1 where it is certainly above `band`, −1 where it is certainly below −band, else 0.
   int side(double band) const {
     const auto [least, most] = std::ranges::minmax(b_);
     return least > band ? 1 : most < -band ? -1 : 0;
   }
 
-  /// The same of its derivative.
+  /// side(band) of the derivative.
   int slope_side(double band) const {
     Numbers slopes;
     for (std::size_t k = 0; k + 1 < size; ++k) slopes[k] = static_cast<double>(size - 1) * (b_[k + 1] - b_[k]);
@@ -105,18 +105,18 @@ class BernsteinPolynomial {
     return BernsteinPolynomial(slopes).side(band);
   }
 
-  /// Whether it surely stays from −band to band.
+  /// Whether it certainly stays within ±band.
   bool is_within(double band) const {
     return std::ranges::all_of(b_, [&](double value) { return std::abs(value) <= band; });
   }
 
-  /// Between which numbers it surely stays.
+  /// An enclosure of its values.
   Interval range() const {
     const auto [least, most] = std::ranges::minmax(b_);
     return {least, most};
   }
 
-  /// Its derivative, as one of the same degree.
+  /// Its derivative, raised to the same degree.
   BernsteinPolynomial slopes() const {
     constexpr double degree = size - 1;
     Numbers slopes{};
@@ -128,7 +128,7 @@ class BernsteinPolynomial {
     return BernsteinPolynomial(slopes);
   }
 
-  /// The same polynomial from `low` to `high`, 0 < high, as one on [0, 1].
+  /// The same polynomial restricted to [low, high], 0 < high, and mapped to [0, 1].
   BernsteinPolynomial part(double low, double high) const {
     Numbers b = b_;
     for (std::size_t level = 1; level < size; ++level) {
@@ -141,7 +141,7 @@ class BernsteinPolynomial {
     return BernsteinPolynomial(b);
   }
 
-  /// The same polynomial on [0, 1/2] and on [1/2, 1], each as one on [0, 1].
+  /// The same polynomial restricted to [0, 1/2] and to [1/2, 1], each mapped to [0, 1].
   std::pair<BernsteinPolynomial, BernsteinPolynomial> halves() const {
     Numbers left, right = b_;
     for (std::size_t level = size; level > 0; --level) {
@@ -151,7 +151,7 @@ class BernsteinPolynomial {
     return {BernsteinPolynomial(left), BernsteinPolynomial(right)};
   }
 
-  /// A zero between two places where it has different signs, by halving.
+  /// A root between two places where it has different signs, by bisection.
   double zero(double from, double to) const {
     const bool rises = (*this)(to) > 0;
     for (int halvings = 0; halvings < 60; ++halvings) {
@@ -162,7 +162,7 @@ class BernsteinPolynomial {
   }
 
  private:
-  // Of the polynomials that are one at one place of samples and zero at the others.
+  // Coefficients of the Lagrange polynomials, which are 1 at one sample place and 0 at the others.
   static const std::array<Numbers, size>& from_samples() {
     static const std::array<Numbers, size> found = [] {
       std::array<Numbers, size> polynomials;
@@ -172,7 +172,7 @@ class BernsteinPolynomial {
     return found;
   }
 
-  // The product of (x − a)/(x_j − a) over the places a of all others, each of which raises the degree by one.
+  // The product of (x − a)/(x_j − a) over all other places a; each factor raises the degree by one.
   static Numbers one_at(std::size_t j) {
     Numbers b{1};
     double degree = 0;

@@ -11,7 +11,7 @@ namespace pendula {
 
 namespace detail {
 
-// Polynomials on |r| ≤ π/4 (the minimax coefficients of fdlibm), r + low the argument:
+// The argument is r + low, |r| ≤ π/4. Minimax polynomials of fdlibm:
 // sin r = r + r³ P(r²), cos r = 1 − r²/2 + r⁴ Q(r²).
 template <class Arch>
 struct ReducedSinCos {
@@ -38,10 +38,10 @@ struct ReducedSinCos {
   }
 };
 
-/// From where on reduced arguments lose digits.
+/// From here on the argument reduction below loses digits.
 inline constexpr double large_angle = 1e5;
 
-/// The numbers that are large, or none, by the standard library; the others stay, and do not notice.
+/// Recomputes the lanes with large or NaN arguments by the standard library; the other lanes keep their results.
 template <class Arch>
 [[gnu::noinline, gnu::cold]] void sincos_of_large(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sine,
                                                   xsimd::batch<double, Arch>& cosine) {
@@ -62,8 +62,7 @@ template <class Arch>
 }  // namespace detail
 
 /// Sine and cosine of every number of a register, to 0.8 ulp (0.7 with fused multiply-add) where |x| < 10⁵ and by the
-/// standard library beyond.
-/// (xsimd's own: 1.25 ulp, and slower.)
+/// standard library beyond. (xsimd's own has 1.25 ulp, and is slower.)
 template <class Arch>
 void sincos(const xsimd::batch<double, Arch>& x, xsimd::batch<double, Arch>& sine, xsimd::batch<double, Arch>& cosine) {
   using Batch = xsimd::batch<double, Arch>;

@@ -5,8 +5,8 @@
 
 namespace pendula::detail {
 
-/// start + Σ_j column_j x_j of packs, the columns `Columns` rows of numbers one after the other: in two strands, so
-/// that few products wait for one another.
+/// start + Σ_j column_j x_j, where `columns` holds `Columns` columns of `Width` numbers each. Two partial sums, so that
+/// consecutive products do not wait for each other.
 template <class L, std::size_t Columns, std::size_t Width, class Real>
 [[gnu::always_inline]] inline L stage_product(const Real* columns, const Real* x, const L& start) {
   L even = fma(L(x[0]), L::load(columns), start);

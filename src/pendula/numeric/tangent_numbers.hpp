@@ -8,10 +8,10 @@
 
 namespace pendula {
 
-/// Of what a tangent errs by, relative to itself, what chosen steps heed.
+/// Weight of the relative error of a tangent in the choice of step sizes.
 inline constexpr double tangent_share = 0.01;
 
-// What numbers in lanes with derivatives along tangents (Dual) need besides arithmetic.
+// What numbers with derivatives along tangents (Dual) need besides arithmetic, when they are held in lanes.
 
 template <class L>
 Dual<L> in_register(const Dual<L>& a) {
@@ -23,7 +23,7 @@ Dual<L> select(const Mask& which, const Dual<L>& yes, const Dual<L>& no) {
   return {select(which, yes.value, no.value), select(which, yes.slope, no.slope)};
 }
 
-/// Of derivatives no more is kept than they are rounded to.
+/// Derivatives are rounded as usual; only values carry their rounding error.
 template <class L>
 Twofold<Dual<L>> exact_sum(const Dual<L>& a, const Dual<L>& b) {
   const Twofold<L> sum = exact_sum(a.value, b.value);
@@ -51,7 +51,7 @@ Twofold<Dual<L>> exact_product(const L& a, const Dual<L>& b) {
 
 namespace detail {
 
-/// Sets a member's, and leaves its derivative.
+/// Sets the value of one lane, and leaves its derivative.
 template <class L>
 void set_value(int lane, double value, L& x) {
   set(x, lane, value);

@@ -5,13 +5,13 @@
 
 namespace pendula {
 
-/// How many numbers a number is: of several members one for each, of one motion one.
+/// How many members a number holds: the lanes of a pack, 1 for a plain number.
 template <class Num>
 inline constexpr std::size_t width_of = Num::width;
 template <std::floating_point Real>
 inline constexpr std::size_t width_of<Real> = 1;
 
-/// The number in a row of PackRows of this width.
+/// Loads a number from a row of PackRows of its width.
 template <class Num>
 Num from_row(const double* row) {
   if constexpr (std::floating_point<Num>) {

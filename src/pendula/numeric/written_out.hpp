@@ -2,12 +2,12 @@
 
 #include <utility>
 
-/// Behind the parameters of a lambda: it is always inlined.
+/// Written behind the parameters of a lambda: forces its inlining.
 #define PENDULA_WRITTEN_OUT __attribute__((always_inline))
 
 namespace pendula::detail {
 
-/// body(0), body(1), … written out, the numbers being constants.
+/// body(0), body(1), … unrolled, with the index as a compile-time constant.
 template <int Count, class Body>
 [[gnu::always_inline]] inline void unrolled(Body body) {
   [&]<int... k>(std::integer_sequence<int, k...>) PENDULA_WRITTEN_OUT {
@@ -16,11 +16,11 @@ template <int Count, class Body>
   (std::make_integer_sequence<int, Count>());
 }
 
-/// Chains so short that loops along them are written out.
+/// Whether loops along a chain of N links are unrolled.
 template <int N>
 inline constexpr bool is_short_chain = N > 0 && N <= 3;  // Eigen::Dynamic is negative
 
-/// body(0), body(1), … of all links, from the pivot on; written out where they are few.
+/// body(i) for all links i from the pivot outward; unrolled for short chains.
 template <int N, class Body>
 [[gnu::always_inline]] inline void for_links(int links, Body body) {
   if constexpr (is_short_chain<N>) {
@@ -30,7 +30,7 @@ template <int N, class Body>
   }
 }
 
-/// The same from the tip on.
+/// body(i) for all links i from the tip inward; unrolled for short chains.
 template <int N, class Body>
 [[gnu::always_inline]] inline void for_links_inward(int links, Body body) {
   if constexpr (is_short_chain<N>) {
