@@ -5,7 +5,8 @@
 
 namespace pendula {
 
-/// A kernel in C, as a shared object has it under the name of pendula_kernel (pendula_codegen/templates/kernel.c.j2).
+/// A kernel compiled from C, as a shared object exports it under the name pendula_kernel
+/// (pendula_codegen/templates/kernel.c.j2).
 struct CKernel {
   int interface;                        ///< system_interface
   const char* description;              ///< for KernelDescription
@@ -14,8 +15,8 @@ struct CKernel {
 };
 static_assert(std::is_trivially_copyable_v<CKernel> && std::is_standard_layout_v<CKernel>);
 
-/// Its table, which keeps `object`, where all of that lies. Throws std::invalid_argument where it is of another
-/// interface, or its description is none.
+/// The table of `kernel`. It shares ownership of `object`, the loaded library that everything in `kernel` points into.
+/// Throws std::invalid_argument for another interface version or an invalid description.
 std::shared_ptr<const SystemTable> table_of(const CKernel& kernel, std::shared_ptr<const void> object);
 
 }  // namespace pendula

@@ -12,7 +12,7 @@ namespace pendula {
 
 namespace detail {
 
-/// Legendre's polynomials on (0, 1), P_0 to P_n.
+/// Legendre polynomials P_0 to P_n shifted to (0, 1), at x.
 template <std::size_t n>
 constexpr std::array<double, n + 1> legendre_polynomials(double x) {
   const double y = 2 * x - 1;
@@ -26,17 +26,18 @@ constexpr std::array<double, n + 1> legendre_polynomials(double x) {
 
 }  // namespace detail
 
-/// Looks for what forces do between the nodes of a step: a wall or a pulse that is narrower than they are apart shows
-/// in none of them.
+/// Checks whether forces change between the nodes of a step: a wall or a pulse narrower than their spacing is seen by
+/// none of them.
 ///
-/// Functions of a model change within a short time where what they are taken of does: exp, tanh and their like where
-/// that comes by zero, or by its largest or smallest value, powers and logarithms where it comes by the smallest. What
-/// they are taken of is smooth along the polynomial of a step, so that few places show where that is; there and close
-/// to it forces are summed over ever shorter intervals. Shares of the step are 0 to 1.
+/// The functions of a model change rapidly only near certain values of their arguments: exp, tanh and the like where
+/// the argument crosses zero or has an extremum, powers and logarithms where the argument is smallest. The arguments
+/// are smooth along the polynomial of a step, so that few samples locate such places; there, forces are integrated over
+/// ever shorter intervals. "Share" is the fraction of the step that is done, 0 to 1.
 class FieldLook {
  public:
-  /// For a method of so many nodes; `few` samples of a step take little time. Functions that change by no more than
-  /// `smooth` from sample to sample, as `changes` tells it, are left to the error of the step.
+  /// `nodes` of the method; `few` samples of the step are cheap enough for every step. `is_base` tells of each argument
+  /// whether it is the base of a power. Changes of up to `smooth` from sample to sample, as `changes` measures them,
+  /// are left to the error estimate of the step.
   FieldLook(int nodes, int few, std::span<const bool> is_base, double smooth = 0.5)
       : is_base_(is_base.begin(), is_base.end()), smooth_(smooth), parts_(std::max(1, nodes / 2)) {
     if (is_base.empty()) return;
@@ -45,11 +46,11 @@ class FieldLook {
     places_.reserve(most_places);
   }
 
-  /// Whether a model has functions that may be narrow.
+  /// Whether the model has functions that may change within a short time.
   bool has_to_look() const { return !is_base_.empty(); }
 
-  /// Whether few samples show that one of them may change fast; arguments(shares, found) are what functions are taken
-  /// of, (shares, arguments).
+  /// Whether a few samples show that one of them may change fast. arguments(shares, found) writes the arguments of the
+  /// model's functions, (shares, arguments).
   template <class Arguments>
   bool may_find(Arguments&& arguments) {
     evaluate(few_, arguments, found_);
@@ -61,7 +62,7 @@ class FieldLook {
     return false;
   }
 
-  /// Whether any of them changes faster than samples of the step show.
+  /// Whether one of them changes faster than the samples of the step show.
   template <class Arguments>
   bool finds(Arguments&& arguments) {
     places_.clear();
@@ -72,17 +73,17 @@ class FieldLook {
     return !places_.empty();
   }
 
-  /// Of some numbers along the step, where something was found, what they sum up to, and what nodes that lie about
-  /// twice as close as those of the method do not see of them.
-  ///   sums     ∫₀¹
-  ///   moments  ∫₀¹ (1 − share): of rates of rates, where they move to
-  ///   missed   the largest |∫ (number − polynomial through nodes)| from the start of a part of the step to anywhere in
-  ///            it, of all parts
+  /// Integrals over the step of several quantities, where something was found, and how much of them is missed by nodes
+  /// about twice as dense as those of the method.
+  ///   sums     ∫₀¹ quantity
+  ///   moments  ∫₀¹ (1 − share) quantity: for accelerations, the displacement they cause
+  ///   missed   the largest |∫ (quantity − polynomial through nodes)| from the start of a part of the step to anywhere
+  /// in it, over all parts
   struct Sums {
     std::span<double> sums, moments, missed;
   };
 
-  /// Finds them; numbers(shares, found) are the numbers, (shares, sums.size()).
+  /// Computes them. numbers(shares, found) writes the quantities, (shares, sums.size()).
   template <class Numbers>
   void sum(Numbers&& numbers, const Sums& into) {
     find_borders();
@@ -101,16 +102,17 @@ class FieldLook {
   using Gauss = kernels::GaussTableau<8>;
   using Nodes = std::array<double, Gauss::stages>;
 
-  /// Where a function changes, and the distance within which it does not change much any more.
+  /// Where a function changes rapidly, and the distance from there beyond which it hardly changes.
   struct Place {
     double share, distance;
   };
 
   static constexpr int least_intervals = 8, sections = 7, most_rounds = 9;
-  // Of an argument, from place to place; of a base, relative to itself. Functions that change by so little are smooth.
+  // Largest change of an argument from sample to sample that counts as flat; of the base of a power, relative to
+  // itself.
   static constexpr double flat = 0.25;
-  static constexpr double gone = 60;   // exp of minus that is nothing
-  static constexpr double growth = 3;  // of intervals, away from a place
+  static constexpr double gone = 60;   // exp(−gone) is negligible
+  static constexpr double growth = 3;  // of the intervals' lengths, away from a place
   static constexpr std::size_t most_places = 64;
 
   static std::vector<double> spread(int intervals) {
@@ -132,7 +134,7 @@ class FieldLook {
     return std::abs(one - other) > limit * size;
   }
 
-  // How near a function is to where it changes: the larger, the nearer.
+  // Larger where a function is closer to its rapid change.
   double nearness(std::size_t a, double sign, double value) const {
     return is_base_[a] ? -std::abs(value) : sign * value;
   }
@@ -145,7 +147,7 @@ class FieldLook {
       zoom(a, 0, samples_[i], samples_[i + 1], arguments);
     }
     if (!changes(a, here, before, smooth_) && !changes(a, here, after, smooth_)) return;
-    // Between samples an argument goes further than at them, by what it bends.
+    // Between samples an argument may go further than at them, by its curvature.
     const std::size_t middle = std::clamp(i, std::size_t{1}, last - 1);
     const double bend = std::abs(at(middle - 1, a) - 2 * at(middle, a) + at(middle + 1, a));
     const double reach = std::max(std::abs(here - before), std::abs(here - after)) + bend / 4;
@@ -158,7 +160,7 @@ class FieldLook {
     }
   }
 
-  // Into an interval, where an argument crosses zero (sign 0), or comes to its largest or smallest value.
+  // Narrows an interval down to where an argument crosses zero (sign 0) or has an extremum.
   template <class Arguments>
   void zoom(std::size_t a, double sign, double from, double to, Arguments& arguments) {
     std::array<double, sections + 1> shares;
@@ -199,7 +201,7 @@ class FieldLook {
     }
   }
 
-  // Around every place: what is far from it may be far apart.
+  // Interval borders around every place, spaced more widely further away from it.
   void find_borders() {
     borders_.clear();
     for (const Place& place : places_) {
@@ -252,7 +254,7 @@ class FieldLook {
     }
   }
 
-  // ∫₀ˣ of the polynomial that is 1 at one node of Gauss and 0 at the others, for each.
+  // ∫₀ˣ of each Lagrange polynomial of the Gauss nodes.
   static Nodes sums_of_polynomials(double x) {
     const auto values = detail::legendre_polynomials<Gauss::stages>(x);
     Nodes sums{};

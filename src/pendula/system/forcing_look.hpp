@@ -9,14 +9,15 @@
 
 namespace pendula {
 
-/// How far a sine may turn in a step for a quadrature to sum it up. Of n nodes, its error is a constant times a power
-/// of the turn: n!⁴/((2n + 1) (2n)!³) and 2n of Gauss's, n (n − 1)!⁴/(2 (2n − 1)!³) and 2n − 1 of Radau's.
+/// How far a sine may turn in a step so that a quadrature still integrates it. With n nodes the error is a constant
+/// times a power of the turn: n!⁴/((2n + 1) (2n)!³) and the power 2n for Gauss, n (n − 1)!⁴/(2 (2n − 1)!³) and 2n − 1
+/// for Radau.
 class SineTurn {
  public:
-  /// Of a quadrature of this order, 2n or 2n − 1.
+  /// `order` of the quadrature: 2n or 2n − 1 for n nodes.
   SineTurn(int nodes, int order) : nodes_(nodes), order_(order), constant_(error_constant(nodes, order)) {}
 
-  /// The most that its error is within the tolerance by, but no more than a radian a node  [rad].
+  /// The largest turn whose error is within the tolerance, at most one radian per node  [rad].
   double within(double tolerance) const {
     return std::min(static_cast<double>(nodes_), std::pow(tolerance / constant_, 1.0 / order_));
   }
@@ -32,15 +33,15 @@ class SineTurn {
   double constant_;
 };
 
-/// How far a step may go so that its nodes see what forces do that depend on time: a pulse between them, or what turns
-/// many times in the step, no error estimate shows.
+/// Limits a step so that its nodes resolve forces that depend on time: no error estimate shows a pulse between the
+/// nodes, or forces that oscillate many times in the step.
 ///
-/// Accelerations of a state that stands still are summed over the step by the nodes of a quadrature, and again by the
-/// same nodes in many parts of it. Steps are halved until both agree. Nothing of Eigen, because explicit methods, which
-/// are compiled for any processor, and programs that are not, have the same.
+/// The accelerations of a fixed state are integrated over the step by a quadrature, and again with the step divided
+/// into many parts. The step is halved until both agree. This header does not use Eigen, because both the library's
+/// copies for each instruction set and programs compiled with other flags use it.
 class ForcingLook {
  public:
-  /// By a quadrature of these nodes and weights on (0, 1), of a system of so many coordinates.
+  /// `nodes` and `weights` of a quadrature on (0, 1); `coordinates` of the system.
   ForcingLook(std::span<const double> nodes, std::span<const double> weights, std::size_t coordinates)
       : nodes_(nodes.begin(), nodes.end()),
         weights_(weights.begin(), weights.end()),
@@ -49,10 +50,11 @@ class ForcingLook {
         speeds_(coordinates),
         least_speeds_(coordinates) {}
 
-  /// The longest of h, h/2, h/4 … from `time` on in which forces are seen to a tolerance, relative to rates v, to what
-  /// forces make of them, and to what would round a coordinate by that goes `sizes` in the time in which the motion
-  /// changes, 1/pace; accelerations(times, found) are those of the state, (times, coordinates).
-  /// What lasts for less than a hundredth of that time, and of h/8, may be missed.
+  /// Returns the longest of h, h/2, h/4 … from `time` on in which forces are resolved to a tolerance. Errors are
+  /// relative to the largest of the rates v, of what forces make of them, and of a speed whose effect is below
+  /// rounding: `sizes`, how far each coordinate goes while the motion changes, times `pace`, the inverse of that time.
+  /// accelerations(times, found) writes those of the fixed state, (times, coordinates). Pulses shorter than a hundredth
+  /// of 1/pace, and of h/8, may be missed.
   template <class Rates, class Sizes, class Accelerations>
   double resolved(double time, double h, double pace, double tolerance, const Rates& v, const Sizes& sizes,
                   Accelerations&& accelerations) {
@@ -66,29 +68,31 @@ class ForcingLook {
     return h;
   }
 
-  /// Of a tolerance, for a step in which the motion goes on by so much.
+  /// Factor on the tolerance for a step in which the motion advances by `moved`, a fraction of the time in which it
+  /// changes.
   template <class Number>
   static Number share_of(const Number& moved) {
     using std::max, std::min;
     return min(max(moved, Number(shortest)), Number(1.0));
   }
 
-  static constexpr double looks = 100;  ///< in the time in which motion changes
-  /// In that time: shorter steps than this are left to the error of the step. What does not look smooth then jumps, or
-  /// is nothing but differences of large numbers, as 1 + tanh(t) is long before 0.
+  static constexpr double looks = 100;  ///< samples in the time in which the motion changes
+  /// Shortest step, as a fraction of the time in which the motion changes; what is shorter is left to the error
+  /// estimate of the step. Forces that are not smooth on that scale jump, or are mere differences of large numbers,
+  /// such as 1 + tanh(t) long before t = 0.
   static constexpr double finest = 1e-3;
-  static constexpr int least_parts = 8;      ///< of a step
-  static constexpr double invisible = 1e-3;  ///< of a rounding error: what forces are rounded by themselves
-  static constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();  ///< of sums, and of times
-  static constexpr double negligible = 1e-280;  ///< speed: smaller numbers lose digits
+  static constexpr int least_parts = 8;      ///< that a step is divided into
+  static constexpr double invisible = 1e-3;  ///< fraction of a rounding error: forces are rounded by as much themselves
+  static constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();  ///< relative, of sums and times
+  static constexpr double negligible = 1e-280;  ///< speed; smaller numbers lose digits
 
  private:
-  // What accelerations are summed to.
+  // Integrals of the accelerations over a step.
   struct Sums {
     explicit Sums(std::size_t coordinates)
         : push(coordinates), size(coordinates), change(coordinates), last(coordinates) {}
     std::vector<double> push, size;    // ∫ a dt, ∫ |a| dt
-    std::vector<double> change, last;  // by how much they went up and down, and where from
+    std::vector<double> change, last;  // total variation of a, and its last value
 
     void clear() {
       for (std::vector<double>* sums : {&push, &size, &change}) std::fill(sums->begin(), sums->end(), 0.0);
@@ -140,12 +144,12 @@ class ForcingLook {
   }
 
   static constexpr double most_parts = 4096;
-  static constexpr double smallest = 1e-13;  // step, of the time so far
-  static constexpr double shortest = 1e-3;   // where forces jump, no step is short enough to see that they do
+  static constexpr double smallest = 1e-13;  // step, relative to the time so far
+  static constexpr double shortest = 1e-3;   // least share_of: no step resolves a jump of the forces
 
   std::vector<double> nodes_, weights_;
   Sums coarse_, fine_;
-  std::vector<double> speeds_, least_speeds_;  // that errors are compared with, at least
+  std::vector<double> speeds_, least_speeds_;  // that errors are relative to, and their lower bounds
   std::vector<double> times_, found_;
 };
 

@@ -15,7 +15,7 @@
 namespace pendula {
 namespace {
 
-/// How many rows an array has.
+/// Number of rows of an array.
 enum class Rows { none, one, coordinates, square, parameters, inputs, components, arguments };
 
 struct Array {
@@ -23,7 +23,7 @@ struct Array {
   Rows rows = Rows::none;
 };
 
-/// A function as the generator calls it, and its arrays: so many that it takes, then those that it gives.
+/// A function as the generator names it, and its arrays: first `taken` inputs, then the outputs.
 struct Signature {
   std::string_view name;
   std::size_t taken;
@@ -75,7 +75,7 @@ struct OperationName {
   int registers;  ///< results and operands
 };
 
-/// All but linear systems, which have any number of operands.
+/// All operations but factor and solve, which have any number of operands.
 constexpr std::array<OperationName, 21> operations = {{
     {"add", Operation::add, 3},
     {"subtract", Operation::subtract, 3},
@@ -101,9 +101,9 @@ constexpr std::array<OperationName, 21> operations = {{
 }};
 
 constexpr std::uint16_t most_of_a_kind = 65535;
-constexpr int most_registers = 65535, most_unknowns = 361;  // whose lower triangle registers hold
+constexpr int most_registers = 65535, most_unknowns = 361;  // whose lower triangle fits into the registers
 
-/// An array of a function: what it is called, and its rows.
+/// An array of a function: its name and its number of rows.
 struct Given {
   std::string_view name;
   std::size_t rows;
@@ -113,10 +113,11 @@ void end_line(KernelText& text) {
   if (!text.at_end()) text.fail("the end of the line", text.word());
 }
 
-/// A function, and the memory that its steps lie in.
+/// A function of the program, and the memory that it refers to.
 class OwnedFunction {
  public:
-  /// Reads from the line that begins it to that which ends it. Arrays that are taken come before those that are given.
+  /// Reads the function, from the line that begins it up to the line that begins the next one. `taken` are its input
+  /// arrays, `given` its output arrays.
   void read(KernelText& text, const std::vector<Given>& taken, const std::vector<Given>& given) {
     registers_ = text.whole(1, most_registers);
     end_line(text);
@@ -147,11 +148,11 @@ class OwnedFunction {
     code_.push_back(static_cast<std::uint16_t>(Operation::end));
   }
 
-  /// Lives as long as this.
+  /// Valid as long as this object.
   ProgramFunction function() const { return {static_cast<std::size_t>(registers_), reads_, writes_, numbers_, code_}; }
 
  private:
-  /// The first of `count` registers in a row.
+  /// Reads the index of the first of `count` consecutive registers.
   std::uint16_t place(KernelText& text, int count = 1) const {
     return static_cast<std::uint16_t>(text.whole(0, registers_ - count));
   }
@@ -168,7 +169,7 @@ class OwnedFunction {
   void take_operation(KernelText& text) {
     const auto* known = std::ranges::find(operations, text.kind(), &OperationName::name);
     if (known == operations.end()) text.fail("an operation", text.kind());
-    // How many of a kind come one after the other stands behind the kind.
+    // The code of an operation is followed by the number of consecutive operations of that kind.
     const auto operation = static_cast<std::uint16_t>(known->operation);
     if (!run_ || code_[*run_] != operation || code_[*run_ + 1] == most_of_a_kind) {
       run_ = code_.size();
@@ -190,13 +191,13 @@ class OwnedFunction {
   }
 
   int registers_ = 0;
-  std::optional<std::size_t> run_;  // where the last steps of a kind begin, if more may follow
+  std::optional<std::size_t> run_;  // where the last run of one operation begins, if it may be extended
   std::vector<ProgramMove> reads_, writes_;
   std::vector<ProgramNumber> numbers_;
   std::vector<std::uint16_t> code_;
 };
 
-/// A kernel, and the memory that its table points into.
+/// An interpreted kernel, and the memory that its table points into.
 class OwnedKernel {
  public:
   OwnedKernel(std::string text, const ProgramInterpreter& interpreter) : text_(std::move(text)) {
@@ -262,7 +263,7 @@ class OwnedKernel {
     return 0;
   }
 
-  /// That all functions are there but those of what the model has not, which the table is not to have either.
+  /// Requires every function, except those that return something the model does not have; these must be missing.
   void require_all(const KernelText& lines) {
     const SystemInfo& info = table_.info;
     for (std::size_t k = 0; k < signatures.size(); ++k) {

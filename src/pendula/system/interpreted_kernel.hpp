@@ -7,8 +7,8 @@
 
 namespace pendula {
 
-/// The table of a kernel that is interpreted: of the text that `python -m pendula_codegen program --as bytecode`
-/// writes, which may be damaged. Throws std::invalid_argument with the line that is wrong.
+/// The table of an interpreted kernel. `text` is what `python -m pendula_codegen program --as bytecode` writes; it is
+/// checked, since it may be damaged. Throws std::invalid_argument that names the offending line.
 std::shared_ptr<const SystemTable> table_of(std::string text, const ProgramInterpreter& interpreter);
 
 }  // namespace pendula

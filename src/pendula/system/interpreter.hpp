@@ -17,7 +17,7 @@ namespace pendula {
 
 namespace detail {
 
-/// Carries out programs, for W states at once: registers are rows of W numbers.
+/// Executes programs for W states at once: a register is a row of W numbers.
 template <int W>
 class Interpreter : NumbersOfStates<W> {
   using typename NumbersOfStates<W>::L;
@@ -39,7 +39,7 @@ class Interpreter : NumbersOfStates<W> {
   template <std::size_t which, class... Arrays>
   static void call(const Conditions& at, Arrays... arrays) {
     const auto& program = *static_cast<const Program*>(at.context);
-    // What is read of is not written to: such places are those of other moves.
+    // The casts are safe: input arrays are only read, only the moves in `writes` write.
     run(program.functions[which],
         std::array<double*, 3 + sizeof...(Arrays)>{const_cast<double*>(at.parameters), const_cast<double*>(at.times),
                                                    const_cast<double*>(at.inputs), const_cast<double*>(arrays)...}
@@ -64,7 +64,7 @@ class Interpreter : NumbersOfStates<W> {
     using std::acos, std::asin, std::atan, std::cbrt, std::cosh, std::exp, std::log, std::pow, std::sinh, std::sqrt,
         std::tan, std::tanh;
     const auto at = [&](int k) { return load(registers + code[k] * width); };
-    // As many steps of a kind as come one after the other, of so many registers each, the first of which is the result.
+    // Executes a run of operations of one kind with `places` registers each, the first of which is the result.
     const auto each = [&](int places, auto result) {
       for (int left = (code += 2)[-1]; left > 0; --left, code += places) store(result(), registers + code[0] * width);
     };
@@ -160,7 +160,7 @@ class Interpreter : NumbersOfStates<W> {
 
   // --- Linear systems ---
 
-  /// Rows of a lower triangle.
+  /// A lower triangle stored row by row.
   struct Triangle {
     double* first;
     double* operator()(std::size_t i, std::size_t j) const { return first + (i * (i + 1) / 2 + j) * width; }
@@ -176,7 +176,7 @@ class Interpreter : NumbersOfStates<W> {
     for (std::size_t k = 0; k < size; ++k) {
       const L inverse = L(1.0) / load(a(k, k));
       store(inverse, a(k, k));
-      // From the last row on: the entries above are still those of the column.
+      // From the last row up, so that the entries above in the column are still unscaled.
       for (std::size_t i = size - 1; i > k; --i) {
         const L l = load(a(i, k)) * inverse;
         for (std::size_t j = k + 1; j <= i; ++j) {
@@ -231,7 +231,7 @@ class Interpreter : NumbersOfStates<W> {
       all = all + change;
       now.store(increments);
     }
-    // NaN if any change is no number: that reaches their sum, though not always the largest.
+    // A NaN change reaches the sum, though not always the maximum.
     double total = 0;
     for (const double sum : each_of(all)) total += sum;
     const double size = std::ranges::max(each_of(scale));

@@ -39,14 +39,14 @@ Numbers sum(Numbers a, double factor, const Numbers& b) {
   return a;
 }
 
-/// Of a matrix, row by row, and a vector.
+/// Matrix, stored row by row, times vector.
 Numbers product(const Numbers& matrix, const Numbers& x) {
   Numbers found(matrix.size() / x.size());
   for (std::size_t k = 0; k < matrix.size(); ++k) found[k / x.size()] += matrix[k] * x[k % x.size()];
   return found;
 }
 
-/// Largest entry of a − b, relative to the largest of b (or to 1 where b is small).
+/// Largest entry of a − b, relative to the largest entry of b, or to 1 if that is larger.
 double relative_error(const Numbers& a, const Numbers& b) {
   if (!all_finite(a) || !all_finite(b)) return std::numeric_limits<double>::quiet_NaN();
   return largest_of(sum(a, -1, b)) / std::max(1.0, largest_of(b));
@@ -55,7 +55,7 @@ double relative_error(const Numbers& a, const Numbers& b) {
 /// Derivative of x ↦ f(x) along `direction`, by central differences of order 6.
 template <class F>
 Numbers directional_difference(const F& f, const Numbers& x, const Numbers& direction) {
-  // Truncation (2h)^6/140 and round-off ε/h are both near 1e-13 here.
+  // The truncation error (2h)⁶/140 and the rounding error ε/h are both near 1e-13 for this h.
   constexpr double h = 4e-3;
   Numbers found;
   for (const auto& [steps, weight] : {std::pair(1, 45.0), std::pair(2, -9.0), std::pair(3, 1.0)}) {
@@ -66,7 +66,7 @@ Numbers directional_difference(const F& f, const Numbers& x, const Numbers& dire
   return found;
 }
 
-/// Relative error of ∂f/∂x given as `jacobian`, row by row, against differences.
+/// Relative error of `jacobian` = ∂f/∂x, stored row by row, against differences.
 template <class F>
 double jacobian_error(const F& f, const Numbers& x, const Numbers& jacobian) {
   Numbers differences(jacobian.size());
@@ -79,7 +79,7 @@ double jacobian_error(const F& f, const Numbers& x, const Numbers& jacobian) {
   return relative_error(jacobian, differences);
 }
 
-/// A chain with random parameters in a random state, and what is checked there.
+/// A chain with random parameters in a random state, and the checks to be made there.
 class ChainDraw {
  public:
   ChainDraw(const SystemTable& table, std::mt19937& random)
@@ -101,14 +101,14 @@ class ChainDraw {
       }
     }
     for (std::size_t k = 0; k < n_; ++k) {
-      q_.push_back(uniform(0.3, 2.8));  // away from where (θ, φ) fails
+      q_.push_back(uniform(0.3, 2.8));  // away from the poles of (θ, φ)
       v_.push_back(uniform(-2, 2));
       a_.push_back(uniform(-2, 2));
     }
     for (std::size_t k = 0; k < info.inputs.size(); ++k) inputs_.push_back(uniform(-1, 1));
   }
 
-  /// Lives as long as this.
+  /// Valid as long as this object.
   KernelPoint point() const { return {0, parameters_, inputs_, q_, v_, a_}; }
 
   /// ∂E/∂q, ∂E/∂v, ∂E/∂a.
@@ -128,7 +128,7 @@ class ChainDraw {
                        jacobian_error([&](const Numbers& v) { return form(q_, v)[1]; }, v_, f_v)});
   }
 
-  /// Entry points that give the same values give the same values.
+  /// Functions that return the same quantity return the same values.
   double same_values() const {
     const auto [p, f] = form(q_, v_);
     const auto same_form = form_with_jacobians();
@@ -153,7 +153,7 @@ class ChainDraw {
         {relative_error(sum(at_rest, -1, residual(q_, v_, acceleration())), at_rest), relative_error(v, v_)});
   }
 
-  /// Along the motion energy changes by the power of forces.
+  /// Along the motion the energy changes by the power of the forces.
   double energy_balances() const {
     Numbers here = q_, motion = v_;
     const Numbers a = acceleration();
@@ -167,14 +167,14 @@ class ChainDraw {
     return relative_error(directional_difference(energy, here, motion), call(table_.of_1.power, {1}, q_, v_)[0]);
   }
 
-  /// Velocities of the bobs are derivatives of their positions.
+  /// Velocities of the bobs are the derivatives of their positions.
   double points_move() const {
     const auto positions = [&](const Numbers& q) { return call(table_.plain.positions, {points_}, q)[0]; };
     return relative_error(call(table_.plain.velocities, {points_}, q_, v_)[0],
                           directional_difference(positions, q_, v_));
   }
 
-  /// ∂E/∂q, ∂E/∂v, ∂E/∂a alone; ∂Q/∂q, ∂Q/∂v.
+  /// The functions that return one Jacobian only: ∂E/∂q, ∂E/∂v, ∂E/∂a; and ∂Q/∂q, ∂Q/∂v.
   double single_jacobians() const {
     const auto [E, E_q, E_v, E_a] = residual_with_jacobians();
     const auto [only_q] = call(table_.chain->residual_D_q, {n_ * n_}, q_, v_, a_);
@@ -187,7 +187,7 @@ class ChainDraw {
                        jacobian_error([&](const Numbers& v) { return force(q_, v); }, v_, by_v)});
   }
 
-  /// ∂L/∂q, ∂L/∂v against differences of L; the Hessian against differences of those.
+  /// ∂L/∂q and ∂L/∂v against differences of L, the Hessian against differences of the gradient.
   double lagrangian_derivatives() const {
     const auto lagrangian = [&](const Numbers& q, const Numbers& v) {
       return call(table_.chain->lagrangian, {1}, q, v)[0];
@@ -204,7 +204,7 @@ class ChainDraw {
                        jacobian_error([&](const Numbers& v) { return gradient(q_, v)[1]; }, v_, vv)});
   }
 
-  /// p = ∂L/∂v = A v, and H, T + U, L + 2U agree.
+  /// p = ∂L/∂v = A v, and H = T + U = L + 2U.
   double energies() const {
     const Numbers p = form(q_, v_)[0];
     const auto [mass] = call(table_.of_1.mass_matrix, {n_ * n_}, q_);
@@ -218,7 +218,7 @@ class ChainDraw {
   }
 
  private:
-  // What a function finds: outputs of so many numbers.
+  // Calls a function with outputs of these sizes, and returns the outputs.
   template <std::size_t outputs, class Function, class... Given>
   std::array<Numbers, outputs> call(Function* function, const std::size_t (&sizes)[outputs],
                                     const Given&... given) const {
@@ -250,7 +250,7 @@ class ChainDraw {
   Numbers parameters_, inputs_, q_, v_, a_;
 };
 
-/// One statement, and what measures it on a draw.
+/// One statement about a kernel, and the function that measures its error.
 struct CheckItem {
   KernelCheck::Line line;
   double (ChainDraw::*measure)() const;

@@ -7,15 +7,15 @@
 
 namespace pendula {
 
-/// What a check of a generated kernel measured.
+/// The result of checking a generated kernel.
 struct KernelCheck {
-  /// One statement about the kernel, the largest error found in it, and what that may be.
+  /// One statement about the kernel, the largest error found, and the largest one allowed.
   struct Line {
     std::string_view what;
     double error = 0;
     double limit = 0;
 
-    /// Takes an error that is larger; NaN counts as the largest, so that the check fails.
+    /// Keeps the larger error; NaN counts as the largest, so that the check fails.
     void keep(double found) {
       if (!std::isnan(error) && !(found <= error)) error = found;
     }
@@ -25,8 +25,8 @@ struct KernelCheck {
   int count = 0;
 };
 
-/// Checks the generated kernel of a chain against itself with seeded random parameters in random states: each Jacobian
-/// against differences of the function it belongs to, each pair of entry points that must agree, functions of several
+/// Checks the generated kernel of a chain for consistency, with seeded random parameters in random states: every
+/// Jacobian against differences of its function, every pair of functions that must agree, and functions of several
 /// states against those of one.
 KernelCheck check_chain_kernel(const SystemTable& table, unsigned seed);
 

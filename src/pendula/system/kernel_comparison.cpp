@@ -31,7 +31,7 @@ KernelComparison::KernelComparison(const SystemTable& table, std::span<const dou
   }
 }
 
-// Where the written output `what` begins among those of a kernel: the first of several.
+// Where the output `what`, or the first of several such outputs, begins among the outputs of a kernel.
 std::size_t KernelComparison::place(Written what) const {
   std::size_t at = 0;
   for (const Written output : kernel_outputs) {
@@ -41,7 +41,7 @@ std::size_t KernelComparison::place(Written what) const {
   return at;
 }
 
-// Of M x = b, by what is left of it: L D Lᵀ without pivoting has solved a system that is a rounding away.
+// Checks solutions x of M x = b by their residual: L D Lᵀ without pivoting solves a system that differs by rounding.
 template <class Keep>
 void KernelComparison::compare_solved(std::size_t point, const std::vector<double>& values, const Keep& keep) const {
   const double* solved = values.data() + outputs_;
@@ -79,7 +79,8 @@ void KernelComparison::compare_solved(std::size_t point, const std::vector<doubl
 
 KernelCheck KernelComparison::check() const {
   constexpr double limit = 8;
-  // Between functions that are told from what the model says above: one that is wrong is off by more.
+  // Looser: functions of one state are compared with the model already, and a wrong function is off by far more than
+  // this.
   constexpr double width_limit = 1e-6;
   KernelCheck check;
   const auto add = [&](std::string_view what) {

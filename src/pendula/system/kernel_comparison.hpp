@@ -12,15 +12,15 @@
 
 namespace pendula {
 
-/// Compares a kernel with what its model says at several points, in units of what the text of the model is off by where
-/// each of its operations is rounded once.
+/// Compares a kernel with the expressions of its model at several points. Errors are in units of the rounding error of
+/// the model's own expressions, with each operation rounded once.
 class KernelComparison {
  public:
-  /// `said` are the numbers that `python -m pendula_codegen written` writes. Throws std::invalid_argument where they
-  /// are of another model. Both have to outlive it.
+  /// `said` are the numbers that `python -m pendula_codegen written` writes. Throws std::invalid_argument if they
+  /// belong to another model. Both arguments must outlive this object.
   KernelComparison(const SystemTable& table, std::span<const double> said);
 
-  /// What energies are off by at the first point, by rounding  [J].
+  /// Rounding error of the energy at the first point  [J].
   double energy_rounding() const { return count_ == 0 ? 0 : std::abs(truth(0, Written::energy, 0).error); }
 
   KernelCheck check() const;

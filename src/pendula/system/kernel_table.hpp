@@ -18,7 +18,7 @@ namespace pendula {
 
 namespace detail {
 
-/// The functions of the generated kernel S, of W states at once.
+/// The functions of the generated kernel S for W states at once.
 template <System S, int W>
 class KernelFunctions : NumbersOfStates<W> {
   using typename NumbersOfStates<W>::L;
@@ -81,7 +81,7 @@ class KernelFunctions : NumbersOfStates<W> {
  private:
   // --- Numbers as they cross ---
 
-  // Rows of W numbers, and with their derivatives.
+  // Rows of W numbers, without and with their derivatives.
   struct Rows {
     const double* from;
     L operator[](std::size_t k) const { return load(from + k * W); }
@@ -91,7 +91,7 @@ class KernelFunctions : NumbersOfStates<W> {
     Dual<L> operator[](std::size_t k) const { return {load(from + k * W), load(slopes + k * W)}; }
   };
 
-  // Their loops are short, and what is not used of them need not be read: inlined, compilers see that.
+  // Inlined, so that compilers see which numbers a function uses, and read no others.
   template <class Number, class From>
   [[gnu::always_inline]] static Parameters<Number> read_parameters(const From& from, const Conditions& at) {
     Parameters<Number> parameters;
@@ -231,7 +231,8 @@ class KernelFunctions : NumbersOfStates<W> {
     }
   }
 
-  // --- The loop that is compiled with a kernel: a call of its functions would cost what few coordinates take ---
+  // --- The iteration loop, compiled with the kernel: for few coordinates a call of its functions would cost as much
+  // ---
 
   PENDULA_IN_REGISTERS static IterationChange iterate(const Conditions& at, const StageIteration& on) {
     constexpr std::size_t count = S::coordinates;
@@ -260,7 +261,7 @@ class KernelFunctions : NumbersOfStates<W> {
       moved.store(moved_at);
       pushed.store(pushed_at);
     }
-    // NaN if any change is no number: that reaches their sum, though not always the largest.
+    // A NaN change reaches the sum, though not always the maximum.
     if (!std::isfinite(total(all))) return {std::numeric_limits<double>::quiet_NaN(), largest_of(scale)};
     return {largest_of(largest), largest_of(scale)};
   }
@@ -289,7 +290,7 @@ class KernelFunctions : NumbersOfStates<W> {
     return total;
   }
 
-  // --- Of chains ---
+  // --- Functions of chains only ---
 
   static void residual_D_q(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_q) {
     Matrix<L> found;
@@ -370,7 +371,7 @@ constexpr const ChainFunctions* chain_functions_of() {
 
 }  // namespace detail
 
-/// All that is compiled from the generated kernel S.
+/// The table of the generated kernel S.
 template <System S>
 inline constexpr SystemTable system_table = {info_of<S>(),
                                              nullptr,
@@ -381,8 +382,8 @@ inline constexpr SystemTable system_table = {info_of<S>(),
                                              detail::plain_functions<S>(),
                                              detail::chain_functions_of<S>()};
 
-/// A system with its numbers, of the generated kernel S: `parameters` as it has them (time may be anything), constant
-/// `inputs`, and sines that are added to them.
+/// A model of the generated kernel S with `parameters` in the kernel's own layout (its time is ignored), constant
+/// `inputs` (zero where null), and `sines` added to them.
 template <System S>
 SystemModel model_of(typename S::template Parameters<double> parameters,
                      const typename S::template Inputs<double>* inputs = nullptr, std::vector<InputSine> sines = {}) {

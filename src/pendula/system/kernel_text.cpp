@@ -8,7 +8,8 @@
 namespace pendula {
 namespace {
 
-/// Cuts off what comes before the first `end`; where there is none, all, and leaves no address.
+/// Returns the text before the first `end`, and removes it and `end`. Without an `end` returns all, and leaves a text
+/// whose data() is null.
 std::string_view cut(std::string_view& text, char end) {
   const std::size_t at = text.find(end);
   const std::string_view before = text.substr(0, at);
@@ -16,7 +17,7 @@ std::string_view cut(std::string_view& text, char end) {
   return before;
 }
 
-constexpr int many = 1'000'000;  // of what a model has of a kind
+constexpr int many = 1'000'000;  // upper bound of counts
 
 }  // namespace
 

@@ -10,18 +10,18 @@
 
 namespace pendula {
 
-/// A text of lines, and these of words with tabs between them, read from the first to the last. It may be damaged: what
-/// is not as it should be is thrown as std::invalid_argument, with the number of the line.
+/// Reads a text line by line, and each line as words separated by tabs. The text may be damaged: errors are thrown as
+/// std::invalid_argument with the line number.
 class KernelText {
  public:
-  /// The text has to outlive it.
+  /// `text` must outlive this object.
   explicit KernelText(std::string_view text) : rest_(text) {}
 
-  /// Goes to the next line, whose first word is its kind; whether there is one.
+  /// Goes to the next line, whose first word is its kind. Returns whether there is one.
   bool next();
   std::string_view kind() const { return kind_; }
 
-  /// Words of the line, one after the other.
+  /// Each of these reads the next word of the line.
   std::string_view word();
   int whole(int least, int most);
   double number();
@@ -35,23 +35,25 @@ class KernelText {
   std::size_t line_ = 0;
 };
 
-/// What a kernel says of itself, line by line (pendula_codegen/system_info.py): SystemInfo, and what that points into.
+/// The description of a kernel, read line by line (pendula_codegen/system_info.py): holds a SystemInfo and the memory
+/// that it points into.
 class KernelDescription {
  public:
   KernelDescription() = default;
   KernelDescription(const KernelDescription&) = delete;
   KernelDescription& operator=(const KernelDescription&) = delete;
 
-  /// Takes a line of `text`, whose words have to outlive this; false where it is of another kind.
+  /// Takes the current line of `text`, whose words must outlive this object. Returns false if it is a line of another
+  /// kind.
   bool take(KernelText& text);
 
-  /// Lives as long as this. Throws std::invalid_argument where something is missing.
+  /// Valid as long as this object. Throws std::invalid_argument if something is missing.
   SystemInfo info() const;
 
  private:
   using Names = std::vector<std::string_view>;
 
-  /// std::vector<bool> has no addresses.
+  /// An array of flags with addresses, which std::vector<bool> does not have.
   class Flags {
    public:
     void push_back(bool flag);

@@ -13,7 +13,8 @@ void evaluate_kernel(const SystemTable& table, const PlainSystem& system, double
   const std::size_t n = info.coordinates.size(), square = n * n;
   const auto points = static_cast<std::size_t>(std::accumulate(info.point_sizes.begin(), info.point_sizes.end(), 0));
   const Conditions at{table.context, system.parameters, &time, system.inputs};
-  // What a function finds, outputs of so many numbers, one after the other; gives where the first one is.
+  // Calls a function with outputs of these sizes, written one after the other to `values`; returns where the first one
+  // is.
   const auto write = [&]<std::size_t outputs>(const std::size_t(&sizes)[outputs], auto* function, auto... given) {
     std::array<double*, outputs> to{};
     for (std::size_t k = 0; k < outputs; ++k) to[k] = std::exchange(values, values + sizes[k]);

@@ -6,7 +6,7 @@
 
 namespace pendula {
 
-/// Functions of a model that its kernel computes, as pendula_codegen/written.py has them; matrices row by row.
+/// Quantities of a model that its kernel computes, as pendula_codegen/written.py lists them; matrices row by row.
 enum class Written {
   kinetic_energy,
   energy,
@@ -27,7 +27,7 @@ enum class Written {
 };
 inline constexpr int written_count = 16;
 
-/// Numbers of one of them, of a system of n coordinates and so many components of points.
+/// How many numbers a quantity has, for a system of n coordinates.
 constexpr int written_size(Written what, int n, int point_components) {
   switch (what) {
     case Written::kinetic_energy:
@@ -49,9 +49,10 @@ constexpr int written_size(Written what, int n, int point_components) {
   }
 }
 
-/// What evaluate_kernel writes, in this order: some of it several times, by each function of the kernel that has it.
+/// The order in which evaluate_kernel writes. A quantity occurs several times if several functions of a kernel return
+/// it.
 inline constexpr std::array kernel_outputs = {
-    Written::kinetic_energy, Written::energy,     Written::mass,        // each by a function of that name
+    Written::kinetic_energy, Written::energy,     Written::mass,        // a function each
     Written::momenta,                                                   // momentum_from_velocity
     Written::momenta,        Written::forces,                           // momentum_form
     Written::momenta,        Written::forces,     Written::momenta_q,   // momentum_form_with_jacobians
@@ -60,16 +61,16 @@ inline constexpr std::array kernel_outputs = {
     Written::residual,       Written::residual_q, Written::residual_v,  // residual_with_jacobians
     Written::mass,           Written::power,      Written::positions,  Written::velocities};
 
-/// And what it writes after that, each of n numbers: what equations are solved for.
+/// What evaluate_kernel writes after these, n numbers each: solutions of linear systems.
 enum class Solved {
   accelerations,
-  rates,              ///< velocity_from_momentum, of the momenta that momentum_from_velocity has
-  hamiltonian_rates,  ///< hamiltonian_form, of the same
+  rates,              ///< velocity_from_momentum of the momenta that momentum_from_velocity returns
+  hamiltonian_rates,  ///< hamiltonian_form of the same momenta
   hamiltonian_forces,
 };
 inline constexpr int solved_count = 4;
 
-/// Every function of a kernel at one point of a system without sines.
+/// Evaluates every function of a kernel at one point; sines of the inputs are ignored.
 void evaluate_kernel(const SystemTable& table, const PlainSystem& system, double time, const double* q, const double* v,
                      const double* a, double* values);
 

@@ -14,7 +14,7 @@ namespace pendula {
 namespace {
 
 using Numbers = std::vector<double>;
-/// An array of each point.
+/// One array for each point.
 using Arrays = std::vector<Numbers>;
 /// Rows of as many numbers as there are lanes.
 using Wide = std::vector<double, detail::PackAllocator<double>>;
@@ -25,7 +25,7 @@ const SystemFunctions& functions(const SystemTable& table, std::size_t width) {
   return width == 1 ? table.of_1 : width == 2 ? table.of_2 : width == 4 ? table.of_4 : table.of_8;
 }
 
-/// Differences from numbers that are right, of any size.
+/// The largest difference from reference numbers, relative to the largest of these.
 class Difference {
  public:
   void take(double found, double right) {
@@ -87,7 +87,7 @@ class Widths {
  private:
   std::size_t point_of(std::size_t first, std::size_t lane) const { return (first + lane) % points_.size(); }
 
-  // Of points side by side. No numbers have an address, too.
+  // Interleaves arrays of points. One row more than needed: even without numbers there is a valid address.
   Wide wide(const Arrays& arrays, std::size_t width, std::size_t first) const {
     const std::size_t rows = arrays[0].size();
     Wide numbers((rows + 1) * width);
@@ -98,7 +98,7 @@ class Widths {
     return numbers;
   }
 
-  /// What a function of so many states finds at the points from the first on, outputs of so many rows.
+  /// Calls a function of `width` states at the points from `first` on. Returns its outputs, which have this many rows.
   template <class... Places>
   std::vector<Wide> call(void (*SystemFunctions::*function)(const Conditions&, Places...), std::size_t width,
                          std::size_t first, std::initializer_list<const Arrays*> given,
@@ -138,11 +138,11 @@ class Widths {
     for (const Difference& difference : differences) worst_.keep(difference.relative());
   }
 
-  /// One iteration on stages that are not those of any method, against hamiltonian_form of each.
+  /// One fixed-point iteration with arbitrary coefficients, against hamiltonian_form of each stage.
   void compare_iteration(std::size_t width) {
     Difference increments, changes;
     for (std::size_t first = 0; first < points_.size(); ++first) {
-      // Stages differ in time and inputs; parameters are those of one system.
+      // Stages differ in time and inputs, and share the parameters of one system.
       const Wide parameters = wide(Arrays(points_.size(), parameters_[first]), width, 0),
                  times = wide(times_, width, first), inputs = wide(inputs_, width, first);
       Wide m(width * width), hb(width), before(2 * n_ * width);

@@ -8,7 +8,7 @@
 
 namespace pendula {
 
-/// What functions of a system find in any number of states, eight at once.
+/// Evaluates functions of a system in any number of states, eight at a time.
 class ManyStates {
  public:
   explicit ManyStates(const SystemModel& model)
@@ -19,12 +19,12 @@ class ManyStates {
 
   const SystemModel& model() const { return at_.model(); }
 
-  /// q̈ of one state q, v at each of some times: (times, coordinates).
+  /// Accelerations of one state q, v at each of the times: (times, coordinates).
   void accelerations(std::span<const double> times, const double* q, const double* v, double* found) {
     evaluate(&SystemFunctions::acceleration, model().coordinates(), times, q, v, 0, found);
   }
 
-  /// What functions of the model are taken of in states q, v, (times, coordinates): (times, arguments).
+  /// Arguments of the model's functions in states q, v, (times, coordinates): (times, arguments).
   void arguments(std::span<const double> times, const double* q, const double* v, double* found) {
     evaluate(&SystemFunctions::call_arguments, model().info().argument_is_base.size(), times, q, v,
              model().coordinates(), found);
@@ -34,7 +34,7 @@ class ManyStates {
   static constexpr std::size_t width = 8;
   using Function = void (*)(const Conditions&, const double* q, const double* v, double* found);
 
-  // States lie so many numbers `apart`, as what is found of them lies `count` numbers. Beyond the last it is repeated.
+  // States are `apart` numbers apart, results `count` numbers. Lanes beyond the last state repeat it.
   void evaluate(Function SystemFunctions::*function, std::size_t count, std::span<const double> times, const double* q,
                 const double* v, std::size_t apart, double* found) {
     for (std::size_t first = 0; first < times.size(); first += width) {

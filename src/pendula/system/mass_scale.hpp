@@ -11,17 +11,17 @@
 
 namespace pendula {
 
-/// How the inertia of each coordinate, a pivot of the mass matrix, compares with the largest that it has elsewhere; of
-/// one motion, or of several members.
+/// Compares the inertia of each coordinate, a pivot of the mass matrix, with the largest value that it takes elsewhere;
+/// for one motion or for several members.
 ///
-/// Where it vanishes the coordinate has no meaning: φ at a pole, an angle about a point that the bob is at. How large
-/// it may be is seen at the start, with all angles at a few other values, and as the motion goes on.
+/// Where the inertia vanishes, the coordinate is undefined: φ at a pole, or an angle about a point where the bob is.
+/// The largest value is estimated at the start, with all angles at a few other values, and updated along the motion.
 template <class Num>
 class MassScale {
  public:
   using Mask = MaskOf<Num>;
 
-  /// `info` has to outlive it.
+  /// `info` must outlive this object.
   explicit MassScale(const SystemInfo& info)
       : is_angle_(info.is_angle),
         constant_(info.constant_masses),
@@ -30,7 +30,7 @@ class MassScale {
         largest_(inertia_),
         mass_(count() * count()) {}
 
-  /// Of a system at q  (coordinates).
+  /// Starts for a system at q  (coordinates).
   void start(const SystemAt<1>& here, const double* q) requires(!is_batch<Num>) {
     std::vector<double> turned(count());
     std::fill(largest_.begin(), largest_.end(), 0.0);
@@ -42,7 +42,7 @@ class MassScale {
     }
     read(here, q);
   }
-  /// A member comes, with what it has there.
+  /// Starts a member, with the scale found for it alone.
   void start(int member, const MassScale<double>& own) {
     for (std::size_t k = 0; k < count(); ++k) set(largest_[k], member, own.largest_pivot(k));
   }
@@ -52,13 +52,15 @@ class MassScale {
     see();
   }
 
-  /// Takes a mass matrix, that of a stage of a step, say: its numbers row by row, each `apart` from the one before.
+  /// Updates from a mass matrix, such as that of a stage: its entries row by row, each `apart` numbers after the one
+  /// before.
   void see(const double* mass, std::size_t apart) requires(!is_batch<Num>) {
     for (std::size_t k = 0; k < count() * count(); ++k) numbers()[k] = mass[k * apart];
     see();
   }
 
-  /// Room for mass matrices  (coordinates, coordinates, members), and a look at those that are there, which it uses up.
+  /// Room for mass matrices  (coordinates, coordinates, members), and the update from what is in there, which it
+  /// overwrites.
   double* numbers() { return mass_[0]; }
   void see() {
     for (std::size_t k = 0; k < count(); ++k) inertia_[k] = mass(k, k);
@@ -76,16 +78,16 @@ class MassScale {
     numbers(inertia_, pivot_, largest_, singular_);
   }
 
-  /// M_kk, where it was looked at last.
+  /// M_kk of the last update.
   const Num& inertia(std::size_t k) const { return inertia_[k]; }
 
-  /// The largest pivot of coordinate k that was seen.
+  /// The largest pivot of coordinate k so far.
   const Num& largest_pivot(std::size_t k) const { return largest_[k]; }
 
-  /// Whether the inertia of coordinate k is far below what it is elsewhere.
+  /// Whether the inertia of coordinate k is far below its largest value.
   Mask is_small(std::size_t k) const { return constant_ ? Num(1.0) < Num(0.0) : pivot_[k] < Num(small) * largest_[k]; }
 
-  /// Whether a coordinate has lost more than half of its digits; of one motion which, −1 where none has.
+  /// Whether a coordinate has lost more than half of its digits; for one motion also which, −1 for none.
   Mask is_singular() const { return singular_ > Num(0.0); }
   int singular() const requires(!is_batch<Num>) {
     std::size_t k = 0;
@@ -94,14 +96,14 @@ class MassScale {
   }
 
  private:
-  static constexpr double small = 1.0 / 16, vanished = 1e-12;  // pivots, of the largest
+  static constexpr double small = 1.0 / 16, vanished = 1e-12;  // pivots, relative to the largest
   static constexpr int samples = 8;
 
   std::size_t count() const { return is_angle_.size(); }
   Num mass(std::size_t i, std::size_t j) const { return from_row<Num>(mass_[i * count() + j]); }
   Mask is_there(std::size_t k) const { return pivot_[k] > Num(vanished) * largest_[k]; }
 
-  // Of L D Lᵀ, in place.
+  // One column of the L D Lᵀ factorisation, in place.
   void eliminate(std::size_t k) {
     for (std::size_t i = k + 1; i < count(); ++i) {
       const Num factor = mass(i, k) / pivot_[k];

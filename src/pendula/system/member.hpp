@@ -13,25 +13,25 @@
 
 namespace pendula {
 
-/// The copyable state of a run: all that its next steps depend on besides the model and the options. Two runs that have
-/// the same member go on alike to the last bit.
+/// The copyable state of a run: everything besides the model and the options that its next steps depend on. Two runs
+/// with equal members continue identically, to the last bit.
 struct Member {
   std::vector<double> numbers;
 
-  /// To the last bit.
+  /// Bitwise comparison.
   bool operator==(const Member& other) const {
     const auto bits = [](double number) { return std::bit_cast<std::uint64_t>(number); };
     return std::ranges::equal(numbers, other.numbers, {}, bits, bits);
   }
 };
 
-/// Goes through the numbers of a member, to count, to read or to write them: what has some lists them once,
+/// Visits the numbers of a member, to count, read or write them. A class with such numbers lists them once:
 ///   template <class Numbers> void member(Numbers& numbers) { numbers(first, second, …); }
 class MemberNumbers {
  public:
   enum class Pass { count, read, write };
 
-  /// `at` is where numbers go to (read) or come from (write).
+  /// `at` is where numbers are copied to (read) or from (write).
   explicit MemberNumbers(Pass pass, double* at = nullptr) : pass_(pass), at_(at) {}
 
   template <class... Values>
@@ -39,7 +39,7 @@ class MemberNumbers {
     (pass(values), ...);
   }
 
-  /// The `count` numbers from `first` on.
+  /// Visits `count` numbers from `first` on.
   template <class Number>
   void range(Number* first, std::size_t count) {
     for (std::size_t k = 0; k < count; ++k) pass(first[k]);
@@ -52,7 +52,7 @@ class MemberNumbers {
   requires std::is_arithmetic_v<Number> || std::is_enum_v<Number>
   void pass(Number& value) {
     if (pass_ == Pass::read) at_[count_] = static_cast<double>(value);
-    if (pass_ == Pass::write) value = static_cast<Number>(at_[count_]);  // which `read` has put there
+    if (pass_ == Pass::write) value = static_cast<Number>(at_[count_]);  // as a read stored it
     ++count_;
   }
   template <class Value, std::size_t size>
@@ -86,7 +86,7 @@ class MemberNumbers {
   std::size_t count_ = 0;
 };
 
-/// A copy of the member of `part`, which lists its numbers.
+/// A copy of the member of `part`.
 template <class Part>
 Member member_of(Part& part) {
   MemberNumbers counted(MemberNumbers::Pass::count);
@@ -97,7 +97,7 @@ Member member_of(Part& part) {
   return member;
 }
 
-/// Makes `part` what `member` is a copy of. Throws std::invalid_argument on another number of numbers.
+/// Sets the numbers of `part` to those of `member`. Throws std::invalid_argument if their count differs.
 template <class Part>
 void become(Part& part, const Member& member) {
   MemberNumbers counted(MemberNumbers::Pass::count);

@@ -12,13 +12,13 @@
 
 namespace pendula {
 
-/// The inputs of several systems, one in each lane: what is constant of them, and sines of time.
+/// Inputs of several systems, one in each lane: constants and sines of time.
 template <class L>
 class MemberInputs {
  public:
   explicit MemberInputs(std::size_t count) : constant_(count, L(0.0)) {}
 
-  /// A member's come into a lane; `constant`: (count).
+  /// Sets the inputs of a lane; `constant`: (count).
   void take(int lane, const double* constant, std::span<const InputSine> sines) {
     for (L& input : constant_) set(input, lane, *constant++);
     for (Sine& sine : sines_) set(sine.amplitude, lane, 0);
@@ -37,7 +37,7 @@ class MemberInputs {
     }
   }
 
-  /// The highest frequency that a member's are driven with; 0 where there is none.
+  /// Highest driving frequency of each member  [rad/s]; 0 without drives.
   L fastest() const {
     L fastest(0.0);
     for (const Sine& sine : sines_) {
@@ -46,7 +46,7 @@ class MemberInputs {
     return fastest;
   }
 
-  /// What they are at `time`, each a row of `inputs`.
+  /// Writes the inputs at `time`, a row each.
   void at(const L& time, PackRows<width_of<L>>& inputs) const {
     using std::sin;
     for (std::size_t k = 0; k < constant_.size(); ++k) to_row(constant_[k], inputs[k]);
@@ -57,7 +57,7 @@ class MemberInputs {
   }
 
  private:
-  // A sine that members add to an input; who has fewer of them than others has some without an amplitude.
+  // A sine that members add to an input. A member with fewer sines than others has zero amplitudes.
   struct Sine {
     int input;
     L amplitude{0.0}, frequency{0.0}, phase{0.0};

@@ -10,16 +10,16 @@
 
 namespace pendula {
 
-/// Several systems of one kernel, one in each lane: every member has parameters, inputs and times of its own. Numbers
-/// of all lanes lie side by side, those of a coordinate after those of the one before, aligned to `pack_alignment`.
+/// Several systems of one kernel, one in each lane: every member has its own parameters, inputs and time. Numbers of
+/// all lanes lie side by side, coordinate after coordinate, aligned to `pack_alignment`.
 template <class L>
 class MemberSystems {
  public:
-  /// `table` must outlive it.
+  /// `table` must outlive this object.
   explicit MemberSystems(const SystemTable& table)
       : table_(table),
         functions_(functions_of<static_cast<int>(width_of<L>)>(table)),
-        parameters_(1 + parameter_count(table.info)),  // none has an address, too
+        parameters_(1 + parameter_count(table.info)),  // one more, so that there is always an address
         inputs_now_(1 + table.info.inputs.size()),
         now_(1),
         inputs_(table.info.inputs.size()) {}
@@ -29,27 +29,27 @@ class MemberSystems {
   const SystemTable& table() const { return table_; }
   const SystemInfo& info() const { return table_.info; }
   int coordinates() const { return static_cast<int>(info().coordinates.size()); }
-  /// What kind of numbers coordinates are.
+  /// Kinds and units of coordinates.
   bool is_angle(int i) const { return info().is_angle[static_cast<std::size_t>(i)]; }
   bool of_one_unit(int i, int j) const {
     return info().coordinate_units[static_cast<std::size_t>(i)] == info().coordinate_units[static_cast<std::size_t>(j)];
   }
   bool is_periodic(int i) const { return info().is_periodic[static_cast<std::size_t>(i)]; }
-  /// Whether pivots of the mass matrix are the same wherever they are.
+  /// Whether the pivots of the mass matrix are constant.
   bool constant_masses() const { return info().constant_masses; }
-  /// Whether they depend on time other than by inputs.
+  /// Whether functions depend on time other than through inputs.
   bool depends_on_time() const { return info().depends_on_time; }
 
-  /// A member's numbers come into a lane.
+  /// Loads the parameters and inputs of a member into a lane.
   void take(int lane, const PlainSystem& system) {
     for (std::size_t k = 0; k < parameter_count(info()); ++k) parameters_[k][lane] = system.parameters[k];
     inputs_.take(lane, system.inputs, system.sines);
   }
-  /// Highest frequency of a sine that is added to their inputs  [rad/s].
+  /// Highest frequency of a sine added to the inputs  [rad/s].
   L fastest_drives() const { return inputs_.fastest(); }
 
-  /// Calls a function at the times of a row, or at one time of each member: call(times,
-  /// &SystemFunctions::acceleration, q, v, a).
+  /// Calls a function at a row of times, or at one time of each member: call(times, &SystemFunctions::acceleration, q,
+  /// v, a).
   template <class Function, class... Numbers>
   void call(const double* times, Function function, Numbers... numbers) {
     (functions_.*function)(at(times), numbers...);

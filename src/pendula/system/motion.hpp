@@ -5,7 +5,7 @@
 
 namespace pendula {
 
-/// Coordinates and rates of any system at one time: what users give, get and keep.
+/// Coordinates and rates of a system at one time: the state as users give, get and store it.
 struct Motion {
   double time = 0;    ///< s
   Eigen::VectorXd q;  ///< coordinates
@@ -14,7 +14,7 @@ struct Motion {
   Motion() = default;
   Motion(double at, Eigen::VectorXd coordinates, Eigen::VectorXd rates)
       : time(at), q(std::move(coordinates)), v(std::move(rates)) {}
-  /// Of whatever has a time, coordinates and rates: the state of a chain, say.
+  /// From any other state with a time, coordinates and rates, such as that of a chain.
   template <class Other>
   requires requires(const Other& other) { Eigen::VectorXd(other.q), Eigen::VectorXd(other.v), other.time; }
   Motion(const Other& other) : time(other.time), q(other.q), v(other.v) {}  // NOLINT(google-explicit-constructor)

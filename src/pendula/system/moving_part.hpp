@@ -5,14 +5,14 @@
 
 namespace pendula {
 
-/// Where coordinates lie that are numbers and nothing else.
+/// Coordinates of a system as parts of dimension one.
 struct CoordinateSpace {
   static constexpr int dof = 1;
   static constexpr std::size_t dimension = 1;
 };
 
-/// A part of what moves, of several members of an ensemble: where it is and its rate, of D components; of slopes their
-/// derivatives by time.
+/// A part of a moving system in all lanes: its position and rate, of D components each; as a slope, their time
+/// derivatives.
 template <class Number, std::size_t D>
 struct MovingPart {
   std::array<Number, D> place, rate;

@@ -12,15 +12,15 @@
 
 namespace pendula {
 
-/// How a step ended. Everything but `ok` means that the state was left as it was before the step.
+/// How a step ended. Any status but `ok` means that the state is unchanged.
 enum class Status {
   ok,
   not_converged,         ///< the stage equations were not solved to round-off
-  wrong_root,            ///< they were, but not by the motion: energy came from nowhere, or went there
-  tolerance_not_met,     ///< an explicit method shrank its step to nothing
+  wrong_root,            ///< they were solved, but not by the motion: its energy does not balance
+  tolerance_not_met,     ///< an explicit method reduced its step to the minimum
   not_finite,            ///< a value became infinite or NaN
-  singular_mass_matrix,  ///< a coordinate fails: φ in (θ, φ) where sin θ = 0
-  interrupted,           ///< it was asked to stop
+  singular_mass_matrix,  ///< a coordinate is undefined: φ in (θ, φ) where sin θ = 0
+  interrupted,           ///< the caller asked to stop
 };
 
 constexpr std::string_view name_of(Status status) {
@@ -47,20 +47,19 @@ inline std::ostream& operator<<(std::ostream& out, Status status) {
   return out << name_of(status);
 }
 
-/// What came of a step, with all that is needed to understand a failure.
+/// The result of a step, with what is needed to understand a failure.
 struct Outcome {
   Status status = Status::ok;
   double time = 0;      ///< time before the step  [s]
   double step = 0;      ///< step size that was tried  [s]
   int iterations = 0;   ///< Newton (or fixed-point) iterations of the last attempt
   double residual = 0;  ///< last correction relative to the size of the unknowns
-  int part = -1;        ///< 0-based link of a chain, coordinate of another system, that it points at; −1: none
+  int part = -1;  ///< 0-based link of a chain, or coordinate of another system, that caused the failure; −1: none
 
   explicit operator bool() const { return status == Status::ok; }
 };
 
-/// One sentence that says what happened, when, and where. Of a system that is no chain, with the names of its
-/// coordinates.
+/// One sentence: what happened, when, and where. For a system that is not a chain, pass the names of its coordinates.
 inline std::string message(const Outcome& outcome, std::span<const std::string_view> coordinates = {}) {
   if (outcome) return "ok";
   std::ostringstream out;
@@ -111,35 +110,36 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
   return out << message(outcome);
 }
 
-/// What a step does not see between its stages, relative to the speed of the motion.
+/// What a step misses between its stages, relative to the speed of the motion.
 struct Unseen {
-  double impulse = 0;  ///< the largest, to anywhere in the step
-  double effect = 0;   ///< on the end of the step
+  double impulse = 0;  ///< the largest missed impulse, to anywhere in the step
+  double effect = 0;   ///< on the state at the end of the step
 
-  /// Of an impulse, relative to the speed where it is, that is missed: a wall throws back what it takes half of that
-  /// from.
+  /// The impulse if it is large enough for a wall, else 0. It is relative to the speed there: a wall that takes up half
+  /// of the speed reflects the motion.
   static constexpr double of_wall(double impulse) { return impulse > 0.4 ? impulse : 0; }
 };
 
-/// Counts over a run.
+/// Counts and extremes over a run.
 struct Statistics {
   std::int64_t steps = 0;                      ///< accepted steps
   std::int64_t rejected_steps = 0;             ///< attempts that were not accepted
   std::int64_t newton_iterations = 0;          ///< Newton or fixed-point iterations, all attempts
-  double load_work = 0;                        ///< energy that torque and damping brought  [J]; NaN where nobody counts
-  double largest_defect = 0;                   ///< of a step that was accepted: GaussStepper::step
-  double smallest_step = 0, largest_step = 0;  ///< of the method's own choice  [s]; 0: there was none
-  /// What steps did not see of the field between their stages, of the speed of the motion, in all; the time from which
-  /// that shows in rows  [s].
+  double load_work = 0;                        ///< work of torques and damping  [J]; NaN where it is not computed
+  double largest_defect = 0;                   ///< defect of an accepted step: GaussStepper::step
+  double smallest_step = 0, largest_step = 0;  ///< of steps chosen by the method  [s]; 0: none
+  /// Effects that steps missed between their stages, summed, relative to the speed of the motion; the time from which
+  /// rows show them  [s].
   double unseen = 0, unseen_from = std::numeric_limits<double>::infinity();
 
-  /// A step of the method's own choice was taken.
+  /// Counts a step whose size the method chose.
   void count_chosen(double h) {
     smallest_step = smallest_step == 0 ? h : std::min(smallest_step, h);
     largest_step = std::max(largest_step, h);
   }
 
-  /// The step from `time` does not see so much. It was chosen by a tolerance; 0: it was as asked for.
+  /// Counts `effect` missed by the accepted step from `time`. `tolerance` is that of the step size, 0 for constant
+  /// steps.
   void step_over(double time, double effect, double tolerance) {
     constexpr double visible = 5e-4;
     if (effect <= std::max(tolerance, unseen_rounding)) return;
@@ -148,10 +148,10 @@ struct Statistics {
     if (unseen > trusted) unseen_from = std::min(unseen_from, time);
   }
 
-  /// Whether a step by a tolerance is to be taken shorter for what it does not see; the shortest are left to their
-  /// errors.
+  /// Whether a step chosen by tolerance must be retried shorter because of what it misses. The shortest steps are left
+  /// to their error estimate.
   bool has_to_see(double impulse, double h, double tolerance) const {
-    constexpr double shortest = 1e-6;  // of the longest step
+    constexpr double shortest = 1e-6;  // relative to the longest step
     return !(impulse <= std::max(tolerance, unseen_rounding)) && h > shortest * largest_step;
   }
 

@@ -16,25 +16,25 @@ struct InputSine {
   double phase;      ///< rad
 };
 
-/// The numbers of a system as they cross from a program to compiled code (run/library.hpp). Everything pointed at
+/// Parameters and inputs of a system as they cross from a program to compiled code (run/library.hpp). The memory
 /// belongs to the caller.
 struct PlainSystem {
-  const double* parameters;  ///< one after the other, as the kernel's parameter_names tell
-  const double* inputs;      ///< constant part of each, as its input_names tell
+  const double* parameters;  ///< concatenated, in the order of the kernel's parameter_names
+  const double* inputs;      ///< constant part of each, in the order of its input_names
   std::span<const InputSine> sines;
 };
 static_assert(std::is_trivially_copyable_v<PlainSystem> && std::is_standard_layout_v<PlainSystem>);
 
-/// The same with the memory that they lie in.
+/// The same with the memory that holds the numbers.
 struct SystemNumbers {
   std::vector<double> parameters, inputs;  ///< in the order of SystemInfo; inputs are their constant part
   std::vector<InputSine> sines;
 
-  /// Lives as long as this.
+  /// Valid as long as this object.
   PlainSystem plain() const { return {parameters.data(), inputs.data(), sines}; }
 };
 
-/// What a kernel says of itself, as it crosses from compiled code to a program.
+/// Description of a kernel, as it crosses from compiled code to a program.
 struct SystemInfo {
   std::string_view name;   ///< "cart_chain_2"
   std::string_view model;  ///< "cart_chain"
@@ -49,12 +49,13 @@ struct SystemInfo {
   std::span<const std::string_view> points;
   std::span<const int> point_sizes;  ///< components of each
   bool depends_on_time;              ///< other than by inputs
-  bool constant_masses;              ///< whether pivots of the mass matrix are the same wherever it is
-  /// Of what its functions are taken of that may be narrow, whether it is the base of a power (field_look.hpp).
+  bool constant_masses;              ///< whether the pivots of the mass matrix are constant
+  /// For each argument of the model's functions that may change fast: whether it is the base of a power
+  /// (field_look.hpp).
   std::span<const bool> argument_is_base;
 };
 
-/// What the generated kernel S says of itself.
+/// The description of the generated kernel S.
 template <System S>
 constexpr SystemInfo info_of() {
   return {S::name,

@@ -8,8 +8,8 @@
 
 namespace pendula {
 
-/// What steps of a program do. Behind the kind stands how many of them come one after the other, then of each its
-/// result and its operands x, y, z, all of them registers.
+/// Operations of a program. In the code, the operation is followed by the number of consecutive operations of that
+/// kind, then for each its result and its operands x, y, z, all of them registers.
 enum class Operation : std::uint16_t {
   end,
   add,
@@ -20,7 +20,7 @@ enum class Operation : std::uint16_t {
   subtract_product,   ///< z - x y
   negative,
   inverse,
-  sincos,  ///< of two results
+  sincos,  ///< two results
   tan,
   asin,
   acos,
@@ -33,14 +33,14 @@ enum class Operation : std::uint16_t {
   sqrt,
   cbrt,
   pow,
-  // One system; behind the kind stands its size.
-  factor,  ///< first result, lower triangle row by row: L and 1/D of L D Lᵀ, as many in a row
-  solve    ///< first result, first of L and 1/D, right-hand side: the solution, as many in a row
+  // A linear system; the operation is followed by its size.
+  factor,  ///< operands: first register of the result, then the lower triangle row by row; result: L and 1/D of L D Lᵀ
+  solve    ///< operands: first register of the solution, first of L and 1/D, then the right-hand side
 };
 
-/// A register, and the number of an array that goes there before a function begins, or comes from there when it ends.
+/// Copies a row of an array to a register before a function begins, or back when it ends.
 struct ProgramMove {
-  std::uint16_t place;  ///< of the register
+  std::uint16_t place;  ///< the register
   std::uint16_t array;  ///< parameters, times, inputs, then the arguments of the function
   std::uint32_t row;
 };
@@ -50,7 +50,7 @@ struct ProgramNumber {
   double value;
 };
 
-/// A function of a table as steps on registers.
+/// A function of a table as operations on registers.
 struct ProgramFunction {
   std::size_t registers = 0;
   std::span<const ProgramMove> reads, writes;
@@ -58,17 +58,17 @@ struct ProgramFunction {
   std::span<const std::uint16_t> code;  ///< ends with Operation::end
 };
 
-/// All of a kernel: a SystemTable's context. Whoever makes one sees to it that no step leaves the registers, and no
-/// move an array.
+/// A whole kernel: the context of its SystemTable. Whoever makes one must ensure that operations stay within the
+/// registers, and moves within the arrays.
 struct Program {
-  /// Of SystemFunctions, but for iterate, then of PlainFunctions.
+  /// Numbers of functions: those of SystemFunctions except iterate, then those of PlainFunctions.
   static constexpr std::size_t many = 13, plain = 3;
 
   std::size_t coordinates = 0;
   std::array<ProgramFunction, many + plain> functions;
 };
 
-/// Functions of a table whose context is a Program: those of any.
+/// The functions of every table whose context is a Program.
 struct ProgramInterpreter {
   SystemFunctions of_1, of_2, of_4, of_8;
   PlainFunctions plain;

@@ -2,16 +2,16 @@
 
 namespace pendula {
 
-/// Asked within steps that take long whether the run is to end; once yes, always yes. It holds nothing that flags of
-/// compilers change: it passes between a program and the library.
+/// Asked within long steps whether the run should end; once true, it stays true. Its layout does not depend on compiler
+/// flags, since it passes between a program and the library.
 struct StopSign {
-  bool (*asked)(const void*) = nullptr;  ///< none: it never does
-  const void* about = nullptr;           ///< handed to it
+  bool (*asked)(const void*) = nullptr;  ///< null: never stops
+  const void* about = nullptr;           ///< argument of `asked`
 
   bool operator()() const { return asked != nullptr && asked(about); }
 };
 
-/// That of a function, which has to live as long as it is asked.
+/// A StopSign that asks `stop`, which must outlive it.
 template <class Stop>
 StopSign stop_sign(const Stop& stop) {
   return {[](const void* about) -> bool { return (*static_cast<const Stop*>(about))(); }, &stop};

@@ -7,9 +7,9 @@
 
 namespace pendula {
 
-/// What the runtime asks of a mechanical system: a set of pure functions of parameters, coordinates q, rates v, momenta
-/// p and inputs, outputs by reference, for any number type. Generated kernels are (pendula_codegen/entry_points.py);
-/// what they depend on time by is in their parameters.
+/// What the runtime requires of a mechanical system: pure functions of parameters, coordinates q, rates v, momenta p
+/// and inputs, with outputs by reference, for any number type. Generated kernels are such systems
+/// (pendula_codegen/entry_points.py). A time on which they depend explicitly is among the parameters.
 template <class S>
 concept System = requires(const typename S::template Parameters<double>& parameters,
                           const typename S::template Vector<double>& x,
@@ -34,13 +34,13 @@ concept System = requires(const typename S::template Parameters<double>& paramet
   S::acceleration(parameters, x, x, inputs, out);
 };
 
-/// Whether a system's functions depend on time.
+/// Whether the functions of a system depend on time explicitly.
 template <System S>
 inline constexpr bool holds_time = requires(typename S::template Parameters<double>& parameters) {
   parameters.time;
 };
 
-/// Numbers in all parameters of a system.
+/// How many numbers all parameters of a system have.
 template <System S>
 constexpr int parameter_count() {
   int count = 0;
@@ -48,14 +48,14 @@ constexpr int parameter_count() {
   return count;
 }
 
-/// Whether a kernel tells what its functions are taken of: S::call_arguments, and of each whether that is the base of a
-/// power (pendula_codegen/model_kernel.py).
+/// Whether a kernel provides the arguments of the model's functions (S::call_arguments), and of each whether it is the
+/// base of a power (pendula_codegen/model_kernel.py).
 template <class S>
 inline constexpr bool tells_arguments = requires {
   S::argument_is_base;
 };
 
-/// Which they are; none where a kernel tells of none.
+/// For each of these arguments whether it is the base of a power; empty if the kernel does not provide them.
 template <class S>
 constexpr std::span<const bool> argument_bases() {
   if constexpr (tells_arguments<S>) return S::argument_is_base;

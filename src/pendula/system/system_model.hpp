@@ -16,7 +16,7 @@
 
 namespace pendula {
 
-/// A system with its numbers: immutable. Its table has to outlive it.
+/// A system with its parameters and inputs; immutable. Its table must outlive it.
 class SystemModel {
  public:
   SystemModel(const SystemTable& table, const PlainSystem& plain)
@@ -32,7 +32,7 @@ class SystemModel {
   const SystemInfo& info() const { return table_->info; }
   std::size_t coordinates() const { return info().coordinates.size(); }
 
-  /// Throws std::invalid_argument unless a motion has as many coordinates and rates.
+  /// Throws std::invalid_argument unless a motion has the right number of coordinates and rates.
   void require(const Motion& motion) const {
     for (const auto& [name, numbers] : {std::pair{"q", &motion.q}, std::pair{"v", &motion.v}}) {
       if (static_cast<std::size_t>(numbers->size()) == coordinates()) continue;
@@ -44,7 +44,7 @@ class SystemModel {
   std::span<const double> parameters() const { return parameters_; }
   std::size_t inputs() const { return constant_.size(); }
 
-  /// Its inputs at `time`, each `apart` numbers from the one before.
+  /// Writes the inputs at `time`, each `apart` numbers after the one before.
   void inputs(double time, double* found, std::size_t apart = 1) const {
     for (std::size_t k = 0; k < constant_.size(); ++k) found[k * apart] = constant_[k];
     for (const InputSine& sine : sines_) {
@@ -56,7 +56,7 @@ class SystemModel {
   /// Whether anything depends on time.
   bool driven() const { return info().depends_on_time || !sines_.empty(); }
 
-  /// Highest frequency of a sine that is added to an input; 0 where there is none  [rad/s].
+  /// Highest frequency of a sine added to an input  [rad/s]; 0 without sines.
   double fastest_drive() const {
     double fastest = 0;
     for (const InputSine& sine : sines_) {
@@ -65,10 +65,10 @@ class SystemModel {
     return fastest;
   }
 
-  /// Whether energy may come from outside, or go there.
+  /// Whether the energy may change through forces or inputs.
   bool loaded() const { return loaded_; }
 
-  /// Whether forces without inputs take energy out.
+  /// Whether forces dissipate energy when all inputs are zero.
   bool damped() const { return damped_; }
 
  private:
@@ -76,8 +76,8 @@ class SystemModel {
     return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), 0);
   }
 
-  // Forces are loads where they bring power somewhere: looked for in a few states, none of which is special. What
-  // depends on time may bring it at others.
+  // Forces are loads if their power is not zero; this is sampled in a few generic states. Systems that depend on time
+  // explicitly always count as loaded.
   void sample_power() {
     std::vector<double> q(coordinates()), v(coordinates()), driven(inputs());
     const std::vector<double> none(inputs());
@@ -106,7 +106,7 @@ class SystemModel {
   bool loaded_, damped_ = false;
 };
 
-/// W states of a system, each at a time of its own: what its functions are taken at, and they.
+/// W states of a system, each at its own time: their parameters, times and inputs, and calls of its functions.
 template <int W>
 class SystemAt {
   static constexpr auto width = static_cast<std::size_t>(W);
@@ -117,7 +117,7 @@ class SystemAt {
         functions_(functions_of<W>(model.table())),
         parameters_(model.parameters().size() + 1),
         times_(1),
-        inputs_(model.inputs() + 1) {  // none has an address, too
+        inputs_(model.inputs() + 1) {  // one more, so that there is always an address
     for (std::size_t k = 0; k < model.parameters().size(); ++k) {
       std::fill_n(parameters_[k], width, model.parameters()[k]);
     }
@@ -126,7 +126,7 @@ class SystemAt {
 
   const SystemModel& model() const { return model_; }
 
-  /// All of them at one time, or at times(k) each.
+  /// Sets one time for all states, or times(k) for state k.
   void set_time(double time) {
     set_times([&](std::size_t /*lane*/) { return time; });
   }
@@ -141,7 +141,7 @@ class SystemAt {
 
   Conditions conditions() const { return {model_.table().context, parameters_[0], times_[0], inputs_[0]}; }
 
-  /// Calls one of its functions: at(&SystemFunctions::acceleration, q, v, a).
+  /// Calls a function: at(&SystemFunctions::acceleration, q, v, a).
   template <class Result, class... Given, class... Numbers>
   Result operator()(Result (*SystemFunctions::*function)(const Conditions&, Given...), Numbers... numbers) const {
     return (functions_.*function)(conditions(), numbers...);

@@ -7,9 +7,8 @@
 
 namespace pendula {
 
-/// What functions of W states are taken at besides the states. Here and below numbers of W states lie side by side,
-/// those of one parameter, coordinate … after those of the one before, matrices row by row, aligned to
-/// `pack_alignment`.
+/// What functions of W states depend on besides the states. Here and below, numbers of W states lie side by side,
+/// parameter after parameter, coordinate after coordinate, matrices row by row; all aligned to `pack_alignment`.
 struct Conditions {
   const void* context;       ///< SystemTable::context
   const double* parameters;  ///< (parameters, W)
@@ -17,24 +16,24 @@ struct Conditions {
   const double* inputs;      ///< (inputs, W)
 };
 
-/// One fixed-point iteration on the stages of a step, W stages at once (gauss/lagrangian_stages.hpp). Stages are held
-/// as increments, h b v of a coordinate and h b f of its momentum.
+/// One fixed-point iteration on W stages of a step at once (gauss/lagrangian_stages.hpp). The unknowns of a stage are
+/// increments: h b v for a coordinate, h b f for its momentum.
 struct StageIteration {
   const double* m;                   ///< (W, W): column by column m_ij = a_ij / b_j
-  const double* hb;                  ///< (W): h b_j, zero beyond the stages
-  const Compensated<double>* start;  ///< (2 coordinates): coordinates, then momenta, where the step begins
-  const double* weights;             ///< (2 coordinates): of changes, as they are compared
-  double* increments;                ///< (2 coordinates, W): of coordinates, then of momenta; replaced
+  const double* hb;                  ///< (W): h b_j, zero beyond the last stage
+  const Compensated<double>* start;  ///< (2 coordinates): coordinates, then momenta, at the start of the step
+  const double* weights;             ///< (2 coordinates): of changes, in their comparison
+  double* increments;                ///< (2 coordinates, W): for coordinates, then momenta; replaced
 };
 
-/// What an iteration did.
+/// Result of an iteration.
 struct IterationChange {
-  double change;  ///< the largest weighed change of an increment; NaN where one is not finite
-  double size;    ///< the largest weighed increment
+  double change;  ///< the largest weighted change of an increment; NaN if one is not finite
+  double size;    ///< the largest weighted increment
 };
 
-/// The functions of a kernel, of W states at once, as generated kernels have them (pendula_codegen/entry_points.py).
-/// Outputs come last and overlap nothing.
+/// The functions of a kernel for W states at once, as generated kernels define them (pendula_codegen/entry_points.py).
+/// Outputs come last, and overlap no other array.
 struct SystemFunctions {
   using Numbers = const double*;
 
@@ -51,28 +50,28 @@ struct SystemFunctions {
   void (*energies)(const Conditions&, Numbers q, Numbers v, double* kinetic, double* total);
   void (*power)(const Conditions&, Numbers q, Numbers v, double* power);
 
-  /// Acceleration, and its derivative along a tangent (dq, dv) of each state.
+  /// Acceleration and its derivative along a tangent (dq, dv) of each state.
   void (*acceleration_along)(const Conditions&, Numbers q, Numbers v, Numbers dq, Numbers dv, double* a, double* da);
-  /// The derivatives of momentum_form along variations of parameters and inputs.
+  /// Derivatives of momentum_form along variations of parameters and inputs.
   void (*momentum_form_along)(const Conditions&, Numbers parameters, Numbers inputs, Numbers q, Numbers v, double* dp,
                               double* df);
-  /// What functions of the model are taken of, (arguments, W) (field_look.hpp); none where they are not told.
+  /// Arguments of the model's functions, (arguments, W) (field_look.hpp); null if the kernel does not provide them.
   void (*call_arguments)(const Conditions&, Numbers q, Numbers v, double* found);
 
   IterationChange (*iterate)(const Conditions&, const StageIteration&);
 };
 
-/// Functions of one state that are not asked for within steps.
+/// Functions of one state that are not needed within steps.
 struct PlainFunctions {
   using Numbers = const double*;
 
   void (*residual)(const Conditions&, Numbers q, Numbers v, Numbers a, double* E);
-  /// Of points and their velocities, components of one after those of the one before; none where there are no points.
+  /// Positions and velocities of points, point after point; null if the model has no points.
   void (*positions)(const Conditions&, Numbers q, double* points);
   void (*velocities)(const Conditions&, Numbers q, Numbers v, double* velocities);
 };
 
-/// What kernels of chains have besides, to check them by (kernel_check.hpp).
+/// Further functions of chain kernels, used to check them (kernel_check.hpp).
 struct ChainFunctions {
   using Numbers = const double*;
 
@@ -88,25 +87,25 @@ struct ChainFunctions {
   void (*hamiltonian)(const Conditions&, Numbers q, Numbers p, double* H);
 };
 
-/// A mechanical system as the runtime meets it: what it says of itself, and its functions. All that is compiled from a
-/// generated kernel (kernel_table.hpp).
+/// A mechanical system as the runtime sees it: its description and its functions, all that is compiled from a generated
+/// kernel (kernel_table.hpp).
 struct SystemTable {
   SystemInfo info;
-  const void* context;  ///< handed to its functions
+  const void* context;  ///< passed to its functions
   SystemFunctions of_1, of_2, of_4, of_8;
   PlainFunctions plain;
-  const ChainFunctions* chain;  ///< none where it is no chain
+  const ChainFunctions* chain;  ///< null if it is not a chain
 };
 static_assert(std::is_trivially_copyable_v<SystemTable> && std::is_standard_layout_v<SystemTable>);
 
-/// Its functions of so many states at once: 1, 2, 4 or 8.
+/// The functions of W states at once: W = 1, 2, 4 or 8.
 template <int W>
 const SystemFunctions& functions_of(const SystemTable& table) {
   static_assert(W == 1 || W == 2 || W == 4 || W == 8);
   return W == 1 ? table.of_1 : W == 2 ? table.of_2 : W == 4 ? table.of_4 : table.of_8;
 }
 
-/// Layout of what crosses to a kernel that was compiled by itself: SystemTable and all that it leads to.
+/// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
 inline constexpr int system_interface = 10;
 
 }  // namespace pendula

@@ -11,13 +11,12 @@
 
 namespace pendula {
 
-/// What tangents of systems in lanes begin with and are measured by: Σ (δq/size)² + (δq̇/(size ω))², size being 1 of
-/// angles, and of others the largest coordinate of the same unit where the member began; ω how fast it moved then, and
-/// what is a little beside it.
+/// Initial tangents of systems in lanes, and their norm: Σ (δq/size)² + (δq̇/(size ω))². The size is 1 for angles, for
+/// other coordinates the largest initial one of the same unit; ω is the initial rate of change of the motion.
 template <class L>
 class SystemTangents {
  public:
-  /// `dynamics` must outlive it.
+  /// `dynamics` must outlive this object.
   explicit SystemTangents(MemberSystems<L>& dynamics)
       : dynamics_(dynamics),
         rows_(static_cast<std::size_t>(kinds * count()) + 1),
@@ -28,8 +27,8 @@ class SystemTangents {
     std::vector<double> place, rate;
   };
 
-  /// Of length 1, drawn at random, the same one for all members: of one that came into a lane, at q and v. Where it
-  /// rests, its tangent tells how fast it swung, or is damped.
+  /// A random tangent of length 1, the same for all members, for the member at q and v in a lane. For a member at rest,
+  /// the tangent itself shows its oscillation frequency or damping rate, from which ω follows.
   Tangent start(int lane, double time, const double* q, const double* v) {
     std::vector<double> sizes, drawn;
     std::mt19937 random(1);
@@ -66,7 +65,7 @@ class SystemTangents {
     return tangent(1 / length, std::sqrt(squared) / length);
   }
 
-  /// The square of the length of a tangent; place(i), rate(i): δq_i and δq̇_i.
+  /// Squared norm of a tangent; place(i) = δq_i, rate(i) = δq̇_i.
   template <class Place, class Rate>
   L squared(Place place, Rate rate) const {
     L squared(0.0);
@@ -81,7 +80,7 @@ class SystemTangents {
   const L& inverse_pace_squared() const { return inverse_pace_squared_; }  ///< 1/ω²
 
  private:
-  // q, q̇, δq, δq̇, q̈, δq̈, and a time.
+  // Kinds of rows: q, q̇, δq, δq̇, q̈, δq̈; one row more for times.
   static constexpr int kinds = 6;
 
   int count() const { return dynamics_.coordinates(); }
