@@ -10,20 +10,20 @@
 
 namespace pendula {
 
-/// What is wanted of a run, of every row and event.
+/// The accuracy wanted of a run, for every row and event.
 struct Accuracy {
-  double error = 0;            ///< relative to the size and the speed of the motion; 0: what the tolerance makes of it
-  bool chooses_stages = true;  ///< as many as the tolerance wants; else those of the options
+  double error = 0;            ///< relative to the size and speed of the motion; 0: none, use the tolerance
+  bool chooses_stages = true;  ///< by the tolerance; else the number of stages of the options is used
 };
 
-/// By which tolerance a run is as accurate as is wanted.
+/// The tolerance by which a run reaches the wanted accuracy.
 struct AccuracyAim {
   double tolerance = 0;
-  /// Error by that tolerance, the largest along the motion; infinite where trials by the smallest ones part.
+  /// Largest error along the motion with that tolerance; infinite where trials with the smallest tolerances diverge.
   double error = std::numeric_limits<double>::infinity();
-  /// The finest trial, which the run is compared with; nothing where that has no states.
+  /// Track of the finest trial, which the run is compared with; empty if that trial failed.
   std::optional<Track> finest = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  /// Up to where that is as accurate as is wanted  [s].
+  /// Up to when that trial is as accurate as wanted  [s].
   double trusted_until = std::numeric_limits<double>::infinity();
 
   template <class Numbers>
@@ -34,7 +34,7 @@ struct AccuracyAim {
 
 namespace detail {
 
-/// Order of steps of a method that does not choose it.
+/// Order of a method that does not choose its order.
 inline int order_of(const RunOptions& options) {
   switch (options.method) {
     case Method::dopri5:
@@ -48,14 +48,14 @@ inline int order_of(const RunOptions& options) {
   }
 }
 
-/// The smallest tolerances that steps are chosen by.
+/// The smallest tolerances that trials use.
 struct FinestTolerance {
-  double good;      ///< where it may be good enough
-  double hopeless;  ///< where none is, so that it only tells up to when the motion is known
+  double good;      ///< where the accuracy may still be reached
+  double hopeless;  ///< where it cannot be, so that a trial only tells up to when the motion is known
 };
 
-/// Rounding allows so much; and an order that is given no more than some steps for each of a run by the accuracy
-/// itself, unless more of them lead to the accuracy.
+/// Limited by rounding. Where the order is given, also to about `most_steps` times the steps that the wanted accuracy
+/// as a tolerance would take, unless more steps reach the accuracy.
 inline FinestTolerance finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
   constexpr double most_steps = 4;
   const double rounding = is_explicit(options.method) ? 1e-14 : 1e-16;
@@ -66,41 +66,42 @@ inline FinestTolerance finest_tolerance(const RunOptions& options, const Accurac
   return {rounding, options.method == Method::gauss ? rounding : few_steps};
 }
 
-/// What is known of the errors by two tolerances of which the finer one is good enough.
+/// The errors found for two tolerances, the finer of which is good enough.
 struct AccuracyLadder {
-  AccuracyAim finest;         ///< which all others are compared with
-  double factor = 0;          ///< what the motion makes of a tolerance
-  bool can_be_finer = false;  ///< whether it is good enough, and smaller tolerances are left to try
+  AccuracyAim finest;         ///< the finest trial, which all others are compared with
+  double factor = 0;          ///< error of the motion per tolerance
+  bool can_be_finer = false;  ///< whether it is good enough and smaller tolerances are left
 };
 
-/// Two tolerances to compare, and the trial by the coarser one.
+/// Two tolerances to compare, and the trial with the coarser one.
 struct AccuracyRung {
   double coarse = 0, fine = 0;
   std::optional<Track> far = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
 };
 
-/// How far rows may be off what was wanted and not be told: errors scatter about what was seen in trials.
+/// An error is reported only beyond this multiple of the wanted one: errors scatter about those seen in trials.
 inline constexpr double close_to_wanted = 2;
 
-/// What the error that is expected may be of the one that is wanted, and what it is aimed at.
+/// The expected error may be `enough` times the wanted one; trials aim at `aimed_at` times it.
 inline constexpr double enough = 0.3, aimed_at = 0.1;
 
-/// What runs are off each other by, at most, that still tell errors.
+/// Largest distance of two runs that still measures an error; beyond it they have diverged.
 inline constexpr double together = 0.01;
 
-/// What a motion makes of the errors of its steps is a factor that grows with chaos. Trials tell it: `run(tolerance)`
-/// is the track of one, nothing where a run does not come to its end. Two of them part by the error of the coarser one;
-/// `apart(a, b)` is a Separation. Where the finer one is not expected to be good enough, or they part too far for a
-/// factor, the next is finer, and is compared with it. Errors scatter about what tolerances ask for by factors of ten
-/// and more, so that aims lie below what is wanted.
+/// Refines the tolerance until it is good enough. The motion amplifies the errors of steps by a factor, which grows
+/// with chaos and is measured by trials: `run(tolerance)` returns the track of one, or nothing where it fails before
+/// its end. The distance of two trials is the error of the coarser one; `apart(a, b)` is their Separation. If the finer
+/// one is not expected to be good enough, or the distance is too large to measure a factor, a still finer trial is
+/// compared with it. Errors scatter about tolerances by factors of ten and more, so that the aim lies below the wanted
+/// error.
 template <class RunTrial, class Apart>
 AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start, AccuracyRung from, RunTrial run,
                           Apart apart) {
-  constexpr double rounding = 2e-16;  // errs as a tolerance of that size would
+  constexpr double rounding = 2e-16;  // acts as a tolerance of this size would
   auto& [coarse, fine, far] = from;
   for (;;) {
     std::optional<Track> near = run(fine);
-    const double finer = std::max(fine, rounding) / coarse;  // by which the finer one errs less
+    const double finer = std::max(fine, rounding) / coarse;  // error relative to the coarser trial
     std::optional<Separation> parted;
     if (far && near) parted.emplace(apart(*far, *near));
     const double off = parted ? parted->largest() : std::numeric_limits<double>::infinity();
@@ -125,10 +126,10 @@ AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start,
   }
 }
 
-/// The finest tolerance may be good enough by far. So a coarser one, `coarsest` at most, is looked for by which a trial
-/// is off the finest one by a part of what is wanted, as was seen. `run` and `apart` as above. `factor` becomes the
-/// largest that was seen. Returns nothing where the finest tolerance is not good enough by that factor: the trial that
-/// told the ladder's was right by chance.
+/// Coarsens the tolerance, to `coarsest` at most, since the finest one may be much better than needed: looks for a
+/// tolerance whose trial differs from the finest trial by a fraction of the wanted error. `run` and `apart` are as
+/// above. `factor` is raised to the largest one seen. Returns nothing if by that factor the finest tolerance is not
+/// good enough, that is, if the ladder's factor was too small by chance.
 template <class RunTrial, class Apart>
 std::optional<AccuracyAim> climb_up(double wanted, double coarsest, const AccuracyLadder& ladder, double& factor,
                                     RunTrial run, Apart apart) {
@@ -154,7 +155,8 @@ std::optional<AccuracyAim> climb_up(double wanted, double coarsest, const Accura
   return best;
 }
 
-/// By `run` down to a tolerance that is good enough, and by `run_alike` up to one that is no finer than is needed.
+/// Refines the tolerance by trials of `run` until it is good enough, then coarsens it by trials of `run_alike` as far
+/// as possible.
 template <class RunTrial, class RunAlike, class Apart>
 AccuracyAim find_aim(double wanted, double coarsest, FinestTolerance smallest, double start, RunTrial run,
                      RunAlike run_alike, Apart apart) {

@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-/// A chain as what a run moves.
+/// A chain as the subject of a run.
 template <class Space>
 class ChainSubject : public Subject {
  public:
@@ -31,11 +31,11 @@ class ChainSubject : public Subject {
   bool loaded() const override { return chain_.loaded(); }
   bool damped() const override { return chain_.damped(); }
 
-  /// Damping so strong that a Gauss step does not follow it: Gauss methods are A-stable, but do not damp what they do
-  /// not resolve. The rate is that of a link alone, λ/l² (1/m_i + 1/m_{i−1}).
+  /// Warns of damping too strong for Gauss steps to follow: Gauss methods are A-stable, but not L-stable. The decay
+  /// rate is that of a single link, λ/l² (1/m_i + 1/m_{i−1}).
   std::vector<std::string> expected_trouble(const RunOptions& options) const override {
     if (options.method != Method::gauss) return {};
-    static constexpr double followed = 5;  // of one step, where e^{-x} is 0.7 %
+    static constexpr double followed = 5;  // decay exponent of one step; e^{−5} is 0.7 %
     for (int i = 0; i < chain_.links(); ++i) {
       const double inverse_mass = 1 / chain_.masses()[i] + (i == 0 ? 0 : 1 / chain_.masses()[i - 1]);
       const double rate = chain_.damping()[i] * inverse_mass / (chain_.lengths()[i] * chain_.lengths()[i]);
@@ -73,7 +73,7 @@ class ChainSubject : public Subject {
     return quantities;
   }
 
-  /// Masses, lengths, gravity, damping and the constant part of torques; drives are not among them.
+  /// Masses, lengths, gravity, damping and the constant part of torques; without drives.
   std::vector<Constant> constants() const override {
     const auto numbers = [](const auto& vector) { return std::vector<double>(vector.begin(), vector.end()); };
     std::vector<Constant> constants{{"masses", "kg", "mass of the bob", numbers(chain_.masses()), true},
@@ -102,7 +102,7 @@ class ChainSubject : public Subject {
 
   std::span<const std::string_view> coordinates() const override { return {}; }
 
-  /// The last bob.
+  /// Columns of the last bob.
   std::pair<std::size_t, std::size_t> shown_columns() const override {
     constexpr std::size_t dimension = Space::dimension;
     const auto links = static_cast<std::size_t>(chain_.links());
@@ -110,9 +110,10 @@ class ChainSubject : public Subject {
   }
 
   using Subject::distance;
-  /// Of bobs relative to the length of the chain, and of angles  [rad]: the larger one; in space of directions, which
-  /// two pairs of angles and more tell after a pole. And of their rates relative to the fastest bob and rod there; to a
-  /// tenth of what the chain swings with, and a hundredth of the fastest theta in the motion, at least.
+  /// The larger of the distance of bobs, relative to the length of the chain, and that of angles  [rad]; in space that
+  /// of directions, because after a pole two or more pairs of angles stand for one direction. Plus the larger distance
+  /// of rates, relative to the fastest bob and rod there; these count at least as a tenth of the chain's swing
+  /// frequency and a hundredth of the fastest theta in the motion.
   double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     const auto furthest = [](const auto& x) { return x.colwise().norm().maxCoeff(); };
     const auto of = [](double off, double whole) { return off == 0 ? 0 : off / whole; };
@@ -133,7 +134,7 @@ class ChainSubject : public Subject {
     return std::span(all).first(Space::dimension);
   }
 
-  /// What rods differ by, and the fastest of the first state.
+  /// Largest differences of rods' angles and rates, and the fastest rod of the first state.
   struct Turned {
     double angle = 0, rate = 0, fastest = 0;
   };

@@ -5,14 +5,14 @@
 
 namespace pendula {
 
-/// Where a run may go on from: with the same subject, start and options, and to any end that is later, as if it had
-/// never stopped, to the last bit.
+/// Where a run can be continued: with the same subject, start and options, and any later end, as if it had never
+/// stopped, to the last bit.
 struct Checkpoint {
   double time = 0;             ///< of the state  [s]
-  std::int64_t rows = 0;       ///< that the run had come by; later ones are there only because it ended
-  std::int64_t since_row = 0;  ///< steps since the last of them
+  std::int64_t rows = 0;       ///< so far; rows written only because the run ended do not count
+  std::int64_t since_row = 0;  ///< steps since the last row
   Member integrator;
-  Member record;  ///< of the rows and the events (RunRecord, EventWatch)
+  Member record;  ///< state of the rows and events (RunRecord, EventWatch)
 };
 
 }  // namespace pendula

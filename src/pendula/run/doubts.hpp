@@ -23,7 +23,7 @@ inline std::string smaller_step_advice(const RunOptions& run) {
   return run.stages < 4 ? "a smaller run.step or more run.stages may help" : "a smaller run.step may help";
 }
 
-/// The energy of an undamped motion is known, that of a damped one at least never grows.
+/// The energy of an undamped motion is known; that of a damped one never grows.
 inline Doubt of_energy(const Subject& subject, const RunOptions& run, const EnergyBalance& balance) {
   static constexpr double trusted = 1e-3;
   if (!subject.balances(run.method)) return {};
@@ -34,7 +34,7 @@ inline Doubt of_energy(const Subject& subject, const RunOptions& run, const Ener
   return "energy is off by " + pendula::rounded(off, 2) + " " + whole + smaller_step_advice(run);
 }
 
-/// Near a pole φ moves faster than steps of one size follow, even in parts.
+/// Near a pole φ changes faster than steps of constant size follow, even when they are divided.
 inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunReport& report) {
   const std::int64_t rejected = report.statistics.rejected_steps;
   if (is_adaptive(run) || !subject.has_poles() || report.description.solver != "dense" || rejected == 0) return {};
@@ -42,10 +42,10 @@ inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunRep
          " steps in parts; run.solver = \"chain\" knows no pole";
 }
 
-/// An error that everybody sees, relative to the size of the motion.
+/// An error that anybody sees, relative to the size of the motion.
 inline constexpr double visible = 1e-3;
 
-/// Which rows are meant, by up to when others are not.
+/// Names the rows after `until`.
 inline std::string rows_after(double until, double start) {
   return until > start ? "rows after t = " + pendula::rounded(until, 4) + " s" : "all rows";
 }
@@ -53,12 +53,12 @@ inline std::string untrusted_after(double until, double start) {
   return until > start ? rows_after(until, start) + " cannot be trusted" : "no row can be trusted";
 }
 
-/// Whether a step is off by more than steps of the program's choice are, that resolve motion as the tolerance wants.
+/// Whether the defect of a step is larger than that of steps whose size was chosen to resolve the motion.
 inline bool misses(const RunOptions& run, double defect) {
   return run.stages != 1 && defect > (is_adaptive(run) ? std::max(1e-3, 30 * std::sqrt(run.tolerance)) : 0.02);
 }
 
-/// `missed`: when the first such step began.
+/// `missed` is when the first such step began.
 inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<double> missed, Trust& trust) {
   const RunOptions& run = setup.options;
   if (!missed) return {};
@@ -69,7 +69,7 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
          " of the fastest: " + rows_after(*missed, setup.start.time) + " may be wrong; " + advice;
 }
 
-/// Steps went past something narrow in the forces, from a time on that shows in rows.
+/// Steps missed something narrow in the forces, from a time on whose effect shows in rows.
 inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trust& trust) {
   if (std::isinf(statistics.unseen_from)) return {};
   trust.until = std::min(trust.until, statistics.unseen_from);
@@ -79,7 +79,8 @@ inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trus
          smaller_step_advice(setup.options);
 }
 
-/// Of trials before the run; `parted` tells how far it went from the finest of them, where it was compared.
+/// Reports what the trials before the run found. `parted` is the distance of the run from the finest trial, if
+/// compared.
 inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& parted, const AccuracyAim& aim,
                     Trust& trust) {
   const double wanted = setup.accuracy.error, trusted = close_to_wanted * wanted, start = setup.start.time;
@@ -94,23 +95,23 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
   }
   const double seen = parted ? parted->within(visible, start) : aim.trusted_until;
   const std::string of_those = of_wanted + "even runs by the smallest useful tolerances part; ";
-  // The trials part from each other, this run does not part from the finest of them.
+  // The trials diverge from one another, but this run does not diverge from the finest of them.
   if (std::isinf(seen)) return of_those + rows_after(trust.until, start) + " may be less accurate";
   return of_those + rows_after(trust.until, start) + " are less accurate, " +
          untrusted_after(std::max(seen, trust.until), start);
 }
 
-/// Another run to compare one with.
+/// Options of another run to compare a run with.
 struct SecondLook {
   RunOptions options;
-  std::string how;     ///< "with twice the step"
-  double factor = 1;   ///< what the run errs by over what it is off this one, about
-  double trusted = 1;  ///< at most, since errors scatter: that factor
+  std::string how;     ///< for messages: "with twice the step"
+  double factor = 1;   ///< error of the run, relative to its distance from the other one, estimated
+  double trusted = 1;  ///< upper bound of that factor, since errors scatter
 };
 
-/// One that errs more, and takes less time: with a tolerance a hundred times as large, or longer steps. Steps of twice
-/// the length, where some were taken in parts, would be taken in the same parts again; steps that are as long as a
-/// method can take by both tolerances, the same ones, are not where there are fewer stages.
+/// A comparison run that errs more and takes less time: with a hundred times the tolerance, or longer steps. If some
+/// steps were divided, doubled steps would be divided into the same parts, so the step is tripled. Fewer stages are
+/// used with a tolerance because steps as long as the method allows would be the same with both tolerances.
 inline SecondLook coarser(const RunOptions& run, const Statistics& statistics) {
   SecondLook look{run, "with a hundred times the tolerance", 0.2, 0.2};
   if (is_adaptive(run)) {
@@ -128,13 +129,13 @@ inline SecondLook coarser(const RunOptions& run, const Statistics& statistics) {
   return look;
 }
 
-/// One that errs less, where the coarser one says that the run cannot be trusted, which is so of the coarser one,
-/// perhaps. None where no run errs less.
+/// A comparison run that errs less, for when the coarser one disagrees, which may be the fault of the coarser one
+/// alone. Nothing if no run errs less.
 inline std::optional<SecondLook> finer(const RunOptions& run) {
   SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
   if (is_adaptive(run)) {
     look.options.tolerance /= 100;
-    const bool is_added_up = is_explicit(run.method) && run.method != Method::taylor;  // in rounding, step by step
+    const bool is_added_up = is_explicit(run.method) && run.method != Method::taylor;  // rounding, step by step
     if (look.options.tolerance < (is_added_up ? 1e-14 : 1e-16)) return {};
     if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
     return look;
@@ -147,15 +148,15 @@ inline std::optional<SecondLook> finer(const RunOptions& run) {
   return look;
 }
 
-/// The error that is not told: about what was asked for; where that is a tolerance of the motion, what that makes of it
-/// where it is no chaos.
+/// The largest error that is not reported: about the one asked for. With a tolerance of the motion, the usual error of
+/// a motion without chaos.
 inline double trusted_error(const RunSetup& setup) {
   if (setup.accuracy.error > 0) return close_to_wanted * setup.accuracy.error;
   const bool is_of_motion = is_adaptive(setup.options) && !is_explicit(setup.options.method);
   return is_of_motion ? std::min(visible, 1000 * setup.options.tolerance) : visible;
 }
 
-/// Where the other run goes elsewhere, the steps or the chaos of the motion decide where.
+/// Where the two runs diverge depends on the steps or on the chaos of the motion.
 inline Doubt of_second_look(const RunSetup& setup, const SecondLook& look, const Separation& parted, Trust& trust) {
   const double start = setup.start.time, trusted = trusted_error(setup), error = parted.largest() * look.factor;
   trust.expected_error = error <= visible ? error : std::numeric_limits<double>::quiet_NaN();

@@ -15,10 +15,11 @@
 
 namespace pendula {
 
-/// Which changes of sign are meant.
+/// Which sign changes count.
 enum class Direction { up, down, both };
 
-/// An event's function as one of a few numbers of the motion: what it may be over a time is known where they are.
+/// The function of an event as a formula of a few quantities of the motion, so that it can be enclosed over an interval
+/// of time once these are.
 class Formula {
  public:
   Formula() = default;
@@ -26,42 +27,42 @@ class Formula {
   Formula& operator=(const Formula&) = delete;
   virtual ~Formula() = default;
 
-  /// How many numbers besides the time it is made of.
+  /// How many quantities it depends on, besides the time.
   virtual std::size_t size() const = 0;
-  /// These, of a motion.
+  /// Reads these from a motion.
   virtual void read(const Motion& motion, std::span<double> numbers) = 0;
   virtual double value(double time, std::span<const double> numbers) = 0;
   virtual Reach reach(const Reach& time, std::span<const Reach> numbers) = 0;
 };
 
-/// Something that happens where a function of the motion changes its sign.
+/// Something that happens where a function of the motion changes sign.
 ///
-/// A zero that is touched is none, nor is one that the motion starts or ends at; a jump over zero is one. Where the
-/// function is not finite nothing is looked for.
+/// A root that is only touched does not count, nor does one where the motion starts or ends; a jump across zero does.
+/// Events are not searched where the function is not finite.
 struct Event {
   std::string name = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   std::function<double(const Motion&)> value;
   Direction direction = Direction::both;
   bool stop = false;  ///< whether the run ends there
-  /// The same function, where it may turn faster than the motion: none for what turns as slowly as that.
+  /// The same function as a formula, needed if it may vary faster than the motion; null otherwise.
   std::shared_ptr<Formula> formula = nullptr;
 };
 
-/// That an event happened.
+/// One occurrence of an event.
 struct Occurrence {
-  std::size_t event = 0;  ///< its number among those of the run
+  std::size_t event = 0;  ///< index among the events of the run
   bool up = false;        ///< from − to +
-  Motion motion;          ///< the state at that instant, to round-off of the time
+  Motion motion;          ///< the state at that instant; its time is exact to rounding
 };
 
-/// What is kept of an event along a run.
+/// Counts of an event along a run.
 struct EventTally {
   std::int64_t count = 0;
   double first = std::numeric_limits<double>::quiet_NaN();  ///< s; NaN where it never happened
   double last = std::numeric_limits<double>::quiet_NaN();   ///< s
-  /// End of the first step in which the function was not finite  [s]; NaN where there is none.
+  /// End of the first step in which the function was not finite  [s]; NaN if there was none.
   double not_finite = std::numeric_limits<double>::quiet_NaN();
-  /// The same of steps in which it changed too often to be followed.
+  /// End of the first step in which the function changed too often to be resolved  [s]; NaN if there was none.
   double not_told = std::numeric_limits<double>::quiet_NaN();
 
   void add(double time) {
@@ -75,7 +76,7 @@ struct EventTally {
   }
 };
 
-/// Why not to trust what was found of events along a run: one sentence each.
+/// Reasons not to trust the events found in a run, one sentence each.
 inline std::vector<std::string> event_warnings(std::span<const Event> events, std::span<const EventTally> tallies) {
   std::vector<std::string> warnings;
   const auto warn = [&](const Event& event, const std::string& what, double time, const std::string& so) {
@@ -90,10 +91,10 @@ inline std::vector<std::string> event_warnings(std::span<const Event> events, st
   return warnings;
 }
 
-/// What looking for events has cost.
+/// The cost of event location.
 struct EventCost {
-  std::int64_t glances = 0;  ///< states by the polynomial of a step
-  std::int64_t looks = 0;    ///< states at full order: about a step each
+  std::int64_t glances = 0;  ///< states by dense output
+  std::int64_t looks = 0;    ///< states at full order: about one step each
 };
 
 }  // namespace pendula

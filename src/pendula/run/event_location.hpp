@@ -17,41 +17,41 @@ inline int sign_of(double value) {
   return value > 0 ? 1 : value < 0 ? -1 : 0;
 }
 
-/// Where a function of time, an event's, changes its sign once: in parts of a step.
+/// A single sign change of an event's function within a step; times are fractions of the step.
 struct SignChange {
   double from = 0, to = 0;
-  int sign = 0;                 ///< after it
-  std::optional<double> guess;  ///< where about, and how steep the function is there; none at a jump
-  double slope = 0;             ///< a step
+  int sign = 0;                 ///< sign after the change
+  std::optional<double> guess;  ///< approximate root, with the slope there; none at a jump
+  double slope = 0;             ///< per step
 };
 
-/// What states of a step are taken from.
+/// How states within a step are computed: by its dense output, or by a step at full order.
 enum class SeenBy { polynomial, full_order };
 
-/// Where the polynomial of a step, of a degree from 1 to 8, misses the motion most: at the node next to the middle,
-/// since its error has a derivative that is zero at all nodes.
+/// Where the dense output of a step, a polynomial of a degree from 1 to 8, has its largest error: at the node next to
+/// the middle, because the derivative of the error vanishes at all nodes.
 inline double place_of_miss(std::size_t degree) {
   constexpr std::array<double, 9> next_to_middle{0.5, 0.5, 0.2113, 0.5, 0.33, 0.5, 0.3807, 0.5, 0.4083};
   return next_to_middle[degree];
 }
 
-/// What the signs at both ends of a step tell, and no more.
+/// The sign change implied by the signs at both ends of a step.
 inline std::vector<SignChange> changes_by_ends(int first, int last) {
   if (first * last >= 0) return {};
   return {{0, 1, last, std::nullopt, 0}};
 }
 
-/// The signs of a function at places of a step, from left to right, and where they change.
+/// Collects the signs of a function at increasing places of a step, and the changes between them.
 class SignLine {
  public:
-  /// `first` is the value at the beginning, `sign` the last one before it that was not 0, or 0.
+  /// `first` is the value at the beginning, `sign` the last nonzero sign before it, or 0.
   void begin(double first, int sign) {
     changes_.clear();
     last_ = {0, sign, first == 0};
     go_on(0, sign_of(first));
   }
 
-  /// To a place where the function has a sign, 0 where that says nothing: the change that this shows, if there is one.
+  /// Adds the sign at a place, 0 where it is unknown. Returns the change that it shows, or null.
   SignChange* go_on(double u, int sign) {
     if (sign == 0) return nullptr;
     const Node before = std::exchange(last_, {u, sign, false});
@@ -59,10 +59,10 @@ class SignLine {
     return &changes_.emplace_back(SignChange{before.at, before.is_zero ? before.at : u, sign, std::nullopt, 0});
   }
 
-  /// To a place where the function has no value, or none that says anything of what was before.
+  /// Adds a place where the function has no value, or where nothing relates it to earlier signs.
   void forget(double u) { last_ = {u, 0, false}; }
 
-  /// The last sign, 0 where it is not known.
+  /// The last sign, 0 if unknown.
   int sign() const { return last_.sign; }
 
   std::vector<SignChange> take() { return std::exchange(changes_, {}); }
@@ -71,16 +71,16 @@ class SignLine {
   struct Node {
     double at = 0;
     int sign = 0;
-    bool is_zero = false;  // and of that sign before
+    bool is_zero = false;  // then `sign` is the sign before it
   };
 
   std::vector<SignChange> changes_;
   Node last_;
 };
 
-/// Between two places of one sign a function comes close to zero and turns: golden sections lead to where, or to a
-/// place of the other sign, which is given, if there is one. What they do not tell from zero is a zero that is touched.
-/// `value` gives the value at a place, `goes_on` whether more of these may be asked for.
+/// Searches for a place of the other sign between two places of the same sign, where the function approaches zero and
+/// turns back, by golden-section minimisation. A minimum that is zero to rounding is a touched root, and gives nothing.
+/// `value` evaluates the function, `goes_on` tells whether further evaluations are allowed.
 template <class Value, class GoesOn>
 std::optional<double> other_sign(double from, double to, int sign, Value value, GoesOn goes_on) {
   constexpr double golden = 0.38196601125010515, nearest = 4 * std::numeric_limits<double>::epsilon();
@@ -102,28 +102,27 @@ std::optional<double> other_sign(double from, double to, int sign, Value value, 
   return height < 0 ? std::optional(u) : std::nullopt;
 }
 
-/// Finds every change of sign of a function within a step, from what the step's polynomial shows of it.
+/// Finds every sign change of a function within a step from the step's dense output.
 ///
-/// Six samples decide where the function is far from zero: five are Chebyshev points, by which twice what the function
-/// was seen to vary by is less than what it is from zero, and a sixth is none, so that what turns often in a step is
-/// not taken for what it is at the others. Else nine samples are interpolated, or halves where they do not tell the
-/// function. Bernstein coefficients, halved as long as needed, show pieces that are clear of zero or rise or fall all
-/// through, by more than interpolation and the polynomial may be off: by the last two coefficients that it can have, or
-/// where that does not decide, by as much as it is off at one place. What is neither, a zero that is nearly touched, is
-/// decided by states of full order, sampled and interpolated in the same way; and what that does not decide by the
-/// place where the function turns.
+/// Steps in which the function stays far from zero are dismissed by six samples: five at Chebyshev points, whose
+/// variation, doubled, is less than the distance from zero, and a sixth elsewhere against aliasing. Otherwise the
+/// function is interpolated at nine points, on halves of the interval where these do not resolve it. Bernstein
+/// coefficients, subdivided as needed, show pieces on which the function is certainly nonzero or certainly monotone, by
+/// a margin that covers the errors of interpolation and of dense output. The latter is bounded by the last two
+/// coefficients of the polynomial, and if that does not decide, measured at one place. Pieces left undecided,
+/// near-tangent roots, are sampled and interpolated at full order, and finally decided by the extremum there.
 ///
-/// `Sight` has value(u), by the polynomial, and exact_value(u), at full order; u runs from 0 to 1.
+/// `Sight` provides value(u), by dense output, and exact_value(u), at full order; u runs from 0 to 1.
 template <class Sight>
 class SignSearch {
  public:
   using By = SeenBy;
 
-  /// `degree` of the step's polynomial: how fast its error falls with the length of the step.
+  /// `degree` of the dense output: how fast its error falls with the length of the step.
   SignSearch(Sight& sight, int degree) : sight_(sight), degree_(static_cast<std::size_t>(std::clamp(degree, 1, 8))) {}
 
-  /// Changes in order; `first` and `last` are the values at both ends, `sign` is the last one before the step that was
-  /// not 0, 0 where there was none. A zero at the beginning belongs to this step, one at its end to the next.
+  /// The changes in order. `first` and `last` are the values at both ends, `sign` is the last nonzero sign before the
+  /// step, 0 if there was none. A root at the beginning belongs to this step, one at the end to the next.
   std::vector<SignChange> find(double first, double last, int sign, By by = By::polynomial) {
     is_finite_ = true;
     samples_left_ = most_samples;
@@ -136,11 +135,11 @@ class SignSearch {
     return is_told() ? line_.take() : changes_by_ends(sign, sign_of(last));
   }
 
-  /// Whether the function was finite wherever it was looked at.
+  /// Whether the function was finite at all samples.
   bool is_finite() const { return is_finite_; }
 
-  /// Whether so many samples tell the function. Where they do not, as where it is nothing but rounding errors, no more
-  /// is found than that its signs differ.
+  /// Whether the samples sufficed to resolve the function. If not, as for mere rounding noise, only the change between
+  /// its signs at the ends is returned.
   bool is_told() const { return samples_left_ > 0; }
 
  private:
@@ -149,7 +148,7 @@ class SignSearch {
   static constexpr double epsilon = std::numeric_limits<double>::epsilon();
   using Samples = BernsteinPolynomial::Numbers;
 
-  /// A part of the step, the values at its ends, and the sign of the latter, which is certain.
+  /// A part of the step, and the values at its ends; `sign` is the certain sign of the last one.
   struct Interval {
     double from, to, first, last;
     int sign;
@@ -158,19 +157,19 @@ class SignSearch {
     double middle() const { return at(0.5); }
   };
 
-  /// How far a polynomial may be from the function, and its derivative from the function's.
+  /// Bounds of the error of a polynomial and of its derivative.
   struct Band {
     double value, slope;
   };
 
-  /// Pieces that are not clear of zero, one after the other.
+  /// A run of consecutive pieces that may contain zeros.
   struct Doubtful {
     bool open = false;
     double from = 0;
-    int slope = 0;  // of all of them, or 0
+    int slope = 0;  // common sign of their slopes, or 0
   };
 
-  /// What the values between the last node and the next are known by.
+  /// The polynomial that interpolates the function between two nodes.
   struct Curve {
     const BernsteinPolynomial& polynomial;
     const Interval& interval;
@@ -227,7 +226,7 @@ class SignSearch {
     resolved(interval, polynomial, by, band(missed_ + sizes[degree_] * whole));
   }
 
-  /// How far the polynomial misses where it does most.
+  /// Measures the error of dense output where it is largest.
   void measure() {
     const double place = place_of_miss(degree_);
     const double off = std::abs(sample(place, By::polynomial) - sample(place, By::full_order));
@@ -235,8 +234,8 @@ class SignSearch {
     is_measured_ = true;
   }
 
-  /// The polynomial's values at the ends of the step in place of the true ones, and how far it misses them: rates by it
-  /// do, coordinates do not.
+  /// Replaces the true values at the ends of the step by those of dense output, whose coordinates are exact there and
+  /// whose rates are not; the difference measures its error.
   void take_ends(Samples& values) {
     values.front() = sample(0, By::polynomial);
     values.back() = sample(1, By::polynomial);
@@ -244,7 +243,7 @@ class SignSearch {
     if (!std::isfinite(missed_)) missed_ = 0;
   }
 
-  /// Not where a sample is no number.
+  /// False if a sample is not finite.
   bool is_far_from_zero(const Samples& values, const Interval& interval, By by) {
     const std::array<double, 5> seen{values[0], values[2], values[4], values[6], values[8]};
     const std::array<double, 5> sizes = chebyshev_sizes<5>(seen);
@@ -252,14 +251,15 @@ class SignSearch {
     return std::abs(sample(interval.at(odd_place), by) - expected_at_odd_place(seen)) < 0.1 * sizes[0];
   }
 
-  /// How far the interpolant is off there. Full order is asked for short parts only, where looks would cost more than
-  /// they tell.
+  /// Error of the interpolant at the sixth place. Not measured at full order: that is used on short intervals only,
+  /// where the sample would cost more than it tells.
   double off_at_sixth(const BernsteinPolynomial& interpolant, const Interval& interval, By by) {
     if (by == By::full_order) return 0;
     return std::abs(sample(interval.at(odd_place), by) - interpolant(odd_place));
   }
 
-  /// Halves; where those are too short for anything but a jump or a corner, or too many, the samples' signs.
+  /// Halves the interval. If it is too short for anything but a jump or a corner, or too many samples were taken, uses
+  /// the signs of the samples.
   void unresolved(const Interval& interval, const Samples& values, int halvings, By by) {
     if (halvings < most_halvings && is_told()) {
       const double middle = interval.middle(), value = values[4];
@@ -281,7 +281,7 @@ class SignSearch {
     node(interval.to, interval.sign, &curve);
   }
 
-  /// `piece` is the curve from `low` to `high`, as a polynomial on [0, 1].
+  /// `piece` is the curve from `low` to `high`, mapped to [0, 1].
   void walk(const Curve& curve, const BernsteinPolynomial& piece, double low, double high, int halvings, By by,
             const Band& band, Doubtful& doubtful) {
     if (const int side = piece.side(band.value); side != 0) {
@@ -304,7 +304,7 @@ class SignSearch {
     }
   }
 
-  /// What rises or falls all through has a zero or none, as its ends tell; anything else takes a closer look.
+  /// A monotone run has a root if its ends differ in sign; any other run is examined more closely.
   void close(Doubtful& doubtful, double to, By by) {
     const bool is_known = !doubtful.open || doubtful.slope != 0;
     const double from = doubtful.from;
@@ -326,8 +326,7 @@ class SignSearch {
     if (other) node(*other, -line_.sign());
   }
 
-  /// Goes on to a place where the function has a sign, 0 where that says nothing; a value that is not finite forgets
-  /// all before it.
+  /// Adds the sign at a place. A value that is not finite makes all earlier signs irrelevant.
   void node(double u, double value) {
     if (!std::isfinite(value)) {
       line_.forget(u);
@@ -351,13 +350,13 @@ class SignSearch {
   int samples_left_ = 0;
   bool is_finite_ = true;
   double first_value_ = 0, last_value_ = 0;  // at the ends of the step
-  double missed_ = 0;                        // by the polynomial there, and where it was measured
+  double missed_ = 0;                        // error of dense output, at the ends and where it was measured
   bool is_measured_ = false, is_unsure_ = false;
 };
 
-/// The instant of a change: the zero to within `tolerance`, or of a jump the first place that was seen behind it.
-/// Newton's method with the slope of the guess, then secants, halving where they lead nowhere. The last place that
-/// `sight` is asked for is the one that is returned. None where full order does not have this change.
+/// The instant of a sign change: its root to within `tolerance`, or for a jump the first place seen behind it. Newton's
+/// method with the slope of the guess, then secants, with bisection as the safeguard. The place returned is the last
+/// one at which `sight` was evaluated. Nothing if the change does not exist at full order.
 template <class Sight>
 std::optional<double> locate(Sight& sight, const SignChange& change, double tolerance) {
   double from = change.from, to = change.to;
@@ -383,8 +382,8 @@ std::optional<double> locate(Sight& sight, const SignChange& change, double tole
   return to;
 }
 
-/// The same of a change that may be beside the places that it was seen between, as jumps are where states of full order
-/// are rounded: not far from there, and from `low` to `high`.
+/// Like locate, for a change that may lie beside the interval in which it was seen, as jumps do where states at full
+/// order are rounded: close to it, and within [low, high].
 template <class Sight>
 std::optional<double> locate_beside(Sight& sight, SignChange change, double low, double high, double tolerance) {
   constexpr double furthest = 1e-6;

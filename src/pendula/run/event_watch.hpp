@@ -19,28 +19,28 @@ namespace pendula {
 
 namespace detail {
 
-/// Of the polynomial that shows a step: through the stages of an implicit method, the series itself, else a cubic.
+/// Degree of dense output: the stages of an implicit method, the series of taylor, else a cubic.
 inline int glance_degree(const RunOptions& options) {
   if (options.method == Method::taylor) return 8;
   return is_explicit(options.method) ? 3 : options.stages;
 }
 
-/// The last step of an integrator, as events are looked for in it: by the share of it that is done, 0 to 1, which is at
-/// `time`.
+/// The last step of an integrator as the event search sees it; `share` is the fraction of the step that is done, 0 to
+/// 1, which `time` corresponds to.
 class LastStep {
  public:
   explicit LastStep(Integrator& integrator) : integrator_(integrator) {}
 
   void state(Motion& motion) const { motion = integrator_.state(); }
   void glance(double /*share*/, double time, Motion& motion) { motion = integrator_.glance(time); }
-  /// `begin` is where it began.
+  /// `begin` is the state at the start of the step.
   bool look(const Motion& /*begin*/, double time, Motion& motion) { return bool(integrator_.look(time, motion)); }
 
  private:
   Integrator& integrator_;
 };
 
-/// States of a step that were looked at: those that every event begins with, and the last one.
+/// Cached states of a step: those that the search for every event begins with, and the last one.
 struct StepViews {
   struct View {
     double share = -1;
@@ -54,7 +54,7 @@ struct StepViews {
   }
 };
 
-/// The states of a step, by the share of it that is done. `Step` is as LastStep.
+/// States within a step by the fraction of it that is done. `Step` has the interface of LastStep.
 template <class Step>
 class StepStates {
  public:
@@ -66,13 +66,13 @@ class StepStates {
   double time(double u) const { return u == 1 ? end_.time : begin_.time + u * (end_.time - begin_.time); }
   double length() const { return end_.time - begin_.time; }
 
-  /// Of which a place is to be told, at best: a few roundings of the time.
+  /// Smallest meaningful fraction of the step: a few roundings of the time.
   double resolution() const {
     const double latest = std::max(std::abs(begin_.time), std::abs(end_.time));
     return 2 * std::numeric_limits<double>::epsilon() * (latest / length() + 1);
   }
 
-  /// By the step's polynomial.
+  /// By dense output.
   const Motion& glance(double u) {
     for (StepViews::View& view : views_.kept) {
       if (view.share == u) return view.motion;
@@ -83,7 +83,7 @@ class StepStates {
     return new_glance(u, views_.passing);
   }
 
-  /// At full order; the polynomial's where the step cannot be taken.
+  /// At full order; by dense output if the step fails.
   const Motion& look(double u) {
     if (u <= 0) return begin_;
     if (u >= 1) return end_;
@@ -106,7 +106,7 @@ class StepStates {
   EventCost& cost_;
 };
 
-/// One function of them.
+/// Values of one event function within a step.
 template <class Step>
 class StepValues {
  public:
@@ -128,7 +128,7 @@ class StepValues {
   const Motion* seen_ = nullptr;
 };
 
-/// A formula of them. One of the time alone takes no state but where something happens.
+/// Values of an event formula within a step. A formula of time alone needs no states except where something happens.
 template <class Step>
 class FormulaValues {
  public:
@@ -165,36 +165,36 @@ class FormulaValues {
 
 }  // namespace detail
 
-/// Finds the events of a run, step by step, and counts them. The motion does not depend on it.
+/// Finds and counts the events of a run step by step. The motion does not depend on it.
 class EventWatch {
  public:
-  /// `degree` of the polynomial of a step (SignSearch).
+  /// `degree` of dense output (SignSearch).
   EventWatch(std::vector<Event> events, int degree)
       : events_(std::move(events)), tallies_(events_.size()), sides_(events_.size()), degree_(degree) {}
 
-  /// The same of another method.
+  /// For a change of the method.
   void set_degree(int degree) { degree_ = degree; }
 
   const std::vector<Event>& events() const { return events_; }
   const std::vector<EventTally>& tallies() const { return tallies_; }
   const EventCost& cost() const { return cost_; }
 
-  /// Begins where the motion does: what is zero there has not happened.
+  /// Starts with the motion; a root at the start is no event.
   void start(const Motion& motion) {
     motion_ = motion;
     for (std::size_t k = 0; k < events_.size(); ++k) sides_[k] = side_at(events_[k], motion);
   }
 
-  /// Begins where something has happened, and does not once more.
+  /// Starts from an event that has happened, which is not found again.
   void start_after(const Occurrence& happened) {
     start(happened.motion);
     sides_[happened.event] = {0, happened.up ? 1 : -1};
   }
 
-  /// Others in their place, of the same functions.
+  /// Replaces the events by others with the same functions.
   void replace(std::vector<Event> events) { events_ = std::move(events); }
 
-  /// One more, where the motion has come to.
+  /// Adds an event from the current motion on.
   void add(Event event, const Motion& motion) {
     motion_ = motion;
     sides_.push_back(side_at(event, motion));
@@ -202,13 +202,13 @@ class EventWatch {
     events_.push_back(std::move(event));
   }
 
-  /// Goes on at `motion`, with a member of what had come there.
+  /// Continues at `motion`, after the numbers of a member were restored.
   void resume(const Motion& motion) { motion_ = motion; }
 
-  /// What happened in the step that `integrator` has just taken, by time; nothing after an event that ends the run.
+  /// The events in the last step of `integrator`, in order of time, up to the first that ends the run.
   std::vector<Occurrence> after_step(Integrator& integrator) { return after_step(detail::LastStep(integrator)); }
 
-  /// The same of any other step that shows itself as LastStep does.
+  /// The events in the last step of anything with the interface of LastStep.
   template <class Step>
   std::vector<Occurrence> after_step(Step step) {
     std::swap(before_, motion_);
@@ -232,10 +232,10 @@ class EventWatch {
   }
 
  private:
-  /// Where a function has come to.
+  /// State of an event's function at the end of the last step.
   struct Side {
     double value = 0;
-    int sign = 0;  // the last that was not 0; 0 where it is not known
+    int sign = 0;  // the last nonzero sign; 0 if unknown
   };
 
   static Side side_at(const Event& event, const Motion& motion) {
@@ -263,7 +263,7 @@ class EventWatch {
       const std::vector<SignChange> changes = search.find(before.value, last, before.sign, by);
       return search.is_told() && locate_all(k, changes, values, resolution, found);
     };
-    // States of full order are dear: a function that they did not tell once is not looked at by them again.
+    // States at full order are expensive: after one failure they are not used again for this function.
     const bool may_tell = std::isnan(tallies_[k].not_told);
     const bool is_found =
         search_by(SeenBy::polynomial) || ((search.is_told() || may_tell) && search_by(SeenBy::full_order));
@@ -273,7 +273,7 @@ class EventWatch {
     if (!is_found) note(tallies_[k].not_told);
   }
 
-  /// Adds what happened at changes; nothing, and false, where the motion does not have one of them.
+  /// Adds the occurrences at these changes; adds nothing and returns false if the motion lacks one of them.
   template <class Values>
   bool locate_all(std::size_t k, const std::vector<SignChange>& changes, Values& values, double resolution,
                   std::vector<Occurrence>& found) const {
@@ -293,8 +293,8 @@ class EventWatch {
     return true;
   }
 
-  /// Where a function crosses zero, states that are rounded may cross it several times within their rounding: there and
-  /// back is nothing, and twice is once.
+  /// Near a root, rounded states may cross zero several times within their rounding. Two crossings in opposite
+  /// directions cancel, two in the same direction count once.
   static void forget_noise(std::size_t first, double resolution, std::vector<Occurrence>& found) {
     for (std::size_t n = first; n + 1 < found.size();) {
       if (found[n + 1].motion.time - found[n].motion.time > most_noise * resolution) {
@@ -308,12 +308,12 @@ class EventWatch {
     }
   }
 
-  /// The first time that something was so.
+  /// Keeps the first time.
   void note(double& time) const {
     if (std::isnan(time)) time = motion_.time;
   }
 
-  static constexpr double most_noise = 16;  // of instants, in resolutions: 3.4 were seen
+  static constexpr double most_noise = 16;  // between instants, in resolutions; 3.4 were observed
 
   std::vector<Event> events_;
   std::vector<EventTally> tallies_;

@@ -16,25 +16,25 @@
 
 namespace pendula {
 
-/// Finds every change of sign of a formula within a step, however narrow: from what its numbers are along the step, and
-/// what it is of them.
+/// Finds every sign change of a formula within a step, however narrow, from enclosures of its quantities along the step
+/// and interval arithmetic.
 ///
-/// Four samples of its numbers bound these on the whole step, and the formula is bounded by them: so end most steps.
-/// Else the numbers are interpolated, at nine places, or halves where they turn more often than that tells. On a part
-/// of the step Bernstein coefficients bound them and their slopes, and interval arithmetic the formula and its slope. A
-/// part is halved until the formula has one sign there or rises or falls all through, or until it is not known better
-/// at one place than in the whole part. What is left then is looked at more closely: interpolated anew, from fewer
-/// samples of the polynomial, then from states of full order, and at last where it turns. A formula of the time alone
-/// is known at once, to rounding.
+/// A few samples bound the quantities over the whole step, and the formula is enclosed with these bounds; most steps
+/// end here. Otherwise the quantities are interpolated at nine places, on halves of the step where these do not resolve
+/// them. On each part, Bernstein coefficients enclose the quantities and their slopes, and interval arithmetic encloses
+/// the formula and its slope. Parts are halved until the formula has one sign or is monotone there, or until its
+/// enclosure at one place is no narrower than that on the part. What is then undecided is examined more closely:
+/// interpolated on shorter intervals by dense output, then at full order, and finally by its extremum. A formula of
+/// time alone is known to rounding from the start.
 ///
-/// `Sight` has size(), time(u), resolution(), glance(u, numbers), by the polynomial, look(u, numbers), at full order,
-/// value(time, numbers) and reach(time, numbers); u runs from 0 to 1.
+/// `Sight` provides size(), time(u), resolution(), glance(u, numbers), by dense output, look(u, numbers), at full
+/// order, value(time, numbers) and reach(time, numbers); u runs from 0 to 1.
 template <class Sight>
 class FormulaSearch {
  public:
   using By = SeenBy;
 
-  /// `degree` of the step's polynomial: how fast its error falls with the length of the step.
+  /// `degree` of the dense output: how fast its error falls with the length of the step.
   FormulaSearch(Sight& sight, int degree)
       : sight_(sight),
         degree_(static_cast<std::size_t>(std::clamp(degree, 1, 8))),
@@ -66,7 +66,7 @@ class FormulaSearch {
     return is_told() ? line_.take() : changes_by_ends(sign, sign_of(last));
   }
 
-  /// As those of SignSearch.
+  /// As in SignSearch.
   bool is_finite() const { return is_finite_; }
   bool is_told() const { return samples_left_ > 0 && parts_left_ > 0; }
 
@@ -77,37 +77,38 @@ class FormulaSearch {
   using Samples = BernsteinPolynomial::Numbers;
   using Defined = Reach::Defined;
 
-  /// A number of the formula from one place of the step to another, how far it and its slope may be off.
+  /// A quantity of the formula on an interval of the step, with error bounds of its value and slope.
   struct Number {
     BernsteinPolynomial values, slopes;
     double band, slope_band;
   };
 
-  /// All of them.
+  /// All quantities on an interval.
   struct Fit {
     double from = 0, to = 1;
     std::vector<Number> numbers = {};
-    /// How far samples may be off what is in between, relative to the largest; 0 where closer ones would not tell more.
+    /// Error bound of interpolation between the samples, relative to the largest value; 0 if closer samples would not
+    /// help.
     double roughness = 0;
-    bool is_resolved = true;  // they are about what this says
-    bool is_blurred = false;  // they are as rough as they vary
+    bool is_resolved = true;  // the interpolants are accurate to about 1e-3 of their variation
+    bool is_blurred = false;  // the error of an interpolant is comparable to its variation
 
     double width() const { return to - from; }
     double at(double x) const { return x == 1 ? to : from + x * width(); }
     double local(double u) const { return (u - from) / width(); }
   };
 
-  /// A part of a fit.
+  /// A subinterval of a fit, as places in [0, 1].
   struct Part {
     double low, high;
   };
 
-  /// Parts in which the formula may be zero, one after the other.
+  /// A run of consecutive parts in which the formula may be zero.
   struct Doubtful {
     bool open = false;
     double from = 0;
-    int slope = 0;                    // of all of them, or 0
-    double roughness = 0, width = 0;  // the largest of fits
+    int slope = 0;                    // common sign of their slopes, or 0
+    double roughness = 0, width = 0;  // largest ones of the fits
   };
 
   // --- Samples ---
@@ -130,8 +131,8 @@ class FormulaSearch {
     return sight_.value(sight_.time(u), numbers_);
   }
 
-  /// By samples at five Chebyshev points, both ends of the step among them, and a sixth, which tells that no number
-  /// turns often in the step. None varies by more than twice what it was seen to.
+  /// Uses samples at five Chebyshev points, including both ends of the step, and a sixth against aliasing. Assumes that
+  /// no quantity varies by more than twice what the samples show.
   bool is_far_from_zero() {
     std::vector<std::array<double, 5>> seen(sight_.size());
     for (std::size_t k = 0; k < 5; ++k) {
@@ -152,8 +153,8 @@ class FormulaSearch {
     return decide(reach, reach.value, {}, {0, 1}, By::polynomial, 0, none);
   }
 
-  /// How far the polynomial misses: at the ends, where rates by it do, where it does most, and elsewhere, since a
-  /// number may turn at one of these places.
+  /// Measures the error of dense output: at the ends, where its rates are off; where its error is largest; and at a
+  /// third place, because a quantity may have an extremum at one of these.
   void measure() {
     const double place = place_of_miss(degree_);
     for (const double end : {0.0, 1.0}) compare(end, 1);
@@ -168,7 +169,7 @@ class FormulaSearch {
     }
   }
 
-  // --- What numbers are in between ---
+  // --- Interpolation of the quantities ---
 
   Fit fitted(double from, double to, By by) {
     Fit fit{from, to};
@@ -185,7 +186,7 @@ class FormulaSearch {
       const double noise = 64 * epsilon * largest_[n];
       double tail = 2 * (sizes[points - 2] + sizes[points - 1]), miss = 0;
       if (by == By::polynomial) {
-        const double whole = 1 / std::pow(fit.width(), static_cast<double>(degree_));  // from coefficients here
+        const double whole = 1 / std::pow(fit.width(), static_cast<double>(degree_));  // from this part to the step
         tail = std::max(tail, std::abs(numbers_[n] - polynomial(odd_place)));
         if (sizes[degree_] > noise) last_[n] = std::max(last_[n], sizes[degree_] * whole);
         miss = missed_[n] + last_[n];
@@ -193,7 +194,7 @@ class FormulaSearch {
       fit.is_resolved &= tail <= 1e-3 * variation + noise;
       fit.is_blurred |= tail > 1e-2 * variation + noise;
       if (tail > noise + miss) fit.roughness = std::max(fit.roughness, tail / largest_[n]);
-      // Of a derivative by Markov's inequality.
+      // Bound of the derivative of a polynomial, by Markov's inequality.
       const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
       fit.numbers.push_back(
           {polynomial, polynomial.slopes(), tail + noise + miss,
@@ -202,7 +203,7 @@ class FormulaSearch {
     return fit;
   }
 
-  /// The formula over a part of a fit, or at one place of it.
+  /// Enclosure of the formula on a part of a fit, or at one place of it.
   Reach reach(const Fit& fit, const Part& part) {
     const bool is_place = part.low == part.high;
     const auto within = [&](const BernsteinPolynomial& polynomial, double band) -> Interval {
@@ -220,9 +221,9 @@ class FormulaSearch {
         reaches_);
   }
 
-  // --- Where it changes its sign ---
+  // --- Sign changes ---
 
-  /// `roughness` is that of samples that were further apart.
+  /// `roughness` is that of the wider fit before.
   void search(double from, double to, By by, int level, double roughness) {
     Doubtful doubtful;
     search(from, to, by, level, roughness, doubtful);
@@ -230,8 +231,8 @@ class FormulaSearch {
   }
   void search(double from, double to, By by, int level, double roughness, Doubtful& doubtful) {
     Fit fit = fitted(from, to, by);
-    // What closer samples do not make better is no roughness, but noise of steps that are taken one by one. Of the sign
-    // that says nothing where it is all that is seen.
+    // Roughness that closer samples do not reduce is noise of states at full order, each by a step of its own. If all
+    // that is seen is noise, it says nothing about the sign.
     const bool is_fine = by == By::full_order && fit.roughness < 1e-6;
     const bool is_noise = is_fine && fit.roughness > roughness / 4;
     if (is_noise || (is_fine && fit.is_blurred)) fit.roughness = 0;
@@ -271,13 +272,13 @@ class FormulaSearch {
     doubtful.width = std::max(doubtful.width, fit.width());
   }
 
-  /// Whether the formula is known worse in a part of a fit than at one place of it.
+  /// Whether the enclosure on a part of a fit is wider than that at one place of it.
   static bool is_wider(const Reach& part, const Reach& place) {
     if (place.defined != Defined::everywhere || place.value.width() == Interval::infinity) return false;
     return part.defined != Defined::everywhere || part.value.width() > 2 * place.value.width();
   }
 
-  /// Whether the formula, which is `value` in a part of a fit, does not change its sign there.
+  /// Whether the formula, enclosed by `value`, certainly does not change sign in a part of a fit.
   bool decide(const Reach& reach, const Interval& value, const Fit& fit, const Part& part, By by, int level,
               Doubtful& doubtful) {
     if (reach.defined == Defined::nowhere) {
@@ -298,7 +299,7 @@ class FormulaSearch {
     return true;
   }
 
-  /// Goes on to a place of a fit where the sign is certain, or 0 where it is not.
+  /// Adds the sign at a place of a fit, 0 if it is not certain.
   void settle(const Fit& fit, double place, int side, By by, int level, Doubtful& doubtful) {
     if (side == 0) return;
     const double u = fit.at(place);
@@ -307,7 +308,7 @@ class FormulaSearch {
     if (change != nullptr && change->from >= fit.from && change->from < change->to) guess(fit, *change);
   }
 
-  /// What rises or falls all through has a zero or none, as its ends tell; anything else takes a closer look.
+  /// A monotone run has a root if its ends differ in sign; any other run is examined more closely.
   void close(Doubtful& doubtful, double to, By by, int level) {
     const Doubtful seen = std::exchange(doubtful, {});
     if (!seen.open || seen.slope != 0 || !is_told()) return;
@@ -321,7 +322,7 @@ class FormulaSearch {
       if (other) line_.go_on(*other, -line_.sign());
     }
   }
-  /// By fits that are less wide.
+  /// Searches again with narrower fits.
   void closer(const Doubtful& seen, double to, By by, int level) {
     const double roughness = seen.roughness > 0 ? seen.roughness : 1;
     if (to - seen.from < 0.75 * seen.width) return search(seen.from, to, by, level, roughness);
@@ -332,9 +333,9 @@ class FormulaSearch {
     close(doubtful, to, by, level);
   }
 
-  // --- Where about the zero is ---
+  // --- Approximate roots ---
 
-  /// The formula as a fit shows it.
+  /// The formula evaluated with the interpolants of a fit.
   struct Shown {
     FormulaSearch& search;
     const Fit& fit;
@@ -362,8 +363,8 @@ class FormulaSearch {
   SignLine line_;
   std::vector<double> numbers_;  // the last sample
   std::vector<Reach> reaches_;
-  // Of each number: the largest that was seen, by how much the polynomial was seen to miss it, and its last
-  // coefficient.
+  // For each quantity: the largest absolute value seen, the measured error of dense output, and the last coefficient of
+  // its polynomial.
   std::vector<double> largest_, missed_, last_;
   bool is_finite_ = true;
   int samples_left_ = 0, parts_left_ = 0;

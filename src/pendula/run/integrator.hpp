@@ -23,7 +23,7 @@
 
 namespace pendula {
 
-/// What really runs, where the options left it open.
+/// What actually runs, where the options left it open.
 struct Description {
   std::string solver;     ///< "dense" or "chain"; empty for explicit methods
   std::string iteration;  ///< "newton" or "fixed-point"; empty for explicit methods
@@ -33,11 +33,11 @@ struct Description {
 /// Any method on any system, chosen at run time.
 class Integrator {
  public:
-  /// `coordinates` is how many the system has; `system` how messages call it.
+  /// `coordinates` is the number of coordinates; `system` is what messages call the system.
   Integrator(std::unique_ptr<PlainIntegrator> integrator, Eigen::Index coordinates, std::string_view system)
       : integrator_(std::move(integrator)), coordinates_(coordinates), system_(system) {}
 
-  /// Starts a run. Fails where the method's coordinates do (at a pole). Throws std::invalid_argument on another number
+  /// Starts a run. Fails where the method's coordinates do (at a pole). Throws std::invalid_argument for a wrong number
   /// of coordinates.
   Outcome start(const Motion& motion) {
     require_size("coordinates", motion.q.size());
@@ -45,8 +45,8 @@ class Integrator {
     return integrator_->start(motion.time, motion.q.data(), motion.v.data());
   }
 
-  /// Advances by `h`; an adaptive method takes one accepted step of its own size, at most `h`. On failure the state
-  /// stays what it was.
+  /// Advances by `h`; an adaptive method takes one accepted step of its own size, at most `h`. On failure the state is
+  /// unchanged.
   Outcome step(double h) { return integrator_->step(h); }
 
   double time() const { return integrator_->time(); }
@@ -57,33 +57,33 @@ class Integrator {
     return motion;
   }
 
-  /// Whether steps are remembered from now on, so that glance and look can go back into the last one; it costs a copy
-  /// of the state a step.
+  /// Whether to remember steps from now on, so that glance and look can go back into the last one; this costs a copy of
+  /// the state per step.
   void remember_steps(bool wanted) { integrator_->remember_steps(wanted); }
 
-  /// The state at `time` within the last step by the polynomial through its stages: cheap. Positions are of one order
-  /// more than there are stages, rates of as many.
+  /// The state at `time` within the last step by dense output, the polynomial through its stages: cheap. Its order is
+  /// one more than the number of stages for positions, that number for rates.
   Motion glance(double time) {
     Motion motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
     integrator_->glance(time, motion.q.data(), motion.v.data());
     return motion;
   }
 
-  /// The same at the full order of the method: by a step from where the last one began. The integrator is left as it
-  /// was; `motion` is set where the outcome is ok.
+  /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
+  /// began. The integrator is unchanged; `motion` is set if the outcome is ok.
   Outcome look(double time, Motion& motion) {
     double work = 0;
     return look(time, motion, work);
   }
 
-  /// And what loads have brought by then  [J].
+  /// Also sets `work` to the work of loads until then  [J].
   Outcome look(double time, Motion& motion, double& work) {
     motion = Motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
     return integrator_->look(time, motion.q.data(), motion.v.data(), work);
   }
 
-  /// From now on steps and looks that take long end by Status::interrupted where `stop` says so, and what it was before
-  /// no longer does; gives that.
+  /// From now on, long steps and looks end with Status::interrupted when `stop` says so. Replaces and returns the sign
+  /// used before.
   StopSign heed(StopSign stop) {
     integrator_->heed(stop);
     return std::exchange(stop_, stop);
@@ -91,52 +91,52 @@ class Integrator {
 
   const Statistics& statistics() const { return integrator_->statistics(); }
 
-  /// A copy of all that the next steps depend on.
+  /// A copy of everything that the next steps depend on.
   Member member() const { return member_of(*integrator_); }
 
-  /// Goes on where the integrator was that `member` is a copy of, to the last bit; instead of `start`. That the system
-  /// and the options are the same is the caller's to know: refused, by std::invalid_argument, is only another number of
-  /// numbers.
+  /// Continues from `member`, a copy of another integrator's, to the last bit; replaces `start`. The caller must ensure
+  /// that the system and the options are the same: std::invalid_argument is thrown only for a wrong number of numbers.
   void resume(const Member& member) { become(*integrator_, member); }
 
-  /// From now on every step leaves its derivative behind, for `push`; gives how many rows a tangent has. Throws
-  /// std::invalid_argument for methods that have none: explicit ones, and the velocity form.
+  /// From now on every step keeps its derivative, for `push`. Returns the number of rows of a tangent. Throws
+  /// std::invalid_argument for methods without a derivative: explicit ones, and the velocity form.
   int linearize() {
     rows_ = integrator_->linearize();
     if (rows_ > 0) return rows_;
     throw std::invalid_argument("tangents: expected method = gauss or radau in momentum form, other steps have none");
   }
 
-  /// The largest z for which a step makes e^(−z) of a tangent that decays, but for `error` of z, once `linearize` has
-  /// asked for derivatives.
+  /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z; valid after
+  /// linearize().
   double resolved_decay(double error) const { return integrator_->resolved_decay(error); }
 
-  /// Replaces tangents at the start of the last step, (rows x any), by those at its end: by the exact derivative of the
-  /// step. Coordinates are the integrator's own: of a chain those of chain_tangent.hpp, of a generated kernel (δq, δp).
+  /// Replaces tangents at the start of the last step, (rows x any), by those at its end, using the exact derivative of
+  /// the step. Tangents are in the integrator's own coordinates: for a chain those of chain_tangent.hpp, for a
+  /// generated kernel (δq, δp).
   void push(Directions<>& tangents) {
     require("tangents", tangents, rows_, tangents.cols());
     integrator_->push(tangents.data(), static_cast<int>(tangents.cols()), nullptr);
   }
 
-  /// Rows of a variation of the parameters, once `linearize` has asked for derivatives: masses, lengths … of a chain as
-  /// chain_tangent.hpp numbers them, of a generated kernel its parameters, then its inputs.
+  /// Number of rows of a variation of the parameters; valid after linearize(). The rows are masses, lengths … of a
+  /// chain as chain_tangent.hpp numbers them; for a generated kernel its parameters, then its inputs.
   int parameters() { return integrator_->parameters(); }
 
-  /// The same where parameters vary, too, by (parameters x as many).
+  /// Also varies the parameters, (parameters x as many).
   void push(Directions<>& tangents, const Directions<>& parameters) {
     require("tangents", tangents, rows_, tangents.cols());
     require("parameters", parameters, this->parameters(), tangents.cols());
     integrator_->push(tangents.data(), static_cast<int>(tangents.cols()), parameters.data());
   }
 
-  /// The transpose: replaces gradients with respect to the end of the last step, (rows x any), by those with respect to
-  /// its start.
+  /// The transpose of push: replaces gradients with respect to the end of the last step, (rows x any), by those with
+  /// respect to its start.
   void pull(Directions<>& gradients) {
     require("gradients", gradients, rows_, gradients.cols());
     integrator_->pull(gradients.data(), static_cast<int>(gradients.cols()), nullptr);
   }
 
-  /// And adds those with respect to the parameters to (parameters x as many).
+  /// Also adds the gradients with respect to the parameters to `parameters`, (parameters x as many).
   void pull(Directions<>& gradients, Directions<>& parameters) {
     require("gradients", gradients, rows_, gradients.cols());
     require("parameters", parameters, this->parameters(), gradients.cols());
@@ -164,12 +164,12 @@ class Integrator {
 
   std::unique_ptr<PlainIntegrator> integrator_;
   Eigen::Index coordinates_;
-  int rows_ = 0;  // of tangents; 0: nobody has asked for derivatives
+  int rows_ = 0;  // of tangents; 0 before linearize()
   std::string system_;
   StopSign stop_;
 };
 
-/// Has an integrator heed a sign for as long as it lives.
+/// Makes an integrator heed a stop sign within a scope.
 class Heeding {
  public:
   Heeding(Integrator& integrator, StopSign stop) : integrator_(integrator), before_(integrator.heed(stop)) {}
@@ -182,9 +182,9 @@ class Heeding {
   StopSign before_;
 };
 
-/// The integrator of the method that `options` ask for (Integrator::step is told its size), of the compiled library for
-/// this processor. Throws NoKernel, naming the PENDULA_KERNELS to configure, where a dense kernel is needed and not
-/// built in; std::invalid_argument for options that make no sense, and for a PENDULA_ARCH as library() does.
+/// The integrator for `options` from the compiled library for this processor (Integrator::step is told the step size).
+/// Throws NoKernel, naming the PENDULA_KERNELS to configure, if a dense kernel is needed that is not built in;
+/// std::invalid_argument for options that make no sense, and for a PENDULA_ARCH as library() does.
 template <class Space>
 std::unique_ptr<Integrator> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
   const std::vector<PlainChain::Drive> drives = plain_drives(chain);
@@ -199,7 +199,7 @@ struct KernelInfo {
   int links = 0;
 };
 
-/// Those in this build, by space and number of links.
+/// The kernels in this build, by space and number of links.
 inline std::vector<KernelInfo> built_in_kernels() {
   std::vector<KernelInfo> kernels;
   for (const auto& tables : {library().planar.kernels, library().spatial.kernels}) {

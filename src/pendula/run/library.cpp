@@ -9,7 +9,8 @@
 namespace pendula {
 namespace {
 
-// What cmake/PendulaLibrary.cmake compiles a copy for; besides the processor, the system has to save the registers.
+// The instruction sets that cmake/PendulaLibrary.cmake compiles copies for. __builtin_cpu_supports also asks whether
+// the operating system saves the registers.
 bool processor_has([[maybe_unused]] std::string_view instruction_set) {
 #ifdef __x86_64__
   const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");

@@ -13,50 +13,51 @@
 
 namespace pendula {
 
-/// What the compiled library offers for chains of one space.
+/// The part of the compiled library for chains of one space.
 struct SpaceLibrary {
-  /// As make_integrator, of integrator.hpp.
+  /// As make_integrator of integrator.hpp.
   std::unique_ptr<PlainIntegrator> (*make_integrator)(const PlainChain&, const RunOptions&);
   /// The fixed-n kernels of this build, by number of links.
   std::span<const SystemTable* const> kernels;
-  /// Members in lanes; nullptr for methods and stages that move them one by one.
+  /// Moves members in lanes; nullptr for methods and stages that move members one by one.
   MoveMembers* (*lanes)(const RunOptions&);
-  /// The same with a tangent of each; nullptr for methods that have none.
+  /// The same with a tangent of each member; nullptr for methods that have none.
   MoveMembers* (*tangent_lanes)(const RunOptions&);
 };
 
-/// The compiled library for one instruction set. There are several in one file, each compiled for itself; all that
-/// passes between them and a program is what is in here: numbers, pointers to them, classes of nothing but virtual
-/// functions. So it does not matter how either was compiled. (How Eigen's vectors lie in memory and who may free them
-/// depends on flags such as -mavx.)
+/// The compiled library for one instruction set. A program contains several, compiled with different flags; only what
+/// is declared here passes between them and the program: numbers, pointers to numbers, and classes with virtual
+/// functions only. So it does not matter how either was compiled. (The memory layout of Eigen's vectors, and who may
+/// free them, depend on flags such as -mavx.)
 struct Library {
-  std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" where there is one only
+  std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" if there is only one
   SpaceLibrary planar, spatial;
-  std::span<const SystemTable* const> systems;  ///< kernels of this build that are no chains
-  /// Every method over these, and over any other kernel; `parts` is what failures name, 0 for the coordinates. Throws
-  /// as make_integrator.
+  std::span<const SystemTable* const> systems;  ///< kernels of this build other than chains
+  /// Every method for these kernels and any other. `parts` is the number of parts that failures name, 0 for the
+  /// coordinates. Throws as make_integrator.
   std::unique_ptr<PlainIntegrator> (*make_system_integrator)(const SystemTable&, const PlainSystem&, const RunOptions&,
                                                              int parts);
-  /// Members of these, and of any other kernel, in lanes; nullptr for methods that move them one by one.
+  /// Moves members of any kernel in lanes; nullptr for methods that move members one by one.
   MoveSystemMembers* (*system_lanes)(const RunOptions&);
-  /// The same with a tangent of each; nullptr for methods that have none.
+  /// The same with a tangent of each member; nullptr for methods that have none.
   MoveSystemMembers* (*system_tangent_lanes)(const RunOptions&);
-  /// Makes directions, (rows, count) numbers row by row, an orthonormal basis of what the first of them span, for any
-  /// number of them; `lengths`, (count), gets |R_kk| of the QR decomposition, by Householder reflections.
+  /// Replaces directions, (rows, count) numbers row by row, by an orthonormal basis such that the first k span what the
+  /// first k did, for every k. `lengths`, (count), is set to |R_kk| of the QR decomposition, by Householder
+  /// reflections.
   void (*make_orthonormal)(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
-  /// Functions of kernels that are no code but programs (system/interpreted_kernel.hpp).
+  /// Functions of interpreted kernels (system/interpreted_kernel.hpp).
   const ProgramInterpreter* interpreter;
 };
 
-/// The library for the best instruction set that this processor has, or for the lesser one that the environment
-/// variable PENDULA_ARCH asks for, which is read once. Throws std::invalid_argument where PENDULA_ARCH names none of
-/// this build, or one that the processor lacks; std::runtime_error where the processor has none of this build.
+/// The library for the best instruction set of this processor, or for the lesser one that the environment variable
+/// PENDULA_ARCH asks for, which is read once. Throws std::invalid_argument if PENDULA_ARCH names none of this build, or
+/// one that the processor lacks; std::runtime_error if the processor supports none of this build.
 const Library& library();
 
-/// The instruction set without which a processor runs nothing of this build; empty where it runs on all of its kind.
+/// The instruction set that a processor needs to run this build; empty if every processor of its kind can.
 std::string_view needed_instruction_set();
 
-/// Its part for one space.
+/// The part of the library for one space.
 template <class Space>
 const SpaceLibrary& library_of() {
   return Space::dof == 1 ? library().planar : library().spatial;

@@ -18,26 +18,27 @@ namespace pendula {
 namespace {
 
 constexpr double smallest = std::numeric_limits<double>::min();
-// How much more the fastest tangent may have grown than the slowest: what QR tells has as many digits less.
+// How much more the fastest tangent may grow than the slowest before they are made orthonormal; QR loses as many
+// digits.
 constexpr double parted = 1e3;
 
-/// What tangents are measured by, of a motion's start and all along: Σ (m ω² δq² + δp²/m)/ω, an energy, so that neither
-/// units nor the sizes of masses matter, and pairs of exponents stay pairs.
+/// Scales of tangents, fixed at the start of a motion: the squared norm is an energy over a rate, Σ (m ω² δq² +
+/// δp²/m)/ω. So neither units nor the sizes of masses matter, and exponents come in pairs.
 struct TangentScale {
-  Eigen::VectorXd rows;  ///< that each is multiplied with
-  double rate = 1;       ///< that the motion changes by where it starts, or what is beside it  [1/s]
+  Eigen::VectorXd rows;  ///< factors of the rows
+  double rate = 1;       ///< initial rate of change of the motion  [1/s]
 };
 
-/// From the derivative of a step that is next to nothing, which `integrator` then has taken; none where it cannot.
-/// `rows` as Integrator::linearize tells.
+/// Finds the scales from the derivative of a tiny step, which `integrator` has taken afterwards; nothing if it fails.
+/// `rows` as from Integrator::linearize.
 std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& start, int rows, double duration) {
   const double h = std::max(1e-10 * duration, 1e-12 * std::abs(start.time));
   TangentScale scale{Eigen::VectorXd::Ones(rows), 1};
   integrator.start(start);
   if (!(h > 0) || !integrator.step(h)) return {};
   const Eigen::Index half = rows / 2;
-  // Of a momentum's unit, what coordinates are moved by: the inverse mass; then the pushes of coordinates, which
-  // compare by that. In space there are three a link, of which the one along it moves nothing.
+  // Momenta that move a coordinate: their inverse mass. In space a link has three components, one of which, along the
+  // link, moves nothing; they share the largest.
   const Eigen::Index group = rows == 2 * start.q.size() ? 1 : 3;
   Eigen::VectorXd mobility(half), kept(half);
   const auto pushed_columns = [&](Eigen::Index begin, Eigen::Index end, auto take) {
@@ -53,19 +54,19 @@ std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& 
     mobility[of] = std::abs(column[of]) / h;
     kept[of] = column[half + of];
   });
-  double loss = 0;  // of momenta, by damping; how many directions of a group there are, their sum tells
+  double loss = 0;  // decay rate of momenta by damping; the sum over a group tells its number of directions
   for (Eigen::Index first = 0; first < half; first += group) {
     mobility.segment(first, group).setConstant(mobility.segment(first, group).maxCoeff());
     const double sum = kept.segment(first, group).sum(), whole = std::max(1.0, std::round(sum));
     loss = std::max(loss, std::abs(whole - sum) / (whole * h));
   }
   const Eigen::VectorXd lightness = mobility.cwiseSqrt();
-  double swing = 0;  // squared, of one coordinate by another's push
+  double swing = 0;  // squared, of one coordinate by a displacement of another
   pushed_columns(0, half, [&](Eigen::Index of, const auto& column) {
     const double push = column.tail(half).cwiseAbs().cwiseProduct(lightness).maxCoeff();
     swing = std::max(swing, push * lightness[of] / h);
   });
-  // Beside a radian; lengths that are larger beside themselves.
+  // Relative to a radian, or to larger lengths.
   const Eigen::ArrayXd sizes = start.q.array().abs().max(1);
   const Motion moved = integrator.state();
   const double turning = (start.v.array().abs() / sizes).maxCoeff();
@@ -133,7 +134,7 @@ LyapunovSpectrum LyapunovTangents::spectrum() const {
   return spectrum;
 }
 
-// Of tangents that have not begun only directions are kept of the first step, which takes them into the tangent space.
+// Until tangents have begun, the first step only takes them into the tangent space: their growth in it does not count.
 double LyapunovTangents::counted() const {
   if (has_begun_) return time_;
   return history_.size() < 2 ? 0 : time_ - history_.first_time();
@@ -173,7 +174,7 @@ LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, 
   const std::optional<TangentScale> scale = tangent_scale(integrator, start, rows, duration);
   if (scale) tangents.begin(integrator, scale->rows);
   Schedule schedule;
-  // Steps that follow the motion are as long as they like where that has come to rest; tangents have not.
+  // At rest, steps that follow the motion become arbitrarily long; tangents still need to be resolved.
   if (scale && std::isinf(step)) step = std::min(2.0, integrator.resolved_decay(1e-6)) / scale->rate;
   schedule.step = step;
   schedule.duration = duration;

@@ -11,40 +11,40 @@
 
 namespace pendula {
 
-/// What is told of a spectrum on the way.
+/// The spectrum so far.
 struct LyapunovProgress {
   double time = 0;            ///< s, since the start
-  Eigen::VectorXd exponents;  ///< as they are so far, of all the time  [1/s]
+  Eigen::VectorXd exponents;  ///< averaged over all the time so far  [1/s]
 };
 
-/// And how the run ended that it was found by.
+/// A spectrum, and the result of the run that found it.
 struct LyapunovRun : LyapunovSpectrum {
   RunResult result;
 };
 
-/// The leading Lyapunov exponents of a motion: tangents are pushed by the exact derivatives of its steps, and made
-/// orthonormal again by QR before they fall into the leading directions (Benettin, Galgani, Giorgilli, Strelcyn 1980).
-/// Steps may have any sizes. The first tangent is never turned, so that FTLE and MEGNO are read off it on the way.
+/// The leading Lyapunov exponents of a motion. Tangents are propagated by the exact derivatives of the steps and made
+/// orthonormal by QR before they align with the leading directions (Benettin, Galgani, Giorgilli, Strelcyn 1980). Step
+/// sizes may vary. QR does not turn the first tangent, so that FTLE and MEGNO follow from its growth.
 ///
-/// It is a value: a copy, and the integrator's member of the same instant, are all that goes on from there.
+/// The object is a value: a copy, together with the integrator's member of the same instant, continues the computation.
 class LyapunovTangents {
  public:
-  /// `rows` as Integrator::linearize tells; the tangents are random, by `seed`.
+  /// `rows` as from Integrator::linearize; tangents are random, by `seed`.
   LyapunovTangents(int rows, int count, unsigned seed = 1);
 
-  /// Tangents of the motion's start, whose rows are measured by `scale`, after a next-to-nothing step of `integrator`.
-  /// Without it they are whatever the first step makes of them, and what that adds to them is not known.
+  /// Starts with tangents at the motion's start whose rows are scaled by `scale`, after `integrator` has taken a tiny
+  /// step. Without this call, the growth of tangents in the first step is unknown and left out.
   void begin(Integrator& integrator, const Eigen::VectorXd& scale);
 
-  /// After a step of `integrator` to `time` since the start. Tells whether there is a new entry of the history.
+  /// Call after each step of `integrator`, to `time` since the start. Returns whether the history has a new entry.
   bool follow(Integrator& integrator, double time);
 
-  /// Makes the last entry of the history.
+  /// Adds the last entry of the history.
   void finish();
 
   LyapunovProgress progress() const;
 
-  /// The spectrum, when all is done.
+  /// The final spectrum; call after finish().
   LyapunovSpectrum spectrum() const;
 
  private:
@@ -53,7 +53,7 @@ class LyapunovTangents {
   void make_orthonormal();
 
   Directions<> tangents_;
-  Eigen::VectorXd scale_;  // none where they are measured as they are
+  Eigen::VectorXd scale_;  // empty: no scaling
   bool has_begun_ = false;
   GrowthHistory history_;
   TangentGrowth first_;
@@ -61,10 +61,10 @@ class LyapunovTangents {
   double grown_ = 0;  // logarithm of the first tangent's length
 };
 
-/// Runs `integrator` from `start` over `duration` in steps of at most `step`, which may be infinite where it chooses
-/// them, and finds the `count` leading exponents of the motion, 0 for all. Calls `on_way` where tangents were made
-/// orthonormal; `stop` is asked after every step. Throws std::invalid_argument where there are not so many exponents,
-/// and for methods whose steps have no derivative.
+/// Runs `integrator` from `start` over `duration` in steps of at most `step`, which may be infinite if the method
+/// chooses its steps, and finds the `count` leading exponents of the motion, 0 for all. Calls `on_way` whenever
+/// tangents were made orthonormal; asks `stop` after every step. Throws std::invalid_argument if there are fewer
+/// exponents, and for methods whose steps have no derivative.
 LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, double step, double duration, int count,
                                    const std::function<void(const LyapunovProgress&)>& on_way,
                                    const std::function<bool()>& stop);

@@ -4,7 +4,7 @@
 
 namespace pendula {
 
-/// Thrown where a run needs a fixed-n kernel that this build does not have.
+/// Thrown if a run needs a fixed-n kernel that this build does not have.
 class NoKernel : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -13,18 +13,18 @@ struct Row {
   const Motion& motion;
   const Observation& seen;
   std::span<const double> numbers;  ///< in the order of Subject::columns
-  double step = 0;                  ///< s; size of the step that it lies in; 0 at the start
+  double step = 0;                  ///< size of the step that contains it  [s]; 0 at the start
 };
 
-/// An event of a run: what happened, and the row that the instant would be.
+/// An event of a run, and the row at its instant.
 struct EventRow {
   const Event& event;
   bool up;  ///< from − to +
   Row row;
 };
 
-/// Takes the rows of a run: a file, a picture, a line that shows how far it is. What it throws ends the run, which
-/// keeps all that it has.
+/// Receives the rows of a run: a file, a picture, a progress line. An exception that it throws ends the run; the rows
+/// so far are kept.
 class Observer {
  public:
   Observer() = default;
@@ -34,15 +34,15 @@ class Observer {
 
   virtual void take(const Row& row) = 0;
 
-  /// What happened, as it comes: before later rows, and after those of the steps before.
+  /// Receives an event, in order of time: before later rows, and after those of earlier steps.
   virtual void happen(const EventRow&) {}
 
-  /// Where the run may go on from, once it is over: after the rows that it has come by.
+  /// Receives a point from which the run can be continued, after the rows up to there.
   virtual void keep(const Checkpoint&) {}
-  /// Whether the next place to go on from is wanted, whatever the time.
+  /// Whether the next checkpoint is wanted regardless of wall time.
   virtual bool wants_checkpoint() const { return false; }
 
-  /// After the last row, however the run ended.
+  /// Called after the last row, however the run ended.
   virtual void finish() {}
 };
 

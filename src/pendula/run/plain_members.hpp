@@ -11,8 +11,8 @@
 
 namespace pendula {
 
-/// The steps that members in lanes have just taken, as those who watch them see them; q and v are all the angles and
-/// their rates.
+/// The steps that members in lanes have just taken, for those who watch them. q and v are all the coordinates and their
+/// rates.
 class MemberSteps {
  public:
   MemberSteps() = default;
@@ -21,27 +21,27 @@ class MemberSteps {
   virtual ~MemberSteps() = default;
 
   virtual int lanes() const = 0;
-  /// Whether the member in a lane has taken one.
+  /// Whether the member in a lane has taken a step.
   virtual bool took_step(int lane) const = 0;
-  /// Its number, from 0 on, and the times that its step began and ended at  [s].
+  /// Index of the member, and the times at which its step began and ended  [s].
   virtual std::size_t member(int lane) const = 0;
   virtual double begin(int lane) const = 0;
   virtual double end(int lane) const = 0;
 
-  /// Where it is now.
+  /// Its current state.
   virtual void state(int lane, double* q, double* v) = 0;
-  /// Where it was when a share of the step was done, 0 to 1, by the polynomial through the step's stages: cheap where
-  /// several lanes ask for the same share.
+  /// Its state at the fraction `share` of the step, 0 to 1, by dense output; cheap if several lanes ask for the same
+  /// share.
   virtual void glance(int lane, double share, double* q, double* v) = 0;
-  /// The same at the full order of the method, for a watch that wants looks; false where such a step is not found.
+  /// The same at the full order of the method, for a watch that wants looks; false if the step there fails.
   virtual bool look(int lane, double share, double* q, double* v) = 0;
-  /// The logarithm of how its tangent has grown in the step; 0 where members are moved without.
+  /// Logarithm of the growth of its tangent in the step; 0 if members have no tangents.
   virtual double growth(int lane) const = 0;
-  /// Its motion is over, whatever its time.
+  /// Ends its motion now.
   virtual void finish(int lane) = 0;
 };
 
-/// Who watches members while they are moved.
+/// Watches members while they are moved.
 class MemberWatch {
  public:
   MemberWatch() = default;
@@ -49,18 +49,18 @@ class MemberWatch {
   MemberWatch& operator=(const MemberWatch&) = delete;
   virtual ~MemberWatch() = default;
 
-  /// Whether to look into steps at all: `after_step` is called for those of all lanes together.
+  /// Whether `after_step` is to be called: for the steps of all lanes together.
   virtual bool wants_steps() const = 0;
-  /// Whether it will ask for states of full order within steps (MemberSteps::look).
+  /// Whether `after_step` will ask for states at full order within steps (MemberSteps::look).
   virtual bool wants_looks() const = 0;
   virtual void after_step(MemberSteps& steps) = 0;
-  /// Whether to leave off; asked after every step.
+  /// Whether to stop; asked after every step.
   virtual bool stops() = 0;
 };
 
-/// A member of an ensemble: a chain (PlainChain) or a system of a generated kernel (PlainSystem), where it starts, and
-/// when it ends. Plain numbers cross from a program to the compiled library (library.hpp); the caller owns what is
-/// pointed at.
+/// A member of an ensemble as plain numbers, which cross from a program to the compiled library (library.hpp): a chain
+/// (PlainChain) or a system of a generated kernel (PlainSystem), its start, and when it ends. The memory belongs to the
+/// caller.
 template <class Model>
 struct PlainMember {
   Model model;
@@ -68,25 +68,24 @@ struct PlainMember {
   const double *q, *v;  ///< (coordinates)
 };
 
-/// What became of it.
+/// The result for a member.
 struct MemberEnd {
-  double *q, *v;               ///< (coordinates), of the caller, written
+  double *q, *v;               ///< (coordinates); memory of the caller, written
   double time = 0;             ///< s
-  Status status = Status::ok;  ///< otherwise the last accepted step ended here, and a stepper of one motion may go on
-  std::int64_t steps = 0;      ///< accepted ones
+  Status status = Status::ok;  ///< if not ok, the last accepted step ended here, and a stepper of one motion may go on
+  std::int64_t steps = 0;      ///< accepted steps
   std::int64_t rejected_steps = 0;
-  double energy_error = 0;  ///< the largest |H − H_0| at every so many steps  [J]
-  double energy_sum = 0;    ///< of systems, the largest |T| + |U| there  [J]
+  double energy_error = 0;  ///< the largest |H − H_0|, sampled regularly  [J]
+  double energy_sum = 0;    ///< systems: the largest |T| + |U|, sampled likewise  [J]
 };
 
-/// Moves chains of one number of links, a member in each lane; `every` how many steps from one look at the energy to
-/// the next. What becomes of a member depends on that member alone, to the last bit. False where `watch` made it leave
-/// off.
+/// Moves chains with the same number of links, one member in each lane. The energy is sampled every `every` steps. The
+/// result for a member depends on that member alone, to the last bit. Returns false if `watch` stopped it.
 using MoveMembers = bool(const RunOptions& options, std::int64_t every,
                          std::span<const PlainMember<PlainChain>> members, std::span<MemberEnd> ends,
                          MemberWatch& watch);
 
-/// The same of systems of one kernel.
+/// The same for systems of one kernel.
 using MoveSystemMembers = bool(const SystemTable& table, const RunOptions& options, std::int64_t every,
                                std::span<const PlainMember<PlainSystem>> members, std::span<MemberEnd> ends,
                                MemberWatch& watch);

@@ -7,45 +7,45 @@
 
 namespace pendula {
 
-/// What a quantity of a trajectory is.
+/// Kinds of quantities of a trajectory.
 enum class Role { time, coordinate, rate, input, point, energy };
 
-/// A quantity of a trajectory: one number a row, or one of each link.
+/// A quantity of a trajectory: one number per row, or one for each link.
 struct Quantity {
   std::string name;  ///< "theta"
   std::string unit;  ///< in SI, "rad/s"; "1" where it has none
   Role role = Role::time;
-  std::string meaning;     ///< in words
+  std::string meaning;     ///< description in words
   std::size_t first = 0;   ///< column of its first number
-  std::size_t links = 0;   ///< 0: it is one number, of no link
+  std::size_t links = 0;   ///< 0: one number, not of a link
   std::size_t stride = 1;  ///< columns from link to link
 
   std::size_t size() const { return links == 0 ? 1 : links; }
   std::size_t column(std::size_t k) const { return first + k * stride; }
 };
 
-/// A number of what is moved that stays what it is: one, or one of each link.
+/// A constant of a system: one number, or one for each link.
 struct Constant {
   std::string name, unit, meaning;
   std::vector<double> values;
   bool per_link = false;
 };
 
-/// The index at the end of a name, with its line: `_1` of `theta_1`; empty where there is none.
+/// The index at the end of a name with its underscore: `_1` of `theta_1`; empty if there is none.
 inline std::string_view index_of(std::string_view name) {
   const std::size_t end = name.find_last_not_of("0123456789");
   const bool numbered = end != std::string_view::npos && end > 0 && end + 1 < name.size() && name[end] == '_';
   return numbered ? name.substr(end) : std::string_view();
 }
 
-/// What the rate of a coordinate is called: `x_dot`, and `theta_dot_1`, since an index stays last.
+/// Name of the rate of a coordinate: `x_dot`, and `theta_dot_1`, since an index stays last.
 inline std::string rate_name(std::string_view coordinate) {
   const std::string_view index = index_of(coordinate);
   const std::string_view stem = coordinate.substr(0, coordinate.size() - index.size());
   return std::string(stem).append("_dot").append(index);
 }
 
-/// What it was called before: `theta_1_dot` of `theta_dot_1`, the same of `x_dot`.
+/// Name of a rate in older files: `theta_1_dot` for `theta_dot_1`, but `x_dot` for `x_dot`.
 inline std::string former_rate_name(std::string_view rate) {
   constexpr std::string_view ending = "_dot";
   const std::string_view index = index_of(rate), stem = rate.substr(0, rate.size() - index.size());
@@ -53,14 +53,14 @@ inline std::string former_rate_name(std::string_view rate) {
   return std::string(stem.substr(0, stem.size() - ending.size())).append(index).append(ending);
 }
 
-/// The name that a rate has now, of one that it had before; any other name as it is.
+/// Present name of a rate with an older name; any other name unchanged.
 inline std::string present_name(std::string_view name) {
   constexpr std::string_view ending = "_dot";
   if (!name.ends_with(ending)) return std::string(name);
   return rate_name(name.substr(0, name.size() - ending.size()));
 }
 
-/// Names of the columns that quantities have in a row: `energy`, `theta_1`.
+/// Names of the columns of a row: `energy`, `theta_1`.
 inline std::vector<std::string> columns_of(const std::vector<Quantity>& quantities) {
   std::size_t count = 0;
   for (const Quantity& quantity : quantities) count += quantity.size();

@@ -7,14 +7,14 @@
 
 namespace pendula {
 
-/// Times at which rows are wanted, whatever the steps are, counted from the start of the run  [s].
+/// Times of rows, independent of the steps, counted from the start of the run  [s].
 struct RowTimes {
-  double interval = 0;        ///< from row to row, the first at the start; 0: there is none
-  std::vector<double> times;  ///< or these, ascending
+  double interval = 0;        ///< between rows, the first at the start; 0: none
+  std::vector<double> times;  ///< instead of an interval, ascending
 
   bool any() const { return interval > 0 || !times.empty(); }
 
-  /// Of the row with this number, from 0 on; infinity after the last.
+  /// Time of row `number`, counted from 0; infinity after the last.
   double at(std::int64_t number) const {
     if (interval > 0) return static_cast<double>(number) * interval;
     const auto index = static_cast<std::size_t>(number);
@@ -22,7 +22,7 @@ struct RowTimes {
   }
 };
 
-/// Whether a run that has come so far has reached a time, but for rounding, whatever the end of the run is.
+/// Whether `elapsed` has reached `time`, up to rounding.
 inline bool is_reached(double time, double elapsed) {
   return time <= elapsed + 8 * std::numeric_limits<double>::epsilon() * elapsed;
 }

@@ -12,7 +12,7 @@ namespace pendula {
 
 namespace {
 
-// How far rows are apart; 0 where steps tell it.
+// Distance of rows in time; 0 if it depends on the steps.
 double row_spacing(const RunSetup& setup) {
   if (setup.rows.any()) return setup.rows.interval;
   return is_adaptive(setup.options) ? 0 : static_cast<double>(setup.every) * setup.options.step;
@@ -44,8 +44,9 @@ RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& 
   return go(&checkpoint, stop);
 }
 
-// As far as it comes, until `stop`, asked of its track after every step. Its start is off by `share` of itself: what a
-// motion makes of that, errors of steps do not show where they vanish with it, as beside an equilibrium.
+// Runs a trial as far as it gets, or until `stop` says so, asked after every step. The start is perturbed by the
+// fraction `share`: where the errors of steps vanish, as near an equilibrium, only this shows how the motion amplifies
+// errors.
 Track Run::try_out(const RunOptions& options, double share, Track track,
                    const std::function<bool(const Track&)>& stop) const {
   RunSetup trial = setup_;
@@ -63,13 +64,13 @@ Track Run::try_out(const RunOptions& options, double share, Track track,
   return *std::move(run.track_);
 }
 
-// Whether the trials came to their ends.
+// Returns whether the trials were not stopped.
 bool Run::aim(const std::function<bool()>& stop) {
-  integrator_.reset();  // of a long chain as large as that of a trial; follow_aim makes one anew
+  integrator_.reset();  // frees memory: for a long chain it is as large as that of a trial; follow_aim makes a new one
   bool stopped = false;
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
-  std::optional<Track> alike;  // by times of the first one, which are those of all
+  std::optional<Track> alike;  // whose times are those of the first trial, and of all
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
     if (stopped) return {};
     RunOptions options = setup_.options;
@@ -82,19 +83,19 @@ bool Run::aim(const std::function<bool()>& stop) {
   };
   const auto run = [&](double tolerance) {
     share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
-    return run_alike(tolerance);  // no two begin alike
+    return run_alike(tolerance);  // no two trials start alike
   };
   const auto apart = [&](const Track& a, const Track& b) { return Separation(*setup_.subject, a, b); };
   const double wanted = setup_.accuracy.error;
   const detail::FinestTolerance finest = detail::finest_tolerance(setup_.options, setup_.accuracy);
-  const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides what was before
+  const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides earlier errors
   const double start = setup_.start.time;
   kept_.aim = detail::find_aim(wanted, coarsest, finest, start, run, run_alike, apart);
   if (!stopped) follow_aim();
   return !stopped;
 }
 
-// The same for all trials and the run: errors of few and of many stages are not of one size.
+// The same number of stages for all trials and the run: errors with few and with many stages differ in size.
 void Run::choose_stages(RunOptions& options) const {
   const Accuracy& accuracy = setup_.accuracy;
   if (accuracy.chooses_stages) options.stages = stages_for(options.method, 0.01 * accuracy.error);
@@ -193,10 +194,10 @@ void Run::take(const Motion& motion, double work) {
   for (Observer* observer : takers_) observer->take({motion, seen, row_, step_});
 }
 
-// The first event that ends the run does so, and is the last one that is told.
+// The first event that ends the run is the last one reported.
 std::optional<Motion> Run::take_events(RunReport& report) {
   if (setup_.events.empty()) return {};
-  const Heeding nothing(*integrator_, {});  // what is found has to be right
+  const Heeding nothing(*integrator_, {});  // events have to be right: no interruption
   for (const Occurrence& happened : kept_.watch.after_step(*integrator_)) {
     tell(happened);
     if (!setup_.events[happened.event].stop) continue;
@@ -214,7 +215,7 @@ void Run::tell(const Occurrence& happened) {
   for (Observer* observer : observers_) observer->happen(row);
 }
 
-// Between steps, but no part of stepping.
+// Runs between steps, and does not count as stepping time.
 void Run::view(const std::optional<Motion>& end) {
   using Clock = std::chrono::steady_clock;
   const auto before = Clock::now();
@@ -222,7 +223,7 @@ void Run::view(const std::optional<Motion>& end) {
   viewing_seconds_ += std::chrono::duration<double>(Clock::now() - before).count();
 }
 
-// The energy is not finite wherever anything else is not.
+// The energy is not finite if anything else is not.
 Observation Run::look_at(const Motion& motion, double work) {
   Observation seen = setup_.subject->observe(motion);
   if (!std::isfinite(seen.energy)) throw NotFinite();
@@ -232,7 +233,7 @@ Observation Run::look_at(const Motion& motion, double work) {
   return seen;
 }
 
-// The last state, where that is no row.
+// Looks at the last state if it is not a row.
 void Run::look_at_end(const RunResult& result) {
   const double time = result.end ? result.end->time : integrator_->time();
   if (time == kept_.record.last().time) return;
@@ -256,7 +257,7 @@ void Run::come_by(const RowPlace& place, bool last) {
   for (Observer* observer : observers_) observer->keep(checkpoint);
 }
 
-// What trials told is not known of an end that came later.
+// The trials say nothing about an end that was moved later.
 void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) {
   report.warnings = event_warnings(setup_.events, report.events);
   if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
@@ -276,8 +277,8 @@ void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& st
   add(detail::of_unseen(setup_, report.statistics, report.trust));
 }
 
-// By a run that takes less time; where that says that this one cannot be trusted, by one that takes more, if there is
-// time for it: of constant steps not where the other came far.
+// Compares with a run that takes less time. If that says that this run cannot be trusted, compares with one that takes
+// more; with constant steps only if the first comparison run diverged early.
 detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
   integrator_.reset();
@@ -307,7 +308,7 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);
 }
 
-// The first failure is the one that is told.
+// The first failure is the one reported.
 void Run::finish(RunReport& report) {
   for (Observer* observer : observers_) {
     try {

@@ -24,41 +24,41 @@
 
 namespace pendula {
 
-/// One run of anything that moves, once.
+/// One run of any subject; runs once.
 class Run {
  public:
-  /// Throws std::invalid_argument on options that make no sense, NoKernel.
+  /// Throws std::invalid_argument for options that make no sense, and NoKernel.
   explicit Run(RunSetup setup);
 
-  /// What is odd about it already: one sentence each.
+  /// Problems known before the run, one sentence each.
   std::vector<std::string> expected_trouble() const { return setup_.subject->expected_trouble(setup_.options); }
 
-  /// What really runs.
+  /// What actually runs.
   const Description& description() const { return description_; }
 
-  /// Hands every row to `observer`, which must outlive the run.
+  /// Passes every row to `observer`, which must outlive the run.
   void add(Observer& observer) {
     observers_.push_back(&observer);
     takers_.push_back(&observer);
   }
 
-  /// The same, with rows at times of its own in place of those of the run.
+  /// Passes rows at `times` instead of the rows of the run.
   void add(Observer& observer, const RowTimes& times) {
     observers_.push_back(&observer);
     viewers_.emplace_back(*setup_.subject, observer, times);
   }
 
-  /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons to doubt what came out,
-  /// which may take a second run with longer steps. A run that fails throws nothing: the report says so.
+  /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons to doubt the result,
+  /// which may take a second run with longer steps. A failing run does not throw: the report says how it failed.
   RunReport go(const std::function<bool()>& stop = [] { return false; });
 
-  /// The same from where a run with this setup, but for its end, had come to: as if that had never stopped. Observers
-  /// get the rows that are new. Throws std::invalid_argument where a checkpoint is of something else.
+  /// Continues from a checkpoint of a run with the same setup except for its end, as if that run had never stopped.
+  /// Observers receive the new rows only. Throws std::invalid_argument if the checkpoint belongs to something else.
   RunReport go_on(
       const Checkpoint& checkpoint, const std::function<bool()>& stop = [] { return false; });
 
  private:
-  /// Ends a run at a state that is no row.
+  /// Thrown to end a run at a state that cannot be a row.
   struct NotFinite {};
 
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
@@ -83,9 +83,9 @@ class Run {
   detail::Doubt look_again(RunReport& report, const std::function<bool()>& stop);
   bool is_estimated() const { return setup_.doubted && setup_.estimate; }
 
-  /// What is kept of a run besides its observers, for checkpoints.
+  /// The state of a run besides its integrator, for checkpoints.
   struct Kept {
-    RunRecord record;  // of the rows; where those are wanted at times, of the first and the last state, too
+    RunRecord record;  // of the rows; with rows at times also of the first and the last state
     EventWatch watch;
     AccuracyAim aim;
 
@@ -96,16 +96,16 @@ class Run {
   };
 
   RunSetup setup_;
-  std::unique_ptr<Integrator> integrator_;     // one at a time: of a million links it takes a gigabyte
-  std::vector<Observer*> observers_, takers_;  // all; those that take the rows of the run
-  std::vector<Viewer> viewers_;                // of the others
+  std::unique_ptr<Integrator> integrator_;     // one at a time: for a million links it takes a gigabyte
+  std::vector<Observer*> observers_, takers_;  // all of them; those that take the rows of the run
+  std::vector<Viewer> viewers_;                // observers with row times of their own
   double viewing_seconds_ = 0;
-  std::optional<Track> track_;  // of this run, where another is compared with it
+  std::optional<Track> track_;  // of this run, if another is compared with it
   Kept kept_;
   Description description_;
-  std::int64_t rows_ = 0;           // that there were
-  double step_ = 0, step_end_ = 0;  // the last step's size and end
-  std::optional<double> missed_;    // when the first step began that is off by more than it may be
+  std::int64_t rows_ = 0;           // so far
+  double step_ = 0, step_end_ = 0;  // size and end of the last step
+  std::optional<double> missed_;    // start of the first step with too large a defect
   std::vector<double> row_, event_row_;
   std::chrono::steady_clock::time_point kept_at_ = std::chrono::steady_clock::now();
 };

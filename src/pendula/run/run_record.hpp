@@ -12,14 +12,14 @@
 
 namespace pendula {
 
-/// Energy errors |H − H₀|, relative to Σ M_i |g| l_i of a chain, or to |H₀| where there is no gravity; of any other
-/// system to the largest |T| + |U| over the rows.
+/// Energy errors |H − H₀|, for a chain relative to Σ M_i |g| l_i, or to |H₀| without gravity; for any other system
+/// relative to the largest |T| + |U| over the rows.
 struct EnergyError {
   double initial = std::nan("");  ///< H₀, NaN before the first row
-  double scale = 0;               ///< what errors are divided by
-  double largest = 0;  ///< over the rows so far; NaN, and so to stay, where the scale is zero and an error is not
+  double scale = 0;               ///< divisor of errors
+  double largest = 0;  ///< over the rows so far; NaN, and staying so, if the scale is zero and an error is not
 
-  /// The relative error of one energy.
+  /// The relative error of an energy.
   double of(double energy) const {
     const double error = std::abs(energy - initial);
     return error == 0 ? 0 : error / (scale > 0 ? scale : std::nan(""));
@@ -28,19 +28,19 @@ struct EnergyError {
 
 namespace detail {
 
-/// What the energies of a chain are compared with, given Σ M_i |g| l_i.
+/// Scale of the energy errors of a chain, given Σ M_i |g| l_i.
 inline double compared_with(std::optional<double> scale, double initial) {
   return scale.value_or(0) > 0 ? *scale : std::abs(initial);
 }
 
 }  // namespace detail
 
-/// How far the energy is from what the start had and loads brought, over the rows; relative to all that there was.
+/// How far the energy was from the initial one plus the work of loads, over the rows; relative to all energy involved.
 struct EnergyBalance {
   double most = 0, least = 0;  ///< relative, above and below
 };
 
-/// A row of the table that summaries show.
+/// A row of the table in a summary.
 struct TableRow {
   double time = 0;
   std::vector<double> shown;  ///< Subject::shown_columns
@@ -55,10 +55,10 @@ struct TableRow {
 
 /// What is kept of the rows of a run besides the file: energy errors, a thinned table, the last state.
 ///
-/// What energies are compared with may be known when the run ends only: errors are kept in joules.
+/// Errors are kept in joules, since their scale may be known only when the run ends.
 class RunRecord {
  public:
-  /// The table has a few rows, evenly over `duration`; `spacing` is how far rows are apart, 0 where that is not known.
+  /// The table has a few rows spread evenly over `duration`; `spacing` is the distance of rows in time, 0 if unknown.
   RunRecord(const Subject& subject, Motion start, double duration, double spacing = 0)
       : scale_(subject.energy_scale()),
         shown_(subject.shown_columns()),
@@ -66,7 +66,7 @@ class RunRecord {
         last_(std::move(start)),
         last_row_(empty_row()) {}
 
-  /// row  the numbers of the trajectory; work: what loads have brought since the first row  [J]
+  /// `row` holds the numbers of the trajectory; `work` is that of loads since the first row  [J].
   void add(const Motion& motion, const Observation& seen, const std::vector<double>& row, double work) {
     if (rows_++ == 0) start(seen, work);
     follow(seen, work);
@@ -92,7 +92,7 @@ class RunRecord {
     return {balance_.most / whole, balance_.least / whole};
   }
 
-  /// The thinned table; it ends in the last row.
+  /// The thinned table; its last row is the last row of the run.
   std::vector<TableRow> table() const {
     std::vector<TableRow> table = table_;
     if (!table.empty() && table.back().time != last_row_.time) table.push_back(last_row_);
@@ -101,7 +101,8 @@ class RunRecord {
     return table;
   }
 
-  /// What is kept of the rows so far. The table is thinned anew: this run may be longer than the one it was kept in.
+  /// What is kept of the rows so far. The table is thinned again when read, since this run may be longer than the one
+  /// that it was saved in.
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(rows_, initial_, energy_, brought_before_, largest_, largest_sum_, whole_, balance_.most, balance_.least);
@@ -117,12 +118,12 @@ class RunRecord {
 
  private:
   static constexpr std::size_t most_table_rows = 16;
-  // Of |T| + |U|, what moves less is lost in the rounding of these, a thousandth of it and more.
+  // Fraction of |T| + |U|: smaller energies are lost in its rounding, by a thousandth and more.
   static constexpr double rounding = 1e-10;
 
   TableRow empty_row() const { return {0, std::vector<double>(shown_.second), 0}; }
 
-  // The slack lets a row in that comes at its time but for rounding.
+  // The slack accepts a row whose time is at its place up to rounding.
   void add_to_table(const TableRow& row) {
     const double place = interval_ > 0 ? std::floor(row.time / interval_ + 1e-6) : 0;
     if (place <= place_ || table_.size() == most_table_rows) return;
@@ -142,8 +143,8 @@ class RunRecord {
     if (!std::isnan(largest_) && !(error <= largest_)) largest_ = error;
     largest_sum_ = std::max(largest_sum_, std::abs(seen.kinetic) + std::abs(seen.potential()));
     const double brought = work - brought_before_, off = energy_ - initial_ - brought;
-    // All that there was: of a chain, what gravity can give and it began with; else what was seen to move, which is
-    // known when the run is over.
+    // All energy involved: for a chain the initial kinetic energy and what gravity can give; for other systems the
+    // largest kinetic energy seen, which is known only at the end.
     if (!scale_) whole_ = std::max(whole_, seen.kinetic + std::abs(brought));
     const double whole = scale_ ? whole_ + std::abs(brought) : 1;
     if (off == 0 || !(whole > 0)) return;
@@ -159,9 +160,9 @@ class RunRecord {
   double place_ = -1;
   std::int64_t rows_ = 0;
   double initial_ = std::nan(""), energy_ = std::nan(""), brought_before_ = 0;
-  double largest_ = 0, largest_sum_ = 0;  // error; |T| + |U|  [J]
-  double whole_ = 0;                      // that energies are balanced against  [J]
-  EnergyBalance balance_;                 // of systems that are no chains in joules
+  double largest_ = 0, largest_sum_ = 0;  // largest error and |T| + |U|  [J]
+  double whole_ = 0;                      // scale of the energy balance  [J]
+  EnergyBalance balance_;                 // in joules for systems that are not chains
   Motion last_;
   TableRow last_row_;  // here and in the table, energy errors are in joules
   std::vector<TableRow> table_;

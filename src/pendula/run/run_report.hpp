@@ -19,61 +19,60 @@
 
 namespace pendula {
 
-/// What is run, from where, and how.
+/// What to run, from where, and how.
 struct RunSetup {
   std::shared_ptr<const Subject> subject;
   Motion start;
   RunOptions options;
   double duration = 10;     ///< s
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
-  RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
-  Accuracy accuracy = {};   ///< of runs by tolerance, which follows from it by trials where it has an error
-  bool doubted = true;      ///< whether to look for reasons to doubt it
-  bool estimate = true;     ///< whether to run a second time to see how far it can be trusted, where it is doubted
-  double checkpoint = std::numeric_limits<double>::infinity();  ///< of wall time from one checkpoint to the next  [s]
-  /// To look for.
+  RowTimes rows = {};       ///< if any: rows at these times instead of `every`
+  Accuracy accuracy = {};   ///< if given, the tolerance is found from it by trials
+  bool doubted = true;      ///< whether to look for reasons to doubt the result
+  bool estimate = true;     ///< whether to run a second time to estimate the error, if doubted
+  double checkpoint = std::numeric_limits<double>::infinity();  ///< wall time between checkpoints  [s]
+  /// Events to find.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
 };
 
-/// How far a run can be trusted, as another one tells.
+/// How far a run can be trusted, found by comparison with another run.
 struct Trust {
-  /// The largest error of its rows and events, relative to the size and the speed of the motion; NaN where that is not
-  /// known.
+  /// Largest error of its rows and events, relative to the size and speed of the motion; NaN if unknown.
   double expected_error = std::numeric_limits<double>::quiet_NaN();
-  /// Up to where they are as accurate as was asked for, or to a thousandth where nothing was  [s].
+  /// Until when rows are as accurate as asked for, or to a thousandth if nothing was asked for  [s].
   double until = std::numeric_limits<double>::infinity();
 };
 
-/// Why a run was over.
+/// Why a run ended.
 enum class RunEnd {
-  complete,         ///< it came to its end
-  event,            ///< it came to an event that ends it, RunReport::ended_by
+  complete,         ///< it reached its end
+  event,            ///< an event ended it: RunReport::ended_by
   stopped,          ///< it was asked to stop
-  step_failed,      ///< RunReport::step says how
-  not_finite,       ///< the energy of its last state is not a number; that state is no row
-  observer_failed,  ///< RunReport::failure is what an observer threw
+  step_failed,      ///< a step failed: RunReport::step
+  not_finite,       ///< the energy of its last state is not finite; that state is not a row
+  observer_failed,  ///< an observer threw: RunReport::failure
 };
 
-/// All that is known of a run when it is over. A run that failed has everything up to there.
+/// Everything known about a run when it is over; for a failed run, up to the failure.
 struct RunReport {
   RunEnd end = RunEnd::complete;
-  Outcome step;                ///< the last one
+  Outcome step;                ///< the last step
   std::exception_ptr failure;  ///< of an observer
-  Motion last;                 ///< the last state that is a row; the start where none is
+  Motion last;                 ///< the last state that is a row; the start if there is none
   std::int64_t rows = 0;
-  RunOptions options;                ///< that it was run by
-  std::optional<AccuracyAim> aimed;  ///< of RunSetup::accuracy
-  Trust trust;                       ///< where it was doubted
+  RunOptions options;                ///< as used
+  std::optional<AccuracyAim> aimed;  ///< for RunSetup::accuracy
+  Trust trust;                       ///< if the run was doubted
   Description description;
   Statistics statistics;
-  double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN where a row ended the run
+  double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN if a row ended the run
   EnergyError energy_error;
   double energy_final = 0;         ///< of the last row  [J]
-  std::vector<TableRow> table;     ///< a few rows, evenly over the run, the last one among them
+  std::vector<TableRow> table;     ///< a few rows spread evenly over the run, including the last
   std::vector<EventTally> events;  ///< of each of RunSetup::events
-  std::size_t ended_by = 0;        ///< number of an event, where one ended the run
+  std::size_t ended_by = 0;        ///< index of the event that ended the run
   EventCost event_cost;
-  std::vector<std::string> warnings;  ///< why not to trust a run that ended well: one sentence each
+  std::vector<std::string> warnings;  ///< reasons not to trust a run that ended well: one sentence each
 };
 
 }  // namespace pendula

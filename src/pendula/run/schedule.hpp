@@ -17,21 +17,21 @@
 
 namespace pendula {
 
-/// How long a run is, and which of its states are wanted.
+/// Length of a run, and which of its states become rows.
 struct Schedule {
-  double step = 1e-3;       ///< s; for adaptive methods the largest step, may be infinite
-  double duration = 10;     ///< s; the last step is cut so that the run ends there
+  double step = 1e-3;       ///< for adaptive methods the largest step, may be infinite  [s]
+  double duration = 10;     ///< the last step is cut to end there  [s]
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
-  RowTimes rows = {};       ///< where there are any, in place of `every`: rows there and nowhere else
+  RowTimes rows = {};       ///< if any: rows at these times instead of `every`
 };
 
-/// What came of a run.
+/// Result of a run.
 struct RunResult {
   Outcome outcome;       ///< of the step that ended it
-  bool stopped = false;  ///< whether it was asked to end before its time
-  /// Where it ended within the last step.
+  bool stopped = false;  ///< whether it was asked to stop early
+  /// The state within the last step at which it ended.
   std::optional<Motion> end = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  double stepping_seconds = 0;     ///< wall time inside the integrator, without rows
+  double stepping_seconds = 0;     ///< wall time in the integrator, without rows
 };
 
 namespace detail {
@@ -45,14 +45,14 @@ inline void require(const Schedule& schedule) {
   if (!std::ranges::is_sorted(schedule.rows.times)) reject("rows: expected times that ascend");
 }
 
-/// Size of the next step. A rest that is one step but for rounding is taken as one step, not as a step and a sliver.
+/// Size of the next step. A remainder that is one step up to rounding is taken as one step.
 inline double next_step(const Schedule& schedule, double elapsed) {
   const double rest = schedule.duration - elapsed;
   return rest <= schedule.step * (1 + 1e-9) ? rest : schedule.step;
 }
 
-/// Whether the end may have a say in a step that is to be `h`, after one of the size `last`, 0 where that is unknown.
-/// An adaptive method's next step is never ten times as long.
+/// Whether the end of the run may affect a step planned to be `h`, after one of size `last`, 0 if unknown. The next
+/// step of an adaptive method is never ten times as long.
 inline bool may_be_cut(const Schedule& schedule, double h, double last) {
   return h != schedule.step && (last == 0 || h <= 10 * last);
 }
@@ -64,18 +64,18 @@ inline bool at_end(const Schedule& schedule, double elapsed) {
 
 }  // namespace detail
 
-/// Where a run is among its rows.
+/// Position of a run among its rows.
 struct RowPlace {
-  std::int64_t rows = 0;       ///< that there were
-  std::int64_t since_row = 0;  ///< steps since the last of them; 0 where rows are wanted at times
+  std::int64_t rows = 0;       ///< so far
+  std::int64_t since_row = 0;  ///< steps since the last row; 0 for rows at times
 };
 
 namespace detail {
 
-/// No step is the last but for the schedule.
+/// on_step that ends the run at no step.
 inline constexpr auto runs_on = [] { return std::optional<Motion>(); };
 
-/// What a run goes by, and who is told: see go_on.
+/// State and callbacks of a run: see go_on.
 template <class OnRow, class Stop, class OnWay, class OnStep>
 struct Course {
   Integrator& integrator;
@@ -87,8 +87,8 @@ struct Course {
   OnWay on_way;
   OnStep on_step;
   RunResult result = {};
-  bool is_cut_off = false;  // it was stopped within a step or its rows: from there nothing goes on
-  bool near_end = false;    // the end may have had a say in a step since: a longer run would not come by here
+  bool is_cut_off = false;  // stopped within a step or its rows: cannot be continued from there
+  bool near_end = false;    // whether the end may have affected a step: a longer run would not pass here
 
   double elapsed() const { return integrator.time() - begin; }
   bool is_over() const { return at_end(schedule, elapsed()); }
@@ -124,7 +124,7 @@ struct Course {
     if (!near_end && !result.end && !is_cut_off) on_way(place, !goes_on() || is_over());
   }
 
-  /// A row every so many steps, and at the last state.
+  /// Steps to the next row, every so many steps.
   void to_next_row() {
     while (place.since_row < schedule.every && goes_on() && !is_over()) {
       step();
@@ -142,7 +142,7 @@ struct Course {
     if (is_row) come_by();
   }
 
-  /// Rows at times: steps to the first one that comes by some, and looks back into it.
+  /// For rows at times: steps until one step contains rows.
   void to_next_times() {
     while (goes_on() && !is_over()) {
       step();
@@ -151,7 +151,7 @@ struct Course {
   }
   void take_times() {
     using Clock = std::chrono::steady_clock;
-    constexpr std::chrono::milliseconds long_time(200);  // for the rows of one step: then they are cut off
+    constexpr std::chrono::milliseconds long_time(200);  // for the rows of one step: beyond it the run is cut off
     if (!result.outcome) return come_by();
     const auto began = Clock::now();
     for (double time = 0; is_reached(time = schedule.rows.at(place.rows), elapsed());) {
@@ -182,13 +182,14 @@ struct Course {
 
 }  // namespace detail
 
-/// Runs `integrator`, which is at `place`, on to the end of a schedule that began at the time `begin`. Calls
-/// on_row(const Motion&), or on_row(const Motion&, double work) with what loads have brought by then, every
-/// `schedule.every` accepted steps, and at the last state, also where the run fails or is stopped; or at the times of
-/// `schedule.rows`, which the steps do not depend on. bool stop() is asked after every step. Calls on_way(place, last)
-/// where a longer run would come by as well: where it begins, where rows are, before a step that the end may cut short,
-/// and where the run fails or is stopped; `last` tells that there may be none after it. Asks std::optional<Motion>
-/// on_step() after every accepted step whether the run ends within it, at that state.
+/// Runs `integrator`, which is at `place`, to the end of a schedule that began at the time `begin`.
+///
+/// Calls on_row(const Motion&), or on_row(const Motion&, double work) with the work of loads until then, every
+/// `schedule.every` accepted steps and at the last state, also if the run fails or is stopped; or else at the times of
+/// `schedule.rows`, which do not affect the steps. Asks bool stop() after every step. Calls on_way(place, last) where a
+/// longer run would pass as well: where it begins, at rows, before a step that the end may cut short, and where the run
+/// fails or is stopped; `last` tells that there may be no further call. Asks std::optional<Motion> on_step() after
+/// every accepted step whether the run ends within it, at that state.
 template <class OnRow, class Stop, class OnWay, class OnStep = decltype(detail::runs_on)>
 RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, const RowPlace& place, OnRow on_row,
                 const Stop& stop, OnWay on_way, OnStep on_step = detail::runs_on) {
@@ -208,27 +209,27 @@ RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, 
   return course.result;
 }
 
-/// Runs `integrator` from `start`, which is a row unless rows are wanted at other times, over `schedule`. Throws
-/// std::invalid_argument on a schedule that makes no sense.
+/// Runs `integrator` from `start`, which is a row unless rows are wanted at other times, over `schedule`. Callbacks as
+/// for go_on. Throws std::invalid_argument for a schedule that makes no sense.
 template <class OnRow, class Stop, class OnWay, class OnStep = decltype(detail::runs_on)>
 RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
                    const Stop& stop, OnWay on_way, OnStep on_step = detail::runs_on) {
   detail::require(schedule);
   const Outcome started = integrator.start(start);
   const bool is_row = !schedule.rows.any() || schedule.rows.at(0) == 0;
-  if (is_row) on_row(start);  // nothing has brought anything yet
+  if (is_row) on_row(start);  // no work yet
   if (!started) return {.outcome = started};
   return go_on(integrator, start.time, schedule, {is_row ? 1 : 0, 0}, on_row, stop, on_way, on_step);
 }
 
-/// The same without a way.
+/// Without on_way.
 template <class OnRow, class Stop>
 RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row,
                    const Stop& stop) {
   return simulate(integrator, start, schedule, on_row, stop, [](const RowPlace&, bool) {});
 }
 
-/// The same to the end of the schedule.
+/// Without stop.
 template <class OnRow>
 RunResult simulate(Integrator& integrator, const Motion& start, const Schedule& schedule, OnRow on_row) {
   return simulate(integrator, start, schedule, on_row, [] { return false; });

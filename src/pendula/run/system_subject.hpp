@@ -15,11 +15,11 @@
 
 namespace pendula {
 
-/// A system of any other kind as what a run moves.
+/// A system other than a chain as the subject of a run.
 class SystemSubject : public Subject {
  public:
-  /// `table` is kept, with whatever it was loaded from. Throws std::invalid_argument on another number of parameters or
-  /// inputs than it has, and on sines on inputs that it has not.
+  /// Shares ownership of `table` and of what it was loaded from. Throws std::invalid_argument for a wrong number of
+  /// parameters or inputs, and for sines on inputs that do not exist.
   SystemSubject(std::shared_ptr<const SystemTable> table, SystemNumbers numbers)
       : table_(std::move(table)), numbers_(std::move(numbers)) {
     const auto& sizes = info().parameter_sizes;
@@ -54,10 +54,10 @@ class SystemSubject : public Subject {
     return seen;
   }
 
-  /// Whether forces may change within a short way by functions other than powers and logarithms (field_look.hpp).
+  /// Whether forces may change rapidly by functions other than powers and logarithms (field_look.hpp).
   bool may_be_narrow() const { return !std::ranges::all_of(info().argument_is_base, std::identity()); }
 
-  /// Rates that go with momenta; not finite where the mass matrix is singular.
+  /// Rates that belong to momenta; not finite if the mass matrix is singular.
   Eigen::VectorXd rates(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& p) const {
     Eigen::VectorXd v(q.size());
     table_->of_1.velocity_from_momentum(conditions(time), q.data(), p.data(), v.data());
@@ -67,7 +67,7 @@ class SystemSubject : public Subject {
   std::optional<double> energy_scale() const override { return std::nullopt; }
   bool loaded() const override { return SystemModel(*table_, numbers_.plain()).loaded(); }
   bool damped() const override { return loaded(); }
-  /// What depends on time may bring and take energy many times in a step that the motion does not need to be shorter.
+  /// Forces that depend on time may exchange energy many times within one step of the motion.
   bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
   std::vector<std::string> expected_trouble(const RunOptions& /*options*/) const override { return {}; }
   bool has_poles() const override { return false; }
@@ -129,7 +129,7 @@ class SystemSubject : public Subject {
 
   std::span<const std::string_view> coordinates() const override { return info().coordinates; }
 
-  /// The last point; of a system without points its first coordinates.
+  /// The last point, or the first coordinates of a system without points.
   std::pair<std::size_t, std::size_t> shown_columns() const override {
     const std::size_t count = info().coordinates.size();
     if (info().points.empty()) return {1, std::min<std::size_t>(count, 3)};
@@ -139,9 +139,9 @@ class SystemSubject : public Subject {
   }
 
   using Subject::distance;
-  /// The largest of coordinates, relative to the largest of their unit, angles at least to one radian, and of rates,
-  /// relative to the fastest of their unit, at least to what moves a coordinate by a hundredth of that until the end:
-  /// rates of what rests are nothing but rounding.
+  /// The largest difference of coordinates and of rates. Coordinates are relative to the largest of their unit, angles
+  /// at least to one radian. Rates are relative to the fastest of their unit, at least to one that moves a coordinate
+  /// by a hundredth of its scale until the end, since rates at rest are mere rounding.
   double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     double furthest = 0;
     const auto compare = [&](double x, double y, double scale) {
@@ -166,7 +166,7 @@ class SystemSubject : public Subject {
 
   static std::string rate_unit(std::string_view unit) { return (unit.empty() ? "1" : std::string(unit)) + "/s"; }
 
-  // For functions that depend on no inputs; `time` has to outlive them.
+  // For functions that do not depend on inputs; `time` must outlive the result.
   Conditions conditions(const double& time) const {
     return {table_->context, numbers_.parameters.data(), &time, numbers_.inputs.data()};
   }
@@ -182,7 +182,7 @@ class SystemSubject : public Subject {
 
   int point_components() const { return std::accumulate(info().point_sizes.begin(), info().point_sizes.end(), 0); }
 
-  // Among those of one unit.
+  // The largest entry among coordinates of one unit.
   double largest(const Eigen::VectorXd& sizes, std::string_view unit) const {
     double largest = 0;
     for (std::size_t k = 0; k < info().coordinates.size(); ++k) {

@@ -6,8 +6,8 @@
 
 namespace pendula {
 
-/// From row to row of a table of about ten rows of a run: a round time where there are rows at its multiples; `spacing`
-/// is how far those of the run are apart, 0 where that is not known.
+/// Time between rows of a table of about ten rows of a run: a round number, if the rows of the run lie on its
+/// multiples. `spacing` is the distance of these in time, 0 if unknown.
 inline double table_interval(double duration, double spacing) {
   constexpr double wanted = 10, most = 15, fewest = 5, slack = 1e-6;
   if (!(duration > 0) || !(spacing > 0)) return duration / wanted;

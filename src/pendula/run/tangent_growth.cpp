@@ -7,7 +7,7 @@
 namespace pendula {
 
 void TangentGrowth::follow(double growth, double before, double time) {
-  // Of Y = 2/t ∫ s d ln|w|, where w grows by the same rate all through the step.
+  // Integrates Y = 2/t ∫ s d ln|w|, with a constant growth rate of w within the step.
   const double rate = growth / (time - before);
   const double offset = weighted_ - rate * before * before / 2;
   integral_ += (before > 0 ? 2 * offset * std::log(time / before) : 0) + rate * (time * time - before * before) / 2;

@@ -14,21 +14,20 @@
 
 namespace pendula {
 
-/// States of a run along its motion: at the ends of some of its steps, or at the times of another run, to be compared
-/// with that.
+/// States of a run along its motion, kept for comparison with another run: at the ends of some of its steps, or at the
+/// times of another track.
 class Track {
  public:
-  /// So many steps lie between states of a run of many. An even number, so that steps of twice the length end there,
-  /// too, and a multiple of three.
+  /// Number of steps between kept states of a long run. It is even, and a multiple of three, so that steps of twice or
+  /// three times the length end there, too.
   static constexpr std::int64_t apart = 6;
 
-  /// At the end of each of the first steps, in which what is stiff dies away, and of every so many later ones, `apart`
-  /// of constant ones; of a run of many steps at fewer of them: at most so many numbers are kept, by default about
-  /// 64 MB.
+  /// Keeps the states after each of the first steps, in which stiff components decay, and after every `every` later
+  /// ones, `apart` for constant steps. Long runs are thinned to at most `most_numbers` numbers, about 64 MB by default.
   explicit Track(std::int64_t every, std::size_t most_numbers = std::size_t{1} << 23)
       : most_numbers_(most_numbers), every_(every) {}
 
-  /// At the times of `other`.
+  /// A track at the times of `other`.
   static Track at_times_of(const Track& other) {
     Track track(0);
     if (other.looks()) {
@@ -39,10 +38,10 @@ class Track {
     return track;
   }
 
-  /// Whether it goes by another's times, which takes a look into steps (Integrator::remember_steps).
+  /// Whether it uses the times of another track, which needs looks into steps (Integrator::remember_steps).
   bool looks() const { return every_ == 0; }
 
-  /// Where it begins.
+  /// Starts at this state.
   void begin(const Motion& start) {
     if (looks()) return;
     most_ = std::max(least, most_numbers_ / (2 * static_cast<std::size_t>(start.q.size()) + numbers_besides));
@@ -51,8 +50,8 @@ class Track {
     numbers_.push_back(0);
   }
 
-  /// After every step of `mover`, an Integrator or what has its time, state, look and glance; the run ends at `end`
-  /// within, if it does.
+  /// Call after every step of `mover`, an Integrator or anything with its time, state, look and glance. `end` is the
+  /// state at which the run ended within the step, if it did.
   template <class Mover>
   void follow(Mover& mover, const std::optional<Motion>& end) {
     if (!looks()) return count_step(mover);
@@ -64,7 +63,7 @@ class Track {
     }
   }
 
-  /// A row within a step, which may err as the step does not. Of very many rows fewer are kept.
+  /// Adds a row within a step, which may have an error that the step has not. Very many rows are thinned.
   void add_row(const Motion& row) {
     if (looks() || ++all_rows_ % every_row_ != 0) return;
     rows_.push_back(row);
@@ -75,7 +74,7 @@ class Track {
     every_row_ *= 2;
   }
 
-  /// The run is over, in this state; one that is not complete ended before its time.
+  /// Ends the track at this state; `is_complete` is false if the run ended early.
   void finish(Motion last, bool is_complete) {
     last_ = std::move(last);
     is_complete_ = is_complete;
@@ -92,7 +91,7 @@ class Track {
   const Motion& last() const { return last_; }
 
  private:
-  // States of a run of few steps, as dense as that, and of any run at least; what a state takes besides its numbers.
+  // Most rows, states of a run of few steps, states of any run at least; numbers that a state takes besides its own.
   static constexpr std::size_t most_rows = 256, few = 64, least = 12, numbers_besides = 24;
 
   template <class Mover>
@@ -120,14 +119,14 @@ class Track {
   std::size_t most_ = few;
   std::vector<double> times_;
   std::vector<Motion> states_;
-  std::vector<std::int64_t> numbers_;  // of the steps that they are the ends of
+  std::vector<std::int64_t> numbers_;  // of the steps that ended at the states
   std::int64_t all_rows_ = 0, every_row_ = 1;
   std::vector<Motion> rows_;
   Motion last_;
   bool is_complete_ = false;
 };
 
-/// The largest of each number of a track.
+/// The largest absolute value of each number of a track.
 inline Motion size_of(const Track& track) {
   Motion size = track.last();
   size.q = size.q.cwiseAbs();
@@ -139,10 +138,10 @@ inline Motion size_of(const Track& track) {
   return size;
 }
 
-/// How far two runs of one system are apart along their motion.
+/// Distances of two runs of one system along their motion.
 class Separation {
  public:
-  /// Of two tracks, one of them at the times of the other, or both at those of a third.
+  /// Of two tracks: one of them at the times of the other, or both at those of a third.
   Separation(const Subject& subject, const Track& a, const Track& b) {
     const std::size_t common = std::min(a.states().size(), b.states().size());
     Motion size = size_of(a);
@@ -169,10 +168,10 @@ class Separation {
     return largest;
   }
 
-  /// That of the ends alone.
+  /// The distance at the ends only.
   Separation of_ends() const { return Separation({places_.back()}); }
 
-  /// The last time up to which all distances are at most so large; infinite where all are. `start` where none is.
+  /// The last time up to which all distances are at most `limit`; infinity if all are, `start` if none is.
   double within(double limit, double start) const {
     double last = start;
     for (const Place& place : places_) {
@@ -194,13 +193,13 @@ class Separation {
   std::vector<Place> places_;
 };
 
-/// Goes along with a track that grows at the times of one that is complete.
+/// Compares a growing track with a complete one at the same times.
 class Divergence {
  public:
-  /// `track` must outlive it.
+  /// `track` must outlive this object.
   Divergence(const Subject& subject, const Track& track) : subject_(subject), track_(track), size_(size_of(track)) {}
 
-  /// Whether what has come since is further off than that.
+  /// Whether a state added since the last call is further off than `limit`.
   bool exceeds(const Track& growing, double limit) {
     for (; next_ < growing.states().size(); ++next_) {
       if (!(subject_.distance(track_.states()[next_], growing.states()[next_], size_) <= limit)) return true;

@@ -14,25 +14,25 @@
 
 namespace pendula {
 
-/// Hands rows to an observer at times of its own, whatever the rows of the run are: a picture moves evenly by them. The
-/// last state is a row, too. It looks into steps (Integrator::remember_steps), which neither the steps nor the rows of
-/// the run depend on.
+/// Passes rows to an observer at times of its own, independent of the rows of the run, as an animation needs. The last
+/// state is a row, too. It looks into steps (Integrator::remember_steps); neither the steps nor the rows of the run
+/// depend on that.
 class Viewer {
  public:
   Viewer(const Subject& subject, Observer& observer, RowTimes times)
       : subject_(&subject), observer_(&observer), times_(std::move(times)) {}
 
-  /// Rows are of this subject from now on, which has the same columns.
+  /// Uses another subject, with the same columns, from now on.
   void show(const Subject& subject) { subject_ = &subject; }
 
-  /// A run of which rows are counted from the time `start` begins in this state, or goes on from it.
+  /// A run starts or continues in this state; row times count from `start`.
   void begin(const Motion& state, double start) {
     start_ = start;
     if (state.time == start && times_.at(0) == 0) show(state);
     while (start + times_.at(next_) <= state.time) ++next_;
   }
 
-  /// After every step, of this size, which the run ends at `end` within, if it does.
+  /// Call after every step of size `step`. `end` is the state at which the run ended within it, if it did.
   void follow(Integrator& integrator, const std::optional<Motion>& end, double step) {
     step_ = step;
     for (double time = 0; is_reached(time = times_.at(next_), integrator.time() - start_); ++next_) {
@@ -42,13 +42,13 @@ class Viewer {
     }
   }
 
-  /// The run is over, in this state.
+  /// The run ends in this state.
   void finish(const Motion& last) {
     if (!is_reached(last.time - start_, shown_ - start_)) show(last);
   }
 
  private:
-  // What is not finite ends the run by itself.
+  // A state that is not finite ends the run elsewhere.
   void show(const Motion& motion) {
     const Observation seen = subject_->observe(motion);
     if (!std::isfinite(seen.energy)) return;
@@ -61,8 +61,8 @@ class Viewer {
   const Subject* subject_;
   Observer* observer_;
   RowTimes times_;
-  std::int64_t next_ = 0;                                    // number of the row that comes next
-  double start_ = 0;                                         // what times count from
+  std::int64_t next_ = 0;                                    // index of the next row
+  double start_ = 0;                                         // origin of the row times
   double step_ = 0;                                          // size of the last step
   double shown_ = -std::numeric_limits<double>::infinity();  // time of the last row
   std::vector<double> row_;
