@@ -17,10 +17,11 @@
 
 namespace pendula {
 
-/// The forward dynamics of several chains at once, one in each lane: rods and their rates are what moves, ξ̈ being made
-/// of weight, loads and multipliers that keep |ξ̇|² + ξ·ξ̈ = 0 (ChainForwardDynamics).
+/// Forward dynamics of several chains at once, one in each lane. The unknowns are the rod vectors ξ and their rates; ξ̈
+/// follows from weight, loads and Lagrange multipliers (rod tensions) that keep |ξ̇|² + ξ·ξ̈ = 0
+/// (ChainForwardDynamics).
 ///
-/// With a tangent, every number has its derivative along one tangent of each member's motion.
+/// With a tangent, every number carries its derivative along one tangent of each member's motion.
 template <class Space, int N = Eigen::Dynamic, class Num = LanePack<MemberRegister>, bool with_tangent = false>
 class ChainAccelerations {
  public:
@@ -30,13 +31,13 @@ class ChainAccelerations {
   using Number = std::conditional_t<with_tangent, Dual<L>, L>;
   static constexpr int links_known = N;
   static constexpr bool has_tangent = with_tangent, is_short = detail::is_short_chain<N>;
-  static constexpr bool limits_turns = true;  ///< whether steps turn rods by less than half a turn
+  static constexpr bool limits_turns = true;  ///< whether a step may turn rods by less than half a turn only
   static constexpr std::size_t D = Space::dimension;
 
   using Part = MovingPart<Number, D>;  ///< ξ, ξ̇
   using Parts = detail::PerLink<Part, N>;
 
-  using Subject = int;  ///< how many links there are
+  using Subject = int;  ///< number of links
   explicit ChainAccelerations(int links)
       : links_(links), constants_(links), rows_(links), loads_(links), freed_(links) {}
 
@@ -48,19 +49,19 @@ class ChainAccelerations {
   const LinkConstants<L>& link(int i) const { return constants_[i]; }
   const L& gravity() const { return gravity_; }
 
-  /// The longest step in which drives turn by no more than `turn`  [rad], for a method that is as good as a quadrature
-  /// of so many nodes.
+  /// The longest step in which drives turn by at most `turn`  [rad]. `nodes`: those of a Gauss quadrature as accurate
+  /// as the method.
   template <int nodes>
   L longest_step(double turn) const {
     return L(turn) / loads_.fastest_drive();
   }
 
-  /// body(0), body(1), … of all links, written out where they are few and their number is known.
+  /// body(i) for all links i from the pivot outward; unrolled for short chains of known length.
   template <class Body>
   [[gnu::always_inline]] void for_parts(Body body) const {
     detail::for_links<N>(links(), body);
   }
-  /// The same from the last one on.
+  /// body(i) for all links i from the tip inward.
   template <class Body>
   [[gnu::always_inline]] void for_parts_inward(Body body) const {
     for_parts([&](auto i) PENDULA_WRITTEN_OUT {
@@ -76,15 +77,15 @@ class ChainAccelerations {
     return of[link];
   }
 
-  /// What lanes hold that are free.
+  /// What unused lanes hold.
   static Part resting() {
     Part rod = Part::zero();
     rod.place[D - 1] = Number(-1.0);
     return rod;
   }
 
-  /// A member comes into a lane, with its chain, at q and v  [rad, rad/s]; `low`, where there is one, is what rods lose
-  /// to rounding.
+  /// Starts a member in a lane, with its chain, at q and v  [rad, rad/s]. `low`, if given, is set to the rounding
+  /// errors of rods and rates.
   template <class... Low>
   void start(int lane, double /*time*/, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain,
              const double* q, const double* v, Parts& rods, Low&... low) {
@@ -112,7 +113,7 @@ class ChainAccelerations {
     if constexpr (has_tangent) start_tangent(lane, rods);
   }
 
-  /// Direction of a member's link and its rate.
+  /// Direction of a member's link, and its rate.
   auto heading(int lane, int i, const Parts& rods) const {
     Heading<Space, long double> heading;
     for (std::size_t k = 0; k < D; ++k) {
@@ -135,7 +136,7 @@ class ChainAccelerations {
     return energy;
   }
 
-  /// Fastest turning of a link, squared, and no less than the chain swings  [1/s²].
+  /// Fastest angular velocity of a link, squared, but at least the frequency of the chain, squared  [1/s²].
   L pace_squared(const Parts& rods) const {
     L largest = slowest_pace_;
     for (int i = 0; i < links(); ++i) {
@@ -145,7 +146,7 @@ class ChainAccelerations {
     return largest;
   }
 
-  /// The largest of rods and rates, squared: of rods relative to their lengths, of rates to those and the pace.
+  /// The largest rod and rate, squared: rods relative to their lengths, rates relative to length times pace.
   [[gnu::always_inline]] L size_squared(const Parts& parts, const L& pace_squared) const {
     L largest(0.0);
     const L inverse_pace = L(1.0) / pace_squared;
@@ -158,9 +159,9 @@ class ChainAccelerations {
     return largest;
   }
 
-  /// What a step of `h` errs by, squared, from the errors of rods and rates that it is made of, across the rods: what
-  /// goes along them `restore` takes away. Relative to the size of the motion after it, which swings is how far they go
-  /// from where they hang, at most 1: so that swings of 1e-9 rad are followed as others are.
+  /// Squared error of a step of `h`, from the error sums of rods and rates. Only the part across the rods counts, since
+  /// `restore` removes the part along them. Relative to the size of the motion after the step: the deflection from
+  /// hanging, at most 1, so that oscillations of 1e-9 rad are resolved like any other.
   [[gnu::always_inline]] L error_squared(const L& h, const Parts& errors, const Parts& /*before*/,
                                          const Parts& /*slopes*/, const Parts& after, const L& pace_squared) const {
     L largest(0.0), swing(0.0);
@@ -185,7 +186,7 @@ class ChainAccelerations {
     return (h * h) * (largest / max(min(swing, L(1.0)), L(smallest_swing)));
   }
 
-  /// ξ̇ and ξ̈ of rods.
+  /// Computes ξ̇ and ξ̈ of the rods.
   [[gnu::always_inline]] void slopes(const L& time, const Parts& rods, Parts& found) {
     const bool loaded = loads_.any();
     if (loaded) find_freed(time, rods);
@@ -225,7 +226,7 @@ class ChainAccelerations {
     });
   }
 
-  /// |ξ| = l and ξ·ξ̇ = 0 again; what a step errs by in them is small.
+  /// Projects rods back to |ξ| = l and ξ·ξ̇ = 0; the errors of a step in these are small.
   [[gnu::always_inline]] void restore(Parts& rods) const {
     for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       const LinkConstants<L>& link = at(constants_, i);
@@ -237,8 +238,9 @@ class ChainAccelerations {
     });
   }
 
-  /// The same of rods that are kept in twice the digits: how long they are does not round where they point. Rods are
-  /// copied and written back: changed in place, Clang 14's loop for AVX2 reads them as they were, an error of 1e-10.
+  /// The same for rods with low parts: the length of a rod is corrected without rounding its direction. Rods are copied
+  /// and written back, because Clang 14 miscompiles the loop for AVX2 when they are changed in place: it reads old
+  /// values, an error of 1e-10.
   [[gnu::always_inline]] void restore(Parts& rods, Parts& low) const {
     for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       const LinkConstants<L>& link = at(constants_, i);
@@ -252,7 +254,7 @@ class ChainAccelerations {
     });
   }
 
-  /// |δξ|²/l² + |δξ̇|²/(l ω)², of all rods, ω being how fast the member swung when it began.
+  /// Squared norm of the tangent: the sum of |δξ|²/l² + |δξ̇|²/(l ω)² over all rods, where ω is the initial pace.
   L tangent_squared(const Parts& rods) const requires with_tangent {
     L squared(0.0);
     for (int i = 0; i < links(); ++i) {
@@ -294,7 +296,7 @@ class ChainAccelerations {
     low = there.low;
   }
 
-  // What loads accelerate rods by, were there no tensions.
+  // Accelerations of rods by loads, as if there were no tensions.
   [[gnu::noinline]] void find_freed(const L& time, const Parts& rods) {
     loads_.set_time(time);
     const auto load = [&](int i) {

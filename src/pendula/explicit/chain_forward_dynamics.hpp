@@ -8,11 +8,11 @@
 
 namespace pendula {
 
-/// Accelerations of a chain in O(n), by the elimination that gives rates from momenta.
+/// Accelerations of a chain in O(n), by the same elimination that gives rates from momenta.
 ///
-/// Bob i is accelerated by what its two rods hand on, T_i ξ_i with tensions T, and by torque and damping across them:
+/// Bob i is accelerated by forces of its two rods: tensions T_i ξ_i, and torques and damping across the rods:
 ///   ξ̈_i = b_i − b_{i−1} − δ_{i1} g up,  b_i = (F_i − F_{i+1})/m_i,  F_i = T_i ξ_i + (torque_i × ξ_i − λ_i ξ̇_i)/l_i²,
-/// and T keeps the lengths: ξ_i·ξ̈_i = −|ξ̇_i|².
+/// where T keeps the lengths: ξ_i·ξ̈_i = −|ξ̇_i|².
 template <class Space>
 class ChainForwardDynamics : public ForwardDynamics {
   using Link = typename Space::Link;
@@ -79,7 +79,7 @@ class ChainForwardDynamics : public ForwardDynamics {
     here.load = difference(scaled(constants_[i].inverse_square, here.load), scaled(constants_[i].drag, here.rate));
   }
 
-  // Tensions, from the tip to the pivot.
+  // Eliminates the tensions from the tip to the pivot.
   void eliminate() {
     MultiplierRow<double> row;
     double beyond = 0;
@@ -103,7 +103,7 @@ class ChainForwardDynamics : public ForwardDynamics {
     }
   }
 
-  // û̈ = Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b.
+  // Solves û̈ = Σ_a û_a q̈_a + Σ_ab û_ab q̇_a q̇_b for q̈.
   Rates of_coordinates(int i, const Rates& v, const Cartesian& direction_acceleration) {
     const Trig& trig = motion(i).trig;
     double determinant;
@@ -113,7 +113,7 @@ class ChainForwardDynamics : public ForwardDynamics {
     return a;
   }
 
-  // Σ_ab û_ab v_a v_b, each pair of different coordinates counted twice.
+  // Σ_ab û_ab v_a v_b; mixed terms count twice.
   static Cartesian turning(const Trig& trig, const Rates& v) {
     typename Link::template Second<double> u_ab;
     Link::direction_second(trig, u_ab);

@@ -7,8 +7,8 @@
 
 namespace pendula {
 
-/// Chooses the steps of every member by the error of its last one, as explicit methods do that have an estimate of it
-/// of `Order`: a step is to err by no more than a tolerance.
+/// Step-size control for explicit methods with an error estimate of order `Order`, for every member by itself: the
+/// error of a step stays below a tolerance.
 template <class L, int Order>
 class ErrorController {
  public:
@@ -19,7 +19,7 @@ class ErrorController {
         log_tolerance_(std::log(tolerance)),
         first_(0.5 * std::min(1.0, std::exp(log_tolerance_ * exponent))) {}
 
-  /// Members that start.
+  /// Starts these members.
   template <class Stepper>
   void start(const Mask& which, Stepper& stepper) {
     const L pace = sqrt(stepper.pace_squared());
@@ -27,13 +27,13 @@ class ErrorController {
     longest_ = select(which, stepper.longest_step(tolerance_), longest_);
   }
 
-  /// Of the next step, unless the run ends before.
+  /// Size of the next step, unless the run ends before.
   template <class Stepper>
   L step(Stepper& /*stepper*/) const {
     return min(next_, longest_);
   }
 
-  /// Which of the steps `h` that were tried are good enough; those that are not get a shorter one.
+  /// Which of the tried steps `h` are accepted. Rejected members get a shorter step.
   template <class Stepper>
   Mask accepts(const Mask& which, const L& h, Stepper& stepper) {
     const L log_error = 0.5 * log(max(stepper.error_squared(), L(tiny)));
@@ -44,10 +44,10 @@ class ErrorController {
     return good;
   }
 
-  /// The next step of these members is to be `factor` of one that failed.
+  /// The next step of these members is `factor` times a failed one.
   void shrink(const Mask& which, const L& h, const L& factor) { next_ = select(which, factor * h, next_); }
 
-  /// Steps h were taken.
+  /// Call when the steps were taken.
   template <class Stepper>
   void move_on(const Mask& which, const L& /*h*/, Stepper& /*stepper*/) {
     next_ = select(which, grown_, next_);

@@ -7,12 +7,12 @@
 
 namespace pendula {
 
-/// What the errors of a step are compared with: coordinates and rates themselves, and beside them a radian and one a
-/// second, or the whole motion where that is smaller, so that swings of 1e-9 rad are followed as others are. The end of
-/// the step counts, too: forces may begin at nothing.
+/// What the errors of a step are relative to: each coordinate or rate itself, plus 1 rad or 1/s, or the size of the
+/// whole motion if that is smaller, so that oscillations of 1e-9 rad are resolved like any other. The state at the end
+/// of the step counts, too: forces may begin at zero.
 class ErrorSize {
  public:
-  /// Of a step that has moved x so far, with `rate` as its derivative.
+  /// For a step from x, with derivative `rate` there, that has moved the state by `moved`.
   ErrorSize(const std::vector<double>& x, const std::vector<double>& rate, const std::vector<double>& moved, double h,
             double tolerance)
       : x_(x), half_(x.size() / 2) {
@@ -23,7 +23,7 @@ class ErrorSize {
       v = std::max({v, std::abs(x[k]), std::abs(x[k] + moved[k])});
       a = std::max(a, std::abs(rate[k]));
     }
-    const double rounding = rounded * q / (tolerance * h);  // what is left of rates at rest
+    const double rounding = rounded * q / (tolerance * h);  // of rates at rest
     place_ = std::clamp(std::max(q, h * v), nothing, 1.0);
     turn_ = std::clamp(std::max({v, h * a, rounding}), nothing, 1.0);
   }

@@ -12,13 +12,13 @@
 
 namespace pendula {
 
-/// A chain as SingleIntegrator moves it: users see angles, steps move rods.
+/// A chain as SingleIntegrator moves it: users see angles, the method integrates rods.
 template <class Space>
 class ExplicitChain {
  public:
   explicit ExplicitChain(Chain<Space> chain) : chain_(std::move(chain)), links_(chain_), angles_(chain_.lengths()) {}
 
-  /// Of a tolerance of angles and their rates, what steps of rods are held to.
+  /// Tolerance for rods as a fraction of that for angles and their rates.
   static constexpr double tolerance_share = 0.2;
 
   int subject() const { return chain_.links(); }
@@ -58,7 +58,7 @@ class ExplicitChain {
     angles_.read_near(i, rod, rate, q, v);
   }
 
-  // Torques depend on time by sines alone, of which steps turn little (ExplicitSteps::longest_step).
+  // Torques depend on time through sines only, of which a step sees a small turn (ExplicitSteps::longest_step).
   template <class Steps>
   double followed(const Steps& /*steps*/, double /*time*/, double h) const {
     return h;
@@ -76,7 +76,7 @@ class ExplicitChain {
   }
 
  private:
-  // Where rods were within the last step.
+  // Direction of a rod within the last step.
   template <class Steps>
   static auto places(const Steps& steps) {
     return [&steps](int i, double share) { return share == 1 ? steps.parts()[i].place : steps.glance(i, share).place; };

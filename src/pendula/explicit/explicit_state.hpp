@@ -8,9 +8,9 @@
 
 namespace pendula {
 
-/// What moves, of one motion or of several members, one in each lane, as explicit methods keep it: parts and their
-/// rates at a time, with a tangent of each member or without; of one motion in twice the digits, so that what many
-/// small steps add to it is not lost to rounding. `Dynamics` is ChainAccelerations or SystemAccelerations.
+/// The state of explicit methods, for one motion or for several members, one in each lane: parts, their rates and the
+/// time, with or without a tangent of each member. For one motion, sums are kept in twice the digits, so that many
+/// small steps do not lose to rounding. `Dynamics` is ChainAccelerations or SystemAccelerations.
 template <class Dynamics>
 class ExplicitState {
  public:
@@ -26,19 +26,19 @@ class ExplicitState {
   const auto& parts() const { return parts_; }
 
   auto heading(int lane, int i) const { return dynamics_.heading(lane, i, parts_); }
-  /// Where a part is and its rate, with what they lost to rounding.
+  /// Position and rate of a part, with their low parts.
   auto exact_place(int i) const requires is_twofold { return exact(parts_[i].place, low_[i].place); }
   auto exact_rate(int i) const requires is_twofold { return exact(parts_[i].rate, low_[i].rate); }
   void find_rates() const {}
   decltype(auto) along(int i) const { return detail::values_of(parts_[i].place); }
 
-  /// Rates of all rods; visit(i, ξ̇_i, …).
+  /// Calls visit(i, ξ̇_i, …) for all rods.
   template <class Visit>
   void for_each_rate(Visit visit) const {
     for (int i = 0; i < links(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
   }
 
-  /// The numbers of the member in a lane, as MemberNumbers goes through them.
+  /// Visits the numbers of the member in a lane, as MemberNumbers does.
   template <class Numbers>
   void member(int lane, Numbers& numbers) requires(!has_tangent) {
     for (int i = 0; i < links(); ++i) {
@@ -62,7 +62,7 @@ class ExplicitState {
   using Part = typename Dynamics::Part;
   using Parts = typename Dynamics::Parts;
 
-  static constexpr double largest_turn = 3;  // in a step  [rad]
+  static constexpr double largest_turn = 3;  // per step  [rad]
 
   explicit ExplicitState(typename Dynamics::Subject subject)
       : dynamics_(subject), parts_(dynamics_.parts()), low_(parts_) {
@@ -72,7 +72,7 @@ class ExplicitState {
     }
   }
 
-  /// A member comes into a lane: ChainAccelerations::start.
+  /// Starts a member in a lane: ChainAccelerations::start.
   template <class... Start>
   void seat(int lane, double time, const Start&... start) {
     if constexpr (is_twofold) {
@@ -95,7 +95,7 @@ class ExplicitState {
     }
   }
 
-  /// By which the tangents of these members have the length 1, those of others what they have.
+  /// Factor that scales the tangents of these members to length 1; 1 for the others.
   static L to_unit_length(const Mask& which, const L& squared) { return select(which, L(1.0) / sqrt(squared), L(1.0)); }
   static void scale_tangent(const L& factor, Part& part) {
     for (std::size_t k = 0; k < D; ++k) {
@@ -104,7 +104,7 @@ class ExplicitState {
     }
   }
 
-  /// Of one motion; nothing of members.
+  /// Low parts of members: none.
   struct NoParts {
     explicit NoParts(const Parts& /*parts*/) {}
   };
@@ -113,7 +113,7 @@ class ExplicitState {
   Dynamics dynamics_;
   L now_{0.0};
   Parts parts_;
-  [[no_unique_address]] LowParts low_;  // what parts lost to rounding
+  [[no_unique_address]] LowParts low_;  // rounding errors of parts
 
  private:
   static auto exact(const Vector& value, const Vector& low) {

@@ -17,9 +17,9 @@
 
 namespace pendula {
 
-/// An explicit Runge–Kutta method, of one motion or on several members at once, one in each lane: for few digits and
-/// short times. After each step rods have their lengths again, and rates go across. `Dynamics` is ChainAccelerations or
-/// SystemAccelerations, with a tangent of each member or without.
+/// An explicit Runge–Kutta method for one motion, or for several members at once, one in each lane; for moderate
+/// accuracy and short times. After each step, rods are restored to their lengths and rates are made perpendicular to
+/// them. `Dynamics` is ChainAccelerations or SystemAccelerations, with or without a tangent of each member.
 template <class Dynamics, class Method>
 class ExplicitSteps : public ExplicitState<Dynamics> {
   using State = ExplicitState<Dynamics>;
@@ -31,7 +31,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
  public:
   static constexpr int stages = static_cast<int>(Method::stages);
   static constexpr bool can_choose = Method::error_order > 0;
-  /// Of the quadrature that is as good.
+  /// Nodes of a Gauss quadrature as accurate as the method.
   static constexpr int nodes = (Method::error_order + 2) / 2;
   using Chain = ExplicitSteps;
   using Subject = typename Dynamics::Subject;
@@ -61,7 +61,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   ExplicitSteps& chain() { return *this; }
   const ExplicitSteps& chain() const { return *this; }
 
-  /// Where the members are, with all that their next steps depend on.
+  /// The state of the members, with everything that their next steps depend on.
   struct Place {
     Place(Parts where, LowParts rest) : parts(std::move(where)), slopes(parts), low(std::move(rest)) {}
 
@@ -79,14 +79,14 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     low_ = place.low;
   }
 
-  /// A member comes into a lane: ChainAccelerations::start.
+  /// Starts a member in a lane: ChainAccelerations::start.
   template <class... Start>
   void start(int lane, double time, const Start&... start) {
     State::seat(lane, time, start...);
     set(fresh_, lane, 1);
   }
 
-  /// The numbers of one motion, as MemberNumbers goes through them.
+  /// Visits the numbers of one motion, as MemberNumbers does.
   template <class Numbers>
   void member(Numbers& numbers) requires is_twofold {
     numbers(fresh_);
@@ -95,11 +95,11 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     }
   }
 
-  /// A part and its rate, of the members whose step was accepted, when `share` of it was done: by the polynomial of
-  /// degree five through both ends with rates and accelerations.
+  /// Dense output: a part and its rate at the fraction `share` of the last accepted step, by the quintic Hermite
+  /// polynomial through both ends with rates and accelerations.
   MovingPart<L, D> glance(int i, double share) const { return Quintic(share).at(*this, i); }
 
-  /// Of all parts; visit(i, ξ, ξ̇).
+  /// Calls visit(i, ξ, ξ̇) for all parts, by dense output.
   template <class Visit>
   void for_each_glance(double share, Visit visit) const {
     const Quintic path(share);
@@ -109,7 +109,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     }
   }
 
-  /// The same by a step that ends there.
+  /// Calls visit(i, ξ, ξ̇) for all parts, after a step that ends there.
   template <class Visit>
   void for_each_look(double share, Visit visit) {
     go_back();
@@ -120,7 +120,8 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     go_back();
   }
 
-  /// In which stages see what drives turn: one that is weak and turns often within a step shows in none what it does.
+  /// The longest step in which stages resolve drives: a weak drive that oscillates often within a step would show in no
+  /// stage.
   L longest_step(double tolerance) const {
     double turn = nodes;
     if constexpr (can_choose) {
@@ -129,8 +130,8 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     return dynamics_.template longest_step<nodes>(turn);
   }
 
-  /// Tries a step of `h` from `time`; gives those of the members that are `wanted` to whom nothing happened that is not
-  /// finite, and who turn by less than half a turn. The state stays what it was.
+  /// Tries a step of `h` from `time`. Returns which of the `wanted` members have a finite result and turn by less than
+  /// half a turn. The state is unchanged.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
     refresh(time);
     detail::unrolled<stages - 1>([&](auto s) PENDULA_WRITTEN_OUT {
@@ -149,13 +150,13 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     return wanted & (turned < L(largest_turn * largest_turn));
   }
 
-  /// What the step errs by, relative to the size of the motion, squared.
+  /// Squared error of the tried step, relative to the size of the motion.
   const L& error_squared() const { return error_; }
 
-  /// Where the step that was tried ends.
+  /// The end of the tried step.
   const Parts& tried() const { return trial_.parts; }
 
-  /// Of the step that was tried the first part that is not finite; −1: all are.
+  /// The first part of the tried step that is not finite; −1: none.
   int part_not_finite() const requires is_twofold {
     for (int i = 0; i < links(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
@@ -165,7 +166,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     return -1;
   }
 
-  /// Moves the members to the end of the step that was tried.
+  /// Moves these members to the end of the tried step.
   void accept(const Mask& which) {
     step_ = select(which, tried_, step_);
     begin_ = select(which, tried_from_, begin_);
@@ -183,7 +184,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     }
   }
 
-  /// Where it is, it has come to by a step from `begin`.
+  /// Declares the way from `begin` to the current state a single step.
   void set_step(const Place& begin, double time, double h) requires is_twofold {
     before_ = begin;
     begin_ = time;
@@ -191,8 +192,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   }
   const Place& begin() const { return before_; }
 
-  /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
-  /// again after this.
+  /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires(Dynamics::has_tangent) {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
     for (int i = 0; i < links(); ++i) {
@@ -255,15 +255,15 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     std::swap(slopes_, with.slopes);
     std::swap(low_, with.low);
   }
-  // To where the last step began, and from there.
+  // Swaps the state with that at the start of the last step; a second call swaps back.
   void go_back() { change_place(before_); }
 
-  // The first slopes of members that have come into lanes; of others they are those of the last step's end.
+  // Computes the first slopes of members that were just started; the others have those from the end of their last step.
   void refresh(const L& time) {
     const Mask fresh = fresh_ > L(0.0);
     if (!any(fresh)) return;
     fresh_ = L(0.0);
-    Parts& found = stages_;  // slopes are as large
+    Parts& found = stages_;  // as scratch space
     dynamics_.slopes(time, parts_, found);
     dynamics_.for_parts([&](auto i)
                             PENDULA_WRITTEN_OUT { State::assign(fresh, State::at(found, i), State::at(slopes_, i)); });
@@ -280,7 +280,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     }
   }
 
-  // Σ weight_j k_j of part i, of the first `Count` slopes.
+  // Σ weight_j k_j of part i over the first `Count` slopes.
   template <std::size_t Count, class Weights, class Index>
   [[gnu::always_inline]] Part weighed(const Weights& weights, Index i) const {
     Part sum = Part::zero();
@@ -297,7 +297,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     return sum;
   }
 
-  // Where the first `Count` slopes lead to, weighed.
+  // The state plus h times the weighted sum of the first `Count` slopes.
   template <std::size_t Count, class Weights>
   [[gnu::always_inline]] void weigh(const L& h, const Weights& weights, Parts& to) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
@@ -316,7 +316,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     });
   }
 
-  // The end of the step.
+  // Computes the end of the step.
   [[gnu::always_inline]] void arrive(const L& h) {
     if constexpr (is_twofold) {
       for (int i = 0; i < links(); ++i) {
@@ -341,13 +341,13 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     dynamics_.for_parts([&](auto i)
                             PENDULA_WRITTEN_OUT { State::at(errors_, i) = weighed<Method::stages + 1>(Method::e, i); });
     error_ = dynamics_.error_squared(h, errors_, parts_, slopes_, trial_.parts, pace_squared);
-    // Of one motion forces are looked at before (ForcedSteps).
+    // For one motion, ForcedSteps checks the forces before the step.
     if constexpr (is_batch<L> && requires { dynamics_.depends_on_time(); }) {
       if (dynamics_.depends_on_time()) {
         error_ = max(error_, dynamics_.template unseen_forcing_squared<nodes>(time, h, parts_));
       }
     }
-    // Where the motion stands still, or almost, nothing but its tangent tells which steps are too long.
+    // At rest, or nearly so, only the tangent shows which steps are too long.
     if constexpr (has_tangent) {
       const L tangent = (h * h) * (dynamics_.tangent_squared(errors_) / dynamics_.tangent_squared(parts_));
       error_ = max(error_, L(tangent_share * tangent_share) * tangent);
@@ -355,13 +355,13 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   }
 
   L fresh_{0.0}, error_{0.0};
-  L tried_{0.0}, step_{1.0};        // the steps that were tried, and those that were taken last
-  L tried_from_{0.0}, begin_{0.0};  // when they began
-  Parts slopes_;                    // where the members are
-  Place trial_, before_;            // the end of a step that is tried, and where the last one began
+  L tried_{0.0}, step_{1.0};        // tried steps, last accepted steps
+  L tried_from_{0.0}, begin_{0.0};  // times at which these began
+  Parts slopes_;                    // at the current state
+  Place trial_, before_;            // end of the tried step, start of the last one
   Parts stages_;
   std::vector<Parts> inner_slopes_;  // of all stages but the first
-  Parts errors_;                     // of the step, over its size
+  Parts errors_;                     // error of the step divided by its size
 };
 
 }  // namespace pendula

@@ -18,19 +18,19 @@
 
 namespace pendula {
 
-/// A system of a generated kernel as SingleIntegrator moves it by a Method of explicit_tableau.hpp. `Dynamics` is
+/// A system of a generated kernel as SingleIntegrator moves it, with a Method of explicit_tableau.hpp. `Dynamics` is
 /// MemberSystems of plain numbers.
 template <class Dynamics, class Method>
 class ExplicitSystem {
   static constexpr bool can_choose = Method::error_order > 0;
-  static constexpr int nodes = can_choose ? (Method::error_order + 2) / 2 : 2;  // of the quadrature that is as good
+  static constexpr int nodes = can_choose ? (Method::error_order + 2) / 2 : 2;  // of an equally accurate quadrature
   static constexpr bool is_blind = [] {
     if constexpr (can_choose) return Method::is_blind;
     return false;
   }();
 
  public:
-  /// `table` must outlive it.
+  /// `table` must outlive this object.
   ExplicitSystem(const SystemTable& table, const PlainSystem& plain, double tolerance)
       : model_(table, plain),
         numbers_{{model_.parameters().begin(), model_.parameters().end()},
@@ -92,8 +92,8 @@ class ExplicitSystem {
 
   bool has_to_look() const { return field_.has_to_look(); }
 
-  /// Relative to what errors are compared with; without a tolerance to the fastest that a coordinate was, or others
-  /// were, nearly.
+  /// Relative to what errors are relative to. Without a tolerance, relative to the fastest that the coordinate has
+  /// been, or to a fraction of the fastest that any coordinate has been.
   template <class Parts>
   Unseen unseen(const Parts& from, const Parts& to, double time, double h, double tolerance) {
     write(from, x_);
@@ -132,7 +132,8 @@ class ExplicitSystem {
     }
   }
 
-  // Of rates and accelerations: at a pole these are infinite, and it is better to say so than to start.
+  // Index of the first rate or acceleration that is not finite: at a pole accelerations are infinite, and starting
+  // there would fail later with a less clear message.
   std::size_t first_not_finite(double time, const double* q, const double* v) {
     std::vector<double> found(count());
     forward_->acceleration(time, q, v, found.data());
@@ -146,12 +147,12 @@ class ExplicitSystem {
 
   SystemModel model_;
   SystemNumbers numbers_;
-  std::unique_ptr<Dynamics> dynamics_;  // of which others know where it is
+  std::unique_ptr<Dynamics> dynamics_;  // on the heap, because others hold references to it
   std::unique_ptr<SystemForwardDynamics> forward_;
   ForcedSteps forcing_;
   FieldSteps field_;
-  std::vector<double> fastest_;          // that each coordinate was
-  std::vector<double> x_, end_, moved_;  // (q, q̇), at the ends of a step and from one to the other
+  std::vector<double> fastest_;          // the fastest of each coordinate so far
+  std::vector<double> x_, end_, moved_;  // (q, q̇) at the start and the end of a step, and their difference
 };
 
 }  // namespace pendula

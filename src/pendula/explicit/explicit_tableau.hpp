@@ -5,12 +5,12 @@
 
 namespace pendula {
 
-// Explicit Runge–Kutta methods: stage i is at y + h Σ_j a_ij k_j, the end at y + h Σ_i b_i k_i. The error of the step
-// is h Σ_i e_i k_i, the last k being the slope at the end; a method with `error_order` 0 has no such estimate. The
-// estimate of a method that `is_blind` compares slopes at both ends only, and does not see what depends on time. A new
-// method has a case in library/explicit_methods.hpp and in ensemble/plain_queue.hpp, too.
+// Explicit Runge–Kutta methods: stage i is at y + h Σ_j a_ij k_j, the end at y + h Σ_i b_i k_i. The error estimate is h
+// Σ_i e_i k_i, where the last k is the slope at the end; a method with `error_order` 0 has no estimate. The estimate of
+// a method that `is_blind` compares only slopes at both ends, and does not see forces that depend on time. A new method
+// also needs a case in library/explicit_methods.hpp and in ensemble/plain_queue.hpp.
 
-/// The classical method.
+/// The classical Runge–Kutta method of order 4.
 struct ClassicalRungeKutta {
   static constexpr std::size_t stages = 4;
   static constexpr int error_order = 0;
@@ -21,7 +21,7 @@ struct ClassicalRungeKutta {
 
 namespace detail {
 
-/// When a stage is, in steps from the start: the sum of what it weighs the slopes with.
+/// Node c_i of a stage: the sum of its weights a_ij.
 template <std::size_t Count>
 constexpr double node_of(const double (&weights)[Count]) {
   double sum = 0;

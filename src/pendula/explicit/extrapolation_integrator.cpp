@@ -23,15 +23,15 @@ namespace odeint = boost::numeric::odeint;
 
 using Vector = std::vector<double>;  // (q, q̇)
 
-/// rate = d/dt (q, q̇) = (q̇, q̈) at time, where the state has moved so far since its step began.
+/// rate = d/dt (q, q̇) = (q̇, q̈) at `time`, where the state has moved by `moved` since its step began.
 using RightHandSide = std::function<void(const Vector& moved, Vector& rate, double time)>;
 
-/// odeint's modified midpoints in 2, 4, 6, … substeps, extrapolated to infinitely many. Order and step are those that
-/// take least work for the way (Hairer, Nørsett, Wanner, Solving ODEs I, II.9). odeint's own control is not used: the
-/// order that it has come to is hidden in it, and would be no part of the member.
+/// Bulirsch–Stoer: odeint's modified midpoint rule with 2, 4, 6, … substeps, extrapolated to step size zero. Order and
+/// step size minimise the work per unit of time (Hairer, Nørsett, Wanner, Solving ODEs I, II.9). odeint's own step-size
+/// control is not used, because it hides the current order, which has to be part of the member.
 ///
-/// Midpoints are given how far the state has moved since its step began, not the state: so what many small steps add to
-/// it is not lost to rounding.
+/// The midpoint rule is given the displacement since the step began instead of the state, so that many small steps do
+/// not lose to rounding.
 class ExtrapolationIntegrator : public PlainIntegrator {
  public:
   ExtrapolationIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, double tolerance,
@@ -67,8 +67,9 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return outcome;
   }
 
-  // What depends on time is looked at as if nothing cut the step, and one that is cut and fails is found as if nothing
-  // cut it: so a run that goes on takes the steps of one that was not cut.
+  // Forces that depend on time are checked for the step that would be taken without the limit h, and a limited step
+  // that fails is repeated without the limit. So a run that is continued takes the same steps as one that was not
+  // interrupted.
   Outcome step(double h) override {
     const double longest = forcing_.followed(*dynamics_, time(), x_.data(), x_.data() + x_.size() / 2,
                                              proposed_ == 0 ? first_step : proposed_);
@@ -82,7 +83,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     if (is_stopped()) return interrupted(trial.size);
     statistics_.rejected_steps += trial.rejected;
     if (!trial.is_accepted) return failure(Status::tolerance_not_met, trial.proposed, next_);
-    const bool tells = !is_cut || trial.proposed < trial.size;  // else that of the next one is not known from this
+    const bool tells = !is_cut || trial.proposed < trial.size;  // else it says nothing about the next step
     if (tells) {
       proposed_ = trial.proposed;
       row_ = next_row_;
@@ -106,7 +107,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     before_.step = 0;
   }
 
-  /// Steps are so long that no polynomial through their ends follows them.
+  /// Steps are too long for polynomials through their ends.
   void glance(double time, double* q, double* v) override {
     double work = 0;
     look(time, q, v, work);
@@ -131,7 +132,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
   }
 
   void heed(StopSign stop) override {
-    constexpr std::size_t quick = 2000;  // numbers whose rates take less than it takes to ask
+    constexpr std::size_t quick = 2000;  // numbers: evaluating fewer rates is faster than asking
     stop_ = x_.size() > quick ? stop : StopSign{};
   }
 
@@ -145,23 +146,23 @@ class ExtrapolationIntegrator : public PlainIntegrator {
   }
 
  private:
-  using Quadrature = kernels::GaussTableau<8>;  // as good as the rows
+  using Quadrature = kernels::GaussTableau<8>;  // as accurate as the extrapolation rows
 
   static constexpr std::size_t rows = 9, first_row = 4, least_row = 2;
-  static constexpr double first_step = 1e-3;  // s; the control finds the right one within a few steps
+  static constexpr double first_step = 1e-3;  // s; the control adapts it within a few steps
   static constexpr int max_attempts = 100;
 
   // --- Steps ---
 
-  /// What steps that were tried have come to; the last one's end is in next_.
+  /// The result of trying steps; next_ is the end of the last one tried.
   struct Trial {
-    double size = 0, proposed = 0;  // of the last one, and of what follows it
+    double size = 0, proposed = 0;  // of the last step tried, and of the step after it
     int rejected = 0;
     bool is_accepted = false;
-    double unseen = 0;  // impulse between its stages
+    double unseen = 0;  // impulse between the stages
   };
 
-  /// Tries steps, shorter and shorter from this one on.
+  /// Tries steps from `longest` on, shorter each time.
   Trial find_step(double longest, int tries = max_attempts) {
     Trial trial{.proposed = longest};
     for (int attempt = 0; attempt < tries && trial.proposed > smallest_step() && !is_stopped(); ++attempt) {
@@ -187,7 +188,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
 
   double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
 
-  // Of the step to next_.
+  // For the step to next_.
   double unseen(double h) {
     const auto size_of = [&](const Vector& rate) {
       return [this, sizes = ErrorSize(x_, rate, moved_, h, tolerance_)](std::size_t k) {
@@ -197,7 +198,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return field_.unseen(*dynamics_, time(), h, x_, next_, size_of).impulse;
   }
 
-  /// Where a step ends that has moved the state so far.
+  /// Computes the end of a step that moves the state by `moved`.
   void arrive(const Vector& moved) {
     for (std::size_t i = 0; i < x_.size(); ++i) {
       const Twofold<double> sum = exact_sum(x_[i], moved[i]);
@@ -206,7 +207,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     }
   }
 
-  /// The step ends where it has arrived; the state that it began at is in next_ after that.
+  /// Moves to next_, which then holds the start of the step.
   Outcome accept(double h) {
     x_.swap(next_);
     low_.swap(next_low_);
@@ -226,13 +227,13 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return {.status = status, .time = time(), .step = h, .part = non_finite_part(at)};
   }
 
-  // --- Rows ---
+  // --- Rows of the extrapolation table ---
 
   static constexpr unsigned short substeps(std::size_t row) { return static_cast<unsigned short>(2 * (row + 1)); }
-  // Accelerations of all rows up to this one.
+  // Evaluations of accelerations in all rows up to this one.
   static constexpr double work(std::size_t row) { return static_cast<double>((row + 1) * (row + 2) + 1); }
 
-  // Rows until one converges: the one that is expected to, or one of its neighbours.
+  // Adds rows until one converges: the expected one or a neighbour.
   bool try_step(double& tried) {
     const double h = tried;
     right_hand_side_(low_, rate_, time());
@@ -253,15 +254,14 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return false;
   }
 
-  /// Moves on by h, which is part of a step that was accepted.
+  /// Advances by h, a part of an accepted step.
   void advance(Vector& moved, double time, double h) {
     right_hand_side_(moved, look_rate_, time);
     for (std::size_t row = 0; row <= row_of_last_; ++row) add_row(row, moved, look_rate_, time, h);
     moved = table_[0];
   }
 
-  /// The table by Aitken and Neville: its new row, from the last, whose ends stand in table_. The rates at the start
-  /// are known.
+  /// Adds a row of the Aitken–Neville table; table_ holds the previous row. `rate` is the derivative at the start.
   void add_row(std::size_t row, const Vector& start, const Vector& rate, double time, double h) {
     midpoint_.set_steps(substeps(row));
     midpoint_.do_step(std::ref(right_hand_side_), start, rate, time, table_[row], h);
@@ -274,7 +274,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     }
   }
 
-  /// Of the last two columns of a row, relative to what is tolerated.
+  /// Difference of the last two columns of a row, relative to the tolerance.
   double largest_error(double h) const {
     const ErrorSize size(x_, rate_, table_[0], h, tolerance_);
     double largest = 0;
@@ -285,13 +285,13 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return largest;
   }
 
-  /// How long a step may be that converges in a row.
+  /// Step size with which a row would converge.
   static double best_step(double h, double error, std::size_t row) {
     const double exponent = 1 / (2 * static_cast<double>(row) + 1), most = std::pow(50, exponent);
     return h * std::clamp(0.94 * std::pow(0.65 / std::max(error, 1e-30), exponent), 1 / (4 * most), most);
   }
 
-  /// The row for the next step, and how long that is to be, where a step has converged in `row`.
+  /// Chooses the row and the step size for the next step, after convergence in `row`.
   double choose(std::size_t row) {
     const auto effort = [&](std::size_t k) { return work(k) / best_[k]; };
     next_row_ = row;
@@ -302,9 +302,9 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return next_row_ <= row ? best_[next_row_] : best_[row] * work(next_row_) / work(row);
   }
 
-  // --- Rates ---
+  // --- Right-hand side ---
 
-  bool is_stopped() const { return stop_(); }  // then rates that were found since are of no use
+  bool is_stopped() const { return stop_(); }  // rates found since then are invalid
   Outcome interrupted(double h) const { return {.status = Status::interrupted, .time = time(), .step = h}; }
 
   void find_rate(const Vector& moved, Vector& rate, double time) {
@@ -319,7 +319,7 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     dynamics_->acceleration(time, x.data(), x.data() + k, rate.data() + k);
   }
 
-  // At a pole the accelerations are infinite: better to say so than to start.
+  // At a pole accelerations are infinite: better to fail at the start.
   Outcome require_finite_rate() {
     find_rate_at(x_, rate_, time());
     if (is_finite(rate_)) return {.status = Status::ok, .time = time()};
@@ -334,17 +334,17 @@ class ExtrapolationIntegrator : public PlainIntegrator {
     return at == x.end() ? -1 : static_cast<int>((at - x.begin()) % parts_);
   }
 
-  // The last step.
+  // The start of the last step.
   struct Remembered {
     double time = 0, step = 0;  // 0: there was none
     Vector x, low;
   };
 
-  Vector x_, low_;                   // the state, and what is below its last bits
-  Vector next_, next_low_;           // where a step that is tried ends
-  Vector rate_, look_rate_, place_;  // where a step begins, and at any place
+  Vector x_, low_;                   // the state, and its rounding error
+  Vector next_, next_low_;           // end of the tried step
+  Vector rate_, look_rate_, place_;  // at the start of a step, and anywhere
   Vector moved_;
-  const Vector* from_ = &x_;  // where the step begins that is taken
+  const Vector* from_ = &x_;  // start of the current step
   std::unique_ptr<ForwardDynamics> dynamics_;
   double tolerance_;
   ForcedSteps forcing_;
@@ -362,8 +362,8 @@ class ExtrapolationIntegrator : public PlainIntegrator {
   odeint::modified_midpoint<Vector> midpoint_;
   std::array<Vector, rows> table_;
   std::array<double, rows> best_{};
-  std::size_t row_ = first_row, next_row_ = first_row;  // that a step is expected to converge in
-  std::size_t row_of_last_ = first_row;                 // that the last one did
+  std::size_t row_ = first_row, next_row_ = first_row;  // in which the next step is expected to converge
+  std::size_t row_of_last_ = first_row;                 // in which the last step converged
 };
 
 }  // namespace

@@ -13,11 +13,11 @@
 
 namespace pendula {
 
-/// What a step of an explicit method does not see of the field between its stages.
+/// Measures what a step of an explicit method misses of the forces between its stages.
 class FieldSteps {
  public:
-  /// For a method that is as good as a quadrature of so many nodes. `is_blind`: its estimate of errors does not see
-  /// what a stage alone meets.
+  /// `nodes`: those of a Gauss quadrature as accurate as the method. `is_blind`: the error estimate of the method
+  /// misses forces that only one stage meets.
   FieldSteps(int nodes, const ForwardDynamics& dynamics, std::size_t coordinates, bool is_blind = false)
       : look_(nodes, few_samples, dynamics.arguments()),
         is_blind_(is_blind),
@@ -32,15 +32,15 @@ class FieldSteps {
 
   bool has_to_look() const { return look_.has_to_look(); }
 
-  /// The next step begins anywhere; where the last one that was looked at has ended.
+  /// The next step begins at an unknown state; or where the last step examined ended.
   void forget() { begin_is_known_ = false; }
   void move_on() {
     begin_.swap(end_);
     begin_is_known_ = end_is_known_;
   }
 
-  /// Along each coordinate k, relative to size_of(rate at x)(k); the largest. The path from x = (q, q̇) to `end` is the
-  /// quintic through both, their rates and accelerations.
+  /// The largest over the coordinates k, relative to size_of(rate at x)(k). The path from x = (q, q̇) to `end` is the
+  /// quintic through both states with their accelerations.
   template <class SizeOf>
   Unseen unseen(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
                 const std::vector<double>& end, SizeOf&& size_of) {
@@ -83,7 +83,7 @@ class FieldSteps {
   }
 
  private:
-  // By the cubic through both ends.
+  // Path by the cubic through both ends.
   void lay_roughly(double h, const std::vector<double>& x, const std::vector<double>& end) {
     const std::size_t count = path_.size();
     for (std::size_t k = 0; k < count; ++k) {
@@ -145,14 +145,14 @@ class FieldSteps {
     }
   }
 
-  static constexpr double path_error = 100;  // of a quintic, in errors of the step, about
+  static constexpr double path_error = 100;  // error of the quintic over that of the step, roughly
   static constexpr int few_samples = 3;
-  static constexpr double beside = 1e-3;  // of others, that a coordinate at rest is compared with
+  static constexpr double beside = 1e-3;  // of the fastest, for a coordinate at rest
 
   FieldLook look_;
   bool is_blind_, begin_is_known_ = false, end_is_known_ = false;
-  std::vector<std::array<double, 6>> path_;  // coefficients of powers of the share
-  std::vector<double> begin_, end_;          // rates; of the coordinates' nothing
+  std::vector<std::array<double, 6>> path_;  // coefficients of the powers of share
+  std::vector<double> begin_, end_;          // accelerations, in the second half only
   std::vector<double> place_, rate_, sums_, moments_, missed_, found_;
   std::vector<double> times_, places_, rates_;
 };

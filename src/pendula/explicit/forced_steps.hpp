@@ -12,11 +12,11 @@
 
 namespace pendula {
 
-/// How long the steps of an explicit method may be for its stages to see what depends on time.
+/// Limits the steps of an explicit method so that its stages resolve forces that depend on time.
 class ForcedSteps {
  public:
-  /// For a method that is as good as the quadrature `Gauss`, a kernels::GaussTableau; `is_blind` where its estimate of
-  /// errors does not see what depends on time alone.
+  /// `Gauss`, a kernels::GaussTableau, is a quadrature as accurate as the method. `is_blind`: the error estimate of the
+  /// method does not see forces that depend on time only.
   template <class Gauss>
   ForcedSteps(Gauss, std::size_t coordinates, double tolerance, bool is_blind = false)
       : turn_(is_blind ? SineTurn(Gauss::stages, 2 * Gauss::stages).within(tolerance) : Gauss::stages),
@@ -26,13 +26,13 @@ class ForcedSteps {
         a_(coordinates),
         sizes_(coordinates) {}
 
-  /// A run starts.
+  /// Call at the start of a run.
   void start(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
     if (dynamics.depends_on_time()) pace_ = pace_of(dynamics, time, q, v);
   }
 
-  /// The longest step up to h from q and v. Drives turn by a radian a node at most: one that is weak and turns often
-  /// within a step shows in no stage what it does.
+  /// The longest step up to h from q and v. Drives turn by at most a radian per node: a weak drive that oscillates
+  /// often within a step would show in no stage.
   double followed(ForwardDynamics& dynamics, double time, const double* q, const double* v, double h) {
     h = std::min(h, turn_ / dynamics.fastest_drive());
     if (!dynamics.depends_on_time()) return h;
@@ -49,7 +49,7 @@ class ForcedSteps {
   }
 
  private:
-  // The fastest that a coordinate alone would swing with where it is; 1/s where nothing tells.
+  // The highest frequency at which a single coordinate would oscillate here; 1/s if there is none.
   double pace_of(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
     double squared = 0;
     dynamics.acceleration(time, q, v, a_.data());
@@ -65,7 +65,7 @@ class ForcedSteps {
     return squared > 0 ? std::sqrt(squared) : 1;
   }
 
-  double turn_;  // of drives in a step, at most  [rad]
+  double turn_;  // of drives per step, at most  [rad]
   double tolerance_, pace_ = 1;
   ForcingLook look_;
   std::vector<double> moved_, a_, sizes_;

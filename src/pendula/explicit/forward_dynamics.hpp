@@ -5,8 +5,8 @@
 
 namespace pendula {
 
-/// Accelerations, as explicit methods need them. Nothing of Eigen, because it crosses between a program and
-/// the compiled library (library.hpp).
+/// Accelerations for explicit methods. The interface does not use Eigen, because it crosses between a program and the
+/// compiled library (library.hpp).
 class ForwardDynamics {
  public:
   ForwardDynamics() = default;
@@ -17,17 +17,18 @@ class ForwardDynamics {
   /// q̈ at `time`, from A(q) q̈ = B q̇² − C[q̇ q̇] − g + Q (paper eq. 27, corrected); all (dof·n).
   virtual void acceleration(double time, const double* q, const double* v, double* acceleration) = 0;
 
-  /// Highest frequency of what drives it  [rad/s].
+  /// Highest driving frequency  [rad/s].
   virtual double fastest_drive() const { return 0; }
-  /// Whether it depends on time in other ways.
+  /// Whether accelerations depend on time in other ways.
   virtual bool depends_on_time() const { return false; }
-  /// Then, of one state at each of `count` times, (count, dof·n).
+  /// If so: accelerations of one state at each of `count` times, (count, dof·n).
   virtual void accelerations(const double* /*times*/, std::size_t /*count*/, const double* /*q*/, const double* /*v*/,
                              double* /*found*/) {}
 
-  /// Of what its functions are taken of that may be narrow, whether it is the base of a power (field_look.hpp).
+  /// For each argument of the model's functions that may change fast: whether it is the base of a power
+  /// (field_look.hpp).
   virtual std::span<const bool> arguments() const { return {}; }
-  /// And what that is in each of `count` states, (count, dof·n): (count, arguments).
+  /// Values of these arguments in `count` states, (count, dof·n): (count, arguments).
   virtual void find_arguments(const double* /*times*/, std::size_t /*count*/, const double* /*q*/, const double* /*v*/,
                               double* /*found*/) {}
 };

@@ -12,15 +12,17 @@
 
 namespace pendula {
 
-/// An explicit method behind the run-time interface: one motion, by the text that moves members of ensembles. `Steps`
-/// takes them, of plain numbers; `Subject` knows the coordinates that users see, and looks for what steps do not:
-///   Steps(subject.subject());  coordinates();  Outcome start(time, q, v, steps);  void follow(steps): a step was taken
-///   void read(steps, q, v);  void read_within(steps, share, q, v): when a share of the last step was done
-///   void read_near(i, place, rate, q, v): of a part, whose q is known nearly
-///   double followed(steps, time, h): the longest step up to h in which it sees what depends on time
-///   bool has_to_look();  Unseen unseen(from, to, time, h, tolerance): what a step does not see
-///   tolerance_share: of the user's tolerance, what the steps are given
-///   void move_on();  void member(numbers);  kernel()
+/// One motion with an explicit method, behind the run-time interface; it uses the same code as members of ensembles.
+/// `Steps` is the method for plain numbers. `Subject` converts between the coordinates of users and those of the
+/// method, and checks what steps miss:
+///   Steps(subject.subject());  coordinates();  Outcome start(time, q, v, steps)
+///   void follow(steps): called after every step
+///   void read(steps, q, v): the state;  void read_within(steps, share, q, v): at a fraction of the last step
+///   void read_near(i, place, rate, q, v): converts one part, near known angles
+///   double followed(steps, time, h): the longest step up to h that resolves forces that depend on time
+///   bool has_to_look();  Unseen unseen(from, to, time, h, tolerance): what a step misses between its stages
+///   tolerance_share: tolerance of the method as a fraction of the user's
+///   void move_on(): called when an examined step is taken;  void member(numbers);  kernel()
 template <class Steps, class Subject>
 class SingleIntegrator final : public PlainIntegrator {
  public:
@@ -31,7 +33,7 @@ class SingleIntegrator final : public PlainIntegrator {
         kept_(steps_.place()),
         end_(kept_),
         tolerance_(tolerance) {
-    // Members of others are resumed without a start: numbers of the subject come into the steps here.
+    // An integrator may be resumed without a start, so the subject's numbers must come into the steps here.
     const std::vector<double> zero(subject_.coordinates());
     start(0, zero.data(), zero.data());
   }
@@ -59,7 +61,7 @@ class SingleIntegrator final : public PlainIntegrator {
   double time() const override { return time_.value; }
   void read_state(double* q, double* v) const override { subject_.read(steps_, q, v); }
 
-  /// Where the last step began is known until the next one.
+  /// Nothing to do: the start of the last step is always kept.
   void remember_steps(bool /*wanted*/) override {}
 
   void glance(double time, double* q, double* v) override {
@@ -84,7 +86,7 @@ class SingleIntegrator final : public PlainIntegrator {
   }
 
   void heed(StopSign stop) override {
-    constexpr int quick = 1000;  // parts whose steps take less than it takes to ask
+    constexpr int quick = 1000;  // parts: a step of fewer is faster than asking
     stop_ = steps_.links() > quick ? stop : StopSign{};
   }
 
@@ -114,9 +116,9 @@ class SingleIntegrator final : public PlainIntegrator {
     return ok(h);
   }
 
-  // --- Steps as they are asked for ---
+  // --- Steps of a given size ---
 
-  // A step that ends nowhere, or turns too far, is taken in ever smaller parts.
+  // A step that fails or turns too far is divided into ever more parts.
   Outcome fixed_step(double h) {
     for (int parts = 1; parts <= most_parts; parts *= 2) {
       const bool is_good = parts == 1 ? steps_.solve(time(), h, true) : goes_in(parts, time(), h);
@@ -140,7 +142,7 @@ class SingleIntegrator final : public PlainIntegrator {
     subject_.move_on();
   }
 
-  // From where it is, which is kept; where that fails it is there again.
+  // Takes h in `parts` steps from the current state, which is kept. On failure returns to it.
   bool goes_in(int parts, double time, double h) {
     kept_ = steps_.place();
     const double size = h / parts;
@@ -166,18 +168,19 @@ class SingleIntegrator final : public PlainIntegrator {
     steps_.set_step(kept_, begin_, step_);
   }
 
-  // --- Steps of its own choice, h being an upper bound ---
+  // --- Adaptive steps, at most h long ---
 
-  /// What steps that were tried have come to.
+  /// The result of trying steps.
   struct Trial {
-    double size = 0;  // of the last one
+    double size = 0;  // of the last step tried
     int rejected = 0;
     bool is_accepted = false;
-    double unseen = 0;  // impulse between its stages
+    double unseen = 0;  // impulse between the stages
   };
 
-  // What depends on time is looked at as if nothing cut the step, and one that is cut and fails is found as if nothing
-  // cut it: so a run that goes on takes the steps of one that was not cut.
+  // Forces that depend on time are checked for the step that would be taken without the limit h, and a limited step
+  // that fails is repeated without the limit. So a run that is continued takes the same steps as one that was not
+  // interrupted.
   Outcome chosen_step(double h) {
     const double longest = subject_.followed(steps_, time(), controller_.step(steps_));
     const auto before = controller_;
@@ -196,7 +199,7 @@ class SingleIntegrator final : public PlainIntegrator {
     statistics_.rejected_steps += trial.rejected;
     if (!trial.is_accepted) return failure(Status::tolerance_not_met, controller_.step(steps_));
     controller_.move_on(true, trial.size, steps_);
-    // Else this one does not tell how long the next one is to be.
+    // A limited step says nothing about the size of the next one, unless it should have been shorter.
     const bool tells = !is_cut || controller_.step(steps_) < trial.size;
     if (!tells) controller_ = before;
     if (!is_cut) statistics_.count_chosen(trial.size);
@@ -206,7 +209,7 @@ class SingleIntegrator final : public PlainIntegrator {
     return accept(trial.size);
   }
 
-  /// Tries steps, shorter and shorter from this one on.
+  /// Tries steps from `longest` on, shorter each time.
   Trial find_step(double longest, int tries = most_attempts) {
     Trial trial;
     double size = longest;
@@ -239,7 +242,7 @@ class SingleIntegrator final : public PlainIntegrator {
   Subject subject_;
   Steps steps_;
   typename Steps::Controller controller_;
-  typename Steps::Place kept_, end_;  // of steps that are taken in parts
+  typename Steps::Place kept_, end_;  // for steps taken in parts
   double tolerance_;
   Statistics statistics_;
   Compensated<double> time_{};

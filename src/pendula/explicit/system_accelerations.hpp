@@ -20,9 +20,9 @@
 
 namespace pendula {
 
-/// The forward dynamics of a system, or of several at once, one in each lane, by their accelerations.
+/// Forward dynamics of a system, or of several at once, one in each lane, by the accelerations of its kernel.
 ///
-/// With a tangent, every number has its derivative along one tangent of each member's motion.
+/// With a tangent, every number carries its derivative along one tangent of each member's motion.
 template <class Num = LanePack<MemberRegister>, bool with_tangent = false>
 class SystemAccelerations {
  public:
@@ -33,12 +33,12 @@ class SystemAccelerations {
   using Subject = MemberSystems<L>&;
   static constexpr int links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
-  static constexpr bool limits_turns = is_batch<L>;  ///< whether steps turn angles by less than half a turn
+  static constexpr bool limits_turns = is_batch<L>;  ///< whether a step may turn angles by less than half a turn only
   static constexpr std::size_t D = 1;
   using Part = MovingPart<Number, D>;  ///< q, q̇ of a coordinate
   using Parts = detail::PerLink<Part, links_known>;
 
-  /// `dynamics` must outlive it.
+  /// `dynamics` must outlive this object.
   explicit SystemAccelerations(MemberSystems<L>& dynamics)
       : dynamics_(dynamics), rows_(static_cast<std::size_t>(kinds * parts()) + 1), tangent_(dynamics) {}
   SystemAccelerations(const SystemAccelerations&) = delete;
@@ -55,7 +55,7 @@ class SystemAccelerations {
   }
   static Part resting() { return Part::zero(); }
 
-  /// A member comes into a lane, with its numbers, at q and v at `time`, of which nothing is `low`.
+  /// Starts a member in a lane, with its parameters and inputs, at q and v at `time`; `low` is set to zero.
   template <class... Low>
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v, Parts& parts,
              Low&... low) {
@@ -85,11 +85,11 @@ class SystemAccelerations {
     energy_sum_ = abs(T) + abs(energy - T);
     return energy;
   }
-  /// |T| + |U| where the energy was asked for last  [J].
+  /// |T| + |U| at the last call of energy()  [J].
   const L& energy_sum() const { return energy_sum_; }
 
-  /// How fast a member swung when it began, squared, and no less than coordinates that are angles turn; not a number
-  /// where anything is none  [1/s²].
+  /// The initial rate of change of a member, squared, but at least the square of the fastest angle's rate; NaN if the
+  /// state is not finite  [1/s²].
   L pace_squared(const Parts& parts) const {
     L largest = pace_squared_, none(0.0);
     for_parts([&](int i) {
@@ -100,9 +100,9 @@ class SystemAccelerations {
     return largest + none;
   }
 
-  /// What a step of `h` errs by, squared, from the errors of coordinates and rates that it is made of: of angles
-  /// relative to a radian, of others to the largest coordinate of the same unit; of rates to the fastest, and to what
-  /// they come to where they fall that far.
+  /// Squared error of a step of `h`, from the error sums of coordinates and rates. Angles are relative to a radian,
+  /// other coordinates to the largest one of the same unit; rates to the fastest one, or to the speed that they would
+  /// reach by falling that far.
   L error_squared(const L& h, const Parts& errors, const Parts& before, const Parts& slopes, const Parts& after,
                   const L& /*pace_squared*/) const {
     if constexpr (!is_batch<L>) return error_squared_of_one(h, errors, before, slopes, after);
@@ -127,7 +127,7 @@ class SystemAccelerations {
     return largest;
   }
 
-  /// q̇ and q̈ at `time`.
+  /// Computes q̇ and q̈ at `time`.
   void slopes(const L& time, const Parts& parts, Parts& found) {
     find_accelerations(time, parts);
     for_parts([&](int i) { found[i] = {parts[i].rate, {acceleration(i)}}; });
@@ -136,8 +136,8 @@ class SystemAccelerations {
   template <class... Low>
   void restore(Parts& /*parts*/, Low&... /*low*/) const {}
 
-  /// The longest step in which drives turn by no more than `turn`  [rad], and in which unseen_forcing_squared looks as
-  /// closely as ForcingLook does, for a method that is as good as a quadrature of so many nodes.
+  /// The longest step in which drives turn by at most `turn`  [rad], and in which unseen_forcing_squared samples as
+  /// densely as ForcingLook. `nodes`: those of a Gauss quadrature as accurate as the method.
   template <int nodes>
   L longest_step(double turn) const {
     const L longest = L(turn) / dynamics_.fastest_drives();
@@ -146,11 +146,11 @@ class SystemAccelerations {
     return min(longest, L(looks) / natural_pace());
   }
 
-  /// Whether accelerations depend on time other than by drives.
+  /// Whether accelerations depend on time other than through drives.
   bool depends_on_time() const { return dynamics_.depends_on_time(); }
 
-  /// What a quadrature of so many nodes in the step makes of accelerations of a state that stands still, less what it
-  /// makes of them in parts of the step; relative to rates and to what comes to them, squared (ForcingLook).
+  /// Difference between integrals over the step of the accelerations of a fixed state: by one quadrature with `nodes`
+  /// nodes, and by one in each of several parts. Relative to rates and their changes, squared (ForcingLook).
   template <int nodes>
   L unseen_forcing_squared(const L& time, const L& h, const Parts& parts) {
     write(time, parts);
@@ -179,7 +179,7 @@ class SystemAccelerations {
   }
 
  private:
-  // What accelerations come to in a step: ∫ a dt, ∫ |a| dt, and by how much they went up and down.
+  // Integrals of the accelerations over a step: ∫ a dt, ∫ |a| dt, and the total variation of a.
   struct Sums {
     std::vector<L> push, size, change, last;
   };
@@ -207,12 +207,12 @@ class SystemAccelerations {
     }
   }
 
-  // 1/s where nothing moves or pushes yet.
+  // The rate of change of the motion; 1/s if nothing moves or pushes yet.
   L natural_pace() const { return sqrt(select(pace_squared_ > L(0.0), pace_squared_, L(1.0))); }
 
-  // Of one motion: relative to coordinates and rates themselves, and beside them to a radian and one a second, or the
-  // whole motion where that is smaller, so that swings of 1e-9 rad are followed as others are. The end of the step
-  // counts, too: forces may begin at nothing.
+  // For one motion. Errors are relative to each coordinate or rate itself, plus 1 rad or 1/s, or the size of the whole
+  // motion if that is smaller, so that oscillations of 1e-9 rad are resolved like any other. The state at the end of
+  // the step counts, too: forces may begin at zero.
   double error_squared_of_one(double h, const Parts& errors, const Parts& before, const Parts& slopes,
                               const Parts& after) const {
     const auto larger = [](const auto& a, const auto& b) { return std::max(std::abs(a[0]), std::abs(b[0])); };
@@ -223,7 +223,7 @@ class SystemAccelerations {
       a = std::max(a, std::abs(slopes[i].rate[0]));
     });
     const double place = std::clamp(std::max(q, h * v), 1e-16, 1.0), rate = std::clamp(std::max(v, h * a), 1e-16, 1.0);
-    const double rounding = 1e-14 * q / h;  // what is left of rates at rest
+    const double rounding = 1e-14 * q / h;  // of rates at rest
     double largest = 0;
     for_parts([&](int i) {
       const double speed = std::abs(before[i].rate[0]), push = std::abs(slopes[i].rate[0]);
@@ -234,16 +234,16 @@ class SystemAccelerations {
     return largest * largest;
   }
 
-  // What has no size errs by nothing: it rests.
+  // If both are zero the result is zero: the part rests.
   static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
 
   static const L& value(const Number& number) { return detail::value_of(number); }
 
-  // --- Numbers as they cross ---
+  // --- Rows of numbers passed to the kernel ---
 
-  // q, q̇, q̈, with their derivatives, and a time.
+  // Kinds of rows: q, q̇, q̈, then their derivatives; one row more for times.
   static constexpr int kinds = with_tangent ? 6 : 3;
-  // Those of coordinate i, of which = 0, 1, 2: q, q̇, q̈; 3, 4, 5: their derivatives.
+  // Row of coordinate i; which = 0, 1, 2: q, q̇, q̈; 3, 4, 5: their derivatives.
   double* numbers(int which, int i) { return rows_[which * parts() + i]; }
   double* times() { return numbers(kinds, 0); }
 

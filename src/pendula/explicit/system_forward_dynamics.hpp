@@ -8,7 +8,7 @@
 
 namespace pendula {
 
-/// Accelerations from a generated kernel: O(n³).
+/// Accelerations from a generated kernel, in O(n³).
 class SystemForwardDynamics : public ForwardDynamics {
  public:
   explicit SystemForwardDynamics(const SystemModel& model) : here_(model), many_(model) {}
