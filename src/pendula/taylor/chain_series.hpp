@@ -10,9 +10,9 @@
 
 namespace pendula {
 
-/// The Taylor series of the motions of several chains, one in each lane, about where they are: of rods, whose equations
-/// have nothing but products, so that a coefficient is a sum of products of those before it. Chains have no loads.
-/// `Rods` is ChainAccelerations, with a tangent of each member or without.
+/// Taylor series of the motions of several chains, one in each lane, about their current states. They are computed for
+/// rods, whose equations contain only products, so that each coefficient is a sum of products of earlier ones. Chains
+/// must have no loads. `Rods` is ChainAccelerations, with or without a tangent of each member.
 template <class Rods>
 class ChainSeries {
  public:
@@ -23,14 +23,14 @@ class ChainSeries {
   static constexpr std::size_t D = Rods::D;
   static constexpr int most_order = 24;
 
-  /// Rates up to t^order, rods to one more; order ≤ most_order. Time is counted in 1/pace, so that coefficients are
-  /// numbers whatever the units are.
+  /// Rates up to t^order, rods up to one order more; order ≤ most_order. The unit of time is 1/pace, so that
+  /// coefficients do not depend on the units.
   ChainSeries(const Rods& rods, int order)
       : order_(order), links_(rods.links()), sums_(Rods::is_short ? 1 : rods.links()) {}
 
   int order() const { return order_; }
 
-  /// About `parts`, which are those of `rods`; pace  [1/s].
+  /// Computes the series about `parts`, a state of `rods`; pace  [1/s].
   PENDULA_IN_REGISTERS [[gnu::noinline]] void expand(const Rods& rods, const Parts& parts, const L& pace) {
     const L unit = L(1.0) / pace;
     for (std::size_t k = 1; k <= static_cast<std::size_t>(order_) + 1; ++k)
@@ -50,7 +50,7 @@ class ChainSeries {
     });
   }
 
-  /// Of (pace t)^k.
+  /// Coefficient of (pace t)^k.
   Part term(int i, int k) const {
     const Link& link = at(i);
     const auto order = static_cast<std::size_t>(k);
@@ -62,7 +62,7 @@ class ChainSeries {
     return term;
   }
 
-  /// After a time t/pace.
+  /// Value after the time t/pace.
   [[gnu::always_inline]] Part sum(int i, const L& t) const {
     const auto last = static_cast<std::size_t>(order_);
     const Link& link = at(i);
@@ -90,10 +90,10 @@ class ChainSeries {
     Number inverse, coupling;  // MultiplierRow, the same for all orders
   };
 
-  // What the coefficients of order k owe to those before, of a rod and the next one.
+  // Contributions of earlier coefficients to those of order k, for a rod and the next one.
   struct Sums {
     Vector pull = none(), across = none(), squares = none();
-    Number here{0.0}, there{0.0};  // what ξ_i·ξ_{i+1} takes from the right sides of both
+    Number here{0.0}, there{0.0};  // contributions of ξ_i·ξ_{i+1} to the right-hand sides of both
     Number right{0.0}, tau{0.0};
   };
 
@@ -118,7 +118,7 @@ class ChainSeries {
         at(i).rate[d][0] = Rods::at(parts, i).rate[d];
       }
     });
-    Number coupled(0.0);  // of the link beyond: what it takes off
+    Number coupled(0.0);  // what the link beyond subtracts
     rods.for_parts_inward([&](auto i) PENDULA_WRITTEN_OUT {
       Link& link = at(i);
       const Number square = rods.link(i).inverse_masses * dot(Rods::at(parts, i).place, Rods::at(parts, i).place);
@@ -140,7 +140,7 @@ class ChainSeries {
     rise(rods, k, sums);
   }
 
-  // Products of orders j and k − j, without those of order 0. Pairs of factors that have to be known latest come last.
+  // Products of orders j and k − j, without those of order 0. Pairs with the most recent factors come last.
   template <class AllSums>
   [[gnu::always_inline]] void gather(const Rods& rods, std::size_t k, AllSums& sums) {
     if constexpr (Rods::is_short) {
@@ -158,7 +158,7 @@ class ChainSeries {
     }
   }
 
-  // Of j and l = k − j, of some rods from `first` on, and of the last of them with what follows.
+  // Products of orders j and l = k − j, for `Count` rods from `first` on, and for the last of them with the next rod.
   template <int Count, bool goes_on, class SomeSums>
   [[gnu::always_inline]] void add_pairs(int first, std::size_t j, std::size_t l, SomeSums& sums) {
     constexpr std::size_t held = Count + (goes_on ? 1 : 0);
@@ -193,7 +193,7 @@ class ChainSeries {
     });
   }
 
-  // The terms that have no partner, and those of order 0 that are known.
+  // Adds the middle term, which has no partner, and the terms with factors of order 0 that are known.
   template <class AllSums>
   [[gnu::always_inline]] void end(const Rods& rods, int i, std::size_t k, AllSums& sums) {
     const bool is_even = k % 2 == 0;
@@ -250,7 +250,7 @@ class ChainSeries {
     });
   }
 
-  // To the next order.
+  // Integrates to order k + 1.
   template <class AllSums>
   [[gnu::always_inline]] void rise(const Rods& rods, std::size_t k, AllSums& sums) {
     const L& inverse = inverses_[k + 1];

@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-/// Chooses the steps of every member by the series that it is to be moved by.
+/// Chooses the step of every member from its Taylor series.
 template <class L>
 class SeriesController {
  public:
@@ -23,7 +23,7 @@ class SeriesController {
     longest_ = select(which, L(unlimited), longest_);
   }
 
-  /// Of the next step, unless the run ends before.
+  /// Size of the next step, unless the run ends before.
   template <class Stepper>
   L step(Stepper& stepper) {
     return min(longest_, stepper.expand());
@@ -34,7 +34,7 @@ class SeriesController {
     return which;
   }
 
-  /// The next step of these members is to be `factor` of one that failed.
+  /// The next step of these members is `factor` times a failed one.
   void shrink(const Mask& which, const L& h, const L& factor) { longest_ = select(which, factor * h, longest_); }
 
   template <class Stepper>
@@ -48,9 +48,9 @@ class SeriesController {
   L longest_{unlimited};
 };
 
-/// Steps of Taylor series on several chains at once, one in each lane: as a stepper of MemberQueue. The order follows
-/// from the tolerance; a step is as long as the last terms of its series allow. After each step rods have their lengths
-/// again, and rates go across. `Rods` is ChainAccelerations, with a tangent of each member or without.
+/// Taylor series steps for several chains at once, one in each lane; a stepper of MemberQueue. The order follows from
+/// the tolerance, the step size from the last terms of the series. After each step, rods are restored to their lengths
+/// and rates are made perpendicular to them. `Rods` is ChainAccelerations, with or without a tangent of each member.
 template <class Rods>
 class TaylorSteps : public ExplicitState<Rods> {
   using State = ExplicitState<Rods>;
@@ -67,7 +67,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   using Controller = SeriesController<L>;
 
   struct Options {
-    double tolerance = 1e-9;  ///< of a step's error, relative to the size of the motion
+    double tolerance = 1e-9;  ///< error of a step relative to the size of the motion
   };
   explicit TaylorSteps(Subject subject, Options options = {})
       : State(subject), series_(dynamics_, order_for(options.tolerance)), trial_(parts_), terms_(parts_) {
@@ -82,9 +82,10 @@ class TaylorSteps : public ExplicitState<Rods> {
     State::seat(lane, time, start...);
   }
 
-  /// The series about where all are, and how long steps may be by them.
+  /// Computes the series about the current states, and returns the largest steps that they allow.
   ///
-  /// Where a light rod is between heavy ones it soon turns much faster than all do now: then in a shorter unit of time.
+  /// A light rod between heavy ones may soon turn much faster than anything does now, which overflows the coefficients:
+  /// then a shorter unit of time is used.
   L expand() {
     const L found = sqrt(State::pace_squared()), now = select(found > L(0.0), found, L(1.0));
     pace_ = now;
@@ -97,8 +98,8 @@ class TaylorSteps : public ExplicitState<Rods> {
     return longest_step(now);
   }
 
-  /// Tries a step of `h` from `time`, by the series about there; gives those of the members that are `wanted` who turn
-  /// by less than half a turn. The state stays what it was.
+  /// Tries a step of `h` from `time` with the current series. Returns which of the `wanted` members turn by less than
+  /// half a turn. The state is unchanged.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { State::at(trial_, i) = series_.sum(i, pace_ * h); });
     dynamics_.restore(trial_);
@@ -108,7 +109,7 @@ class TaylorSteps : public ExplicitState<Rods> {
     return wanted & (turned < L(State::largest_turn * State::largest_turn));
   }
 
-  /// Moves the members to the end of the step that was tried.
+  /// Moves these members to the end of the tried step.
   void accept(const Mask& which) {
     step_ = select(which, tried_, step_);
     now_ = select(which, tried_from_ + tried_, now_);
@@ -118,10 +119,10 @@ class TaylorSteps : public ExplicitState<Rods> {
     });
   }
 
-  /// A rod and its rate, of the members whose step was accepted, when `share` of it was done.
+  /// Dense output: a rod and its rate at the fraction `share` of the last accepted step.
   auto glance(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
 
-  /// Of all rods; visit(i, ξ, ξ̇).
+  /// Calls visit(i, ξ, ξ̇) for all rods.
   template <class Visit>
   void for_each_glance(double share, Visit visit) const {
     for (int i = 0; i < links(); ++i) {
@@ -134,8 +135,7 @@ class TaylorSteps : public ExplicitState<Rods> {
     for_each_glance(share, visit);
   }
 
-  /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
-  /// again after this.
+  /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires has_tangent {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
     for (int i = 0; i < links(); ++i) State::scale_tangent(factor, parts_[i]);
@@ -154,14 +154,14 @@ class TaylorSteps : public ExplicitState<Rods> {
   static constexpr int most_units = 8;
   static constexpr double shorter_unit = 1e6;
 
-  /// Of the fewest operations for a tolerance.
+  /// The order that needs the fewest operations for a tolerance.
   static int order_for(double tolerance) {
     const double order = 3.5 - 1.15 * std::log10(std::max(tolerance, finest));
     return std::clamp(static_cast<int>(std::lround(order)), least_order, ChainSeries<Rods>::most_order);
   }
 
-  // The last terms shrink as the series does, beside the size of the motion. Those that begin at rest, and symmetric
-  // ones, have but every second or fourth.
+  // From the decay of the last terms, relative to the size of the motion. Several terms are used, because motions that
+  // start at rest, and symmetric ones, have only every second or fourth term.
   PENDULA_IN_REGISTERS [[gnu::noinline]] L longest_step(const L& now) {
     const L pace = now * now, units = pace_ / now;
     const L moves = (units * units) * term_squared(1, pace);  // where it is, or will be
@@ -178,17 +178,17 @@ class TaylorSteps : public ExplicitState<Rods> {
     return exp(min(log_radius + L(log_reach_), L(600.0))) / pace_;
   }
 
-  // Of the coefficient of t^k in all rods and rates, relative to lengths and the pace.
+  // Squared coefficient of t^k, the largest over all rods and rates, relative to lengths and the pace.
   L term_squared(int k, const L& pace) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { State::at(terms_, i) = series_.term(i, k); });
     return dynamics_.size_squared(terms_, pace);
   }
 
   ChainSeries<Rods> series_;
-  double log_reach_;          // of steps, relative to the radius that terms tell
-  L pace_{1.0};               // in which time is counted
-  L tried_{0.0}, step_{1.0};  // the steps that were tried, and those that were taken last
-  L tried_from_{0.0};         // when they began
+  double log_reach_;          // step size relative to the estimated radius of convergence, as a logarithm
+  L pace_{1.0};               // inverse of the unit of time
+  L tried_{0.0}, step_{1.0};  // tried steps, last accepted steps
+  L tried_from_{0.0};         // times at which these began
   Parts trial_, terms_;
 };
 
