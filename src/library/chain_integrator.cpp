@@ -11,7 +11,7 @@ namespace {
 template <class Space>
 using Make = std::unique_ptr<PlainIntegrator> (*)(const Chain<Space>&, const RunOptions&);
 
-// By number of stages, from one on.
+// Functions by number of stages, from one on.
 template <class Space, int... stages_less_one>
 constexpr auto make_all_stages(std::integer_sequence<int, stages_less_one...>) {
   return std::array<Make<Space>, sizeof...(stages_less_one)>{&make_chain_stages<Space, stages_less_one + 1>...};

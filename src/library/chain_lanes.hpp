@@ -5,8 +5,8 @@
 
 namespace pendula {
 
-/// Members in lanes: by Gauss steps of as many stages as a tolerance may ask for (stages_for), or of two, and by
-/// explicit Runge–Kutta methods; nullptr for others.
+/// Moves members in lanes: by Gauss methods with 2 stages or those that stages_for returns, by explicit Runge–Kutta
+/// methods, and by Taylor series; nullptr for other options.
 template <class Space>
 MoveMembers* chain_lanes(const RunOptions& options);
 

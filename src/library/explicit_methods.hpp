@@ -12,8 +12,8 @@
 
 namespace pendula {
 
-/// Explicit methods on rods, for any number of links: poles are no obstacle, but to bulirsch-stoer, which moves angles.
-/// Throws std::invalid_argument on taylor, and on a tolerance ≤ 0.
+/// Explicit methods on rods, for any number of links. They pass poles, except bulirsch-stoer, which integrates angles.
+/// Throws std::invalid_argument for taylor, and for a tolerance ≤ 0.
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Space>& chain, const RunOptions& options);
 
@@ -26,7 +26,7 @@ std::unique_ptr<PlainIntegrator> make_explicit_system(const SystemTable& table, 
 
 namespace detail {
 
-/// make.of<Method>() for a method of explicit_tableau.hpp, or make.by_extrapolation().
+/// Returns make.of<Method>() for a method of explicit_tableau.hpp, or make.by_extrapolation().
 template <class Make>
 std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const Make& make) {
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {

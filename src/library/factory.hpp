@@ -7,7 +7,7 @@
 
 namespace pendula {
 
-/// What make_integrator, of integrator.hpp, finds in the library.
+/// What make_integrator of integrator.hpp calls in the library.
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options);
 

@@ -4,7 +4,7 @@
 
 namespace pendula {
 
-/// Carries out programs by this instruction set.
+/// Executes programs with this instruction set.
 extern constinit const ProgramInterpreter interpreter;
 
 }  // namespace pendula

@@ -9,7 +9,7 @@
 namespace pendula {
 namespace {
 
-/// An implicit method, by the narrowest lanes that hold its stages.
+/// An implicit method, with the narrowest pack that holds its stages.
 template <template <int> class OfWidth, class... SolverOptions>
 std::unique_ptr<PlainIntegrator> make_gauss(const SystemModel& model, const RunOptions& options,
                                             const GaussDescription& described, const SolverOptions&... solver_options) {

@@ -7,9 +7,8 @@
 
 namespace pendula {
 
-/// Every method over a generated kernel. `parts` is what failures name: the number of links of a chain, else 0 for the
-/// coordinates themselves. Throws std::invalid_argument for stages without a tableau, and for options that make no
-/// sense.
+/// Every method for a generated kernel. `parts` is the number of parts that failures name: the links of a chain, or 0
+/// for the coordinates. Throws std::invalid_argument for stages without a tableau, and for options that make no sense.
 std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table, const PlainSystem& plain,
                                                         const RunOptions& options, int parts);
 

@@ -4,11 +4,11 @@
 
 namespace pendula {
 
-/// Members of generated kernels in lanes, by explicit methods and Gauss's; nullptr for others.
+/// Moves members of generated kernels in lanes, by explicit and Gauss methods; nullptr for other methods.
 MoveSystemMembers* system_lanes(const RunOptions& options);
-/// Those of so many stages.
+/// The same by the Gauss method with this number of stages.
 MoveSystemMembers* gauss_system_lanes(int stages);
-/// The same with a tangent of each.
+/// The same with a tangent of each member.
 MoveSystemMembers* system_tangent_lanes(const RunOptions& options);
 
 }  // namespace pendula

@@ -16,7 +16,7 @@
 namespace pendula {
 namespace {
 
-/// One chain in the first lane of the least register: steps are those of an ensemble's member.
+/// One chain, in the first lane of the smallest register: its steps are those of a member of an ensemble.
 template <class Space>
 class TaylorIntegrator : public PlainIntegrator {
   using Rods = ChainAccelerations<Space, Eigen::Dynamic, LanePack<RegisterFor<2>>>;
@@ -44,7 +44,7 @@ class TaylorIntegrator : public PlainIntegrator {
     return outcome(Status::not_finite, 0);
   }
 
-  // As MemberQueue takes a member's.
+  // As MemberQueue takes steps of a member.
   Outcome step(double h) override {
     double wanted = std::min(longest_, stepper_.expand()[lane]);
     for (int attempt = 0; attempt < most_attempts; ++attempt) {
@@ -67,7 +67,7 @@ class TaylorIntegrator : public PlainIntegrator {
     for (int i = 0; i < chain_.links(); ++i) write(i, stepper_.heading(lane, i), anchor(i), q, v);
   }
 
-  /// The series is kept until the next step.
+  /// Nothing to do: the series is kept until the next step.
   void remember_steps(bool /*wanted*/) override {}
 
   void glance(double time, double* q, double* v) override {
@@ -136,7 +136,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   Outcome outcome(Status status, double size) const { return {.status = status, .time = time(), .step = size}; }
 
-  // From where the last step began, when a share of it was done.
+  // Follows the angles from the start of the last step to the fraction `share` of it.
   void follow(int i, double share, Anchor& anchor) const {
     const auto direction = [&](double at) { return direction_of(stepper_.glance(i, at).place); };
     const Direction there = direction(share);
@@ -183,7 +183,7 @@ class TaylorIntegrator : public PlainIntegrator {
   Stepper stepper_;
   Statistics statistics_;
   Compensated<double> time_{};
-  double longest_ = unlimited;   // that the next step may be
+  double longest_ = unlimited;   // limit of the next step after a failure
   double begin_ = 0, step_ = 0;  // of the last step; 0: there was none
   std::vector<Anchor> anchors_, begin_anchors_;
 };

@@ -7,8 +7,8 @@
 
 namespace pendula {
 
-/// Steps of Taylor series of rods, for any number of links; poles are no obstacle. Throws std::invalid_argument for
-/// chains with damping, torques or drives, and a tolerance ≤ 0.
+/// Taylor series steps for rods, for any number of links; passes poles. Throws std::invalid_argument for chains with
+/// damping, torques or drives, and for a tolerance ≤ 0.
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Space>& chain, const RunOptions& options);
 
