@@ -11,7 +11,7 @@
 
 namespace pendula {
 
-/// The mathematics of a run failed: a step did not converge, a start is singular. The message says how.
+/// The mathematics of a run failed: a step did not converge, or a start is singular. The message says how.
 class RunFailed : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -19,7 +19,7 @@ class RunFailed : public std::runtime_error {
 
 namespace detail {
 
-/// Throws what a function of pendula.h has failed by.
+/// Throws the exception for the last error of pendula.h.
 [[noreturn]] inline void throw_error(pendula_status status) {
   const std::string what = pendula_error();
   if (status == PENDULA_INVALID) throw std::invalid_argument(what);
@@ -28,20 +28,20 @@ namespace detail {
   throw std::runtime_error(what);
 }
 
-/// Throws where that is a failure; gives it.
+/// Throws if `status` is a failure; returns it otherwise.
 inline pendula_status require(pendula_status status) {
   if (status >= PENDULA_FAILED) throw_error(status);
   return status;
 }
 
-/// Throws where nothing was made.
+/// Throws if `thing` is null; returns it otherwise.
 template <class Thing>
 Thing* made(Thing* thing) {
   if (thing == nullptr) throw_error(pendula_error_kind());
   return thing;
 }
 
-/// Where a name is among others. Throws std::invalid_argument, with all of them, where it is not.
+/// Index of `name` in `names`. Throws std::invalid_argument that lists all names if it is not among them.
 inline std::size_t place_of(const char* what, std::string_view name, const std::vector<std::string>& names) {
   std::string all;
   for (std::size_t k = 0; k < names.size(); ++k) {

@@ -14,16 +14,16 @@
 
 namespace pendula {
 
-/// How long a motion is followed for its exponents, and how.
+/// How long to follow a motion for its exponents, and with which options.
 struct LyapunovOptions {
   double duration = 1000;      ///< s
-  int count = 0;               ///< how many of the leading exponents; 0: all
+  int count = 0;               ///< number of leading exponents; 0: all
   SimulationOptions run = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  std::stop_token stop = {};   ///< ends it, with the exponents of the time until then
+  std::stop_token stop = {};   ///< ends the run; exponents are those of the time until then
 };
 
-/// The Lyapunov exponents of a motion, by the exact derivatives of its steps. Throws std::invalid_argument where there
-/// are not so many, and for methods whose steps have no derivative; RunFailed where the mathematics fails.
+/// The Lyapunov exponents of a motion, by the exact derivatives of its steps. Throws std::invalid_argument if there are
+/// fewer exponents, and for methods whose steps have no derivative; RunFailed if the mathematics fails.
 inline LyapunovSpectrum lyapunov(const Model& model, const Motion& start, const LyapunovOptions& options = {}) {
   model.require(start);
   const auto all = static_cast<int>(2 * model.coordinates());

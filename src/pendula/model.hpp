@@ -15,40 +15,40 @@
 
 namespace pendula {
 
-/// What moves, with its numbers: a chain, a built-in model, or one of your own. Immutable; copies share it.
+/// A system with its parameters: a chain, a built-in model, or one of your own. Immutable; copies share it.
 class Model {
  public:
-  /// Of a chain.
+  /// From a chain.
   template <class Space, int N>
   Model(const Chain<Space, N>& chain) : Model(of_chain(chain)) {}  // NOLINT(google-explicit-constructor)
 
-  /// One that is built in, "cart_chain", with these parameters, one after the other; with its own where there are none.
-  /// Throws NoKernel where this build does not have it, std::invalid_argument on another number of parameters.
+  /// A built-in model, such as "cart_chain", with the given parameters, concatenated, or with its default ones if there
+  /// are none. Throws NoKernel if this build does not have it, std::invalid_argument for a wrong number of parameters.
   explicit Model(const std::string& name, int links = 0, std::span<const double> parameters = {})
       : Model(pendula_model_named(name.c_str(), links, parameters.empty() ? nullptr : parameters.data(),
                                   parameters.size())) {}
 
-  /// As the C interface has it, which this one owns from now on; throws what pendula_error() says where it is null.
+  /// Takes ownership of a model of the C interface; if it is null, throws what pendula_error() says.
   explicit Model(pendula_model* model) : model_(detail::made(model), pendula_model_free) {}
 
   std::size_t coordinates() const { return pendula_coordinates(get()); }
   std::size_t inputs() const { return pendula_inputs(get()); }
 
-  /// Names of the inputs: of a chain its torques, link by link, "torque_1", in space "torque_x_1".
+  /// Names of the inputs; for a chain its torques, link by link: "torque_1", in space "torque_x_1".
   std::vector<std::string> input_names() const {
     std::vector<std::string> names(inputs());
     for (std::size_t k = 0; k < names.size(); ++k) names[k] = pendula_input_name(get(), k);
     return names;
   }
 
-  /// Names of the numbers of a row: t, coordinates, rates, inputs, points, energy.
+  /// Names of the columns of a row: t, coordinates, rates, inputs, points, energy.
   std::vector<std::string> columns() const {
     std::vector<std::string> names(pendula_columns(get()));
     for (std::size_t k = 0; k < names.size(); ++k) names[k] = pendula_column_name(get(), k);
     return names;
   }
 
-  /// The numbers of the row that a motion is.
+  /// The row of a motion.
   std::vector<double> row(const Motion& motion) const {
     require(motion);
     std::vector<double> numbers(pendula_columns(get()));
@@ -56,12 +56,12 @@ class Model {
     return numbers;
   }
 
-  /// One of them, by the name of its column. Throws std::invalid_argument where there is none of that name.
+  /// One number of the row of a motion, by the name of its column. Throws std::invalid_argument for an unknown name.
   double number(std::string_view column, const Motion& motion) const {
     return row(motion)[detail::place_of("column", column, columns())];
   }
 
-  /// Throws std::invalid_argument unless a motion has as many coordinates and rates.
+  /// Throws std::invalid_argument unless a motion has the right number of coordinates and rates.
   void require(const Motion& motion) const {
     detail::require_size("q", static_cast<std::size_t>(motion.q.size()), coordinates());
     detail::require_size("v", static_cast<std::size_t>(motion.v.size()), coordinates());

@@ -8,8 +8,8 @@
 
 namespace pendula {
 
-/// A generated kernel with its numbers: model<kernels::Sprung2>({.masses = {1, 1}, …}). It is compiled here, with all
-/// that is asked of a kernel.
+/// A model of a generated kernel: model<kernels::Sprung2>({.masses = {1, 1}, …}). All functions of the kernel are
+/// compiled here.
 template <System Kernel>
 Model model(typename Kernel::template Parameters<double> parameters,
             const typename Kernel::template Inputs<double>* inputs = nullptr) {

@@ -2,11 +2,12 @@
 #define PENDULA_PENDULA_H
 
 /* pendula for C, and for every language that can call C: the same models, simulations and ensembles as in pendula.hpp,
- * which stands on these functions. Units are SI, angles radians. A motion is its coordinates q and their rates v, each
- * pendula_coordinates() numbers; of a chain theta_1 ... theta_n, then in space phi_1 ... phi_n.
+ * which is built on these functions. Units are SI, angles in radians. A motion consists of coordinates q and their
+ * rates v, pendula_coordinates() numbers each; for a chain theta_1 ... theta_n, then in space phi_1 ... phi_n.
  *
- * Functions that make something give NULL where they fail, the others a status that is not PENDULA_OK; pendula_error()
- * says why, in words. Models never change and may be shared by threads; a simulation is one thread's at a time. */
+ * On failure, functions that make something return NULL, and the others a status >= PENDULA_FAILED; pendula_error()
+ * says why, in words. Models are immutable and may be shared by threads; a simulation may be used by one thread at a
+ * time. */
 
 /* NOLINTBEGIN(modernize-deprecated-headers, modernize-use-using, modernize-redundant-void-arg,
    readability-identifier-naming): C */
@@ -19,31 +20,31 @@ extern "C" {
 
 typedef enum pendula_status {
   PENDULA_OK = 0,
-  PENDULA_EVENT = 1,       /* an event that stops the run has happened: pendula_stopped_by() */
-  PENDULA_STOPPED = 2,     /* it was asked to stop, or a callback gave something other than 0 */
-  PENDULA_FAILED = 3,      /* the computation failed; the motion stays where it came to */
+  PENDULA_EVENT = 1,       /* an event stopped the run: pendula_stopped_by() */
+  PENDULA_STOPPED = 2,     /* it was asked to stop, or a callback returned nonzero */
+  PENDULA_FAILED = 3,      /* the computation failed; the motion keeps its last state */
   PENDULA_INVALID = 4,     /* an argument is wrong */
   PENDULA_NO_KERNEL = 5,   /* this build lacks a kernel that is needed */
   PENDULA_NOT_WRITTEN = 6, /* a file cannot be written */
   PENDULA_INTERNAL = 7     /* anything else */
 } pendula_status;
 
-/* Why the last call of this thread that failed did so; "" where none has. */
+/* Why the last failed call of this thread failed; "" if none has. */
 const char* pendula_error(void);
 pendula_status pendula_error_kind(void);
 
-/* "0.1.0", and the instruction set that the library runs by. */
+/* "0.1.0", and the instruction set that the library uses. */
 const char* pendula_version(void);
 const char* pendula_instruction_set(void);
 
-/* --- What moves: a model with its numbers --- */
+/* --- Models --- */
 
 typedef struct pendula_model pendula_model;
 
-/* A torque amplitude sin(frequency t + phase) on one link, counted from 0. */
+/* A torque amplitude sin(frequency t + phase) on a link, counted from 0. */
 typedef struct pendula_drive {
   int link;
-  double amplitude[3]; /* N m; in the plane the first one counts */
+  double amplitude[3]; /* N m; in the plane only the first is used */
   double frequency, phase;
 } pendula_drive;
 
@@ -60,123 +61,125 @@ typedef struct pendula_chain {
 
 pendula_model* pendula_model_of_chain(const pendula_chain* chain);
 
-/* A built-in model ("cart_chain", 0 links: the first that this build has), by its parameters, (count) numbers one after
- * the other; NULL: those that the model has itself. */
+/* A built-in model such as "cart_chain"; 0 links: the first one that this build has. `parameters`: (count) numbers,
+ * concatenated; NULL: the defaults of the model. */
 pendula_model* pendula_model_named(const char* name, int links, const double* parameters, size_t count);
 
-/* Of a SystemTable (pendula/system/system_table.hpp), which has to outlive it. `inputs` are constant ones, or NULL. */
+/* A model of a SystemTable (pendula/system/system_table.hpp), which must outlive it. `inputs` are constant; may be
+ * NULL. */
 pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
                                       const double* inputs, size_t input_count);
 
 void pendula_model_free(pendula_model* model);
 
-/* Coordinates; inputs, which of a chain are its torques, link by link; and columns of a row: t, coordinates, rates,
- * inputs of a model that is no chain, points, energy. */
+/* Numbers of coordinates; of inputs, which for a chain are its torques, link by link; and of columns of a row: t,
+ * coordinates, rates, inputs (not for a chain), points, energy. */
 size_t pendula_coordinates(const pendula_model* model);
 size_t pendula_inputs(const pendula_model* model);
 size_t pendula_columns(const pendula_model* model);
-/* Of an input, "push", "torque_1", in space "torque_x_1"; it lives as long as the model. NULL where there is none. */
+/* Name of an input: "push", "torque_1", in space "torque_x_1"; valid as long as the model. NULL if out of range. */
 const char* pendula_input_name(const pendula_model* model, size_t input);
-/* Of a column, "theta_dot_1", "rad/s"; they live as long as the model. NULL where there is none of that number. */
+/* Name and unit of a column: "theta_dot_1", "rad/s"; valid as long as the model. NULL if out of range. */
 const char* pendula_column_name(const pendula_model* model, size_t column);
 const char* pendula_column_unit(const pendula_model* model, size_t column);
-/* The numbers of one row. */
+/* Writes the numbers of one row, (pendula_columns()). */
 pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row);
 
 /* --- One simulation --- */
 
-/* Names are those of scenarios, NULL: "gauss", "momentum", "auto", "auto". All zero: steps of its own choice. */
+/* Names as in scenarios; NULL: "gauss", "momentum", "auto", "auto". All zero: adaptive steps. */
 typedef struct pendula_options {
   const char *method, *form, *solver, *iteration;
-  int stages;       /* 0: as many as serve */
-  double step;      /* s, of constant steps; 0: of its own choice, by the tolerance */
+  int stages;       /* 0: by the tolerance; 4 for constant steps */
+  double step;      /* s, constant; 0: adaptive, by the tolerance */
   double tolerance; /* 0: 1e-9 */
-  int forget;       /* 1: earlier steps are not kept for pendula_at() */
+  int forget;       /* 1: do not keep earlier steps for pendula_at() */
 } pendula_options;
 
 typedef struct pendula_simulation pendula_simulation;
 
-/* From a motion at `time`. `options` may be NULL. */
+/* Starts from a motion at `time`. `options` may be NULL. */
 pendula_simulation* pendula_simulation_new(const pendula_model* model, double time, const double* q, const double* v,
                                            const pendula_options* options);
-/* One that goes on as the first does, to the bit, with its events and without its rows. `contexts`, one for each event
- * in the order that they were added, go to its callbacks; NULL: those of the first. */
+/* A copy continues exactly as the original, to the last bit, with its events and without its rows. `contexts`, one for
+ * each event in the order of their addition, are passed to its callbacks; NULL: those of the original. */
 pendula_simulation* pendula_simulation_copy(const pendula_simulation* simulation, void* const* contexts);
 void pendula_simulation_free(pendula_simulation* simulation);
 
-/* Goes on to `time`, where a step ends. */
+/* Advances to `time`, where a step ends. */
 pendula_status pendula_advance_to(pendula_simulation* simulation, double time);
 
 double pendula_time(const pendula_simulation* simulation);
 void pendula_motion(const pendula_simulation* simulation, double* q, double* v);
-/* The numbers of the row where it is, with the inputs that are held. */
+/* Writes the row of the current motion, with the inputs held. */
 pendula_status pendula_simulation_row(const pendula_simulation* simulation, double* row);
 /* The motion at any time since the start, at the full order of the method. */
 pendula_status pendula_at(pendula_simulation* simulation, double time, double* q, double* v);
-/* Steps that were taken. */
+/* Number of steps taken. */
 size_t pendula_steps(const pendula_simulation* simulation);
 
-/* Holds inputs, (count) of them, from now on until others are held; drives are added to them. They are part of copies
- * and of what is saved. At first those of the model are held. Not from within an advance, by a callback. */
+/* Holds all inputs, (count), constant from now on; drives are added to them. They are part of copies and of what is
+ * saved. At first those of the model are held. Callbacks must not call this. */
 pendula_status pendula_hold(pendula_simulation* simulation, const double* inputs, size_t count);
-/* Those that are held, (pendula_inputs()). */
+/* Writes the inputs held, (pendula_inputs()). */
 void pendula_held(const pendula_simulation* simulation, double* inputs);
 
-/* Goes on from another motion, at the time of that: after an impact, say. */
+/* Continues from another motion at `time`, such as after an impact. */
 pendula_status pendula_restart(pendula_simulation* simulation, double time, const double* q, const double* v);
 
-/* All that its next steps depend on: numbers, of which there are pendula_saved(), to go on from in a simulation of the
- * same model, options and events. */
+/* Saves everything that the next steps depend on, as pendula_saved() numbers, and continues from them in a simulation
+ * with the same model, options and events. */
 size_t pendula_saved(pendula_simulation* simulation);
 pendula_status pendula_save(pendula_simulation* simulation, double* numbers, size_t count);
 pendula_status pendula_resume(pendula_simulation* simulation, const double* numbers, size_t count);
 
-/* Asked from now on after every step, and within long ones: other than 0, the run stops there. NULL: no more. */
+/* From now on `stop` is asked after every step, and within long ones: nonzero stops the run. NULL: none. */
 pendula_status pendula_heed(pendula_simulation* simulation, int (*stop)(void* context), void* context);
 
 typedef struct pendula_event {
-  /* What changes its sign where it happens. */
+  /* The event happens where this changes sign. */
   double (*value)(void* context, double time, const double* q, const double* v);
-  /* Told when it does, `up` or down; other than 0: the run stops there. May be NULL. */
+  /* Called when it happens; `up`: from - to +. Nonzero stops the run there. May be NULL. */
   int (*happened)(void* context, int up, double time, const double* q, const double* v);
   void* context;
-  int direction; /* 1: up alone, -1: down alone, 0: both */
+  int direction; /* 1: up only, -1: down only, 0: both */
   int stop;      /* 1: the run stops there */
 } pendula_event;
 
-/* Looks for it from now on; events are numbered from 0. */
+/* Watches for an event from now on; events are numbered from 0. */
 pendula_status pendula_on(pendula_simulation* simulation, const pendula_event* event);
-/* The event that stopped the run last; -1: none has. */
+/* The event that stopped the last advance; -1: none. */
 int pendula_stopped_by(const pendula_simulation* simulation);
 
-/* Rows from now on every `interval`, whatever the steps are: to a CSV file, or to a callback, which may stop the run by
- * giving something other than 0. */
+/* Writes rows from now on every `interval`, independent of the steps: to a CSV file, or to a callback, which stops the
+ * run by returning nonzero. */
 pendula_status pendula_write_csv(pendula_simulation* simulation, const char* file, double interval);
 pendula_status pendula_on_rows(pendula_simulation* simulation, double interval,
                                int (*row)(void* context, const double* numbers, size_t count), void* context);
-/* Files are written and closed, which pendula_simulation_free() does as well, without a word. */
+/* Ends all rows and closes their files. pendula_simulation_free() does so, too, but reports no error. */
 pendula_status pendula_finish(pendula_simulation* simulation);
 
-/* Where it is, d(q, v)/dt = A (q, v) + B inputs beside the motion, row by row: A is (2n, 2n), B (2n, inputs). Either
- * may be NULL. */
+/* d(q, v)/dt = A (q, v) + B inputs, linearised about the current motion; row by row: A is (2n, 2n), B (2n, inputs).
+ * Either may be NULL. */
 pendula_status pendula_linearize(const pendula_simulation* simulation, double* a, double* b);
 
-/* --- Many at once --- */
+/* --- Ensembles --- */
 
 typedef struct pendula_ensemble {
   const pendula_model* const* models; /* one for all, or one for each */
   size_t model_count;
   const double* starts; /* (members, 2 coordinates): q and v of each, row by row */
   size_t members;
-  double time, duration;          /* s; where all begin, and how long */
+  double time, duration;          /* s; start of all members, and duration */
   const pendula_options* options; /* or NULL */
-  int threads;                    /* 0: as many as there are processors */
+  int threads;                    /* 0: one per processor */
   int (*stop)(void* context);     /* or NULL; asked by several threads at once */
   void* context;
 } pendula_ensemble;
 
-/* Where each ends, (members, 2 coordinates), and how: PENDULA_OK, PENDULA_FAILED or PENDULA_STOPPED, whose end is where
- * it came to. `energy_errors`, relative, and `how` may be NULL. Who fails stops nobody else. */
+/* Writes the end of each member, (members, 2 coordinates), and its status: PENDULA_OK, PENDULA_FAILED or
+ * PENDULA_STOPPED; in the last two cases the end is the last state reached. `energy_errors`, relative, and `how` may be
+ * NULL. A member that fails does not stop the others. */
 pendula_status pendula_propagate(const pendula_ensemble* ensemble, double* ends, pendula_status* how,
                                  double* energy_errors);
 
@@ -184,24 +187,24 @@ pendula_status pendula_propagate(const pendula_ensemble* ensemble, double* ends,
 
 typedef struct pendula_tangents {
   const pendula_model* model;
-  double time;                    /* s; where the motion starts, from q and v */
+  double time;                    /* s; start of the motion at q and v */
   const double *q, *v;            /* v may be NULL: at rest */
   double duration;                /* s */
-  const pendula_options* options; /* or NULL; methods with derivatives alone: gauss in momentum form, radau */
-  size_t count;                   /* how many of the leading exponents, at most 2 pendula_coordinates() */
+  const pendula_options* options; /* or NULL; only gauss in momentum form, and radau */
+  size_t count;                   /* of leading exponents, at most 2 pendula_coordinates() */
   int (*stop)(void* context);     /* or NULL; asked after every step */
   void* context;
 } pendula_tangents;
 
 typedef struct pendula_spectrum {
-  double sum;      /* 1/s, of the exponents; of all of them the mean divergence */
-  double duration; /* s, that was run */
+  double sum;      /* 1/s, of the exponents; for all of them the mean divergence */
+  double duration; /* s, of the run */
   double ftle;     /* 1/s, finite-time exponent of one tangent */
-  double megno;    /* 2 where motion is regular, exponent * duration / 2 in chaos */
+  double megno;    /* 2 for regular motion, exponent * duration / 2 in chaos */
 } pendula_spectrum;
 
-/* The leading exponents of a motion, (count) in descending order, 1/s, and the error of each, infinite where the run
- * was too short to tell. `errors` and `rest` may be NULL. Where it was stopped they are those of the time until then.
+/* Writes the leading exponents of a motion, (count) in descending order, 1/s, and the error of each, infinite if the
+ * run was too short to tell. `errors` and `rest` may be NULL. If stopped, the results are those of the time until then.
  */
 pendula_status pendula_lyapunov(const pendula_tangents* tangents, double* exponents, double* errors,
                                 pendula_spectrum* rest);

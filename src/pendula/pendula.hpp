@@ -1,8 +1,8 @@
 #pragma once
 
-/// Everything a program needs to move pendulum chains and other models: Simulation, propagate, lyapunov, Model. A
-/// generated kernel, <pendula/kernels/planar_2.hpp>, becomes one by <pendula/own_model.hpp>; solvers and steppers to
-/// put together oneself are in the folders beside this file.
+/// Everything a program needs to simulate pendulum chains and other models: Simulation, propagate, lyapunov, Model. A
+/// generated kernel, <pendula/kernels/planar_2.hpp>, becomes a Model by <pendula/own_model.hpp>. Solvers and steppers
+/// to combine oneself are in the folders beside this file.
 
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/invariants.hpp>

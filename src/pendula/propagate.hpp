@@ -15,28 +15,29 @@
 
 namespace pendula {
 
-/// How long members of an ensemble are moved, and how.
+/// How long to move the members of an ensemble, and with which options.
 struct PropagateOptions {
   double duration = 10;        ///< s
   SimulationOptions run = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  double time = 0;             ///< s; where all begin
-  int threads = 0;             ///< 0: as many as there are processors
-  std::stop_token stop = {};   ///< ends all, who then say so
+  double time = 0;             ///< start of all members  [s]
+  int threads = 0;             ///< 0: one per processor
+  std::stop_token stop = {};   ///< stops all members, whose status tells
 };
 
-/// Where members of an ensemble ended.
+/// Final states of the members of an ensemble.
 struct Ends {
   using Array = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   Array q, v;  ///< (members x coordinates)
-  /// PENDULA_OK, PENDULA_FAILED or PENDULA_STOPPED: then q and v are what it came to.
+  /// PENDULA_OK, PENDULA_FAILED or PENDULA_STOPPED; in the last two cases q and v are the last state reached.
   std::vector<pendula_status> how;
-  Eigen::VectorXd energy_errors;  ///< the largest of each, relative
+  Eigen::VectorXd energy_errors;  ///< the largest of each member, relative
 };
 
-/// Moves many, each from a row of `starts`: its coordinates, then its rates, which may be left out: at rest. `models`
-/// is one for all, or one for each. Where one ends depends on its row and its model alone, to the last bit; who fails
-/// says so and stops nobody else. Throws std::invalid_argument on sizes and options that make no sense.
+/// Moves an ensemble. Each row of `starts` has the coordinates of a member, then its rates, which may be left out: at
+/// rest. `models` has one for all members, or one for each. The end of a member depends on its row and its model alone,
+/// to the last bit; a member that fails does not stop the others. Throws std::invalid_argument for sizes and options
+/// that make no sense.
 inline Ends propagate(std::span<const Model> models, const Eigen::Ref<const Eigen::MatrixXd>& starts,
                       const PropagateOptions& options = {}) {
   if (models.empty()) throw std::invalid_argument("models: expected one, or one for each member, got none");
@@ -72,7 +73,7 @@ inline Ends propagate(std::span<const Model> models, const Eigen::Ref<const Eige
   return found;
 }
 
-/// The same of one model.
+/// The same with one model.
 inline Ends propagate(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& starts,
                       const PropagateOptions& options = {}) {
   return propagate(std::span(&model, 1), starts, options);

@@ -25,26 +25,26 @@
 
 namespace pendula {
 
-/// How a simulation takes its steps: of its own choice, unless `step` says how long they are.
+/// How a simulation takes its steps: adaptive ones, unless `step` gives their size.
 struct SimulationOptions {
   Method method = Method::gauss;
-  int stages = 0;  ///< 0: as many as the tolerance wants, 4 for constant steps
+  int stages = 0;  ///< 0: as many as suit the tolerance, 4 for constant steps
   Form form = Form::momentum;
   Solver solver = Solver::automatic;
   Iteration iteration = Iteration::automatic;
   double step = 0;          ///< s
-  double tolerance = 1e-9;  ///< of the motion, relative to its size, but for what chaos makes of it
-  bool remember = true;     ///< whether earlier steps are kept, for `at`: so many numbers a step as a motion has
+  double tolerance = 1e-9;  ///< error of the motion relative to its size, before its amplification by chaos
+  bool remember = true;     ///< whether to keep earlier steps, for `at`; each takes as much memory as a motion
 };
 
-/// Rows this far apart, whatever the steps are  [s].
+/// Row times at this distance, independent of the steps  [s].
 inline RowTimes every(double interval) {
   return {interval, {}};
 }
 
 namespace detail {
 
-/// The same for C; it points to literals.
+/// The options for C; pointers refer to string literals.
 inline pendula_options plain(const SimulationOptions& options) {
   return {name_of(options.method).data(),
           name_of(options.form).data(),
@@ -56,13 +56,13 @@ inline pendula_options plain(const SimulationOptions& options) {
           options.remember ? 0 : 1};
 }
 
-/// What asks `token`, its context, whether to stop; none where nobody can request that.
+/// A function that asks `token`, its context, whether to stop; null if nobody can request a stop.
 inline auto stop_function(const std::stop_token& token) -> int (*)(void* token) {
   if (!token.stop_possible()) return nullptr;
   return [](void* context) { return static_cast<const std::stop_token*>(context)->stop_requested() ? 1 : 0; };
 }
 
-/// What callbacks throw does not go through C: it is kept, stops the run, and is thrown where C is left.
+/// Exceptions of callbacks must not pass through C: the first one is stored, stops the run, and is rethrown afterwards.
 struct Guard {
   std::exception_ptr failure = nullptr;
   std::stop_token stop = {};
@@ -88,11 +88,11 @@ struct Guard {
 
 }  // namespace detail
 
-/// A motion that goes on as far as it is asked to. It is a value: a copy goes on as the first one does, to the last
-/// bit, with the same events; rows stay with the first.
+/// A motion that advances as far as it is asked to. It is a value: a copy continues exactly as the original, to the
+/// last bit, with the same events; rows stay with the original.
 class Simulation {
  public:
-  /// Throws std::invalid_argument on options or a start that make no sense, NoKernel, and RunFailed where the motion
+  /// Throws std::invalid_argument for options or a start that make no sense, NoKernel, and RunFailed if the motion
   /// cannot begin (at a pole of the dense solver).
   Simulation(Model model, const Motion& start, const SimulationOptions& options = {}) : model_(std::move(model)) {
     model_.require(start);
@@ -121,8 +121,8 @@ class Simulation {
 
   const Model& model() const { return model_; }
 
-  /// Goes on to `time`, where a step ends. False where an event or a request stopped it before. Throws RunFailed where
-  /// the mathematics fails, what callbacks throw, and std::invalid_argument where that time is past.
+  /// Advances to `time`, where a step ends. Returns false if an event or a request stopped it before. Throws RunFailed
+  /// if the mathematics fails, what callbacks throw, and std::invalid_argument if `time` is past.
   bool advance_to(double time) {
     const pendula_status status = pendula_advance_to(get(), time);
     guard_->rethrow();
@@ -130,7 +130,7 @@ class Simulation {
   }
 
   double time() const { return pendula_time(get()); }
-  /// Steps that were taken.
+  /// Number of steps taken.
   std::size_t steps() const { return pendula_steps(get()); }
 
   Motion motion() const {
@@ -138,15 +138,15 @@ class Simulation {
     pendula_motion(get(), motion.q.data(), motion.v.data());
     return motion;
   }
-  /// At any time since the start, at the full order of the method.
+  /// The motion at any time since the start, at the full order of the method.
   Motion at(double time) {
     Motion motion = empty_motion(time);
     detail::require(pendula_at(get(), time, motion.q.data(), motion.v.data()));
     return motion;
   }
 
-  /// A number of the row that the motion is, by the name of its column: "x_2", "energy". Throws std::invalid_argument
-  /// where there is none of that name.
+  /// A number of the current row by the name of its column: "x_2", "energy". Throws std::invalid_argument for an
+  /// unknown name.
   double operator[](std::string_view column) const {
     const std::size_t place = detail::place_of("column", column, model_.columns());
     std::vector<double> numbers(pendula_columns(model_.get()));
@@ -154,33 +154,32 @@ class Simulation {
     return numbers[place];
   }
 
-  /// Holds an input from now on, until another value is held; drives are added to it. Copies and what is saved have it,
-  /// too. Throws std::invalid_argument where there is none of that name, on a value that is not finite, and in
-  /// callbacks.
+  /// Holds an input at a constant value from now on, to which drives are added. It is part of copies and of what is
+  /// saved. Throws std::invalid_argument for an unknown name, for a value that is not finite, and in callbacks.
   void hold(std::string_view input, double value) {
     Eigen::VectorXd all = held();
     all[static_cast<Eigen::Index>(detail::place_of("input", input, model_.input_names()))] = value;
     hold(all);
   }
-  /// The same of all, in the order of Model::input_names.
+  /// Holds all inputs, in the order of Model::input_names.
   void hold(const Eigen::VectorXd& inputs) {
     detail::require(pendula_hold(get(), inputs.data(), static_cast<std::size_t>(inputs.size())));
   }
-  /// What is held: at first the constant inputs of the model.
+  /// The inputs held; at first the constant inputs of the model.
   Eigen::VectorXd held() const {
     Eigen::VectorXd inputs(static_cast<Eigen::Index>(model_.inputs()));
     pendula_held(get(), inputs.data());
     return inputs;
   }
 
-  /// Goes on from another motion: after an impact, say.
+  /// Continues from another motion, such as after an impact.
   void restart(const Motion& motion) {
     model_.require(motion);
     detail::require(pendula_restart(get(), motion.time, motion.q.data(), motion.v.data()));
   }
 
-  /// Tells happened(motion) where event.value changes its sign, from now on; event.stop ends the advance there. Gives
-  /// the event's number.
+  /// From now on calls happened(motion) where event.value changes sign; event.stop ends the advance there. Returns the
+  /// index of the event.
   std::size_t on(Event event, std::function<void(const Motion&)> happened = nullptr) {
     if (event.formula)
       throw std::invalid_argument("formula: expected none, events of a simulation are functions alone");
@@ -198,24 +197,24 @@ class Simulation {
     return event < 0 ? std::nullopt : std::optional<std::size_t>(static_cast<std::size_t>(event));
   }
 
-  /// Rows from now on, at these times counted from now, to a CSV file; it is written when the simulation, or `finish`,
-  /// is.
+  /// Writes rows to a CSV file, at these times counted from now. The file is complete after `finish`, or when the
+  /// simulation is destroyed.
   void write_csv(const std::string& file, const RowTimes& rows) {
     detail::require(pendula_write_csv(get(), file.c_str(), interval_of(rows)));
   }
-  /// The same, to take(numbers), in the order of Model::columns.
+  /// Passes rows to take(numbers), in the order of Model::columns.
   void on_rows(const RowTimes& rows, std::function<void(std::span<const double>)> take) {
     rows_.push_back(std::make_unique<Rows>(std::move(take), guard_.get()));
     detail::require(pendula_on_rows(get(), interval_of(rows), &Rows::take_row, rows_.back().get()));
     guard_->rethrow();
   }
-  /// No more rows; throws std::runtime_error where a file cannot be written.
+  /// Ends all rows; throws std::runtime_error if a file cannot be written.
   void finish() { detail::require(pendula_finish(get())); }
 
-  /// Stops advances, within long steps too, where that is requested; a copy heeds nobody.
+  /// Stops advances, also within long steps, when a stop is requested. Copies do not heed it.
   void heed(std::stop_token stop) { guard_->stop = std::move(stop); }
 
-  /// d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly: A is (2n x 2n), B (2n x inputs).
+  /// d(q, v)/dt = A (q, v) + B inputs, linearised exactly about the current motion: A is (2n x 2n), B (2n x inputs).
   std::pair<Eigen::MatrixXd, Eigen::MatrixXd> linearize() const {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const auto n = static_cast<Eigen::Index>(2 * model_.coordinates());
@@ -224,19 +223,19 @@ class Simulation {
     return {a, b};
   }
 
-  /// All that its next steps depend on.
+  /// Everything that the next steps depend on.
   Member save() const {
     Member saved{std::vector<double>(pendula_saved(get()))};
     detail::require(pendula_save(get(), saved.numbers.data(), saved.numbers.size()));
     return saved;
   }
-  /// Goes on from what another one with the same model, options and events had come to, to the last bit. Throws
-  /// std::invalid_argument on another number of numbers.
+  /// Continues from what was saved by a simulation with the same model, options and events, to the last bit. Throws
+  /// std::invalid_argument for a wrong number of numbers.
   void resume(const Member& saved) {
     detail::require(pendula_resume(get(), saved.numbers.data(), saved.numbers.size()));
   }
 
-  /// As the C interface has it.
+  /// The simulation of the C interface.
   pendula_simulation* get() const { return simulation_.get(); }
 
  private:
@@ -311,7 +310,7 @@ class Simulation {
   std::unique_ptr<detail::Guard> guard_ = std::make_unique<detail::Guard>();
   std::vector<std::unique_ptr<Watched>> events_;
   std::vector<std::unique_ptr<Rows>> rows_;
-  std::unique_ptr<pendula_simulation, Free> simulation_;  // goes first: it may write rows
+  std::unique_ptr<pendula_simulation, Free> simulation_;  // destroyed first, since it may still write rows
 };
 
 }  // namespace pendula
