@@ -17,7 +17,7 @@ bool move_members(const RunOptions& options, std::int64_t every, std::span<const
   return detail::move_by<Queue>(members[0].model.links, options, every, members, ends, watch);
 }
 
-/// Short chains have kernels of fixed size, whose series are summed in registers.
+/// The series of short chains, whose number of links is known at compile time, are summed in registers.
 template <class Space>
 bool move_by_series(const RunOptions& options, std::int64_t every, std::span<const PlainMember<PlainChain>> members,
                     std::span<MemberEnd> ends, MemberWatch& watch) {

@@ -31,7 +31,7 @@ class ChainAccelerations {
   using Number = std::conditional_t<with_tangent, Dual<L>, L>;
   static constexpr int links_known = N;
   static constexpr bool has_tangent = with_tangent, is_short = detail::is_short_chain<N>;
-  static constexpr bool limits_turns = true;  ///< whether a step may turn rods by less than half a turn only
+  static constexpr bool limits_turns = true;  ///< whether steps are limited to less than half a turn of a rod
   static constexpr std::size_t D = Space::dimension;
 
   using Part = MovingPart<Number, D>;  ///< ξ, ξ̇

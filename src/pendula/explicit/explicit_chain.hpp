@@ -76,7 +76,7 @@ class ExplicitChain {
   }
 
  private:
-  // Direction of a rod within the last step.
+  // The rod vectors within the last step.
   template <class Steps>
   static auto places(const Steps& steps) {
     return [&steps](int i, double share) { return share == 1 ? steps.parts()[i].place : steps.glance(i, share).place; };

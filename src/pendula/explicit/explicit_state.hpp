@@ -9,8 +9,8 @@
 namespace pendula {
 
 /// The state of explicit methods, for one motion or for several members, one in each lane: parts, their rates and the
-/// time, with or without a tangent of each member. For one motion, sums are kept in twice the digits, so that many
-/// small steps do not lose to rounding. `Dynamics` is ChainAccelerations or SystemAccelerations.
+/// time, with or without a tangent of each member. For one motion, sums are kept in twice the digits, so that what
+/// many small steps add is not lost to rounding. `Dynamics` is ChainAccelerations or SystemAccelerations.
 template <class Dynamics>
 class ExplicitState {
  public:

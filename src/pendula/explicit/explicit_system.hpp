@@ -92,8 +92,8 @@ class ExplicitSystem {
 
   bool has_to_look() const { return field_.has_to_look(); }
 
-  /// Relative to what errors are relative to. Without a tolerance, relative to the fastest that the coordinate has
-  /// been, or to a fraction of the fastest that any coordinate has been.
+  /// Relative to the scale of errors (ErrorSize). Without a tolerance, relative to the highest speed of the coordinate
+  /// so far, or to a fraction of the highest speed of any coordinate.
   template <class Parts>
   Unseen unseen(const Parts& from, const Parts& to, double time, double h, double tolerance) {
     write(from, x_);

@@ -30,8 +30,8 @@ using RightHandSide = std::function<void(const Vector& moved, Vector& rate, doub
 /// step size minimise the work per unit of time (Hairer, Nørsett, Wanner, Solving ODEs I, II.9). odeint's own step-size
 /// control is not used, because it hides the current order, which has to be part of the member.
 ///
-/// The midpoint rule is given the displacement since the step began instead of the state, so that many small steps do
-/// not lose to rounding.
+/// The midpoint rule is given the displacement since the step began instead of the state, so that what many small steps
+/// add is not lost to rounding.
 class ExtrapolationIntegrator : public PlainIntegrator {
  public:
   ExtrapolationIntegrator(std::unique_ptr<ForwardDynamics> dynamics, int coordinates, int parts, double tolerance,

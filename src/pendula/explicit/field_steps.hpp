@@ -47,13 +47,13 @@ class FieldSteps {
     const auto arguments = [&](std::span<const double> shares, double* found) {
       find_arguments(dynamics, time, h, shares, found);
     };
-    lay_roughly(h, x, end);
+    fit_cubic(h, x, end);
     const bool may_find = look_.may_find(arguments);
     if (!may_find && !is_blind_) {
       end_is_known_ = false;
       return {};
     }
-    lay_path(dynamics, time, h, x, end);
+    fit_quintic(dynamics, time, h, x, end);
     const auto size = size_of(begin_);
     const auto accelerations = [&](std::span<const double> shares, double* found) {
       for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -64,7 +64,7 @@ class FieldSteps {
     if (may_find && look_.finds(arguments)) {
       look_.sum(accelerations, {sums_, moments_, missed_});
     } else if (is_blind_) {
-      sum_roughly(accelerations);
+      sum_by_few_nodes(accelerations);
     } else {
       return {};
     }
@@ -84,7 +84,7 @@ class FieldSteps {
 
  private:
   // Path by the cubic through both ends.
-  void lay_roughly(double h, const std::vector<double>& x, const std::vector<double>& end) {
+  void fit_cubic(double h, const std::vector<double>& x, const std::vector<double>& end) {
     const std::size_t count = path_.size();
     for (std::size_t k = 0; k < count; ++k) {
       const double v = h * x[count + k], after = h * end[count + k], moved = end[k] - x[k];
@@ -92,8 +92,8 @@ class FieldSteps {
     }
   }
 
-  void lay_path(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
-                const std::vector<double>& end) {
+  void fit_quintic(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
+                   const std::vector<double>& end) {
     const std::size_t count = path_.size();
     if (!begin_is_known_) dynamics.acceleration(time, x.data(), x.data() + count, begin_.data() + count);
     begin_is_known_ = end_is_known_ = true;
@@ -134,7 +134,7 @@ class FieldSteps {
   }
 
   template <class Accelerations>
-  void sum_roughly(Accelerations& accelerations) {
+  void sum_by_few_nodes(Accelerations& accelerations) {
     using Gauss = kernels::GaussTableau<3>;
     found_.resize(Gauss::stages * path_.size());
     accelerations(std::span<const double>(Gauss::c), found_.data());

@@ -33,7 +33,7 @@ class SystemAccelerations {
   using Subject = MemberSystems<L>&;
   static constexpr int links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
-  static constexpr bool limits_turns = is_batch<L>;  ///< whether a step may turn angles by less than half a turn only
+  static constexpr bool limits_turns = is_batch<L>;  ///< whether steps are limited to less than half a turn
   static constexpr std::size_t D = 1;
   using Part = MovingPart<Number, D>;  ///< q, q̇ of a coordinate
   using Parts = detail::PerLink<Part, links_known>;

@@ -79,7 +79,7 @@ namespace detail {
 
 /// Enclosure of a monotonically increasing function of the standard library.
 template <class Function>
-Interval rising(const Interval& x, Function function) {
+Interval increasing(const Interval& x, Function function) {
   return Interval::rounded(function(x.low), function(x.high), 4);
 }
 
@@ -91,7 +91,7 @@ inline bool holds_one_of(const Interval& x, double start, double period) {
 
 /// Enclosure of a function of period 2π between −1 and 1, which is 1 at `top` and −1 half a period later.
 template <class Function>
-Interval waving(const Interval& x, double top, Function function) {
+Interval periodic(const Interval& x, double top, Function function) {
   constexpr double period = 2 * std::numbers::pi;
   if (!(x.width() < period)) return {-1, 1};
   const auto [low, high] = std::minmax({function(x.low), function(x.high)});
@@ -103,44 +103,44 @@ Interval waving(const Interval& x, double top, Function function) {
 }  // namespace detail
 
 inline Interval sin(const Interval& x) {
-  return detail::waving(x, std::numbers::pi / 2, [](double at) { return std::sin(at); });
+  return detail::periodic(x, std::numbers::pi / 2, [](double at) { return std::sin(at); });
 }
 inline Interval cos(const Interval& x) {
-  return detail::waving(x, 0, [](double at) { return std::cos(at); });
+  return detail::periodic(x, 0, [](double at) { return std::cos(at); });
 }
 inline Interval tan(const Interval& x) {
   constexpr double period = std::numbers::pi;
   if (!(x.width() < period) || detail::holds_one_of(x, period / 2, period)) return Interval::all();
-  return detail::rising(x, [](double at) { return std::tan(at); });
+  return detail::increasing(x, [](double at) { return std::tan(at); });
 }
 inline Interval atan(const Interval& x) {
-  return detail::rising(x, [](double at) { return std::atan(at); });
+  return detail::increasing(x, [](double at) { return std::atan(at); });
 }
 inline Interval sinh(const Interval& x) {
-  return detail::rising(x, [](double at) { return std::sinh(at); });
+  return detail::increasing(x, [](double at) { return std::sinh(at); });
 }
 inline Interval cosh(const Interval& x) {
-  return detail::rising(abs(x), [](double at) { return std::cosh(at); });
+  return detail::increasing(abs(x), [](double at) { return std::cosh(at); });
 }
 inline Interval tanh(const Interval& x) {
-  return common(detail::rising(x, [](double at) { return std::tanh(at); }), {-1, 1});
+  return common(detail::increasing(x, [](double at) { return std::tanh(at); }), {-1, 1});
 }
 inline Interval exp(const Interval& x) {
-  return detail::rising(x, [](double at) { return std::exp(at); });
+  return detail::increasing(x, [](double at) { return std::exp(at); });
 }
 /// Of the non-negative part of x, which must not be empty.
 inline Interval sqrt(const Interval& x) {
-  return detail::rising({std::max(x.low, 0.0), x.high}, [](double at) { return std::sqrt(at); });
+  return detail::increasing({std::max(x.low, 0.0), x.high}, [](double at) { return std::sqrt(at); });
 }
 inline Interval log(const Interval& x) {
-  return detail::rising({std::max(x.low, 0.0), x.high}, [](double at) { return std::log(at); });
+  return detail::increasing({std::max(x.low, 0.0), x.high}, [](double at) { return std::log(at); });
 }
 /// Of the part of x in [−1, 1], which must not be empty.
 inline Interval asin(const Interval& x) {
-  return detail::rising(common(x, {-1, 1}), [](double at) { return std::asin(at); });
+  return detail::increasing(common(x, {-1, 1}), [](double at) { return std::asin(at); });
 }
 inline Interval acos(const Interval& x) {
-  return -detail::rising(common(x, {-1, 1}), [](double at) { return -std::acos(at); });
+  return -detail::increasing(common(x, {-1, 1}), [](double at) { return -std::acos(at); });
 }
 
 /// x to a constant exponent. Either the exponent is a whole number, or x is not negative.
@@ -148,8 +148,8 @@ inline Interval pow(const Interval& x, double exponent) {
   const auto power = [=](double at) { return std::pow(at, exponent); };
   if (exponent == 0) return 1;
   if (exponent < 0) return 1 / pow(x, -exponent);
-  if (x.low >= 0 || std::fmod(exponent, 2) != 0) return detail::rising(x, power);
-  return detail::rising(abs(x), power);
+  if (x.low >= 0 || std::fmod(exponent, 2) != 0) return detail::increasing(x, power);
+  return detail::increasing(abs(x), power);
 }
 
 }  // namespace pendula

@@ -54,7 +54,7 @@ Reach within(double least, double most, const Reach& x, Function function) {
 
 /// A step function: piecewise constant, non-decreasing.
 template <class Function>
-Reach stairs(const Reach& x, Function function) {
+Reach step_function(const Reach& x, Function function) {
   const Interval values{function(x.value.low), function(x.value.high)};
   return Reach(values, values.is_number() ? Interval(0) : Interval::all()).where(x);
 }
@@ -161,13 +161,13 @@ inline Reach max(const Reach& a, const Reach& b) {
   return -min(-a, -b);
 }
 inline Reach floor(const Reach& x) {
-  return detail::stairs(x, [](double at) { return std::floor(at); });
+  return detail::step_function(x, [](double at) { return std::floor(at); });
 }
 inline Reach rint(const Reach& x) {
-  return detail::stairs(x, [](double at) { return std::floor(at + 0.5); });
+  return detail::step_function(x, [](double at) { return std::floor(at + 0.5); });
 }
 inline Reach sign(const Reach& x) {
-  return detail::stairs(x, [](double at) { return at > 0 ? 1.0 : at < 0 ? -1.0 : 0.0; });
+  return detail::step_function(x, [](double at) { return at > 0 ? 1.0 : at < 0 ? -1.0 : 0.0; });
 }
 
 /// Exact where the divisor is a number and the remainder does not jump.

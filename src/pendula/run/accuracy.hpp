@@ -95,9 +95,9 @@ inline constexpr double together = 0.01;
 /// compared with it. Errors scatter about tolerances by factors of ten and more, so that the aim lies below the wanted
 /// error.
 template <class RunTrial, class Apart>
-AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start, AccuracyRung from, RunTrial run,
-                          Apart apart) {
-  constexpr double rounding = 2e-16;  // acts as a tolerance of this size would
+AccuracyLadder refine_until_enough(double wanted, FinestTolerance smallest, double start, AccuracyRung from,
+                                   RunTrial run, Apart apart) {
+  constexpr double rounding = 2e-16;  // acts like a tolerance of this size
   auto& [coarse, fine, far] = from;
   for (;;) {
     std::optional<Track> near = run(fine);
@@ -131,8 +131,8 @@ AccuracyLadder climb_down(double wanted, FinestTolerance smallest, double start,
 /// above. `factor` is raised to the largest one seen. Returns nothing if by that factor the finest tolerance is not
 /// good enough, that is, if the ladder's factor was too small by chance.
 template <class RunTrial, class Apart>
-std::optional<AccuracyAim> climb_up(double wanted, double coarsest, const AccuracyLadder& ladder, double& factor,
-                                    RunTrial run, Apart apart) {
+std::optional<AccuracyAim> coarsen_while_enough(double wanted, double coarsest, const AccuracyLadder& ladder,
+                                                double& factor, RunTrial run, Apart apart) {
   constexpr double least = 0.03, most = 0.5, aimed = 0.15, step = 5, most_change = 100;
   constexpr int most_trials = 6;
   AccuracyAim best = ladder.finest;
@@ -166,9 +166,10 @@ AccuracyAim find_aim(double wanted, double coarsest, FinestTolerance smallest, d
   rung.fine = rung.coarse / step;
   rung.far = run(rung.coarse);
   for (;;) {
-    AccuracyLadder ladder = climb_down(wanted, smallest, start, std::move(rung), run, apart);
+    AccuracyLadder ladder = refine_until_enough(wanted, smallest, start, std::move(rung), run, apart);
     double factor = ladder.factor;
-    if (std::optional<AccuracyAim> aim = climb_up(wanted, coarsest, ladder, factor, run_alike, apart)) return *aim;
+    if (std::optional<AccuracyAim> aim = coarsen_while_enough(wanted, coarsest, ladder, factor, run_alike, apart))
+      return *aim;
     const double known = ladder.finest.tolerance, finer = std::min(aimed_at * wanted / factor, known / 10);
     rung = {known, std::max(finer, smallest.good), std::move(ladder.finest.finest)};
   }

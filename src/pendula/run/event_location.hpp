@@ -206,7 +206,7 @@ class SignSearch {
     const double noise = 4 * epsilon * largest;
     if (tail > 1e-3 * variation + noise) return unresolved(interval, values, halvings, by);
     const double width = interval.to - interval.from;
-    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from coefficients here to the step's
+    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from this part to the step
     // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
     const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
     const auto band = [&](double miss) {

@@ -78,7 +78,7 @@ class FieldLook {
   ///   sums     ∫₀¹ quantity
   ///   moments  ∫₀¹ (1 − share) quantity: for accelerations, the displacement they cause
   ///   missed   the largest |∫ (quantity − polynomial through nodes)| from the start of a part of the step to anywhere
-  /// in it, over all parts
+  ///            in it, over all parts
   struct Sums {
     std::span<double> sums, moments, missed;
   };

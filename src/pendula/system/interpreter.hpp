@@ -39,7 +39,7 @@ class Interpreter : NumbersOfStates<W> {
   template <std::size_t which, class... Arrays>
   static void call(const Conditions& at, Arrays... arrays) {
     const auto& program = *static_cast<const Program*>(at.context);
-    // The casts are safe: input arrays are only read, only the moves in `writes` write.
+    // The casts are safe: only the moves in `writes` write to arrays, and these are outputs.
     run(program.functions[which],
         std::array<double*, 3 + sizeof...(Arrays)>{const_cast<double*>(at.parameters), const_cast<double*>(at.times),
                                                    const_cast<double*>(at.inputs), const_cast<double*>(arrays)...}

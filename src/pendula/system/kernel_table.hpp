@@ -231,8 +231,7 @@ class KernelFunctions : NumbersOfStates<W> {
     }
   }
 
-  // --- The iteration loop, compiled with the kernel: for few coordinates a call of its functions would cost as much
-  // ---
+  // --- The iteration, compiled with the kernel: for few coordinates a call of its functions would cost as much ---
 
   PENDULA_IN_REGISTERS static IterationChange iterate(const Conditions& at, const StageIteration& on) {
     constexpr std::size_t count = S::coordinates;

@@ -39,9 +39,9 @@ class ChainSeries {
     for (std::size_t k = 0; k < static_cast<std::size_t>(order_); ++k) {
       if constexpr (Rods::is_short) {
         detail::PerLink<Sums, Rods::links_known> sums(Rods::links_known);
-        go_on(rods, k, sums);
+        add_order(rods, k, sums);
       } else {
-        go_on(rods, k, sums_);
+        add_order(rods, k, sums_);
       }
     }
     const auto last = static_cast<std::size_t>(order_) + 1;
@@ -133,16 +133,16 @@ class ChainSeries {
   }
 
   template <class AllSums>
-  [[gnu::always_inline]] void go_on(const Rods& rods, std::size_t k, AllSums& sums) {
-    gather(rods, k, sums);
-    rods.for_parts([&](auto i) PENDULA_WRITTEN_OUT { end(rods, i, k, sums); });
+  [[gnu::always_inline]] void add_order(const Rods& rods, std::size_t k, AllSums& sums) {
+    add_all_pairs(rods, k, sums);
+    rods.for_parts([&](auto i) PENDULA_WRITTEN_OUT { add_unpaired(rods, i, k, sums); });
     solve(rods, k, sums);
-    rise(rods, k, sums);
+    raise_order(rods, k, sums);
   }
 
   // Products of orders j and k − j, without those of order 0. Pairs with the most recent factors come last.
   template <class AllSums>
-  [[gnu::always_inline]] void gather(const Rods& rods, std::size_t k, AllSums& sums) {
+  [[gnu::always_inline]] void add_all_pairs(const Rods& rods, std::size_t k, AllSums& sums) {
     if constexpr (Rods::is_short) {
       for (std::size_t j = (k + 1) / 2; j-- > 1;) add_pairs<Rods::links_known, false>(0, j, k - j, sums);
     } else {
@@ -195,7 +195,7 @@ class ChainSeries {
 
   // Adds the middle term, which has no partner, and the terms with factors of order 0 that are known.
   template <class AllSums>
-  [[gnu::always_inline]] void end(const Rods& rods, int i, std::size_t k, AllSums& sums) {
+  [[gnu::always_inline]] void add_unpaired(const Rods& rods, int i, std::size_t k, AllSums& sums) {
     const bool is_even = k % 2 == 0;
     Link& link = at(i);
     auto& sum = Rods::at(sums, i);
@@ -252,7 +252,7 @@ class ChainSeries {
 
   // Integrates to order k + 1.
   template <class AllSums>
-  [[gnu::always_inline]] void rise(const Rods& rods, std::size_t k, AllSums& sums) {
+  [[gnu::always_inline]] void raise_order(const Rods& rods, std::size_t k, AllSums& sums) {
     const L& inverse = inverses_[k + 1];
     Vector before = none();
     if (k == 0) before[D - 1] = Number(rods.gravity());
