@@ -77,7 +77,7 @@ class ChainAccelerations {
     return of[link];
   }
 
-  /// What unused lanes hold.
+  /// Unused lanes hold a chain that hangs at rest.
   static Part resting() {
     Part rod = Part::zero();
     rod.place[D - 1] = Number(-1.0);

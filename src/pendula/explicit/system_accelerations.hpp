@@ -101,8 +101,8 @@ class SystemAccelerations {
   }
 
   /// Squared error of a step of `h`, from the error sums of coordinates and rates. Angles are relative to a radian,
-  /// other coordinates to the largest one of the same unit; rates to the fastest one, or to the speed that they would
-  /// reach by falling that far.
+  /// other coordinates to the largest one of the same unit; rates to the fastest one, or to the speed reached by
+  /// falling that far.
   L error_squared(const L& h, const Parts& errors, const Parts& before, const Parts& slopes, const Parts& after,
                   const L& /*pace_squared*/) const {
     if constexpr (!is_batch<L>) return error_squared_of_one(h, errors, before, slopes, after);

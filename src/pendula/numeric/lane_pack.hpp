@@ -104,10 +104,10 @@ class LanePack {
   Register held_;
 };
 
-/// The widest register of members on this processor, of at most eight.
+/// The widest register of this processor, up to eight members.
 using MemberRegister = RegisterFor<8>;
 
-// A number times that of every lane.
+// Multiplies every lane by one number.
 template <class Register>
 LanePack<Register> operator*(double a, const LanePack<Register>& b) {
   return LanePack<Register>(a) * b;

@@ -19,7 +19,7 @@ inline double sample_place(std::size_t sample) {
 }
 
 /// Absolute values |c_k| of the Chebyshev coefficients of the polynomial through `values` at Chebyshev points in order.
-/// The sum of those after the first bounds how far the polynomial goes from the first.
+/// The sum of all but the first bounds the distance of the polynomial from the first coefficient.
 template <std::size_t points>
 std::array<double, points> chebyshev_sizes(const std::array<double, points>& values) {
   using Table = std::array<std::array<double, points>, points>;

@@ -11,7 +11,7 @@ namespace pendula {
 /// Weight of the relative error of a tangent in the choice of step sizes.
 inline constexpr double tangent_share = 0.01;
 
-// What numbers with derivatives along tangents (Dual) need besides arithmetic, when they are held in lanes.
+// Functions of numbers in lanes with derivatives along tangents (Dual), besides arithmetic.
 
 template <class L>
 Dual<L> in_register(const Dual<L>& a) {

@@ -41,8 +41,8 @@ struct Library {
   MoveSystemMembers* (*system_lanes)(const RunOptions&);
   /// The same with a tangent of each member; nullptr for methods that have none.
   MoveSystemMembers* (*system_tangent_lanes)(const RunOptions&);
-  /// Replaces directions, (rows, count) numbers row by row, by an orthonormal basis such that the first k span what the
-  /// first k did, for every k. `lengths`, (count), is set to |R_kk| of the QR decomposition, by Householder
+  /// Replaces directions, (rows, count) numbers row by row, by an orthonormal basis such that the first k span the same
+  /// space as before, for every k. `lengths`, (count), is set to |R_kk| of the QR decomposition, by Householder
   /// reflections.
   void (*make_orthonormal)(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
   /// Functions of interpreted kernels (system/interpreted_kernel.hpp).

@@ -70,7 +70,7 @@ bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
-  std::optional<Track> alike;  // whose times are those of the first trial, and of all
+  std::optional<Track> alike;  // gives all trials the times of the first one
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
     if (stopped) return {};
     RunOptions options = setup_.options;

@@ -14,7 +14,7 @@
 
 namespace pendula {
 
-/// What a row shows of a state besides coordinates.
+/// Quantities of a state besides its coordinates and rates.
 struct Observation {
   Eigen::VectorXd points;  ///< components of all points, point after point  [m]
   double kinetic = 0;      ///< T  [J]

@@ -128,7 +128,7 @@ class ChainDraw {
                        jacobian_error([&](const Numbers& v) { return form(q_, v)[1]; }, v_, f_v)});
   }
 
-  /// Functions that return the same quantity return the same values.
+  /// Entry points that compute the same quantity give equal values.
   double same_values() const {
     const auto [p, f] = form(q_, v_);
     const auto same_form = form_with_jacobians();
