@@ -316,10 +316,10 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
   EXPECT_EQ(told(changed("factor|1|5|0", "factor|3|5|0")), "line 18: expected a whole number from 0 to 0, got 5");
   EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 18: expected an operation, got invert");
   EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 20: expected a whole number from 0 to 5, got 6");
-  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 22: expected that all rows are written before, got function");
+  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 22: expected a write to every row of every output, got function");
   EXPECT_EQ(told(changed("point|bob|2\n", "")), "line 141: expected an array of this function, got r");
   EXPECT_EQ(told(changed("coordinate|x|m|0|0\n", "")),
-            "expected a name, a model, links and coordinates, got none of one of them");
+            "expected a name, a model, links and coordinates, got a description without one of them");
 }
 
 // A program that is cut or changed anywhere is refused, or touches nothing but its own.

@@ -46,9 +46,8 @@ std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const 
     case Method::taylor:
       break;
   }
-  throw std::invalid_argument("method: expected one that needs nothing but accelerations, got " +
-                              std::string(name_of(options.method)) +
-                              (options.method == Method::taylor ? ", which moves chains alone" : ""));
+  throw std::invalid_argument("method: expected one for any system, got " + std::string(name_of(options.method)) +
+                              (options.method == Method::taylor ? ", which is for chains only" : ""));
 }
 
 }  // namespace detail

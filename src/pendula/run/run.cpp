@@ -38,7 +38,11 @@ RunReport Run::go(const std::function<bool()>& stop) {
 
 RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
   become(kept_, checkpoint.record);
-  if (is_aimed() != (kept_.aim.tolerance > 0)) throw std::invalid_argument("checkpoint: it is of another accuracy");
+  if (is_aimed() != (kept_.aim.tolerance > 0)) {
+    throw std::invalid_argument(
+        std::string("checkpoint: expected one of a run ") +
+        (is_aimed() ? "with an accuracy, got one without" : "without an accuracy, got one with"));
+  }
   if (is_aimed()) follow_aim();
   integrator_->resume(checkpoint.integrator);
   return go(&checkpoint, stop);

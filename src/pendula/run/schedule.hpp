@@ -42,7 +42,7 @@ inline void require(const Schedule& schedule) {
   if (!(schedule.duration >= 0) || std::isinf(schedule.duration)) reject("duration: expected a number, not negative");
   if (schedule.every < 1) reject("every: expected at least 1");
   if (!(schedule.rows.interval >= 0)) reject("rows: expected an interval that is not negative");
-  if (!std::ranges::is_sorted(schedule.rows.times)) reject("rows: expected times that ascend");
+  if (!std::ranges::is_sorted(schedule.rows.times)) reject("rows: expected ascending times");
 }
 
 /// Size of the next step. A remainder that is one step up to rounding is taken as one step.

@@ -143,7 +143,7 @@ class OwnedFunction {
       end_line(text);
     }
     for (const auto& rows : missing) {
-      if (std::ranges::find(rows, true) != rows.end()) text.fail("that all rows are written before", text.kind());
+      if (std::ranges::find(rows, true) != rows.end()) text.fail("a write to every row of every output", text.kind());
     }
     code_.push_back(static_cast<std::uint16_t>(Operation::end));
   }
@@ -211,7 +211,7 @@ class OwnedKernel {
     program_.coordinates = info.coordinates.size();
     while (lines.kind() == "function") read_function(lines, info);
     if (lines.kind() != "end") lines.fail("a function or the end", lines.kind());
-    if (lines.next()) lines.fail("nothing behind the end", lines.kind());
+    if (lines.next()) lines.fail("nothing after the end", lines.kind());
     table_ = {
         info,   &program_, interpreter.of_1, interpreter.of_2, interpreter.of_4, interpreter.of_8, interpreter.plain,
         nullptr};
@@ -232,7 +232,7 @@ class OwnedKernel {
       (k < signature->taken ? taken : given).push_back({array.name, count(array.rows, info)});
     }
     const auto which = static_cast<std::size_t>(signature - signatures.begin());
-    if (!program_.functions[which].code.empty()) lines.fail("another function", name);
+    if (!program_.functions[which].code.empty()) lines.fail("a function that is not defined yet", name);
     functions_[which].read(lines, taken, given);
     program_.functions[which] = functions_[which].function();
   }

@@ -6,6 +6,7 @@
 #include <pendula/system/kernel_comparison.hpp>
 #include <pendula/system/kernel_widths.hpp>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 
 namespace pendula {
@@ -27,7 +28,9 @@ KernelComparison::KernelComparison(const SystemTable& table, std::span<const dou
   point_size_ = static_cast<std::size_t>(arguments_) + 2 * static_cast<std::size_t>(numbers);
   count_ = said.empty() ? 0 : static_cast<std::size_t>(said.front());
   if (said.size() != 1 + count_ * point_size_) {
-    throw std::invalid_argument("a kernel can be compared with what its own model says only");
+    throw std::invalid_argument("written values: expected " + std::to_string(1 + count_ * point_size_) +
+                                " numbers for " + std::string(table.info.name) + ", got " +
+                                std::to_string(said.size()));
   }
 }
 

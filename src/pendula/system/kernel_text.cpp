@@ -105,7 +105,8 @@ bool KernelDescription::take(KernelText& text) {
 
 SystemInfo KernelDescription::info() const {
   if (name_.empty() || model_.empty() || links_ == 0 || coordinates_.empty()) {
-    throw std::invalid_argument("expected a name, a model, links and coordinates, got none of one of them");
+    throw std::invalid_argument(
+        "expected a name, a model, links and coordinates, got a description without one of them");
   }
   return {name_,
           model_,
