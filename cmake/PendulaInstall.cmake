@@ -10,14 +10,16 @@ install(TARGETS pendula_kernels pendula EXPORT pendulaTargets FILE_SET HEADERS)
 install(EXPORT pendulaTargets NAMESPACE pendula:: DESTINATION "${package_dir}")
 if(PENDULA_BUILD_PROGRAM)
   set(data_dir "${CMAKE_INSTALL_DATADIR}/pendula")
-  install(TARGETS pendula_cli)
-  install(DIRECTORY "${PROJECT_SOURCE_DIR}/plotting" DESTINATION "${data_dir}" PATTERN "__pycache__" EXCLUDE)
+  # Of the component `program`: what the wheel of the Python package holds, too.
+  install(TARGETS pendula_cli COMPONENT program)
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/plotting" DESTINATION "${data_dir}" COMPONENT program
+          PATTERN "__pycache__" EXCLUDE)
   install(PROGRAMS "${PROJECT_SOURCE_DIR}/cmake/installed_setup" DESTINATION "${data_dir}" RENAME setup)
-  install(DIRECTORY "${PROJECT_BINARY_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}")  # by describe_program.cmake
-  install(DIRECTORY "${PROJECT_SOURCE_DIR}/examples" DESTINATION "${data_dir}" FILES_MATCHING PATTERN "*.toml")
+  install(DIRECTORY "${PROJECT_BINARY_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}" COMPONENT program)  # by describe_program.cmake
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/examples" DESTINATION "${data_dir}" COMPONENT program FILES_MATCHING PATTERN "*.toml")
 endif()
 
-install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codegen_dir}"
+install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codegen_dir}" COMPONENT program
         FILES_MATCHING PATTERN "*.py" PATTERN "*.j2" PATTERN "__pycache__" EXCLUDE)
 install(FILES "${PENDULA_CODEGEN_DIR}/requirements.txt" DESTINATION "${codegen_dir}")
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/pendula")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 import warnings
@@ -134,6 +135,11 @@ def _plain(sentence: str) -> str:
     return re.sub(r"^pendula(:\d+)?: ", "", sentence)
 
 
+def places() -> tuple[str, str]:
+    """Where the program of this package is, and the Python that derives kernels."""
+    return str(Path(__file__).parent / "bin"), os.environ.get("PENDULA_PYTHON") or sys.executable
+
+
 def tell(what: str) -> None:
     print(f"pendula: {what}", file=sys.stderr)
 
@@ -141,7 +147,7 @@ def tell(what: str) -> None:
 def run_text(text: str, name: str = "pendula", overrides: list[str] | None = None) -> Solution:
     """Runs a scenario's text; ``name`` stands for its file in messages."""
     with plainly():
-        result = _core.simulate(text, name, overrides or [], str(Path(__file__).parent), tell)
+        result = _core.simulate(text, name, overrides or [], *places(), tell)
     solution = Solution(result)
     for sentence in solution.summary["warnings"]:
         warnings.warn(_plain(sentence), TrustWarning, stacklevel=3)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _core, _toml
-from ._runs import plainly, tell
+from ._runs import places, plainly, tell
 
 if TYPE_CHECKING:
     import xarray
@@ -35,7 +34,7 @@ def _prepare(
 
 def _prepared(text: str) -> _core.Prepared:
     with plainly():
-        return _core.prepare(text, str(Path(__file__).parent), tell)
+        return _core.prepare(text, *places(), tell)
 
 
 def _split(

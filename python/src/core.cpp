@@ -168,15 +168,17 @@ void run(const Scenario& scenario, const std::string& name, const std::string& k
 }
 
 /// Where models are found, and what is told before a kernel is made: by Python, whose lock others have meanwhile.
-/// `package` is the folder of the Python package, beside which the generator of kernels is found.
+/// `program` is where the program is in the Python package: it tells where the generator is. `python` runs that.
 class Models {
  public:
-  Models(std::string package, const Tell& tell) : package_(std::move(package)), tell_(tell) {}
+  Models(const std::string& program, std::string python, const Tell& tell)
+      : toolchain_(io::Toolchain::of(program)), tell_(tell) {
+    toolchain_.python = std::move(python);
+  }
 
   io::FindSystem finder() {
     return [this](const std::string& model, std::optional<int> links, const std::filesystem::path& folder) {
-      const io::Toolchain toolchain = io::Toolchain::of(package_);
-      const io::ModelKernel kernel = io::find_kernel(model, links, folder, toolchain, [&](const std::string& what) {
+      const io::ModelKernel kernel = io::find_kernel(model, links, folder, toolchain_, [&](const std::string& what) {
         const nb::gil_scoped_acquire lock;
         tell_(what);
       });
@@ -187,19 +189,20 @@ class Models {
   const std::string& by() const { return by_; }
 
  private:
-  std::string package_, by_ = "build";
+  io::Toolchain toolchain_;
+  std::string by_ = "build";
   const Tell& tell_;
 };
 
 /// Runs a scenario.
 std::unique_ptr<Result> simulate(const std::string& text, const std::string& name,
-                                 const std::vector<std::string>& overrides, const std::string& package,
-                                 const Tell& tell) {
+                                 const std::vector<std::string>& overrides, const std::string& program,
+                                 const std::string& python, const Tell& tell) {
   auto result = std::make_unique<Result>();
   Interruption interruption;
   {
     const nb::gil_scoped_release others_may_go_on;
-    Models models(package, tell);
+    Models models(program, python, tell);
     const io::AnyScenario any = io::parse_scenario(text, name, overrides, models.finder());
     std::visit([&](const auto& scenario) { run(scenario, name, models.by(), std::ref(interruption), *result); }, any);
   }
@@ -228,9 +231,10 @@ struct Prepared {
   SimulationOptions options;
 };
 
-std::unique_ptr<Prepared> prepare(const std::string& text, const std::string& package, const Tell& tell) {
+std::unique_ptr<Prepared> prepare(const std::string& text, const std::string& program, const std::string& python,
+                                  const Tell& tell) {
   const nb::gil_scoped_release others_may_go_on;
-  Models models(package, tell);
+  Models models(program, python, tell);
   io::AnyScenario any = io::parse_scenario(text, "pendula", {}, models.finder());
   return std::visit(
       [&](const auto& scenario) {
@@ -327,8 +331,8 @@ NB_MODULE(_core, module) {
       .def("take_event_rows", [](Result& result) {
         return python::array_of(std::move(result.recorder.event_rows), result.columns.size());
       });
-  module.def("simulate", &python::simulate, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("package"),
-             nb::arg("tell"));
+  module.def("simulate", &python::simulate, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
+             nb::arg("python"), nb::arg("tell"));
 
   using python::Prepared;
   nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);
@@ -339,7 +343,7 @@ NB_MODULE(_core, module) {
       .def_prop_ro(
           "start", [](const Prepared& made) { return python::vector_of(python::state_of(made.start)); },
           nb::rv_policy::move);
-  module.def("prepare", &python::prepare, nb::arg("text"), nb::arg("package"), nb::arg("tell"));
+  module.def("prepare", &python::prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"));
 
   nb::class_<Simulation>(module, "Simulation")
       .def(
