@@ -62,7 +62,7 @@ TYPED_TEST(ChainStageEquations, AreSolvedQuadratically) {
   ChainStages<KernelSpace, S> stages(this->chain);
   ChainNewton<KernelSpace, S> newton(TypeParam::links);
   stages.start(this->start);
-  stages.prepare(0, 0.08);  // large, so that every term counts
+  stages.prepare({0, 0.08});  // large, so that every term counts
   double before = newton.correct(stages).relative;
   for (int iteration = 2; iteration <= 5; ++iteration) {
     const double correction = newton.correct(stages).relative;
@@ -115,7 +115,7 @@ void expect_exact_newton_in_a_long_step(double gravity) {
   ChainStages<Space, S> stages{Chain<Space>(parameters)};
   ChainNewton<Space, S> newton(n);
   stages.start(State<Space>{0, q, Eigen::VectorXd::Zero(Space::dof * n)});
-  stages.prepare(0, 0.08);
+  stages.prepare({0, 0.08});
   ASSERT_GT(stages.hanging(0), 0);
   double before = newton.correct(stages).relative;
   for (int iteration = 2; iteration <= 7; ++iteration) {
@@ -147,7 +147,7 @@ void expect_newton_in_blocks_to_be_the_same() {
   ChainNewton<Space, S> newton(n), newton_in_blocks(n, 5);
   for (ChainStages<Space, S>* stages : {&whole, &in_blocks}) {
     stages->start(start);
-    stages->prepare(0, 0.02);
+    stages->prepare({0, 0.02});
   }
   for (int iteration = 1; iteration <= 3; ++iteration) {
     EXPECT_EQ(newton.correct(whole).relative, newton_in_blocks.correct(in_blocks).relative) << iteration;

@@ -34,7 +34,7 @@ struct AlignedDelete {
 };
 
 /// `PerLink` numbers a link in one block aligned for packs; on the stack where the number of links N is known.
-/// Up to eight more numbers can be read after the last. Arrays of as many links can be assigned, without allocation.
+/// Up to eight more numbers can be read after the last. To assign an array of as many links allocates nothing.
 template <int PerLink, int N, class Real = double>
 class LinkArray {
   static_assert(std::is_trivially_destructible_v<Real>);
@@ -53,7 +53,9 @@ class LinkArray {
     std::uninitialized_copy_n(other.data(), held_, data());
   }
   LinkArray& operator=(const LinkArray& other) {
-    if (this != &other) std::copy_n(other.data(), held_, data());
+    if (this == &other) return *this;
+    if (std::exchange(held_, other.held_) != other.held_) allocate();
+    std::copy_n(other.data(), held_, data());
     return *this;
   }
   ~LinkArray() = default;

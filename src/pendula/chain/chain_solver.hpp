@@ -78,10 +78,12 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
     return stages_.energy_defect();
   }
 
-  void accept() {
+  double accept() {
+    const double brought = stages_.brought();
     if (is_by_newton()) newton_.find_multipliers(stages_);
     choice_.end_step();
     stages_.accept();
+    return brought;
   }
 
   /// The derivative of the step that was solved and not yet accepted.

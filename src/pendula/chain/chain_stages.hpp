@@ -14,9 +14,9 @@
 #include <pendula/chain/rod_state.hpp>
 #include <pendula/chain/stage_change.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/gauss/prediction_depth.hpp>
 #include <pendula/gauss/stage_layout.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <utility>
 #include <xsimd/xsimd.hpp>
@@ -28,8 +28,8 @@ namespace pendula {
 template <class Space, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainStages : public ChainTurns<Space, S, N, RealType> {
   using Base = ChainTurns<Space, S, N, RealType>;
-  using Base::anchors_, Base::columns_, Base::constants_, Base::direction, Base::entry, Base::kept_, Base::last_h_,
-      Base::past, Base::rate_at, Base::rods_, Base::stages_, Base::turn_;
+  using Base::anchors_, Base::columns_, Base::constants_, Base::direction, Base::entry, Base::kept_, Base::past,
+      Base::prediction_, Base::rate_at, Base::rods_, Base::stages_, Base::turn_;
 
  public:
   using Real = RealType;
@@ -71,7 +71,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     stages_[i].tau.set(0, tau);
   }
 
-  using Base::keep, Base::place;
+  using Base::keep;
 
   /// Where a rod is at the stages.
   Vector place(int i) const {
@@ -129,9 +129,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   // --- A step ---
 
   void start(const State& state) {
-    forget();
-    depth_ = {};
-    steps_ = 0;
+    prediction_ = {};
     fastest_ = 0;
     using Wide = typename Base::Rods::Wide;
     for (int i = 0; i < links(); ++i) {
@@ -147,26 +145,22 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     }
   }
 
-  /// Predicts the stages of a step of size h: from the last steps', or cold where there was none like it.
-  void prepare(double time, double h) {
-    const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
-    const int depth = depth_.next(alike && h == last_h_, S, Base::Columns::most_depth);
-    predict(time, h, alike ? h / last_h_ : 1, {alike, false, !alike, Real(depth), Real(depth_.known())});
-    last_h_ = 0;  // what was predicted from is gone until the step is accepted
-  }
-
-  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
-  /// one's.
-  void prepare_again(double time, double h) {
-    if (!is_finished_) finish();
-    depth_.forget();
-    const double from = last_h_ != 0 ? last_h_ : step_;
-    predict(time, h, h / from, {false, true, false, Real(0), Real(0)});
+  /// Predicts the stages of a step.
+  void prepare(const StepTask& task) {
+    if (task.from == PredictedFrom::same_step && !is_finished_) finish();
+    const auto [ratio, kind] = prediction_.next(task, S, Base::Columns::most_depth);
+    const Real h(task.h);
+    const bool is_new = h != columns_.h();
+    columns_.prepare(h);
+    if (loaded() && (is_new || chain_.driven() || !torque_is_set_)) set_torques(task.time);
+    Base::predict(h, Real(ratio), {kind.follows, kind.again, kind.cold, Real(kind.depth), Real(kind.known)});
+    is_first_ = true;
+    is_finished_ = false;
   }
 
   void start_cold() {
     Base::start_cold(true);
-    depth_.forget();
+    prediction_.forget();
   }
 
   /// One fixed-point iteration; what it changes, relative to the size of the step. visit(i, change of link i, squared,
@@ -184,7 +178,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   }
 
   /// The first of these changes in a step.
-  void see_first(double change) { depth_.saw(change); }
+  void see_first(double change) { prediction_.see_first(change); }
 
   /// The link where one more iteration changes most.
   int worst_link() {
@@ -206,7 +200,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   double energy_defect() {
     if (!is_finished_) finish();
     const Energies start = energies();
-    const double brought = loaded() ? static_cast<double>(this->work()) : 0;
+    const double brought = this->brought();
     trial_ = rods_.place();
     Base::move(Everyone{});
     const Energies end = energies();
@@ -231,12 +225,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     });
     return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / fastest_) : 0;
   }
-  /// How much larger the error of a prediction is than that defect, at least. Predictions from many steps are better
-  /// than that: some of these steps are looked at whatever they show (0).
-  double predictor_gain() const {
-    if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;
-    return is_predicted_ ? static_cast<double>(columns_.predictor_gain()) : 1;
-  }
+  /// How much larger the error of the prediction is than that defect.
+  double predictor_gain() const { return prediction_.gain(static_cast<double>(columns_.predictor_gain())); }
 
   Tempo tempo() const {
     Real pace, quickening;
@@ -269,22 +259,22 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return shape;
   }
 
-  using Base::work;
+  /// Energy that loads bring in the step  [J].
+  double brought() const { return loaded() ? static_cast<double>(Base::work()) : 0; }
 
   /// Moves the state to the end of the step.
   void accept() {
     if (!is_finished_) finish();
     Base::follow_turns();
     Base::move(Everyone{});
-    ++steps_;
-    if (steps_ % restoring_interval_ == 0) rods_.restore_lengths(constants_, Everyone{});
+    prediction_.accept();
+    if (prediction_.steps() % restoring_interval_ == 0) rods_.restore_lengths(constants_, Everyone{});
     for (int i = 0; i < links(); ++i) anchors_[i].follow(direction(i));
-    last_h_ = step_;
   }
 
   template <class MemberNumbers>
   void member(MemberNumbers& numbers) {
-    numbers(rods_, last_h_, fastest_, steps_, depth_, this->newest_, this->hangs_, this->scale_);
+    numbers(rods_, prediction_, fastest_, this->newest_, this->hangs_, this->scale_);
     for (int i = 0; i < links(); ++i) {
       numbers(anchors_[i]);
       for (auto& step : this->pasts_[i]) {
@@ -294,28 +284,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     }
   }
 
-  /// The next step starts cold.
-  void forget() {
-    last_h_ = 0;
-    depth_.forget();
-  }
-
  private:
-  // Farther than this the polynomial of the last step is no prediction.
-  static constexpr double farthest_extrapolation = 1.5;
-  static constexpr std::int64_t looked_at = 8;  // of the steps, one in so many
-
-  void predict(double time, double h, double ratio, const StagePrediction<Real>& kind) {
-    const bool other = Real(h) != columns_.h();
-    columns_.prepare(Real(h));
-    if (loaded() && (other || chain_.driven() || !torque_is_set_)) set_torques(time);
-    Base::predict(Real(h), Real(ratio), kind);
-    is_predicted_ = !kind.cold;
-    step_ = h;
-    is_first_ = true;
-    is_finished_ = false;
-  }
-
   void finish() {
     Base::finish();
     is_finished_ = true;
@@ -343,7 +312,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
       });
       furthest = std::max(furthest, Real(dot(missed, missed) * constants_[i].inverse_square));
     });
-    return std::abs(step_) * std::sqrt(static_cast<double>(furthest));
+    return std::abs(prediction_.h()) * std::sqrt(static_cast<double>(furthest));
   }
 
   void set_torques(double time) {
@@ -392,10 +361,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   std::int64_t restoring_interval_;  // steps: Gauss methods keep lengths but for rounding
   typename Base::Rods::Place trial_{links()};
   double fastest_ = 0;  // bob, squared  [m²/s²]
-  bool torque_is_set_ = false, is_predicted_ = false, is_finished_ = false, is_first_ = true;
-  PredictionDepth depth_;
-  double step_ = 0;  // of the stages
-  std::int64_t steps_ = 0;
+  bool torque_is_set_ = false, is_finished_ = false, is_first_ = true;
 };
 
 }  // namespace pendula

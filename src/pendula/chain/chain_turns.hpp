@@ -8,6 +8,7 @@
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/state.hpp>
 #include <pendula/gauss/stage_layout.hpp>
+#include <pendula/gauss/step_prediction.hpp>
 #include <pendula/numeric/lanes.hpp>
 
 namespace pendula {
@@ -37,10 +38,9 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
 
   /// Where the chain is, to come back to.
   struct Place {
-    typename Base::Rods::Place rods;
-    detail::PerLink<AngleAnchor<Space, Real>, N> anchors;
+    typename Base::Rods::Place rods{};
+    detail::PerLink<AngleAnchor<Space, Real>, N> anchors{0};
   };
-  Place place() const { return {rods_.place(), anchors_}; }
   void keep(Place& place) const {
     place.rods = rods_.place();
     place.anchors = anchors_;
@@ -56,7 +56,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     const auto up_to = columns_.integrals(Real(x));
     for (int i = 0; i < links(); ++i) {
       const Real* along = begin.rods.along[i];
-      const Numbers rate = rate_at(i, Real(x), Real(last_h_)), rod = rod_in_step(along, i, up_to), low{};
+      const Numbers rate = rate_at(i, Real(x), Real(prediction_.last_h())), rod = rod_in_step(along, i, up_to), low{};
       AngleAnchor<Space, Real> anchor = begin.anchors[i];
       if (may_leave(anchor, i, along, turn_ * std::abs(x))) follow_turn(anchor, along, i, Real(x), rod);
       read_angles(i, Base::Rods::heading_of(rod, low, rate), anchor, state);
@@ -163,8 +163,8 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     }
   }
 
-  double turn_ = 0;    // the most that a link turns in the step that was solved
-  double last_h_ = 0;  // of the step that the stages belong to; 0: they belong to none
+  double turn_ = 0;  // the most that a link turns in the step that was solved
+  StepPrediction prediction_;
   detail::PerLink<AngleAnchor<Space, Real>, N> anchors_;
 };
 

@@ -59,7 +59,7 @@ class RodState {
 
   /// A state, to be kept and come back to.
   struct Place {
-    explicit Place(int links) : along(links), along_low(links), free(links), free_low(links) {}
+    explicit Place(int links = 0) : along(links), along_low(links), free(links), free_low(links) {}
     Numbers<Num> along, along_low;  ///< ξ  [m], and what it lost to rounding
     Numbers<Num> free, free_low;    ///< z  [m/s]
   };

@@ -95,10 +95,12 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
     return stages_.energy_defect();
   }
 
-  void accept() {
+  double accept() {
+    const double brought = stages_.brought();
     find_forces();
     choice_.end_step();
     stages_.accept();
+    return brought;
   }
 
   /// The derivative of the step that was solved and not yet accepted.

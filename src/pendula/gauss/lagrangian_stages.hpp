@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <pendula/gauss/prediction_depth.hpp>
 #include <pendula/gauss/stage_dynamics.hpp>
 #include <pendula/gauss/stage_layout.hpp>
+#include <pendula/gauss/step_prediction.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/gauss/system_motion.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -45,17 +45,15 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   int stages() const { return columns_.stages(); }
   double time_of(int stage) const { return time_ + columns_.h() * columns_.c(static_cast<std::size_t>(stage)); }
 
-  double time_at(double share) const { return time_ + step_ * share; }
+  double time_at(double share) const { return time_ + h() * share; }
 
   // --- The state ---
 
   /// q, v  (coordinates).
   Status start(double time, const double* q, const double* v) {
     time_ = time;
-    forget();
+    prediction_ = {};
     fastest_ = fastest_here_ = most_kinetic_ = 0;
-    steps_ = 0;
-    depth_ = {};
     const SystemAt<1>& here = dynamics_.at(time);
     pace_.start(here, q, v);
     masses_.start(here, q);
@@ -85,13 +83,13 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, state_, turns_, last_h_, masses_, weights_, pace_, fastest_, most_kinetic_, steps_, depth_, newest_);
+    numbers(time_, state_, turns_, prediction_, masses_, weights_, pace_, fastest_, most_kinetic_, newest_);
     for (auto& row : U_) numbers.range(row.numbers(), static_cast<std::size_t>(stages()));
     for (auto& past : pasts_) {
       for (auto& row : past) numbers.range(row.numbers(), static_cast<std::size_t>(stages()));
     }
   }
-  using Base::keep, Base::place;
+  using Base::keep;
   using typename Base::Place;
   void go_to(const Place& there) {
     Base::go_to(there, true);
@@ -100,7 +98,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
   /// The state at x of the last step, which began there, by the polynomials through its rates.
   Motion glance(const Place& begin, double time, double x) const {
-    const auto up_to = columns_.up_to(x), rate_at = columns_.rate_at(x, last_h_);
+    const auto up_to = columns_.up_to(x), rate_at = columns_.rate_at(x, prediction_.last_h());
     Motion motion(time, Eigen::VectorXd(eigen_count()), Eigen::VectorXd(eigen_count()));
     for (std::size_t k = 0; k < count_; ++k) {
       Compensated<double> q = begin.state[k];
@@ -118,27 +116,23 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
   // --- A step ---
 
-  /// Predicts the stages of a step of size h: from the last steps', or cold where there was none like it.
-  void prepare(double time, double h) {
-    const bool alike = last_h_ != 0 && std::abs(h / last_h_) < farthest_extrapolation;
-    const int depth = depth_.next(alike && h == last_h_, stages(), columns_.deepest());
-    is_predicted_ = alike;
-    predict(time, h, alike ? h / last_h_ : 1,
-            {alike, false, !alike, static_cast<double>(depth), static_cast<double>(depth_.known())});
-    last_h_ = 0;  // what was predicted from is gone until the step is accepted
-  }
-
-  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
-  /// one's.
-  void prepare_again(double time, double h) {
-    depth_.forget();
-    predict(time, h, h / (last_h_ != 0 ? last_h_ : step_), {false, true, false, 0, 0});
+  /// Predicts the stages of a step.
+  void prepare(const StepTask& task) {
+    const auto [ratio, from] = prediction_.next(task, stages(), columns_.deepest());
+    if (!from.cold) Base::keep_stages();
+    columns_.prepare(task.h);
+    time_ = task.time;
+    dynamics_.set_times(
+        [&](std::size_t j) { return static_cast<int>(j) < stages() ? time_of(static_cast<int>(j)) : time_; });
+    Base::predict(time_, ratio, from);
+    floor_ = Base::invisible * std::sqrt(Base::size_squared_);
+    for (std::size_t k = 0; k < count_; ++k) weights_[count_ + k] = std::abs(task.h) / weight(k);
   }
 
   /// Stages of a motion that goes on as at the start of the step.
   void start_cold() {
     Base::start_cold(true);
-    forget();
+    prediction_.forget();
   }
 
   /// Replaces the increments by a fixed-point iteration once; its change is relative to the size of the step.
@@ -150,7 +144,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
 
   /// The first of these changes in a step.
-  void see_first(double change) { depth_.saw(change); }
+  void see_first(double change) { prediction_.see_first(change); }
 
   /// The coordinate that one more iteration changes most.
   int most_changing_coordinate() {
@@ -190,12 +184,12 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     for (std::size_t k = 0; k < count_; ++k) {
       double later = 0;
       for (int j = 0; j < stages(); ++j) later += (1 - columns_.c(static_cast<std::size_t>(j))) * pushed(k)[j];
-      const double displaced = step_ * (step_ * moments[count_ + k] - later) / (weight(k) * weight(k));
-      sums[k] = step_ * sums[k] - total(k) + displaced;
-      sums[count_ + k] = step_ * sums[count_ + k] - total(count_ + k);
+      const double displaced = h() * (h() * moments[count_ + k] - later) / (weight(k) * weight(k));
+      sums[k] = h() * sums[k] - total(k) + displaced;
+      sums[count_ + k] = h() * sums[count_ + k] - total(count_ + k);
     }
   }
-  double h() const { return step_; }
+  double h() const { return prediction_.h(); }
 
   /// h b v of coordinate k, h b f of its momentum.
   double* moved(std::size_t k) { return U_[k].numbers(); }
@@ -210,7 +204,10 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// What a correction is compared with, at least: nothing smaller would show in the coordinates.
   double floor() const { return floor_; }
 
-  // --- What the stepper asks of a solution ---
+  // --- What the solved stages show ---
+
+  /// Energy that loads, and what holds time, bring in the step  [J].
+  double brought() const { return model().loaded() ? Base::work() : 0; }
 
   /// The most that an angle turns in the step, one whose inertia nearly vanishes twice.
   double turn() const { return farthest_turn().first; }
@@ -242,12 +239,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     const double missed = missed_at_start();
     return missed > 0 ? std::sqrt(missed / fastest_) : 0;
   }
-  /// How much larger the error of a prediction is than that defect, at least. Predictions from many steps are better
-  /// than that: some of these steps are looked at whatever they show (0).
-  double predictor_gain() const {
-    if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;
-    return is_predicted_ ? columns_.predictor_gain() : 1;
-  }
+  /// How much larger the error of the prediction is than that defect.
+  double predictor_gain() const { return prediction_.gain(columns_.predictor_gain()); }
 
   /// Of the stages as they were solved. Sizes of rates are √(Σ M_kk v_k²).
   StepShape shape() {
@@ -269,7 +262,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     }
     if (stages() == StepShape::few_stages && model().loaded()) {
       find_rates(time_);
-      const double size = std::abs(step_) * std::sqrt(missed_at_start());
+      const double size = std::abs(h()) * std::sqrt(missed_at_start());
       if (size > rounding) shape.beyond = scale * size;
     }
     return shape;
@@ -318,14 +311,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   void accept() {
     Base::move(true);
     fastest_here_ = 0;
-    last_h_ = step_;
-    ++steps_;
-    if (!info().constant_masses || steps_ % 16 == 0) see_masses();
-  }
-
-  void forget() {
-    last_h_ = 0;
-    depth_.forget();
+    prediction_.accept();
+    if (!info().constant_masses || prediction_.steps() % 16 == 0) see_masses();
   }
 
  private:
@@ -333,26 +320,9 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
       Base::masses_, Base::newest_, Base::room, Base::pace_, Base::pace_squared_, Base::pasts_, Base::state_,
       Base::time_, Base::turns_, Base::U_;
 
-  // Farther than this the polynomial of the last step is no prediction.
-  static constexpr double farthest_extrapolation = 1.5;
-  static constexpr std::int64_t looked_at = 8;  // of the steps, one in so many
-
   static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
   Eigen::Index eigen_count() const { return index(count_); }
 
-  void predict(double time, double h, double ratio, const StagePrediction<double>& from) {
-    if (!from.cold) Base::keep_stages();
-    columns_.prepare(h);
-    time_ = time;
-    dynamics_.set_times(
-        [&](std::size_t j) { return static_cast<int>(j) < stages() ? time_of(static_cast<int>(j)) : time_; });
-    Base::predict(time, ratio, from);
-    step_ = h;
-    floor_ = Base::invisible * std::sqrt(Base::size_squared_);
-    for (std::size_t k = 0; k < count_; ++k) weights_[count_ + k] = std::abs(h) / weight(k);
-  }
-
-  double brought() const { return model().loaded() ? Base::work() : 0; }
   double total(std::size_t k) const { return Columns::total(U_[k]); }
 
   L reached(std::size_t k) const {
@@ -384,11 +354,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
 
   std::vector<double> weights_;  // √M_kk, then h over that
-  double floor_ = 0, step_ = 0, last_h_ = 0;
-  double most_kinetic_ = 0;
-  std::int64_t steps_ = 0;
-  PredictionDepth depth_;
-  bool is_predicted_ = false;
+  double floor_ = 0, most_kinetic_ = 0;
+  StepPrediction prediction_;
 };
 
 }  // namespace pendula

@@ -4,13 +4,14 @@
 #include <pendula/gauss/iteration_choice.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/system/options.hpp>
 #include <utility>
 
 namespace pendula {
 
-/// Stage equations that are solved by exact Newton, by fixed point, or by whichever takes less: what solvers of chains
-/// and of any other system share.
+/// What the solvers of chains and of any other system share: their stage equations are solved by exact Newton, by fixed
+/// point, or by whichever takes less.
 template <class Stages>
 class StageIterations {
  public:
@@ -18,26 +19,20 @@ class StageIterations {
   using State = typename Stages::State;
   using Place = typename Stages::Place;
 
-  void prepare(double time, double h) {
-    stages_.prepare(time, h);
-    choice_.begin_step();
+  void prepare(const StepTask& task) {
+    stages_.prepare(task);
+    if (task.from != PredictedFrom::same_step) choice_.begin_step();
+    choice_.allow_newton(task.may_use_newton);
     count_ = 0;
   }
-  void prepare_again(double time, double h) {
-    stages_.prepare_again(time, h);
-    count_ = 0;
-  }
-  void forget() { stages_.forget(); }
-  void allow_newton(bool allowed) { choice_.allow_newton(allowed); }
   Iteration iteration() const { return choice_.preferred(); }
 
-  double defect() { return stages_.defect(); }
-  double predictor_gain() const { return stages_.predictor_gain(); }
+  double defect(double noticed) {
+    return first_correction_ >= noticed * stages_.predictor_gain() ? stages_.defect() : 0;
+  }
   Tempo tempo() const { return stages_.tempo(); }
-  double work() const { return static_cast<double>(stages_.work()); }
 
   State state(double time) const { return stages_.state(time); }
-  Place place() const { return stages_.place(); }
   void keep(Place& place) const { stages_.keep(place); }
   void go_to(const Place& place) {
     stages_.go_to(place);
@@ -51,31 +46,21 @@ class StageIterations {
   }
 
  protected:
-  /// `cost`: of a Newton iteration, in fixed-point iterations.
+  /// newton_cost: of one iteration, in fixed-point iterations.
   template <class... Given>
-  StageIterations(Iteration iteration, double cost, Given&&... stages)
-      : stages_(std::forward<Given>(stages)...), choice_(iteration, cost) {}
+  StageIterations(Iteration iteration, double newton_cost, Given&&... stages)
+      : stages_(std::forward<Given>(stages)...), choice_(iteration, newton_cost) {}
 
   bool is_by_newton() const { return choice_.active() == Iteration::newton; }
 
-  /// One iteration. A fixed point that does not contract leaves the step to Newton; `parts` say how far rounding goes.
+  /// One iteration. A fixed point that does not contract leaves the step to Newton; rounding grows with the number of
+  /// parts.
   template <class Newton>
   Correction correct(Newton& newton, int parts) {
     ++count_;
     choice_.count_iteration();
-    if (!is_by_newton()) {
-      const double change = stages_.iterate();
-      if (count_ == 1) stages_.see_first(change);
-      if (!choice_.is_automatic() ||
-          !diverges(change, last_.relative, count_, usual_rounding(parts, epsilon), epsilon)) {
-        return last_ = {change};
-      }
-      if (!choice_.newton_is_allowed()) return last_ = {std::numeric_limits<double>::quiet_NaN()};
-      stages_.start_cold();
-      choice_.give_up_fixed_point();
-    }
-    last_ = newton.correct(stages_);
-    last_.convergence = Convergence::quadratic;
+    last_ = iterate(newton, parts);
+    if (count_ == 1) first_correction_ = last_.relative;
     return last_;
   }
 
@@ -86,7 +71,26 @@ class StageIterations {
  private:
   static constexpr double epsilon = static_cast<double>(std::numeric_limits<Real>::epsilon());
 
-  int count_ = 0;
+  template <class Newton>
+  Correction iterate(Newton& newton, int parts) {
+    if (!is_by_newton()) {
+      const double change = stages_.iterate();
+      if (count_ == 1) stages_.see_first(change);
+      if (!choice_.is_automatic() ||
+          !diverges(change, last_.relative, count_, usual_rounding(parts, epsilon), epsilon)) {
+        return {change};
+      }
+      if (!choice_.newton_is_allowed()) return {std::numeric_limits<double>::quiet_NaN()};
+      stages_.start_cold();
+      choice_.give_up_fixed_point();
+    }
+    Correction correction = newton.correct(stages_);
+    correction.convergence = Convergence::quadratic;
+    return correction;
+  }
+
+  int count_ = 0;  // of iterations of the step
+  double first_correction_ = 0;
 };
 
 }  // namespace pendula

@@ -3,6 +3,8 @@
 #include <concepts>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/step_task.hpp>
+#include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 
@@ -15,64 +17,73 @@ struct Correction {
   Convergence convergence = Convergence::linear;
 };
 
-/// What a solver is that stays as it is. Parts are what messages name: the links of a chain, the coordinates of any
-/// other system.
+/// What does not change while a solver is used. Parts are what messages name: the links of a chain, the coordinates of
+/// any other system.
 struct SolverTraits {
   int parts, coordinates, stages;
-  double largest_turn;  ///< beyond it stage equations have other solutions than the motion  [rad]
-  bool loaded, damped;  ///< whether energy may come or go, and whether it may only go
+  double largest_turn;  ///< in one step; beyond it the stage equations may have solutions that are no motion  [rad]
+  bool loaded, damped;  ///< whether loads bring or take energy, and whether they may only take it
   bool dissipates;      ///< whether the method itself takes some
 };
 
-/// What solves the stage equations of a step: it owns the model, the state and the workspace.
+/// What solves the stage equations of a step: it owns the model, the state and the stages. GaussStepper takes steps
+/// with any such solver. A solver may have, too:
+///   unseen()      what forces do between the stages that were solved (Unseen);
+///   heed(stop)    a sign that it looks at within long iterations (StopSign);
+///   linearize(…)  the derivative of the step (LinearizingSolver).
 template <class S>
 concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::Place& place,
-                               const typename S::Place& kept, double time, double h, double x, double tolerance,
-                               Status status) {
+                               const typename S::Place& kept, const StepTask& task, MemberNumbers& numbers, double time,
+                               double h, double x, double tolerance, double noticed, Status status) {
   typename S::Model;  // what it is built from, with the number of stages and options of its own
-  typename S::Real;   // what it computes in: round-off is that of this type
-  { fixed.traits() } -> std::same_as<SolverTraits>;
-  { fixed.iteration() } -> std::same_as<Iteration>;  // what it iterates by
+  typename S::Real;   // the number type that it computes in, and that round-off is measured in
+  requires std::default_initializable<typename S::Place>;
 
-  // Takes over a state; may find it singular.
+  { fixed.traits() } -> std::same_as<SolverTraits>;
+  { fixed.iteration() } -> std::same_as<Iteration>;  // that it prefers by now
+
+  // --- The state ---
+
+  // Takes a state over, unless the mass matrix is singular there; tells the state, at the user's coordinates.
   { solver.start(state) } -> std::same_as<Status>;
   { fixed.state(time) } -> std::convertible_to<typename S::State>;
-  // The state as a value, and back to it, the stages still known: prepare_again may follow. To keep it in a place that
-  // there is does not allocate.
-  { fixed.place() } -> std::same_as<typename S::Place>;
+  // Copies the state to a place, and makes one of the past the state; the stages stay what they are. Only the first
+  // copy to a place allocates.
   fixed.keep(place);
   solver.go_to(kept);
-  // Between a place where the last step began and its end, by the polynomials through the stages; x in steps from
-  // there.
+  // The state within the last step, by the polynomials through its stages: x steps after the place where it began.
   { fixed.glance(kept, time, x) } -> std::convertible_to<typename S::State>;
+  // All numbers that the next steps depend on.
+  solver.member(numbers);
 
-  // Predicts the stages of the next step, cold after `forget`; or those of another step from where one began that was
-  // solved and not accepted. Improves them once, moves the state to the end of the step.
-  solver.prepare(time, h);
-  solver.forget();
-  solver.prepare_again(time, h);
+  // --- A step ---
+
+  // Predicts the stages, improves them by one iteration, and moves the state to the end of the step; the last gives the
+  // energy that loads brought in it  [J].
+  solver.prepare(task);
   { solver.correct() } -> std::same_as<Correction>;
-  solver.allow_newton(true);  // or else a step is not solved where a fixed point does not contract
-  solver.accept();
+  { solver.accept() } -> std::convertible_to<double>;
 
-  // The part that fails with such a status: whose coordinates are singular at the stages, which turns too far, where
-  // the last correction was largest; −1 where there is none, or nobody knows.
+  // --- What the stages show, once they are solved ---
+
+  // The most that a coordinate turns in the step  [rad]; infinity where the stages cannot be those of the motion.
+  { solver.turn() } -> std::convertible_to<double>;
+  // Energy at the end of the step, less that of its start and the work of loads, relative to all that there is.
+  { solver.energy_defect() } -> std::convertible_to<double>;
+  // How far the polynomial through the stages' rates misses the rates at the start of the step, relative to the fastest
+  // so far; 0 where the first correction of the step shows that it is less than `noticed`.
+  { solver.defect(noticed) } -> std::convertible_to<double>;
+  // What the error of the step follows from.
+  { solver.shape() } -> std::same_as<StepShape>;
+  // The part that a failure of this kind points at: the one whose coordinates are singular, the one that turns most, or
+  // the one that the last iteration changed most; −1 where there is none, or nobody knows.
   { solver.part_of(status) } -> std::convertible_to<int>;
 
-  // The most that a coordinate turns in the step [rad]; infinity where the stages cannot be those of the motion.
-  { solver.turn() } -> std::convertible_to<double>;
-  // Energy of the end of the step against its start and the work of loads, relative to all that there is; that work
-  // [J].
-  { solver.energy_defect() } -> std::convertible_to<double>;
-  { solver.work() } -> std::convertible_to<double>;
-  // How far, at the start of the step, the polynomial through its stage velocities is off, relative to the fastest so
-  // far; how much larger the error of a prediction is than such a defect.
-  { solver.defect() } -> std::convertible_to<double>;
-  { fixed.predictor_gain() } -> std::convertible_to<double>;
-  // Of the state; what the stages show of the step.
+  // --- How long the next step may be ---
+
+  // How fast the motion goes on from the state.
   { fixed.tempo() } -> std::same_as<Tempo>;
-  { solver.shape() } -> std::same_as<StepShape>;
-  // The longest step up to h from here in which stages see what depends on time.
+  // The longest step up to h in which the stages see, to a tolerance, all that depends on time.
   { solver.followed(time, h, tolerance) } -> std::convertible_to<double>;
 };
 

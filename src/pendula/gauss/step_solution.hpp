@@ -8,6 +8,7 @@
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/step_controller.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/stop_sign.hpp>
@@ -43,8 +44,9 @@ class StepSolution {
   double time() const { return time_.value; }
   int singular_part() { return solver_.part_of(Status::singular_mass_matrix); }
 
-  /// Iterates on the stages, which are predicted.
-  Outcome solve(double h) {
+  /// Predicts the stages of a step of size h from here, and iterates on them.
+  Outcome solve(double h, PredictedFrom from, bool may_use_newton = true) {
+    solver_.prepare({time(), h, from, may_use_newton});
     newton_stop_.restart();
     fixed_point_stop_.restart(1);
     Correction correction;
@@ -127,17 +129,15 @@ class StepSolution {
       if (!(energy < largest_energy_defect)) return Status::wrong_root;
       if (!(energy > -largest_energy_defect) && !traits_.damped) return Status::wrong_root;
     }
-    defect_ = 0;
-    if (!traits_.dissipates && may_have_defect(first, turn)) defect_ = solver_.defect();
+    defect_ = may_have_defect(turn) ? solver_.defect(controller_.chooses() ? 0 : noticed_defect) : 0;
     return Status::ok;
   }
 
   // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that. What
   // hardly moves has rates that are nothing to compare with.
-  bool may_have_defect(double first, double turn) const {
-    if (turn < visible_turn) return false;
-    if (controller_.chooses()) return traits_.damped;
-    return first >= noticed_defect * solver_.predictor_gain();
+  bool may_have_defect(double turn) const {
+    if (traits_.dissipates || turn < visible_turn) return false;
+    return !controller_.chooses() || traits_.damped;
   }
 
   // Of a step of the controller's choice, the error is known too.

@@ -7,6 +7,7 @@
 #include <pendula/gauss/linearization.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/step_solution.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
@@ -29,7 +30,9 @@ class GaussStepper : private StepSolution<Solver> {
   /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
   template <class... SolverOptions>
   GaussStepper(const Model& model, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
-      : Base(model, stages, options, solver_options...), start_(solver_.place()) {}
+      : Base(model, stages, options, solver_options...) {
+    solver_.keep(start_);  // so that no step allocates
+  }
 
   /// Starts a new run at `state`; statistics begin at zero.
   Outcome start(const State& state) {
@@ -68,7 +71,7 @@ class GaussStepper : private StepSolution<Solver> {
   void remember_steps(bool wanted) {
     remembers_ = wanted;
     before_.step = 0;
-    if (wanted && !before_.place) before_.place.emplace(solver_.place());
+    if (wanted) solver_.keep(before_.place);
   }
 
   /// The state at `time` within the last step, by the polynomials through its stages: positions of one order more than
@@ -78,7 +81,7 @@ class GaussStepper : private StepSolution<Solver> {
     if (before_.step == 0) return state();
     State there;
     if (before_.in_parts && look(time, there)) return there;
-    return solver_.glance(*before_.place, time, before_.elapsed(time) / before_.step);
+    return solver_.glance(before_.place, time, before_.elapsed(time) / before_.step);
   }
 
   /// The same at the full order of the method, by a step from where the last one began, which the polynomials predict.
@@ -98,20 +101,17 @@ class GaussStepper : private StepSolution<Solver> {
     const bool remembers = std::exchange(remembers_, false);
     looks_ = true;
     read_member();
-    solver_.go_to(*before_.place);
+    solver_.go_to(before_.place);
     time_ = begin;
     statistics_.load_work = before_.work;
     const double h = before_.elapsed(time);
     Outcome outcome;
     if (!is_rounding(h)) {
       if (!before_.in_parts) {
-        solver_.prepare_again(this->time(), h);
-        outcome = Base::solve(h);
-        if (outcome) outcome = accept(h, outcome);
+        outcome = attempt(h, PredictedFrom::same_step);
       }
       if (before_.in_parts || !outcome) {
-        solver_.forget();
-        outcome = attempt(h);
+        outcome = attempt(h, PredictedFrom::nothing);
         if (!outcome) outcome = step_in_parts(h);
       }
     }
@@ -195,10 +195,8 @@ class GaussStepper : private StepSolution<Solver> {
       const double chosen = std::min(controller_.step(), longest);
       const bool is_cut = !is_within(chosen, most);
       const double h = is_cut ? most : chosen;
-      is_found ? solver_.prepare_again(time(), h) : solver_.prepare(time(), h);
-      solver_.allow_newton(shorter == 0);
-      Outcome outcome = Base::solve(h);
-      solver_.allow_newton(true);
+      const PredictedFrom from = is_found ? PredictedFrom::same_step : PredictedFrom::last_step;
+      Outcome outcome = Base::solve(h, from, shorter == 0);
       is_found = bool(outcome);
       if (is_found) {
         const StepController<double> wide = controller_;  // of what is narrow the steps elsewhere do not know
@@ -218,7 +216,6 @@ class GaussStepper : private StepSolution<Solver> {
         outcome.status = Status::tolerance_not_met;
       } else {
         controller_.shrink(true, h, 0.5);
-        solver_.forget();
         if (shorter > 0 && --shorter == 0) controller_ = before;
       }
       const bool is_last = attempts == tries || outcome.status == Status::interrupted;
@@ -238,9 +235,8 @@ class GaussStepper : private StepSolution<Solver> {
   }
 
   /// One step of exactly h; on failure the state is what it was.
-  Outcome attempt(double h) {
-    solver_.prepare(time(), h);
-    const Outcome outcome = Base::solve(h);
+  Outcome attempt(double h, PredictedFrom from = PredictedFrom::last_step) {
+    const Outcome outcome = Base::solve(h, from);
     return outcome ? accept(h, outcome) : outcome;
   }
 
@@ -261,7 +257,7 @@ class GaussStepper : private StepSolution<Solver> {
   Outcome step_in_parts(double h) {
     const Compensated<double> start = time_;
     const bool remembers = std::exchange(remembers_, false);
-    if (remembers) remember(h, true, statistics_.load_work);
+    if (remembers) remember(h, true);
     const Outcome outcome = parts_of(h, start);
     remembers_ = remembers;
     return outcome;
@@ -281,7 +277,6 @@ class GaussStepper : private StepSolution<Solver> {
         part /= 2;
       } else {
         solver_.go_to(start_);
-        solver_.forget();
         time_ = start;
         statistics_.load_work = work;
         forget_linearization();
@@ -303,15 +298,13 @@ class GaussStepper : private StepSolution<Solver> {
     if (Base::singular_part() >= 0) {
       return Base::failure(Status::singular_mass_matrix, h, outcome.iterations, {outcome.residual, -1});
     }
-    const double work = statistics_.load_work;
-    if (traits_.loaded) statistics_.load_work += solver_.work();
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
     count_unseen();
-    if (remembers_) remember(h, false, work);
+    if (remembers_) remember(h, false);
     if constexpr (LinearizingSolver<Solver>) {
       if (linearization_ && !looks_) solver_.linearize(linearization_->next());
     }
-    solver_.accept();
+    statistics_.load_work += solver_.accept();
     time_.add(h);
     outcome.time = time();
     return outcome;
@@ -332,7 +325,7 @@ class GaussStepper : private StepSolution<Solver> {
     double step = 0;  // 0: there was none
     bool in_parts = false;
     double work = 0;  // that loads had brought
-    std::optional<typename Solver::Place> place{};
+    typename Solver::Place place{};
 
     double elapsed(double at) const { return (at - time.value) - time.compensation; }
   };
@@ -340,12 +333,12 @@ class GaussStepper : private StepSolution<Solver> {
   // Of the time.
   bool is_rounding(double h) const { return std::abs(h) <= 8 * Base::epsilon() * std::abs(time()); }
 
-  void remember(double h, bool in_parts, double work) {
+  void remember(double h, bool in_parts) {
     before_.time = time_;
     before_.step = h;
     before_.in_parts = in_parts;
-    before_.work = work;
-    solver_.keep(*before_.place);
+    before_.work = statistics_.load_work;
+    solver_.keep(before_.place);
   }
 
   Outcome started(Status status) {

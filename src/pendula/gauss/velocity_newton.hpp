@@ -6,12 +6,14 @@
 #include <limits>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/stage_system.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/velocity_stages.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/system/field_look.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace pendula {
@@ -42,6 +44,12 @@ class VelocityNewton : public VelocityStages<Width> {
         jacobians_(3 * count_ * count_),
         sums_(3 * count_) {}
 
+  void prepare(const StepTask& task) {
+    Base::prepare(task);
+    is_first_ = true;
+  }
+  double defect(double noticed) { return Base::defect(noticed, first_correction_); }
+
   Correction correct() {
     place_stages();
     at_(&SystemFunctions::residual_with_jacobians, q(0), v(0), a(0), stages_[3 * count_], jacobian(0, 0, 0),
@@ -57,10 +65,11 @@ class VelocityNewton : public VelocityStages<Width> {
       }
     }
     system_.solve();
-    return apply();
+    const Correction correction = apply();
+    if (std::exchange(is_first_, false)) first_correction_ = correction.relative;
+    return correction;
   }
 
-  static constexpr void allow_newton(bool) {}
   static constexpr Iteration iteration() { return Iteration::newton; }
   int part_of(Status status) const {
     if (status == Status::singular_mass_matrix) return masses_.singular();
@@ -153,6 +162,8 @@ class VelocityNewton : public VelocityStages<Width> {
   FieldLook look_;
   Rows jacobians_;  // ∂E/∂q, ∂E/∂v, ∂E/∂a
   std::vector<double> sums_;
+  bool is_first_ = true;  // of the iterations of a step
+  double first_correction_ = 0;
 };
 
 }  // namespace pendula

@@ -8,6 +8,7 @@
 #include <pendula/gauss/pace.hpp>
 #include <pendula/gauss/stage_columns.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/step_task.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -44,7 +45,7 @@ class VelocityStages {
 
   Status start(const State& state) {
     at_.model().require(state);
-    forget();
+    last_h_ = 0;
     fastest_ = fastest_here_ = most_kinetic_ = 0;
     time_ = state.time;
     for (std::size_t k = 0; k < count_; ++k) {
@@ -59,36 +60,20 @@ class VelocityStages {
     return Status::ok;
   }
 
-  void prepare(double time, double h) {
-    columns_.prepare(h, last_h_);
-    set_times(time);
-    is_predicted_ = last_h_ != 0;
-    for (std::size_t k = 0; k < count_; ++k) {
-      (is_predicted_ ? columns_.extrapolated(last_a_[k]) : L(acceleration_[k])).store(a(k));
-    }
-    last_h_ = 0;  // what was predicted from is gone until the step is accepted
-    set_weights();
-  }
-
-  /// Predicts the stages of another step from where the last one began that was solved, accepted or not: from that
-  /// one's.
-  void prepare_again(double time, double h) {
-    const Rows& found = last_h_ != 0 ? last_a_ : stages_;
-    columns_.predict_at(0, h / (last_h_ != 0 ? last_h_ : columns_.h()));
-    columns_.prepare(h, 0);
-    set_times(time);
-    for (std::size_t k = 0; k < count_; ++k) columns_.extrapolated(found[k]).store(a(k));
-    set_weights();
+  void prepare(const StepTask& task) {
+    task.from == PredictedFrom::same_step ? predict_again(task.h) : predict(task);
+    time_ = task.time;
+    at_.set_times([&](std::size_t j) { return j < count_of_stages() ? time_ + columns_.h() * columns_.c(j) : time_; });
+    for (std::size_t k = 0; k < count_; ++k) weight_[k] = std::sqrt(masses_.inertia(k));
   }
 
   int stages() const { return columns_.stages(); }
-  double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
 
   double turn() const { return farthest_turn().first; }
 
   double energy_defect() {
     find_increments();
-    const double brought = at_.model().loaded() ? work() : 0;
+    const double brought = this->brought();
     double *const q_at = numbers(2), *const v_at = numbers(3);
     read_state(q_at, v_at);
     const auto [start, kinetic] = energies(time_, q_at, v_at);
@@ -102,7 +87,8 @@ class VelocityStages {
     return scale > 0 ? (end - start - brought) / scale : 0;
   }
 
-  double defect() {
+  double defect(double noticed, double first_correction) {
+    if (!(first_correction >= noticed * predictor_gain())) return 0;
     double first = 0, last = 0;
     for (std::size_t k = 0; k < count_; ++k) {
       const double squared = weight_[k] * weight_[k], rate = state_[count_ + k].value, later = v(k)[stages() - 1];
@@ -155,21 +141,15 @@ class VelocityStages {
     return shape;
   }
 
-  double work() const {
-    alignas(pack_alignment) Stored powers;
-    at_(&SystemFunctions::power, q(0), v(0), powers);
-    double work = 0;
-    for (std::size_t i = 0; i < count_of_stages(); ++i) work += columns_.hb(i) * powers[i];
-    return work;
-  }
-
-  void accept() {
+  double accept() {
+    const double brought = this->brought();
     find_increments();
     for (std::size_t k = 0; k < 2 * count_; ++k) state_[k].add(numbers_[k]);
     last_h_ = columns_.h();
     time_ += last_h_;
     for (std::size_t k = 0; k < count_; ++k) std::copy_n(a(k), Width, last_a_[k]);
     fastest_ = std::max(fastest_, std::exchange(fastest_here_, 0));
+    return brought;
   }
 
   template <class Numbers>
@@ -177,7 +157,6 @@ class VelocityStages {
     numbers(time_, state_, acceleration_, last_h_, masses_, pace_, fastest_, most_kinetic_, last_a_);
   }
   using Place = std::vector<Compensated<double>>;  // q, then v
-  Place place() const { return state_; }
   void keep(Place& place) const { place = state_; }
   void go_to(const Place& place) { state_ = place; }
 
@@ -206,9 +185,6 @@ class VelocityStages {
     }
     return state;
   }
-
-  /// The next step starts cold.
-  void forget() { last_h_ = 0; }
 
  protected:
   using L = Pack<Width, RegisterFor<Width>>;
@@ -246,14 +222,35 @@ class VelocityStages {
 
   double fastest() const { return std::max({fastest_, fastest_here_, pace_.natural_speed_squared()}); }
 
-  // Lanes beyond the stages hold the start of the step.
-  void set_times(double time) {
-    time_ = time;
-    at_.set_times([&](std::size_t j) { return j < count_of_stages() ? time + columns_.h() * columns_.c(j) : time; });
+  void predict(const StepTask& task) {
+    if (task.from == PredictedFrom::nothing) last_h_ = 0;
+    columns_.prepare(task.h, last_h_);
+    is_predicted_ = last_h_ != 0;
+    for (std::size_t k = 0; k < count_; ++k) {
+      (is_predicted_ ? columns_.extrapolated(last_a_[k]) : L(acceleration_[k])).store(a(k));
+    }
+    last_h_ = 0;  // until the step is accepted, whose stages take the place of the last step's
   }
 
-  void set_weights() {
-    for (std::size_t k = 0; k < count_; ++k) weight_[k] = std::sqrt(masses_.inertia(k));
+  // From the step that was solved last from this state, accepted or not.
+  void predict_again(double h) {
+    const Rows& found = last_h_ != 0 ? last_a_ : stages_;
+    columns_.predict_at(0, h / (last_h_ != 0 ? last_h_ : columns_.h()));
+    columns_.prepare(h, 0);
+    for (std::size_t k = 0; k < count_; ++k) columns_.extrapolated(found[k]).store(a(k));
+  }
+
+  // How much larger the error of a prediction is than the defect of the step that it is from.
+  double predictor_gain() const { return is_predicted_ ? columns_.predictor_gain() : 1; }
+
+  // Energy that loads bring in the step, by the stages as they were placed last  [J].
+  double brought() const {
+    if (!at_.model().loaded()) return 0;
+    alignas(pack_alignment) Stored powers;
+    at_(&SystemFunctions::power, q(0), v(0), powers);
+    double work = 0;
+    for (std::size_t i = 0; i < count_of_stages(); ++i) work += columns_.hb(i) * powers[i];
+    return work;
   }
 
   void place_stages() {

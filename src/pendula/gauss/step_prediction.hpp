@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <pendula/gauss/prediction_depth.hpp>
+#include <pendula/gauss/stage_prediction.hpp>
+#include <pendula/gauss/step_task.hpp>
+
+namespace pendula {
+
+/// Chooses what the stages of each step of one motion are predicted from. It remembers the size of the last step, and
+/// how well predictions went.
+class StepPrediction {
+ public:
+  struct Source {
+    double ratio;  ///< size of the step over that of the step it is predicted from; 1 where there is none
+    StagePrediction<double> kind;
+  };
+
+  /// For a method of so many stages, from at most `most` steps. From then on no step is known until this one is
+  /// accepted, because its stages take the place of the last step's.
+  Source next(const StepTask& task, int stages, int most) {
+    const double known_h = last_h_ != 0 ? last_h_ : h_;
+    h_ = task.h;
+    if (task.from == PredictedFrom::same_step) {
+      is_predicted_ = true;
+      depth_.forget();
+      return {h_ / known_h, {false, true, false, 0, 0}};
+    }
+    is_predicted_ =
+        task.from == PredictedFrom::last_step && last_h_ != 0 && std::abs(h_ / last_h_) < farthest_extrapolation;
+    const int depth = depth_.next(is_predicted_ && h_ == last_h_, stages, most);
+    const double ratio = is_predicted_ ? h_ / last_h_ : 1;
+    last_h_ = 0;
+    return {ratio,
+            {is_predicted_, false, !is_predicted_, static_cast<double>(depth), static_cast<double>(depth_.known())}};
+  }
+
+  /// The first correction of a fixed point on the predicted stages, relative to the unknowns.
+  void see_first(double correction) { depth_.saw(correction); }
+
+  void accept() {
+    last_h_ = h_;
+    ++steps_;
+  }
+
+  /// Nothing is known of steps before.
+  void forget() {
+    last_h_ = 0;
+    depth_.forget();
+  }
+
+  double h() const { return h_; }                ///< size of the step that was predicted last  [s]
+  double last_h() const { return last_h_; }      ///< size of the last accepted step; 0: its stages are not there
+  std::int64_t steps() const { return steps_; }  ///< accepted
+
+  /// How much larger the error of the prediction is than that of the stage polynomial at the start of its own step: at
+  /// least `gain_of_polynomial`, where it is that polynomial. Predictions from many steps are better than that, so that
+  /// their first corrections tell nothing of it (0); one step in several is looked at.
+  double gain(double gain_of_polynomial) const {
+    if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;
+    return is_predicted_ ? gain_of_polynomial : 1;
+  }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    numbers(last_h_, steps_, depth_);
+  }
+
+ private:
+  // Steps that are longer by this factor are out of reach of the polynomial of the last step.
+  static constexpr double farthest_extrapolation = 1.5;
+  static constexpr std::int64_t looked_at = 8;
+
+  PredictionDepth depth_;
+  double h_ = 0, last_h_ = 0;
+  std::int64_t steps_ = 0;
+  bool is_predicted_ = false;
+};
+
+}  // namespace pendula
