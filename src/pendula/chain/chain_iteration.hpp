@@ -12,10 +12,10 @@
 
 namespace pendula {
 
-/// Of the corrections of a tangent, squared, beside those of its motion, which is solved to as many more digits.
+/// Weight of the squared corrections of a tangent beside those of its motion, which is solved to so many more digits.
 inline constexpr double solved_share = 1e-12;
 
-/// x² onto a sum; of a number with its derivative, that one's with a share.
+/// sum + x²; of a number with its derivative, also the derivative's square with that weight.
 template <class L>
 [[gnu::always_inline]] inline L add_square(const L& x, const L& sum) {
   return fma(x, x, sum);
@@ -25,20 +25,21 @@ template <class L>
   return fma(L(solved_share) * x.slope, x.slope, fma(x.value, x.value, sum));
 }
 
-/// For `select` where everyone is meant: nothing is selected.
+/// A mask for `select` that takes all: the compiler leaves the selection out.
 struct Everyone {};
 template <class T>
 [[gnu::always_inline]] inline const T& select(Everyone, const T& yes, const T&) {
   return yes;
 }
 
-/// One fixed-point iteration on the stages of a chain: the rods and free rates that increments and multipliers make,
-/// then the increments and multipliers that these have. It costs a fraction of a Newton iteration, and converges where
-/// the step is small against the chain's fastest motion.
+/// One fixed-point iteration on the stages of a chain: from increments and multipliers rods and free rates, and from
+/// these increments and multipliers again. It costs a fraction of a Newton iteration, and converges where the step is
+/// small against the chain's fastest motion.
 ///
-/// What is asked for at every link is held here, so that it stays in registers: for all that a compiler knows, what is
-/// stored to stages might be a pointer or a coefficient. Work goes cell by cell of a row, two of them at a time where
-/// there are several, so that one does not wait for itself. A row that is one cell is placed on the way.
+/// Pointers and coefficients that every link needs are members here, so that they stay in registers: otherwise a
+/// compiler must assume that stores to stages change them. Rows are worked on cell by cell, by two cells at a time
+/// where there are several, so that the latency of one hides that of the other. A rod whose row is one cell is placed
+/// where the sweep comes to it.
 template <class Motion>
 class ChainIteration {
   using Num = typename Motion::Num;
@@ -69,7 +70,8 @@ class ChainIteration {
         gravity_(motion.gravity_),
         columns_(motion.columns_.at_hand()) {}
 
-  /// Of those that are `active`; gives Σ (h b Δω)² over stages and links. visit(i, Σ (h b Δξ̇)² of some of its stages).
+  /// Iterates those that are `active`; gives Σ (h b Δω)² over stages and links. visit(i, (h b Δξ̇)² of link i at the
+  /// stages of some cells).
   template <class Who, class Visit>
   [[gnu::always_inline]] C iterate(const Who& active, Visit visit) {
     Sum change(C(0.0));
@@ -85,7 +87,7 @@ class ChainIteration {
     return Layout::total(change);
   }
 
-  /// Where all stages of a link are.
+  /// Places the rod of a link at all stages.
   [[gnu::always_inline]] void place(int i) {
     typename Motion::Pulled pulled;
     place(i, pulled);
@@ -95,7 +97,7 @@ class ChainIteration {
   static constexpr bool places_on_the_way = Motion::places_on_the_way;
   static constexpr bool is_short = detail::is_short_chain<N>;
 
-  // A rod that was placed, at one cell: in registers, or where it stands.
+  // A rod that was placed, at one cell: held in registers, or where it stands in memory.
   struct PlacedHere {
     Point rods, pulls;
     Cell product;
@@ -128,7 +130,7 @@ class ChainIteration {
     detail::for_links<N>(links(), body);
   }
 
-  // X of a link and what its pull adds up to, at all stages.
+  // X of a link at all stages, and the integral of its pull up to each.
   [[gnu::always_inline]] void place(int i, typename Motion::Pulled& pulled) {
     Stage& stage = stages_[i];
     Point rods, advances, pulls;  // of the only cell
@@ -195,7 +197,7 @@ class ChainIteration {
     }
   }
 
-  // From the tip to the pivot: Z − z of every link, and the elimination of the multipliers.
+  // From the tip to the pivot: finds Z − z of every link, and eliminates the multipliers.
   template <int First, int Count, class Links>
   [[gnu::always_inline]] void sweep_inward(Links& kept) {
     struct Carried {
@@ -242,7 +244,7 @@ class ChainIteration {
     });
   }
 
-  // Of two links, both multipliers by one division, as rows that take nothing from each other.
+  // Two links take one division: both multipliers, whose rows have no coupling then.
   template <int c, class Links>
   [[gnu::always_inline]] void eliminate(int i, Links& kept, const Cell& square, const Cell& before, const Cell& right,
                                         MultiplierRow<Cell>& row, const Cell& beyond) {
@@ -260,7 +262,7 @@ class ChainIteration {
     }
   }
 
-  // From the pivot to the tip: the multipliers, and the increments that they make.
+  // From the pivot to the tip: finds the multipliers, and the increments that follow from them.
   template <int First, int Count, class Links, class Who, class Visit>
   [[gnu::always_inline]] void sweep_outward(const Links& kept, const Who& active, Sum& change, Visit& visit) {
     std::array<Point, static_cast<std::size_t>(Count)> bond_before;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <pendula/chain/chain.hpp>
+#include <pendula/chain/chain_forces.hpp>
 #include <pendula/chain/chain_iteration.hpp>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/rod_state.hpp>
@@ -18,67 +19,45 @@
 
 namespace pendula {
 
-/// Rods and stages of a chain that moves by Gauss steps, of one motion (StagesInLanes) or of several members
-/// (MembersInLanes): what both share, which is all but angles and what one motion alone can do.
+/// A chain that moves by Gauss steps, of one motion (StagesInLanes) or of several members (MembersInLanes): prediction
+/// and iteration of the stages, and the end of the step. Angles are not its affair.
 ///
 /// The field on rods ξ and free rates z (rod_state.hpp) is
 ///   ξ̇_i = z_i + e_i − e_{i−1},           e_i = (τ_i ξ_i − τ_{i+1} ξ_{i+1})/m_i,      e_0 = 0,
 ///   ż_i = d_i − d_{i−1} − δ_{i1} g up,    d_i = −(τ_i ξ̇_i − τ_{i+1} ξ̇_{i+1})/m_i,    d_0 = 0,
-/// where damping and torque join τ_i ξ̇_i as (λ_i ξ̇_i − torque_i × ξ_i)/l_i². Every Gauss method keeps |ξ_i|² and the
-/// vertical angular momentum, which are quadratic, and is symplectic: there is no pole and no drift (docs/method.md).
+/// and what ChainForces adds. Every Gauss method keeps |ξ_i|² and the vertical angular momentum, which are quadratic,
+/// and is symplectic: there is no pole and no drift (docs/method.md).
 ///
 /// Stages are held as increments U = h b (ξ̇ − z) and W = h b (ż + δ_{i1} g up), so that what is large enters exactly:
 ///   X = ξ + h c z + m U,  Z = z − δ_{i1} h c g up + m W,  m_ij = a_ij/b_j.
-///
-/// Multipliers grow through a step as tension does, and where they grow too far the stage equations fold: with two
-/// stages at h ω = √12, ω what the chain swings with. Of a step so long, M |g|/l ξ joins τ ξ̇: that is of H the term
-/// Σ M |g|/l (|ξ|² − l²)/2, which is zero on the motion, and of a chain at rest nothing is left for τ. Then any
-/// swinging goes through any step, as it does in angles.
 template <class SpaceType, class LayoutType, int N = Eigen::Dynamic>
-class ChainMotion {
+class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
+  using Base = ChainForces<SpaceType, LayoutType, N>;
+
  public:
   using Space = SpaceType;
   using Layout = LayoutType;
-  using Num = typename Layout::Num;
-  using C = ConstantOf<Num>;
-  using Mask = MaskOf<Num>;
-  using Columns = typename Layout::Columns;
-  using Cell = typename Layout::Cell;
-  using Row = typename Layout::Row;
-  using Rods = RodState<Space, N, Num>;
-  static constexpr std::size_t D = Space::dimension;
+  using Mask = MaskOf<typename Layout::Num>;
+  using Base::D, Base::links;
+  using typename Base::C, typename Base::Cell, typename Base::Columns, typename Base::Num, typename Base::Point,
+      typename Base::Rods, typename Base::Row;
   static constexpr int stages = Layout::stages, links_known = N;
-  using Point = std::array<Num, D>;
 
-  explicit ChainMotion(int links, Family family = Family::gauss)
-      : links_(links),
-        columns_(family),
-        rods_(links),
-        constants_(links),
-        stages_(links),
-        pasts_(links),
-        moved_(links),
-        total_pull_(links),
-        torques_(0),
-        kept_(is_short && is_batch<Num> ? 1 : links),
-        pulled_(places_on_the_way ? 1 : links) {}
+  explicit ChainMotion(int count, Family family = Family::gauss)
+      : Base(count, family),
+        pasts_(count),
+        moved_(count),
+        total_pull_(count),
+        kept_(is_short && is_batch<Num> ? 1 : count),
+        pulled_(places_on_the_way ? 1 : count) {}
 
-  int links() const {
-    if constexpr (N == Eigen::Dynamic) return links_;
-    return N;
-  }
-  const Columns& columns() const { return columns_; }
-  const Rods& rods() const { return rods_; }
-  const LinkConstants<C>& constants(int i) const { return constants_[i]; }
-  C h() const { return columns_.h(); }
-
-  /// Size of the step, squared: Σ over stages and links of (h b ω)², with a share of the tangent's.
+  /// Squared size of the step: Σ (h b ω)² over stages and links, and that of the tangent with its weight (add_square).
   const C& scale() const { return scale_; }
 
-  /// The most that a link turns in the step that is finished, squared; never less, hardly more  [rad²].
+  /// The most that a link turns in the step that was finished, squared; an upper bound, hardly more  [rad²].
   C turn_squared() const { return C(double(stages)) * turn_; }
 
-  /// One fixed-point iteration of those that are `active`, the stages of the others stay; what changed, squared, to be
+  /// One fixed-point iteration of those that are `active`; the stages of others stay. Gives the squared change, to be
   /// compared with `scale`. visit(i, change of link i).
   template <class Who, class Visit>
   PENDULA_IN_REGISTERS [[gnu::noinline]] C iterate(const Who& active, Visit visit) {
@@ -98,8 +77,8 @@ class ChainMotion {
     return energy;
   }
 
-  /// Of the state: R² = κ + (Σ ω_i⁸)^(1/4), ω_i what rod i turns with and κ what gravity moves a long chain by; and
-  /// d ln R/dt. Loads have no part in how R grows: only steps that are symmetric ask for that.
+  /// R of the state, and d ln R/dt: R² = κ + (Σ ω_i⁸)^(1/4), where rod i turns with ω_i, and √κ is the pace of a long
+  /// chain that gravity alone moves. d ln R/dt leaves loads out: only symmetric steps use it.
   PENDULA_IN_REGISTERS void tempo(C& pace, C& quickening) const {
     C sum(0.0), growth(0.0);
     rods_.for_each_acceleration(constants_, gravity_, [&](int i, const Point& rates, const Point& accelerations) {
@@ -116,37 +95,25 @@ class ChainMotion {
   }
 
  protected:
-  struct Stage {
-    std::array<Row, D> U{};  // h b (ξ̇ − z)
-    Row tau{};
-    std::array<Row, D> rod{};  // X, as the last iteration placed it
-  };
-  // What steps are predicted from.
+  using typename Base::Stage;
+  // What later steps are predicted from.
   struct Past {
     std::array<Row, D> advance{};  // h ξ̇
     Row tau{};
   };
   struct Pulled {
-    std::array<Row, D> pull;  // what the pull of the rod adds up to
+    std::array<Row, D> pull;  // integral of the pull of the rod up to each stage
     Row known;                // X·z
   };
-  // What a sweep keeps on its way in for its way out, of one link at some cells.
+  // What the sweep inward keeps for the sweep outward, of one link at some cells.
   template <int Count>
   struct Kept {
     std::array<std::array<typename Layout::Slot, D>, static_cast<std::size_t>(Count)> freed;  // Z − z
     std::array<typename Layout::Slot, static_cast<std::size_t>(Count)> offset, coupling;      // MultiplierRow
   };
   static constexpr auto pasts = static_cast<std::size_t>(Columns::most_depth);
-  using Torques = std::array<Row, static_cast<std::size_t>(Space::torque_components)>;
-
-  static Point zero() {
-    return components<D>([](std::size_t) { return Num(0.0); });
-  }
-
-  /// Whether a step of h resolves how fast a chain can swing, at rest ω² by Gershgorin: up to (h ω)² = 4.
-  auto resolves(const C& h) const { return h * h * fastest_swing_ <= C(4.0); }
-
-  /// Predicts the stages of a step of `h`, `ratio` times as long as the one that they are known from. Torques are set.
+  /// Predicts the stages of a step of `h`, `ratio` times as long as the one that they are predicted from. Torques have
+  /// to be set before.
   void predict(const C& h, const C& ratio, const StagePrediction<C>& kind) {
     columns_.prepare(h);
     const C hung = hangs_;
@@ -164,7 +131,7 @@ class ChainMotion {
     newest_ = (newest_ + pasts - 1) % pasts;
   }
 
-  /// Stages of a motion that goes on as at the start of the step.
+  /// Predicts the stages as if the motion went on as it does at the start of the step.
   void start_cold(const Mask& cold) {
     C scale(0.0);
     const auto& columns = columns_.at_hand();
@@ -183,10 +150,10 @@ class ChainMotion {
       scale = fma(squared, constants_[i].inverse_square, scale);
     });
     rods_.find_products(cold);
-    scale_ = select(cold, scale * (h() * h()), scale_);
+    scale_ = select(cold, scale * (columns_.h() * columns_.h()), scale_);
   }
 
-  /// Sums up what the stages add to the state, which stays.
+  /// Sums up what the stages add to the state, which stays as it is.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void finish() {
     const auto& columns = columns_.at_hand();
     typename Layout::Sum turn(C(0.0)), scale(C(0.0));
@@ -230,83 +197,21 @@ class ChainMotion {
     rods_.for_blocks([&](int begin) PENDULA_WRITTEN_OUT {
       std::copy_n(bond + size, D, bond);
       push(rods_.inverse_mass(begin), total_pull_[begin], bond, pushed);
-      rods_.advance(begin, h(), accepted, moved_[begin], pushed);
+      rods_.advance(begin, columns_.h(), accepted, moved_[begin], pushed);
     });
-    rods_.fall(h(), gravity_, accepted);
+    rods_.fall(columns_.h(), gravity_, accepted);
   }
 
-  /// What pulls a rod at a cell beside its multiplier, h b times: damping and torques, and in a step that does not
-  /// resolve how fast a chain can swing the tension of one that hangs at rest.
-  template <class Weight>
-  [[gnu::always_inline]] std::array<Cell, D> more_pull(int i, int j, const Weight& hb, const std::array<Cell, D>& rod,
-                                                       const std::array<Cell, D>& advance) const {
-    const auto tension = hb * spread(hangs_ * constants_[i].hanging);
-    std::array<Cell, D> pull;
-    if (has_loads()) {
-      pull = load_pull(i, j, rod, advance);
-      for (std::size_t k = 0; k < D; ++k) pull[k] = fma(tension, rod[k], pull[k]);
-    } else {
-      for (std::size_t k = 0; k < D; ++k) pull[k] = tension * rod[k];
-    }
-    return pull;
-  }
+  using Base::columns_, Base::constants_, Base::each_cell, Base::fastest_swing_, Base::hangs_, Base::has_loads,
+      Base::more_pull, Base::resolves, Base::rods_, Base::spread, Base::stages_, Base::zero;
 
-  /// Energy that loads bring in the step that was solved  [J].
-  C work() const {
-    typename Layout::Sum work(C(0.0));
-    const auto inverse_h = spread(select(h() == C(0.0), C(0.0), C(1.0) / h()));
-    for (int i = 0; i < links(); ++i) {
-      each_cell([&](auto j) {
-        const std::array<Cell, D> moved = advance(i, j), pull = load_pull(i, j, rod(i, j), moved);
-        for (std::size_t k = 0; k < D; ++k) {
-          work = fma(-(inverse_h * columns_.inverse_weight(j)) * detail::value_of(pull[k]), detail::value_of(moved[k]),
-                     work);
-        }
-      });
-    }
-    return Layout::total(work);
-  }
-
-  bool has_loads() const { return has_loads_; }
-  /// Makes room for torques.
-  void expect_loads() {
-    if (std::exchange(has_loads_, true)) return;
-    torques_ = detail::PerLink<Torques, N>(links());
-  }
-
-  /// h b ξ̇ of a link at a cell, and X.
-  std::array<Cell, D> advance(int i, int j) const {
-    return components<D>([&](std::size_t k) {
-      return Cell(fma(columns_.at_hand().hb(j), spread(rods_.free(i)[k]), stages_[i].U[k][j]));
-    });
-  }
-  std::array<Cell, D> rod(int i, int j) const {
-    return components<D>([&](std::size_t k) { return Cell(stages_[i].rod[k][j]); });
-  }
-
-  template <class T>
-  static decltype(auto) spread(const T& x) {
-    return Layout::spread(x);
-  }
-  template <class Body>
-  [[gnu::always_inline]] static void each_cell(Body body) {
-    detail::unrolled<Layout::cells>(body);
-  }
-
-  int links_;
-  Columns columns_;
   C gravity_{0.0}, slowest_pace_{1.0};  // the square of the slowest R
-  C fastest_swing_{0.0}, hangs_{0.0};   // ω² at rest; 1 where the step does not resolve it
   C scale_{0.0}, turn_{0.0}, quartic_{0.0};
-  bool pulls_more_ = false, has_loads_ = false;
+  bool pulls_more_ = false;
   std::size_t newest_ = 0;  // of the pasts: the last step's
-  std::size_t known_ = 0;   // of the pasts: what the next step may be predicted from, beside this one
-  Rods rods_;
-  detail::PerLink<LinkConstants<C>, N> constants_;
-  detail::PerLink<Stage, N> stages_;
+  std::size_t known_ = 0;   // of the pasts: those that the step after this one may be predicted from, besides this one
   detail::PerLink<std::array<Past, pasts>, N> pasts_;
   typename Rods::template Numbers<Num> moved_, total_pull_;  // over the step
-  detail::PerLink<Torques, N> torques_;                      // h b times these, over l²
   static constexpr bool is_short = detail::is_short_chain<N>;
   detail::PerLink<Kept<Layout::together>, is_short && is_batch<Num> ? 1 : N> kept_;
 
@@ -317,7 +222,7 @@ class ChainMotion {
   // A cell is the whole row: a rod is placed where the sweep comes to it, and stays in registers.
   static constexpr bool places_on_the_way = Layout::cells == 1;
 
-  // Members keep what they have where they are not asked for.
+  // Writes a cell where `which` is true.
   static void set(Row& row, int j, const Mask& which, const Cell& value) {
     if constexpr (is_batch<Num>) {
       row.set(j, select(which, value, Cell(row[j])));
@@ -326,7 +231,8 @@ class ChainMotion {
     }
   }
 
-  // What a motion was predicted from is not weighed any more; but zero times what is not finite would not be zero.
+  // Clears what members that start cold would be predicted from: its weights are zero, but zero times what is not
+  // finite is not zero.
   static void forget(std::array<Past, pasts>& past, const Mask& cold) {
     for (Past& step : past) {
       each_cell([&](auto j) {
@@ -338,8 +244,8 @@ class ChainMotion {
 
   // --- Prediction ---
 
-  // Mean multipliers go into the free rates: what is left of them at the stages is as often positive as negative, and
-  // so is what it is rounded by.
+  // Takes the mean multipliers into the free rates. What is left of them at the stages is as often positive as
+  // negative, and so are the rounding errors that it makes.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void predict(const Mask& follows) {
     rods_.shift_gauge([&](int i) { return predict_multipliers(i, follows); }, [&](int i) { predict_increments(i); });
   }
@@ -351,7 +257,7 @@ class ChainMotion {
     return history;
   }
 
-  // Those of the stages, less their mean, which is given.
+  // Predicts the multipliers of a link, takes their mean out, and gives it.
   [[gnu::always_inline]] Num predict_multipliers(int i, const Mask& follows) {
     Row& tau = stages_[i].tau;
     columns_.extrapolate(history(i, [](const Past& past) { return &past.tau; }), tau, false);
@@ -378,25 +284,6 @@ class ChainMotion {
 
   // --- Loads ---
 
-  [[gnu::always_inline]] std::array<Cell, D> load_pull(int i, int j, const std::array<Cell, D>& rod,
-                                                       const std::array<Cell, D>& advance) const {
-    typename Space::Link::template Torque<Cell> torque;
-    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = torques_[i][k][j];
-    std::array<Cell, D> turning;
-    Space::Link::torque_load(torque, rod, turning);
-    const auto& drag = spread(constants_[i].drag);
-    return components<D>([&](std::size_t k) { return Cell(drag * advance[k] - turning[k]); });
-  }
-
-  std::array<Row, D> more_pull(int i) const {
-    std::array<Row, D> pull;
-    each_cell([&](auto j) PENDULA_WRITTEN_OUT {
-      const std::array<Cell, D> at_cell = more_pull(i, j, columns_.at_hand().hb(j), rod(i, j), advance(i, j));
-      for (std::size_t k = 0; k < D; ++k) pull[k].set(j, at_cell[k]);
-    });
-    return pull;
-  }
-
   PENDULA_IN_REGISTERS [[gnu::noinline]] void pull_more() {
     for (int i = 0; i < links(); ++i) {
       const std::array<Row, D> more = more_pull(i);
@@ -408,7 +295,7 @@ class ChainMotion {
     }
   }
 
-  // At each member's own stages, however long those of others took.
+  // Places the rods anew, at the last increments of each member.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void add_more_to_totals() {
     ChainIteration<ChainMotion> iteration(*this);
     for (int i = 0; i < links(); ++i) {
@@ -420,14 +307,14 @@ class ChainMotion {
 
   // --- The end of a step ---
 
-  // What the rates of a block of bobs gain by what their rods pull; GCC heeds __restrict of parameters only.
+  // What the free rates of a block of rods gain by all pulls over the step. GCC heeds __restrict of parameters only.
   static void push(const C* __restrict inverse_mass, const Num* __restrict pulled, Num* __restrict bond,
                    Num* __restrict pushed) {
     Rods::for_numbers([&](auto k) PENDULA_WRITTEN_OUT { bond[k + D] = inverse_mass[k] * (pulled[k + D] - pulled[k]); });
     Rods::for_numbers([&](auto k) PENDULA_WRITTEN_OUT { pushed[k] = bond[k + D] - bond[k]; });
   }
 
-  // (h ω)⁸ of a link in the middle of the step.
+  // (h ω)⁸ of a link in the middle of the step that was finished.
   C pace_to_the_eighth(int i) const {
     C squared(0.0);
     for (const Row& advance : pasts_[i][newest_].advance) {

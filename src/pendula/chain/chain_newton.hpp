@@ -13,9 +13,9 @@
 
 namespace pendula {
 
-/// One exact Newton iteration on all stages of a chain at once, in O(n (d s)³) for dimension d.
+/// One exact Newton iteration on all s stages of a chain at once, in O(n (d s)³) for dimension d.
 ///
-/// The stage equations and the blocks that a link has in them stand in chain_elimination.hpp; here the slip is X·V.
+/// The stage equations, and the blocks of a link in them, stand in chain_elimination.hpp; the slip is X·V here.
 /// Multipliers follow from E₂ τ = X̂·(G − H f(τ = 0)). Inward, with δG_{i+1} = P δw_i + g from the link below and
 /// B = P + m I:
 ///   S = L (B − N) Z,  K = −S⁻¹ L B,  k = −S⁻¹ L ((B − N) v₀ + g − q),  P ← B + B Z K,  g ← g + B (v₀ + Z k),
@@ -27,14 +27,14 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
  public:
   using Stages = ChainStages<Space, S, N, Real, Arch>;
 
-  /// The gains of so many links are kept: those of a long chain would take more room than all else. Of the other links
-  /// they are computed a second time, to the same bits, when the sweep outward comes to them.
+  /// The gains of so many links are kept, because those of a long chain would take more memory than everything else.
+  /// For the other links they are computed a second time, to the same bits, when the sweep outward reaches them.
   static constexpr int most_kept = 4096;
 
   explicit ChainNewton(int links, int kept = most_kept)
       : block_(kept), gains_(std::min(links, kept)), below_(static_cast<std::size_t>(std::max(links - 1, 0) / kept)) {}
 
-  /// Asked from now on after every `most_kept` links; what an iteration finds that ends by it is of no use.
+  /// From now on asks `stop` after every `most_kept` links. What an iteration finds that it ends is of no use.
   void heed(StopSign stop) { stop_ = stop; }
 
   /// Improves increments and multipliers once.
@@ -45,7 +45,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     return outward(stages);
   }
 
-  /// The link where one more iteration changes most.
+  /// The link that one more Newton iteration changes most.
   int worst_link(Stages& stages) {
     detail::WorstLink<Real> worst;
     set_coefficients(stages.columns());
@@ -97,17 +97,17 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     Real k[unknowns] = {};
   };
 
-  // Places the rods, and leaves what the bobs' velocities have gained since the start of the step.
+  // Places the rods at the stages, and keeps what the velocities of the bobs have gained since the start of the step.
   PENDULA_IN_REGISTERS void run_out(Stages& stages) {
     Vector w = zero();
     for (int i = 0; i < stages.links(); ++i) {
       const Vector X = stages.place(i), U = stages.increments(i);
       for (std::size_t d = 0; d < D; ++d) w[d] = fma(U[d], inverse_hb_.lanes(), w[d]);
-      stages.keep(i, X, w);
+      stages.set_kept(i, X, w);
     }
   }
 
-  // Carries the mass of the bob to come on the diagonal of P, where nothing has to wait for it.
+  // Adds the mass of the next bob to the diagonal of P one link early, where nothing has to wait for it.
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     positive_ = true;
     Carried carried;
@@ -196,8 +196,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  // From the pivot to the tip: the changes of all stages. Number by number, not in lanes: what a link waits for is
-  // short then.
+  // From the pivot to the tip: changes all stages. It computes number by number, not in lanes: so a link waits less for
+  // the one before.
   PENDULA_IN_REGISTERS Correction outward(Stages& stages, detail::WorstLink<Real>* worst = nullptr) {
     Real dw[vectors] = {};
     detail::StageChange<S, L> change;

@@ -17,8 +17,8 @@
 namespace pendula {
 
 /// Cost of one Newton iteration on a chain in fixed-point iterations, by space and stages, as measured on ten links
-/// (g++ 12; the mean of AVX2 and AVX-512, which are up to a half apart). It grows with the cube of the blocks that
-/// Newton eliminates, and hardly with the links.
+/// (g++ 12; the mean of AVX2 and AVX-512, which differ by up to a half). It grows with the cube of the size of the
+/// blocks that Newton eliminates, and hardly depends on the number of links.
 template <class Space>
 constexpr double newton_cost(int stages) {
   constexpr std::array<double, 8> planar{2.1, 4.8, 9.0, 10.5, 15.5, 18.0, 23.0, 30.0};
@@ -26,9 +26,8 @@ constexpr double newton_cost(int stages) {
   return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)];
 }
 
-/// The stage equations of a chain in momentum form, solved in O(n) by exact Newton, by fixed point, or by whichever
-/// takes less: a StageSolver for GaussStepper. Poles are no obstacle. Real is any floating-point type; float and double
-/// go in SIMD registers.
+/// A StageSolver for chains in momentum form, in O(n): by exact Newton, by fixed point, or by whichever takes less.
+/// Poles are no obstacle. Real is any floating-point type; float and double are computed with in SIMD registers.
 template <class SpaceType, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType, Arch>> {
   using Base = StageIterations<ChainStages<SpaceType, S, N, RealType, Arch>>;
@@ -55,7 +54,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
   Correction correct() { return Base::correct(newton_, stages_.links()); }
   void heed(StopSign stop) { newton_.heed(stop); }
 
-  /// Iterations take no note of where they change what; one more tells.
+  /// Iterations do not note which link they change most: one more finds out.
   int part_of(Status status) {
     if (status == Status::singular_mass_matrix || status == Status::wrong_root) return -1;
     return is_by_newton() ? newton_.worst_link(stages_) : stages_.worst_link();

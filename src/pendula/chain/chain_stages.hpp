@@ -23,8 +23,8 @@
 
 namespace pendula {
 
-/// Rods and stages of one chain, with its angles, as both iterations on the stages see them: the fixed point of
-/// ChainMotion and Newton's. All stages of one number are a Lanes<S, Real>, everything is done for all of them at once.
+/// State and stages of one chain, as both iterations see them: the fixed point of ChainMotion, and Newton's. All stages
+/// of one number are the lanes of a Lanes<S, Real>.
 template <class Space, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainStages : public ChainTurns<Space, S, N, RealType> {
   using Base = ChainTurns<Space, S, N, RealType>;
@@ -71,8 +71,6 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     stages_[i].tau.set(0, tau);
   }
 
-  using Base::keep;
-
   /// Where a rod is at the stages.
   Vector place(int i) const {
     const L hc = columns_.hc(), hc_low = columns_.hc_low();
@@ -83,7 +81,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     });
   }
 
-  /// h b times what τ ξ̇, damping and torque add up to, the rod being X.
+  /// h b times the sum of τ ξ̇, damping and torque, where the rod is X.
   Vector pull(int i, const Vector& X) const {
     const Vector moved = advance(i), pull = scaled(multiplier(i), moved);
     return this->pulls_more_ ? sum(pull, this->more_pull(i, 0, columns_.hb(), X, moved)) : pull;
@@ -92,7 +90,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// h b ξ̇.
   Vector advance(int i) const { return Base::advance(i, 0); }
 
-  /// Σ_j h a_kj f(j) of what acts on a rod but its multiplier, rods at the stages being X.
+  /// Σ_j h a_kj f(j) at the stages k of all forces f on a rod but its multiplier's, where the rod is X.
   Vector impulse_without_multiplier(int i, const Vector& X) const {
     Vector impulse;
     impulse.fill(L(Real(0)));
@@ -104,8 +102,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return impulse;
   }
 
-  /// What the rod pulls beside its multiplier, over its length: of a step that does not resolve how fast the chain can
-  /// swing, the tension of a chain at rest; otherwise nothing.
+  /// Tension over length of the rod of a chain at rest, in a step that does not resolve how fast the chain can swing;
+  /// 0 in others (ChainForces).
   Real hanging(int i) const { return this->hangs_ * constants_[i].hanging; }
 
   /// Torque on link i, times h b / l².
@@ -113,9 +111,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return components<Space::torque_components>([&](std::size_t k) { return this->torques_[i][k][0]; });
   }
 
-  /// What Newton keeps from its way in to its way out: rods at the stages, and how much the velocity of the bob has
-  /// gained.
-  void keep(int i, const Vector& rod, const Vector& gained) {
+  /// What Newton keeps between its sweeps: rods at the stages, and what the velocity of the bob gains up to there.
+  void set_kept(int i, const Vector& rod, const Vector& gained) {
     for (std::size_t k = 0; k < D; ++k) {
       stages_[i].rod[k].set(0, rod[k]);
       kept_[i].freed[0][k].set(0, gained[k]);
@@ -163,8 +160,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     prediction_.forget();
   }
 
-  /// One fixed-point iteration; what it changes, relative to the size of the step. visit(i, change of link i, squared,
-  /// of each stage).
+  /// One fixed-point iteration; its change, relative to the size of the step. visit(i, squared changes of link i at
+  /// the stages).
   template <class Visit>
   double iterate(Visit visit) {
     const Real changed = Base::iterate(Everyone{}, visit);
@@ -177,10 +174,10 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return iterate([](int, const L&) {});
   }
 
-  /// The first of these changes in a step.
+  /// Takes note of the first of these changes in a step.
   void see_first(double change) { prediction_.see_first(change); }
 
-  /// The link where one more iteration changes most.
+  /// The link that one more fixed-point iteration changes most.
   int worst_link() {
     detail::WorstLink<Real> worst;
     iterate([&](int i, const L& change) {
@@ -195,8 +192,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return turn_;
   }
 
-  /// Energy that the end of the step would have, less that of its start and what loads bring; in units of all that the
-  /// chain has, kinetic and Σ M |g| l. Zero but for truncation on the motion.
+  /// Energy at the end of the step less that of its start and what loads bring, relative to kinetic energy, Σ M |g| l
+  /// and what loads bring. On the motion it is the error of the method.
   double energy_defect() {
     if (!is_finished_) finish();
     const Energies start = energies();
@@ -208,8 +205,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return static_cast<double>(end.total() - start.total() - brought) / scale_of(start, brought);
   }
 
-  /// How far, at the start of the step, the polynomial through the stages' rates is off, of bobs, relative to the
-  /// fastest that there was.
+  /// How far the polynomials through the stages' rates miss the velocity of a bob at the start of the step, relative to
+  /// the fastest bob so far.
   double defect() {
     Numbers bob{}, missed{}, last{};
     Real furthest(0);
@@ -234,7 +231,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return {static_cast<double>(pace), static_cast<double>(quickening)};
   }
 
-  /// Of the stages as they were solved.
+  /// What the error of the step follows from.
   PENDULA_IN_REGISTERS StepShape shape() const {
     L quartic(Real(0)), decay(Real(0));
     alignas(pack_alignment) Real inverse[Z] = {};
@@ -302,8 +299,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return shape;
   }
 
-  // By how much the polynomials through the stages' rates are off at the start of the step, times h, relative to the
-  // length of the rod.
+  // The most that the polynomials through the stages' rates miss the rate of a rod at the start of the step, times h,
+  // relative to its length.
   double missed_at_start() const {
     Real furthest(0);
     rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
@@ -358,9 +355,10 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   }
 
   Chain<Space, N> chain_;
-  std::int64_t restoring_interval_;  // steps: Gauss methods keep lengths but for rounding
+  std::int64_t
+      restoring_interval_;  // steps after which lengths are restored; Gauss methods keep them, but for rounding
   typename Base::Rods::Place trial_{links()};
-  double fastest_ = 0;  // bob, squared  [m²/s²]
+  double fastest_ = 0;  // squared velocity of the fastest bob so far  [m²/s²]
   bool torque_is_set_ = false, is_finished_ = false, is_first_ = true;
 };
 

@@ -13,8 +13,8 @@
 
 namespace pendula {
 
-/// The angles of one chain whose rods move by Gauss steps: which of all that belong to a rod are those that the motion
-/// came to, at the end of a step and within it.
+/// The angles of one chain whose rods move by Gauss steps. Of all angles that describe a rod, they are those that the
+/// motion has led to, at the end of a step and within it.
 template <class Space, int S, int N, class Real>
 class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   using Base = ChainMotion<Space, StagesInLanes<S, Real>, N>;
@@ -36,7 +36,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return state;
   }
 
-  /// Where the chain is, to come back to.
+  /// The state of the chain.
   struct Place {
     typename Base::Rods::Place rods{};
     detail::PerLink<AngleAnchor<Space, Real>, N> anchors{0};
@@ -50,7 +50,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     anchors_ = place.anchors;
   }
 
-  /// The state at x of the last step, which began there, by the polynomials through its rates.
+  /// The state within the last step, x steps after its beginning, by the polynomials through its rates.
   State glance(const Place& begin, double time, double x) const {
     State state = empty_state(time);
     const auto up_to = columns_.integrals(Real(x));
@@ -76,7 +76,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return sum;
   }
 
-  // Of the step whose stages are known: the rate of a rod at x of it, and the rod from its start on.
+  // The rate of a rod x steps after the beginning of the last step, and the rod there, which began at `along`.
   Numbers rate_at(int i, const Real& x, const Real& h) const {
     const Weights weights = columns_.values(x);
     return components<D>([&](std::size_t k) {
@@ -112,7 +112,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
 
   Numbers direction(int i) const { return scaled(constants_[i].inverse_length, Base::Rods::vector(rods_.along(i))); }
 
-  // Whether a link may turn so far from where a step began that its anchor does not hold it.
+  // Whether a link that turns by no more than `turn` from `along` on may leave the reach of its anchor.
   bool may_leave(const AngleAnchor<Space, Real>& anchor, int i, const Real* along, double turn) const {
     using std::sqrt;
     const Numbers off = components<D>(
@@ -121,8 +121,8 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return farthest * farthest > anchor.reach_squared();
   }
 
-  // Takes an anchor from a rod on through the stages to x of the step, where it is at `end`; where the stages are too
-  // far apart for that, by a pole, along the polynomial through them.
+  // Takes an anchor from the rod `along` through the stages to the rod `end`, x steps after the beginning; where the
+  // stages are too far apart for that, by a pole, along the polynomial through them.
   void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, int i, const Real& x,
                    const Numbers& end) const {
     const Real& inverse_length = constants_[i].inverse_length;
@@ -152,7 +152,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     anchor.follow_path(direction_at, x);
   }
 
-  // Of the step that is solved.
+  // Takes all anchors to the end of the step that is solved.
   void follow_turns() {
     for (int i = 0; i < links(); ++i) {
       const Real* along = rods_.along(i);
@@ -163,7 +163,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     }
   }
 
-  double turn_ = 0;  // the most that a link turns in the step that was solved
+  double turn_ = 0;  // the most that a link turns in the step that was solved  [rad]
   StepPrediction prediction_;
   detail::PerLink<AngleAnchor<Space, Real>, N> anchors_;
 };

@@ -6,9 +6,9 @@
 
 namespace pendula {
 
-/// What vectors across a rod of direction û are written in, the same numbers all along a motion. In the plane the one
-/// direction that θ grows in; in space, where no such pair exists everywhere, the axes of the world, what lies along û
-/// left out.
+/// The frame that vectors across a rod of direction û are written in, one that is continuous along a motion. In the
+/// plane it is the direction in which θ grows. In space no continuous pair of directions exists everywhere: there it is
+/// the three axes of the world, less their parts along û.
 template <class Space, class Real = double>
 class RodFrame {
  public:
@@ -29,7 +29,7 @@ class RodFrame {
     }
   }
 
-  /// Components of any vector, what lies along û left out.
+  /// Components of any vector; its part along û is left out.
   std::array<Real, size> components(const Vector& x) const {
     if constexpr (size == 1) {
       return {direction_[0] * x[1] - direction_[1] * x[0]};

@@ -7,6 +7,7 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
+#include <pendula/chain/rod_blocks.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/dual.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -17,61 +18,43 @@
 
 namespace pendula {
 
-/// The rods ξ of a chain and what they move with, of one motion or of several members: Num is a number, a LanePack, or
-/// either with its derivative (Dual).
+/// The rods ξ of a chain and their free rates z, of one motion or of several members: Num is a number, a LanePack, or
+/// either with its derivative (Dual). Both are kept in twice the digits of a number.
 ///
 /// Free rates z are the rates that rods would have without their multipliers τ:
 ///   ξ̇_i = z_i + e_i − e_{i−1},  e_i = (τ_i ξ_i − τ_{i+1} ξ_{i+1})/m_i,  e_0 = 0.
-/// y_i → y_i + λ_i ξ_i, which is z_i → z_i + ε_i − ε_{i−1} with ε made of λ as e is of τ, changes no motion: τ → τ − λ.
-/// Of a state just started τ = 0, and z is the rate itself. Both are kept in twice the digits of a number.
-///
-/// Numbers stand component after component, link after link, and are worked on a block of links at a time, of one
-/// motion whole registers of them: behind the last link there are zeros.
+/// They have a gauge freedom: z_i → z_i + ε_i − ε_{i−1}, with ε made of any λ as e is of τ, changes τ → τ − λ and not
+/// the motion. In a state just started τ = 0, and z is the rate itself.
 template <class Space, int N = Eigen::Dynamic, class Num = double>
-class RodState {
+class RodState : public RodBlocks<Space, N, Num> {
+  using Base = RodBlocks<Space, N, Num>;
+
  public:
-  static constexpr std::size_t D = Space::dimension;
+  using Base::D, Base::block, Base::block_size, Base::for_blocks, Base::for_numbers, Base::links;
+  template <class T>
+  using Numbers = typename Base::template Numbers<T>;
   using C = ConstantOf<Num>;
   using Vector = std::array<Num, D>;
 
-  /// What directions are kept in between angles and rods.
+  /// Number type of directions on their way between angles and rods.
   using Wide =
       std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, long double, C>;
 
-  static constexpr int block = is_batch<Num> ? 1 : D == 2 ? 4 : 8;  ///< links that are worked on at a time
-  static constexpr std::size_t block_size = static_cast<std::size_t>(block) * D;
-
-  /// One T for each component of each link, and zeros behind the last link to the end of a block and for one more link.
-  template <class T>
-  class Numbers {
-    static constexpr int held(int links) { return (links + block - 1) / block * block + block; }
-
-   public:
-    explicit Numbers(int links) : numbers_(held(links)) {
-      std::fill_n(numbers_.data(), static_cast<std::size_t>(held(links)) * D, T(0.0));
-    }
-    T* operator[](int link) { return numbers_[link]; }
-    const T* operator[](int link) const { return numbers_[link]; }
-
-   private:
-    detail::LinkArray<D, N == Eigen::Dynamic ? N : held(N), T> numbers_;
-  };
-
-  /// A state, to be kept and come back to.
+  /// A state as a value.
   struct Place {
     explicit Place(int links = 0) : along(links), along_low(links), free(links), free_low(links) {}
     Numbers<Num> along, along_low;  ///< ξ  [m], and what it lost to rounding
     Numbers<Num> free, free_low;    ///< z  [m/s]
   };
 
-  explicit RodState(int links)
-      : links_(links),
-        at_(links),
-        inverse_mass_(links),
-        inverse_mass_low_(links),
-        product_(links),
-        rows_(links),
-        rates_(links) {}
+  explicit RodState(int count)
+      : Base(count),
+        at_(count),
+        inverse_mass_(count),
+        inverse_mass_low_(count),
+        product_(count),
+        rows_(count),
+        rates_(count) {}
 
   /// The mass of bob i, as 1/m.
   void set_mass(int i, const Twofold<C>& inverse_mass) {
@@ -91,7 +74,7 @@ class RodState {
   const Num& product(int i) const { return product_[i]; }  ///< ξ_i·z_i without their low parts, of the last gauge
   const Num* products() const { return &product_[0]; }
 
-  /// Takes over link i of a member, from angles and rates.
+  /// Starts link i of a member in this direction, at this rate.
   void start(int member, int i, const Wide& length, const Heading<Space, Wide>& heading) {
     for (std::size_t k = 0; k < D; ++k) {
       split(member, length * heading.u[k], at_.along[i][k], at_.along_low[i][k]);
@@ -99,7 +82,7 @@ class RodState {
     }
   }
 
-  /// Direction and rate of a member's link, in more digits where there is such a type, for angles to be read from.
+  /// Direction of a member's link and its rate, for angles to be read from.
   Heading<Space, Wide> heading(int member, int i, const Vector& rate) const {
     const auto number = [member](const Num& x) { return get(detail::value_of(x), member); };
     using Number = std::decay_t<decltype(number(rate[0]))>;
@@ -112,7 +95,7 @@ class RodState {
     return heading_of(rod, low, turning);
   }
 
-  /// The same of any rod, as the sum of two.
+  /// The same of any rod + low.
   template <class Number>
   static Heading<Space, Wide> heading_of(const std::array<Number, D>& rod, const std::array<Number, D>& low,
                                          const std::array<Number, D>& rate) {
@@ -147,8 +130,8 @@ class RodState {
     });
   }
 
-  /// The rates and accelerations of all rods where nothing but gravity acts: visit(i, ξ̇_i, ξ̈_i). With multipliers λ
-  /// that keep |ξ̇|² + ξ·ξ̈ = 0, ξ̈_i is made of weight and λ as ξ̇_i is of z_i and τ.
+  /// The rates and accelerations of all rods where only gravity acts: visit(i, ξ̇_i, ξ̈_i). ξ̈_i is made of weight and
+  /// multipliers λ as ξ̇_i is of z_i and τ; |ξ̇|² + ξ·ξ̈ = 0 determines λ.
   template <class Constants, class Visit>
   void for_each_acceleration(const Constants& constants, const C& gravity, Visit visit) const {
     for_each_rate(constants, [&](int i, const Vector& rate, const Num&) { rates_[i] = rate; });
@@ -160,7 +143,7 @@ class RodState {
     });
   }
 
-  /// Takes multipliers λ(i) into the free rates, and finds every ξ·z; then shifted(i).
+  /// Changes the gauge by multiplier(i) = λ_i, and finds every ξ·z; calls shifted(i) as soon as link i is done.
   template <class Multiplier, class Shifted>
   void shift_gauge(Multiplier multiplier, Shifted shifted) {
     Gauge gauge;
@@ -182,41 +165,20 @@ class RodState {
     });
   }
 
-  /// body(k) of all numbers of a block; of several members written out.
-  template <class Body>
-  [[gnu::always_inline]] static void for_numbers(Body body) {
-    if constexpr (is_batch<Num>) {
-      detail::unrolled<static_cast<int>(block_size)>(
-          [&](auto k) PENDULA_WRITTEN_OUT { body(std::integral_constant<std::size_t, k>()); });
-    } else {
-      for (std::size_t k = 0; k < block_size; ++k) body(k);
-    }
-  }
-
-  /// body(begin of a block of links), one after the other.
-  template <class Body>
-  [[gnu::always_inline]] void for_blocks(Body body) const {
-    if constexpr (block == 1) {
-      detail::for_links<N>(links(), body);
-    } else {
-      for (int begin = 0; begin < links(); begin += block) body(begin);
-    }
-  }
-
-  /// Every ξ·z as `shift_gauge` finds it, of those that are asked for.
+  /// Finds ξ·z of every link as shift_gauge does, where `which` is true.
   template <class Who>
   void find_products(const Who& which) {
     for (int i = 0; i < links(); ++i) product_[i] = select(which, exact_product_of_values(i), product_[i]);
   }
 
-  /// Moves those of a block of rods from `begin` on that are `accepted` by h z, z without its low part, and what their
-  /// stages add to ξ and z. GCC heeds __restrict of parameters only.
+  /// Moves a block of rods from `begin` on, where `accepted` is true: ξ by h z (z without its low part) + `moved`, and
+  /// z by `pushed`. GCC heeds __restrict of parameters only.
   template <class Who>
   void advance(int begin, const C& h, const Who& accepted, const Num* moved, const Num* pushed) {
     advance(h, accepted, moved, pushed, at_.along[begin], at_.along_low[begin], at_.free[begin], at_.free_low[begin]);
   }
 
-  /// Weight acts on the first rod's free rate alone: all bobs fall alike.
+  /// Gravity over a time h. It changes the free rate of the first rod alone, because all bobs fall alike.
   template <class Who>
   void fall(const C& h, const C& gravity, const Who& accepted) {
     Num &free = at_.free[0][D - 1], &low = at_.free_low[0][D - 1];
@@ -226,7 +188,7 @@ class RodState {
     low = select(accepted, low + (fallen.low - Num(change.low)), low);
   }
 
-  /// |ξ_i| = l_i again, where rounding has changed it, of those that are asked for.
+  /// Makes |ξ_i| = l_i again, where rounding has changed it and `which` is true.
   template <class Constants, class Who>
   void restore_lengths(const Constants& constants, const Who& which) {
     for (int i = 0; i < links(); ++i) {
@@ -249,7 +211,7 @@ class RodState {
     }
   }
 
-  /// Goes to `place`, those that are asked for.
+  /// Goes to `place` where `which` is true.
   template <class Who>
   void go_to(const Place& place, const Who& which) {
     for (int i = 0; i < links(); ++i) {
@@ -265,15 +227,10 @@ class RodState {
     return components<D>([&](std::size_t k) { return from[k]; });
   }
 
-  int links() const {
-    if constexpr (N == Eigen::Dynamic) return links_;
-    return N;
-  }
-
  private:
-  // A block of a gauge, behind what the link before it left.
+  // The gauge change of a block of links, preceded by what the link before the block adds to it.
   struct Gauge {
-    static constexpr std::size_t copies = is_batch<Num> ? 1 : D;  // of one motion, one for each component
+    static constexpr std::size_t copies = is_batch<Num> ? 1 : D;  // in one motion, one for each component
     alignas(pack_alignment) Num lambda[(block + 1) * copies];
     alignas(pack_alignment) Num bond[block_size + D], bond_low[block_size + D];  // from the link before on
     alignas(pack_alignment) Num product[block_size], product_low[block_size];
@@ -333,7 +290,7 @@ class RodState {
     });
   }
 
-  // Of one link, from the parts of its components.
+  // ξ·z of one link, from the exact products of its components.
   static Num total(const Num* product, const Num* low) {
     Twofold<Num> sum = exact_sum(product[0], product[1]);
     Num rest = sum.low + (low[0] + low[1]);
@@ -382,7 +339,7 @@ class RodState {
     return total(product.data(), low.data());
   }
 
-  // The rows of the multipliers, right(i) being what their equations have on the right (multipliers.hpp).
+  // Eliminates the multipliers, where right(i) is the right-hand side of their equations (multipliers.hpp).
   template <class Constants, class Right>
   void eliminate(const Constants& constants, Right right) const {
     MultiplierRow<Num> row;
@@ -396,7 +353,7 @@ class RodState {
     }
   }
 
-  // What multipliers move the rods by, from the pivot out: visit(i, e_i − e_{i−1}, multiplier of rod i).
+  // What multipliers change the rates of rods by, from the pivot out: visit(i, e_i − e_{i−1}, multiplier of rod i).
   template <class Constants, class Visit>
   void for_each_bond(const Constants& constants, Visit visit) const {
     Num multiplier = rows_[0].offset;
@@ -413,7 +370,6 @@ class RodState {
     }
   }
 
-  int links_;
   Place at_;
   Numbers<C> inverse_mass_, inverse_mass_low_;
   detail::PerLink<Num, N> product_;

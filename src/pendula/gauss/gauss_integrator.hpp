@@ -23,19 +23,19 @@ inline StepperOptions stepper_options(const RunOptions& options) {
   throw std::invalid_argument("tolerance: expected a positive number where no step is asked for");
 }
 
-/// Throws std::invalid_argument where a solver that has Newton only is asked for fixed points.
+/// Throws std::invalid_argument where fixed points are asked of a solver that has Newton only.
 inline void require_newton(Iteration iteration) {
   if (iteration != Iteration::fixed_point) return;
   throw std::invalid_argument("iteration: the velocity form has newton only, got fixed-point");
 }
 
-/// What an integrator says of itself.
+/// How an integrator describes itself.
 struct GaussDescription {
-  std::string_view solver, kernel;  ///< literals
+  std::string_view solver, kernel;  ///< names that outlive it
   int parts = 0;                    ///< what failures name: links of a chain, or coordinates
 };
 
-/// A Gauss–Legendre stepper behind the run-time interface: one virtual call a step.
+/// A GaussStepper behind the run-time interface: one virtual call a step.
 template <StageSolver Solver>
 class GaussIntegrator : public PlainIntegrator {
   using Model = typename Solver::Model;
@@ -100,7 +100,7 @@ class GaussIntegrator : public PlainIntegrator {
     std::copy_n(state.v.data(), coordinates(), v);
   }
 
-  // Coordinates of a chain are ordered by kind, those of one link a number of links apart.
+  // The coordinates θ_1..θ_n, φ_1..φ_n of link i stand n apart.
   Outcome named(Outcome outcome) const {
     if (outcome.part >= 0) outcome.part %= described_.parts;
     return outcome;

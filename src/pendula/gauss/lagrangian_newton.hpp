@@ -11,10 +11,10 @@
 
 namespace pendula {
 
-/// One Newton iteration on the stages of any system in momentum form. Unknown are the stage rates V_i:
-///   Q_i = q + h Σ_j a_ij V_j,  residual ∂L/∂v(Q_i, V_i) − p − h Σ_j a_ij f_j,  f_j = ∂L/∂q(Q_j, V_j) + Q(Q_j, V_j,
-///   t_j).
-/// The matrix is the exact one, from the kernel's generated Jacobians.
+/// One Newton iteration on the stages of any system in momentum form. The unknowns are the stage rates V_i:
+///   Q_i = q + h Σ_j a_ij V_j,  f_j = ∂L/∂q(Q_j, V_j) + Q(Q_j, V_j, t_j),
+///   residual  ∂L/∂v(Q_i, V_i) − p − h Σ_j a_ij f_j.
+/// Its matrix is exact, from the kernel's generated Jacobians.
 template <int Width>
 class LagrangianNewton {
  public:
@@ -22,7 +22,7 @@ class LagrangianNewton {
 
   LagrangianNewton(std::size_t coordinates, int stages) : system_(coordinates, stages), jacobians_(coordinates) {}
 
-  /// Improves the increments of the coordinates once; those of the momenta are what the rates before had.
+  /// Improves the increments of the coordinates once. Those of the momenta become what follows from the rates before.
   Correction correct(Stages& stages) {
     const typename Stages::Columns& columns = stages.columns();
     jacobians_.evaluate(stages);
@@ -41,7 +41,7 @@ class LagrangianNewton {
     return apply(stages);
   }
 
-  /// Makes the increments of the momenta those of the rates.
+  /// Computes the increments of the momenta from the rates as they are.
   void find_forces(Stages& stages) {
     jacobians_.evaluate_forms(stages);
     push(stages);

@@ -19,9 +19,9 @@
 
 namespace pendula {
 
-/// The stage equations of any system in momentum form, q̇ = v, ṗ = ∂L/∂q + Q, p = ∂L/∂v, over its generated kernel:
-/// symplectic. Solved by exact Newton, by fixed point, or by whichever takes less. Up to `Width` stages: 2, 4 or
-/// 8.
+/// A StageSolver for any system in momentum form, q̇ = v, ṗ = ∂L/∂q + Q, p = ∂L/∂v, over its generated kernel, so that
+/// Gauss methods are symplectic. It solves by exact Newton, by fixed point, or by whichever takes less; up to `Width`
+/// stages: 2, 4 or 8.
 template <int Width = max_stages>
 class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
   using Base = StageIterations<LagrangianStages<Width>>;
@@ -39,8 +39,8 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
         newton_(model.coordinates(), stages),
         forcing_(model, family, stages),
         field_(model, stages),
-        // Where lengths change, motion may be singular beside the stages, which angles alone never are. What depends on
-        // time keeps no energy.
+        // Where lengths change, the motion may be singular between the stages, which is never so where all coordinates
+        // are angles: energy tells. Where something depends on time, energy is not conserved.
         may_miss_(family != Family::radau && !model.info().depends_on_time &&
                   !std::ranges::all_of(model.info().is_angle, std::identity())) {}
 
@@ -71,7 +71,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
     }
     return shape;
   }
-  /// Of what forces do between the stages that were solved.
+  /// What forces do between the stages that were solved.
   Unseen unseen() {
     if (!has_to_look()) return {};
     find_forces();
@@ -86,7 +86,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
   }
   SolverTraits traits() const {
     const SystemModel& model = stages_.model();
-    // Where inertia may vanish, coordinates may move faster than all else.
+    // Where inertia may vanish, a coordinate may move faster than everything else.
     return {coordinates(),  coordinates(),  stages_.stages(),        model.info().constant_masses ? 3 : 0.25,
             model.loaded(), model.damped(), family_ == Family::radau};
   }
@@ -119,15 +119,15 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
                                 std::to_string(stages));
   }
 
-  // Of a Newton iteration in fixed-point iterations, as measured on kernels of one to six coordinates (g++ 12, AVX2 and
-  // AVX-512): within a third.
+  // Cost of a Newton iteration in fixed-point iterations, to within a third, as measured on kernels of one to six
+  // coordinates (g++ 12, AVX2 and AVX-512).
   static double newton_cost(const Model& model, int stages) {
     return stages * std::min(1.6 + 0.75 * static_cast<double>(model.coordinates()), 5.5);
   }
 
   bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }
 
-  // Newton leaves the forces of the rates before its last correction.
+  // After Newton, the forces are those at the rates before its last correction.
   void find_forces() {
     if (!forces_are_found_) newton_.find_forces(stages_);
     forces_are_found_ = true;

@@ -21,9 +21,9 @@
 
 namespace pendula {
 
-/// The stages of a step of any system in momentum form (SystemMotion), of one motion, all of them in the lanes of a
-/// pack: what both iterations on them share. `Width` is at least the number of stages, which is a run-time number:
-/// lanes beyond it repeat the start of the step.
+/// State and stages of one motion of any system in momentum form (SystemMotion), as both iterations see them. All
+/// stages of one number are in the lanes of a pack. `Width` is at least the number of stages, which is a run-time
+/// number: lanes beyond it repeat the start of the step.
 template <int Width>
 class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, double, Width>, StageDynamics<Width>> {
   using Base = SystemMotion<StagesInLanes<Eigen::Dynamic, double, Width>, StageDynamics<Width>>;
@@ -34,7 +34,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   using Real = double;
   using State = Motion;
   using Rows = PackRows<static_cast<std::size_t>(Width)>;
-  /// One number a lane.
+  /// One number for each lane.
   using Stored = double[static_cast<std::size_t>(Width)];
 
   LagrangianStages(const SystemModel& model, int stages, Family family)
@@ -63,7 +63,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     return masses_.singular() < 0 ? Status::ok : Status::singular_mass_matrix;
   }
 
-  /// Coordinates with all turns that were made, and rates.
+  /// Coordinates, full turns included, and rates.
   Motion state(double time) const {
     Motion motion(time, Eigen::VectorXd(eigen_count()), Eigen::VectorXd(eigen_count()));
     for (std::size_t k = 0; k < count_; ++k) motion.q[index(k)] = Base::coordinate(k);
@@ -71,8 +71,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     std::copy_n(room(2), count_, motion.v.data());
     return motion;
   }
-  /// Where the system is  (coordinates), those that are periodic within a turn or so. What is told stays until the next
-  /// call.
+  /// Coordinates and rates, where full turns of periodic coordinates are left out. They stay there until the next call.
   struct Here {
     const double *q, *v;
   };
@@ -93,7 +92,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   using typename Base::Place;
   void go_to(const Place& there) {
     Base::go_to(there, true);
-    see_masses();  // as they are here, not where a step failed
+    see_masses();  // here, not where a step failed
   }
 
   /// The state at x of the last step, which began there, by the polynomials through its rates.
@@ -129,13 +128,13 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     for (std::size_t k = 0; k < count_; ++k) weights_[count_ + k] = std::abs(task.h) / weight(k);
   }
 
-  /// Stages of a motion that goes on as at the start of the step.
+  /// Predicts the stages as if the motion went on as it does at the start of the step.
   void start_cold() {
     Base::start_cold(true);
     prediction_.forget();
   }
 
-  /// Replaces the increments by a fixed-point iteration once; its change is relative to the size of the step.
+  /// One fixed-point iteration; its change, relative to the size of the step.
   double iterate() {
     const IterationChange found = at_stages()(
         &SystemFunctions::iterate,
@@ -143,10 +142,10 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     return found.change == 0 ? 0 : found.change / std::max(found.size, floor());
   }
 
-  /// The first of these changes in a step.
+  /// Takes note of the first of these changes in a step.
   void see_first(double change) { prediction_.see_first(change); }
 
-  /// The coordinate that one more iteration changes most.
+  /// The coordinate that one more fixed-point iteration changes most.
   int most_changing_coordinate() {
     const auto before = U_;
     iterate();
@@ -170,7 +169,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   L position(std::size_t k) const { return reached(k); }
   L momentum(std::size_t k) const { return reached(count_ + k); }
   const Compensated<double>& momentum_before(std::size_t k) const { return state_[count_ + k]; }
-  /// All coordinates there.
+  /// Coordinates at the stages, (coordinates x lanes).
   const double* positions() const {
     for (std::size_t k = 0; k < count_; ++k) Base::place_stages(k, 0);
     return Base::call(0, 0);
@@ -178,8 +177,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// The stages, at their times.
   const SystemAt<Width>& at_stages() const { return dynamics_.stages(); }
 
-  /// Makes sums of the rates of coordinates and momenta over the step what the stages lack of them; what momenta lack
-  /// on the way displaces coordinates.
+  /// From integrals of the rates of coordinates and momenta over the step, over h, makes `sums` what the stages lack of
+  /// them. What momenta lack on the way (`moments`) displaces coordinates.
   void take_changes(std::span<double> sums, std::span<const double> moments) const {
     for (std::size_t k = 0; k < count_; ++k) {
       double later = 0;
@@ -201,7 +200,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   double weight(std::size_t k) const { return weights_[k]; }
   /// h over that.
   double inverse_weight(std::size_t k) const { return weights_[count_ + k]; }
-  /// What a correction is compared with, at least: nothing smaller would show in the coordinates.
+  /// The least that a correction is compared with: what would round the coordinates.
   double floor() const { return floor_; }
 
   // --- What the solved stages show ---
@@ -209,13 +208,13 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// Energy that loads, and what holds time, bring in the step  [J].
   double brought() const { return model().loaded() ? Base::work() : 0; }
 
-  /// The most that an angle turns in the step, one whose inertia nearly vanishes twice.
+  /// The most that an angle turns in the step; one whose inertia nearly vanishes counts twice.
   double turn() const { return farthest_turn().first; }
   /// Which angle that is; −1 where none turns.
   int turning_coordinate() const { return farthest_turn().second; }
 
   /// Energy at the end of the step less that of its start and what loads bring, relative to the largest kinetic energy
-  /// that was looked at.
+  /// so far.
   double energy_defect() {
     const auto of = Base::balance(brought());
     most_kinetic_ = std::max(most_kinetic_, of.start.kinetic);
@@ -224,8 +223,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
   double imbalance() { return Base::imbalance(brought()); }
 
-  /// How far, at the start of the step, the polynomial through the stages' rates is off, relative to the fastest motion
-  /// that there was; both as √(Σ M_kk v_k²).
+  /// How far the polynomial through the stages' rates misses the rates at the start of the step, relative to the
+  /// fastest so far; both as √(Σ M_kk v_k²).
   double defect() {
     find_rates(time_);
     double speed = 0, later = 0;
@@ -242,7 +241,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// How much larger the error of the prediction is than that defect.
   double predictor_gain() const { return prediction_.gain(columns_.predictor_gain()); }
 
-  /// Of the stages as they were solved. Sizes of rates are √(Σ M_kk v_k²).
+  /// What the error of the step follows from. Sizes of rates are √(Σ M_kk v_k²).
   StepShape shape() {
     Base::find_speeds();
     const double fastest = Base::fastest(), rounding = StepShape::visible * floor_ / Base::invisible;
@@ -289,7 +288,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     }
   }
 
-  /// The size of changes of coordinates and momenta, relative to the speed of the motion.
+  /// Size of changes of coordinates and momenta, relative to the speed of the motion.
   double size_of(std::span<const double> changes, double pace) const {
     double places = 0, pushes = 0;
     for (std::size_t k = 0; k < count_; ++k) {
@@ -299,12 +298,12 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     }
     return std::sqrt((pace * pace * places + pushes) / Base::fastest());
   }
-  /// Looks how fast stages are, that were solved.
+  /// Finds how fast the solved stages are.
   void see_speed() { Base::find_speeds(); }
-  /// The fastest of the stages, of the speed of the motion.
+  /// How fast the fastest stage is, relative to the speed of the motion.
   double speed_here() const { return std::sqrt(fastest_here_ / Base::fastest()); }
 
-  /// A coordinate whose inertia has vanished at the end of the step, −1 where none has.
+  /// A coordinate whose inertia vanished where masses were looked at last; −1 where none did.
   int singular_coordinate() const { return masses_.singular(); }
 
   /// Moves the state to the end of the step.
@@ -337,8 +336,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     return farthest;
   }
 
-  // Σ M_kk (v_k − what the polynomial through the stages' rates is there)², of the rates that were found at the start
-  // of the step.
+  // Σ M_kk (v_k − polynomial through the stages' rates)² at the start of the step, where find_rates was called.
   double missed_at_start() const {
     double missed = 0;
     for (std::size_t k = 0; k < count_; ++k) {

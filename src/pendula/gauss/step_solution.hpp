@@ -17,13 +17,14 @@ namespace pendula {
 
 struct StepperOptions {
   int max_iterations = 50;
-  double tolerance = 0;  ///< of the error of a step, relative to the size of the motion; 0: steps are as asked for
-  /// How steps are chosen. Loads take or bring energy anyway.
+  double tolerance =
+      0;  ///< of the error of a step, relative to the size of the motion; 0: steps have the size asked for
+  /// How steps are chosen; unless it is given, symmetrically where energy is conserved.
   std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
 };
 
-/// Solves the stage equations of one step: iterates until only rounding is left, and judges whether what it found is
-/// the motion. GaussStepper takes steps by it.
+/// Solves the stage equations of one step: iterates until corrections are rounding, and judges whether the solution is
+/// the motion. GaussStepper takes steps with it.
 template <StageSolver Solver>
 class StepSolution {
  protected:
@@ -66,7 +67,7 @@ class StepSolution {
     return failure(Status::not_converged, h, options_.max_iterations, correction);
   }
 
-  // A failure where coordinates are singular is theirs, whatever shape it took.
+  // Where a coordinate is singular, every failure is reported as that.
   Outcome failure(Status status, double h, int iterations, const Correction& correction) {
     ++statistics_.rejected_steps;
     const int singular = singular_part();
@@ -93,24 +94,24 @@ class StepSolution {
   NewtonStop newton_stop_;
 
  private:
-  // From where on the defect of a step is looked for. It is told, not acted on: steps of different sizes would cost
-  // what symplectic ones are taken for, and long chains move well in modes far slower than their fastest.
+  // Smaller defects of a step are not computed. Defects are reported, not acted on: to change the step would spoil
+  // symplecticity, and long chains are right in modes far slower than their fastest.
   static constexpr double noticed_defect = 1e-6;
   static constexpr double visible_turn = 1e-10;  // rad, or of a coordinate
 
-  // An iteration that goes farther than this from where it began, relative to the unknowns, or a link that turns
-  // farther, may have come to a solution of the stage equations that is not the motion: its energy is looked at.
+  // Where the first correction is larger than this, relative to the unknowns, or a link turns farther, the iteration
+  // may have found a solution of the stage equations that is not the motion: its energy is looked at.
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
   static constexpr double largest_energy_defect = 0.02;
 
-  // A fixed point that is lost the solver itself leaves to Newton.
   bool is_at_roundoff(const Correction& correction) {
     const double change = correction.relative;
     if (correction.convergence == Convergence::quadratic) return newton_stop_.reached(change);
     return fixed_point_stop_.judge(change * change, true).done;
   }
 
-  // Of what is left out, a thousandth of a last bit: of ten times that energy drifts, by 1e-21 a step (8 stages).
+  // What iterations leave out is a thousandth of the last bit. With ten times that, energy drifts by 1e-21 a step (8
+  // stages).
   static CorrectionLimits correction_limits(int parts) {
     return {.enough = 1e-19 * coarseness(epsilon()),
             .last_bit = epsilon(),
@@ -119,8 +120,8 @@ class StepSolution {
             .certainly = 8};
   }
 
-  // Whether the stages are the solution that continues from a step of no length. Methods that
-  // damp what they do not resolve are asked for no more than that energy does not grow.
+  // Whether the stages are the solution that goes over into the state as the step goes to zero. Where there is damping,
+  // only energy that grows speaks against that.
   Status status_of_solution(double first) {
     const double turn = solver_.turn();
     if (!(turn < largest_turn())) return Status::wrong_root;
@@ -133,14 +134,14 @@ class StepSolution {
     return Status::ok;
   }
 
-  // Of a chosen step the error is known, but for what is damped within less than a step: stages do not show that. What
-  // hardly moves has rates that are nothing to compare with.
+  // The error of a chosen step is known, but for motion that is damped out within a step, which stages do not show.
+  // Where hardly anything moves, there are no rates to compare a defect with.
   bool may_have_defect(double turn) const {
     if (traits_.dissipates || turn < visible_turn) return false;
     return !controller_.chooses() || traits_.damped;
   }
 
-  // Of a step of the controller's choice, the error is known too.
+  // Of a step of the controller's choice the error is known, too, so that it may turn farther.
   double largest_turn() const { return controller_.chooses() ? 3 : traits_.largest_turn; }
 };
 

@@ -18,7 +18,8 @@
 
 namespace pendula {
 
-/// Takes implicit Gauss–Legendre steps with any solver of the stage equations, and does not know which one it has.
+/// Takes steps of a Gauss or Radau method with any solver of the stage equations: of a given size, or of a size that it
+/// chooses by a tolerance. It can go back into the last step, for a state between its ends.
 template <StageSolver Solver>
 class GaussStepper : private StepSolution<Solver> {
   using Base = StepSolution<Solver>;
@@ -27,7 +28,7 @@ class GaussStepper : private StepSolution<Solver> {
   using Model = typename Solver::Model;
   using State = typename Solver::State;
 
-  /// Throws std::invalid_argument if there is no such tableau, or the solver is for another number of links.
+  /// Throws std::invalid_argument where there is no method of so many stages, or the solver is not made for it.
   template <class... SolverOptions>
   GaussStepper(const Model& model, int stages, StepperOptions options = {}, const SolverOptions&... solver_options)
       : Base(model, stages, options, solver_options...) {
@@ -46,8 +47,8 @@ class GaussStepper : private StepSolution<Solver> {
   }
 
   /// Advances by `h`; where there is a tolerance, by a step of its own choice, at most `h`. Where the stage equations
-  /// cannot be solved, the step is taken in halves, quarters … as far as `smallest_part`; if that fails too, the state
-  /// is left as it was and the outcome says why.
+  /// of a given step cannot be solved, it is taken in halves, quarters …, down to `smallest_part` of it; if that fails,
+  /// too, the state is left as it was, and the outcome says why.
   Outcome step(double h) {
     forget_linearization();
     if (controller_.chooses()) return chosen_step(h);
@@ -57,7 +58,7 @@ class GaussStepper : private StepSolution<Solver> {
     return outcome;
   }
 
-  /// Reverses the motion where it is: from here on, symmetric steps of its own choice are the ones that it took.
+  /// Reverses the motion where it is. If its steps were chosen symmetrically, it takes the same ones back.
   Outcome turn_back() {
     State state = this->state();
     state.v = -state.v;
@@ -67,16 +68,15 @@ class GaussStepper : private StepSolution<Solver> {
     return started(status);
   }
 
-  /// Whether steps are remembered from now on, for glance and look.
+  /// Whether the start of each step is remembered from now on, for glance and look.
   void remember_steps(bool wanted) {
     remembers_ = wanted;
     before_.step = 0;
     if (wanted) solver_.keep(before_.place);
   }
 
-  /// The state at `time` within the last step, by the polynomials through its stages: positions of one order more than
-  /// there are stages, rates of as many.
-  /// Of a step that was taken in parts no polynomial is left: then it is a look.
+  /// The state at `time` within the last step, by the polynomials through its stages: with s stages, positions of order
+  /// s + 1, rates of order s. A step that was taken in parts has left no polynomial: then this is a look.
   State glance(double time) {
     if (before_.step == 0) return state();
     State there;
@@ -84,13 +84,14 @@ class GaussStepper : private StepSolution<Solver> {
     return solver_.glance(before_.place, time, before_.elapsed(time) / before_.step);
   }
 
-  /// The same at the full order of the method, by a step from where the last one began, which the polynomials predict.
+  /// The same at the full order of the method: takes a step from where the last one began to `time`. Its stages are
+  /// predicted by the polynomials.
   Outcome look(double time, State& there) {
     double work = 0;
     return look(time, there, work);
   }
 
-  /// And what loads have brought by then  [J].
+  /// The same, and the energy that loads have brought by then  [J].
   Outcome look(double time, State& there, double& work) {
     work = statistics_.load_work;
     if (before_.step == 0 || is_rounding(time - this->time())) {
@@ -123,8 +124,8 @@ class GaussStepper : private StepSolution<Solver> {
     return outcome;
   }
 
-  /// Asked from now on between iterations, where there is much to iterate on. A step that ends by it leaves the state
-  /// as it was, but not all that the next steps depend on.
+  /// From now on asks `stop` between iterations, where one iteration takes long. A step that ends by it leaves the
+  /// state as it was, but not everything else that the next steps depend on.
   void heed(StopSign stop) {
     stop_ = traits_.parts > quick_parts ? stop : StopSign{};
     if constexpr (requires { solver_.heed(stop_); }) solver_.heed(stop_);
@@ -141,34 +142,34 @@ class GaussStepper : private StepSolution<Solver> {
 
   const Solver& solver() const { return solver_; }
 
-  /// From now on every step leaves its derivative behind. Beside the iterations a step costs one or two of Newton's
-  /// more.
+  /// From now on every step leaves its derivative behind. That costs as much as one or two Newton iterations a step.
   void linearize() requires LinearizingSolver<Solver> {
     if (!linearization_) linearization_.emplace(solver_.make_tangent());
   }
 
-  /// The derivative of the last step, of a run that `linearize` has asked it of; the identity where no step was made
-  /// yet, or the last one failed.
+  /// The derivative of the last step, after a call of linearize(); the identity where there was no step yet, or the
+  /// last one failed.
   auto& linearization() requires LinearizingSolver<Solver> { return *linearization_; }
 
-  /// A failing step is tried in parts down to this fraction of it.
+  /// The smallest part of a failing step that is tried.
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
-  // Halvings of a step that cost less by fixed point than the whole by Newton. Where they do not help, it is Newton's.
+  // So many halvings of a step are tried by fixed point, which together cost less than the whole step by Newton. Where
+  // they do not help, Newton takes it.
   static constexpr int fixed_point_worth = 3;
 
-  // Links or coordinates on which iterations take less than it takes to ask.
+  // With so many links or coordinates, an iteration takes less time than to ask for the sign to stop.
   static constexpr int quick_parts = 1000;
 
-  // A step of the controller's choice that is smaller than this, of the time so far, does not move it; nor has one a
-  // chance that was shortened so often.
+  // A step of its own choice fails where it would be smaller than this fraction of the time so far, or was tried so
+  // often.
   static constexpr double smallest_chosen = 1e-13;
   static constexpr int most_attempts = 100;
 
-  /// One step of the controller's choice, at most so long. What depends on time is looked at as if nothing cut the
-  /// step, and where one that is cut fails, it is found as if nothing cut it: so a run that goes on takes the steps of
-  /// one that was not cut.
+  /// One step of the controller's choice, at most so long. Forces that depend on time are looked at as if nothing cut
+  /// the step short. Where a step that is cut short fails, the next one is looked for as if nothing cut it: so a run
+  /// that is interrupted and goes on takes the steps of one that was not.
   Outcome chosen_step(double most) {
     const double longest = solver_.followed(time(), controller_.step(), options_.tolerance);
     if (is_within(std::min(controller_.step(), longest), most)) return find_step(longest, most);
@@ -186,7 +187,7 @@ class GaussStepper : private StepSolution<Solver> {
   /// Whether a step is shorter than the most it may be, and by more than a sliver.
   static bool is_within(double h, double most) { return h * (1 + 1e-9) < most; }
 
-  /// Tries steps; one that errs too much is taken again, shorter, from what it has found.
+  /// Tries steps until one is good enough. One whose error is too large predicts the stages of the next, shorter one.
   Outcome find_step(double longest, double most, int tries = most_attempts) {
     const StepController<double> before = controller_;
     int shorter = fixed_point_worth;
@@ -199,7 +200,7 @@ class GaussStepper : private StepSolution<Solver> {
       Outcome outcome = Base::solve(h, from, shorter == 0);
       is_found = bool(outcome);
       if (is_found) {
-        const StepController<double> wide = controller_;  // of what is narrow the steps elsewhere do not know
+        const StepController<double> wide = controller_;  // what is narrow does not shorten the steps elsewhere
         const bool is_good = controller_.accepts(true, solver_.shape().of(h), h);
         const bool sees_all = sees(longest, h);
         if (!sees_all) controller_ = wide;
@@ -223,7 +224,7 @@ class GaussStepper : private StepSolution<Solver> {
     }
   }
 
-  /// Whether stages of a step see what forces do between them; if not, the next one is to be shorter.
+  /// Whether the stages see what forces do between them. If not, `longest` becomes half of this step.
   bool sees(double& longest, double h) {
     if constexpr (requires { solver_.unseen(); }) {
       unseen_ = solver_.unseen();
@@ -240,7 +241,7 @@ class GaussStepper : private StepSolution<Solver> {
     return outcome ? accept(h, outcome) : outcome;
   }
 
-  // All that the next steps depend on, in and out of a place for it.
+  // Saves all that the next steps depend on, and restores it.
   void read_member() {
     MemberNumbers counted(MemberNumbers::Pass::count);
     member(counted);
@@ -253,7 +254,8 @@ class GaussStepper : private StepSolution<Solver> {
     member(numbers);
   }
 
-  // Parts are powers of two of the step, so that they add up to it exactly. They grow again where that works.
+  // Parts are the step over powers of two, so that they add up to it exactly. After one that
+  // succeeded, the next is twice as long, where that fits.
   Outcome step_in_parts(double h) {
     const Compensated<double> start = time_;
     const bool remembers = std::exchange(remembers_, false);
@@ -310,7 +312,7 @@ class GaussStepper : private StepSolution<Solver> {
     return outcome;
   }
 
-  // A step of its own choice was looked at when it was found.
+  // Steps of its own choice were looked at when they were found.
   void count_unseen() {
     if constexpr (requires { solver_.unseen(); }) {
       if (looks_) return;
@@ -319,18 +321,18 @@ class GaussStepper : private StepSolution<Solver> {
     }
   }
 
-  // The last step, which began here.
+  // The last step.
   struct Remembered {
-    Compensated<double> time{};
-    double step = 0;  // 0: there was none
+    Compensated<double> time{};  // where it began
+    double step = 0;             // its size; 0: there was none
     bool in_parts = false;
-    double work = 0;  // that loads had brought
+    double work = 0;  // that loads had brought before
     typename Solver::Place place{};
 
     double elapsed(double at) const { return (at - time.value) - time.compensation; }
   };
 
-  // Of the time.
+  // Whether an interval is no more than the rounding of the time.
   bool is_rounding(double h) const { return std::abs(h) <= 8 * Base::epsilon() * std::abs(time()); }
 
   void remember(double h, bool in_parts) {
@@ -352,7 +354,7 @@ class GaussStepper : private StepSolution<Solver> {
   bool remembers_ = false, looks_ = false;
   Remembered before_;
   typename Solver::Place start_;  // of a step that is taken in parts
-  std::vector<double> member_;    // to come back to: of the end of the step, while `look` is in it, or of its start
+  std::vector<double> member_;    // saved: of the end of the last step during a look, of the start of a chosen step
   std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;
 };
 

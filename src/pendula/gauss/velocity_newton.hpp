@@ -18,12 +18,12 @@
 
 namespace pendula {
 
-/// The stage equations in the paper's velocity form, E(q, v, a, t) = 0, of any system over its generated kernel:
-/// symmetric, but not symplectic.
+/// A StageSolver for any system in the paper's velocity form, E(q, v, a, t) = 0, over its generated kernel: Gauss
+/// methods are symmetric, but not symplectic.
 ///
-/// Unknown are the stage accelerations K_i, so that the mass matrix is never inverted;
-///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,  residual E(Q_i, V_i, K_i, t_i)  (paper eq.
-///   27).
+/// It solves by Newton. The unknowns are the stage accelerations K_i, so that the mass matrix is never inverted:
+///   Q_i = q + h c_i v + h² Σ_j (A²)_ij K_j,  V_i = v + h Σ_j a_ij K_j,
+///   residual  E(Q_i, V_i, K_i, t_i)  (paper eq. 27).
 template <int Width = max_stages>
 class VelocityNewton : public VelocityStages<Width> {
   using Base = VelocityStages<Width>;
@@ -87,7 +87,7 @@ class VelocityNewton : public VelocityStages<Width> {
       return SystemForcing::Here{time, numbers(0), numbers(1), pace};
     });
   }
-  /// Of what forces do between the stages that were solved.
+  /// What forces do between the stages that were solved.
   Unseen unseen() {
     if (!look_.has_to_look()) return {};
     Base::shape();  // places the stages
@@ -122,20 +122,20 @@ class VelocityNewton : public VelocityStages<Width> {
   using Base::a, Base::along, Base::at_, Base::columns_, Base::count_, Base::fastest_here_, Base::find_increments,
       Base::info, Base::masses_, Base::numbers, Base::place_stages, Base::q, Base::read_state, Base::stages_,
       Base::state_, Base::v, Base::weight_;
-  static constexpr int few_samples = 3;  // for what may be narrow
+  static constexpr int few_samples = 3;  // between which functions may be narrow
 
   // ∂E/∂q, ∂E/∂v, ∂E/∂a.
   double* jacobian(std::size_t which, std::size_t row, std::size_t column) {
     return jacobians_[(which * count_ + row) * count_ + column];
   }
 
-  // ∂(residual of row, stage i)/∂(K of column, stage k) of all i.
+  // ∂(residual of row, stage i)/∂(K of column, stage k) for all i.
   L derivative(std::size_t row, std::size_t column, std::size_t k, const L& ha, const L& h2a2) {
     return fma(ha, L::load(jacobian(1, row, column)),
                fma(h2a2, L::load(jacobian(0, row, column)), L(jacobian(2, row, column)[k]) * columns_.unit(k)));
   }
 
-  // Subtracts the solution from the accelerations; compared are the changes of rates that they make.
+  // Subtracts the solution from the accelerations. Its size is that of the changes of rates it makes.
   Correction apply() {
     const double h = std::abs(columns_.h());
     double scale = 0, largest = 0;

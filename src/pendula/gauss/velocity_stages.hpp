@@ -22,8 +22,8 @@
 
 namespace pendula {
 
-/// State and stages of a step in the paper's velocity form, of any system (VelocityNewton). All stages of one number
-/// are in the lanes of a pack of `Width`, which is at least the number of stages.
+/// State and stages of any system in the paper's velocity form (VelocityNewton). All stages of one number are in the
+/// lanes of a pack. `Width` is at least the number of stages.
 template <int Width>
 class VelocityStages {
  public:
@@ -166,7 +166,8 @@ class VelocityStages {
     return state;
   }
 
-  /// The state at x of the last step, which began there, by the polynomials through its rates and accelerations.
+  /// The state within the last step, x steps after its beginning, by the polynomials through its rates and
+  /// accelerations.
   State glance(const Place& begin, double time, double x) const {
     const auto up_to = columns_.up_to(x);
     State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
@@ -195,7 +196,7 @@ class VelocityStages {
 
   const SystemInfo& info() const { return at_.model().info(); }
 
-  // Of the stages: K, Q, V of coordinate k.
+  // K, Q, V of coordinate k at the stages.
   double* a(std::size_t k) { return stages_[k]; }
   const double* a(std::size_t k) const { return stages_[k]; }
   double* q(std::size_t k) { return stages_[count_ + k]; }
@@ -264,8 +265,8 @@ class VelocityStages {
     }
   }
 
-  // The system at a share of the step, and its q and v in numbers(2), numbers(3), by the polynomials through the rates
-  // and accelerations of the stages, which are placed.
+  // The system at a share of the step, and q and v there in numbers(2) and numbers(3), by the polynomials through the
+  // rates and accelerations of the stages, which are placed.
   const SystemAt<1>& along(double share) {
     const auto up_to = columns_.up_to(share);
     read_state(numbers(2), numbers(3));
@@ -278,7 +279,7 @@ class VelocityStages {
     return at(time_ + columns_.h() * share);
   }
 
-  // By how much the polynomial through the stages' rates is off at the start of the step: Σ M_kk of it².
+  // Σ M_kk (v_k − polynomial through the stages' rates)² at the start of the step.
   double missed_at_start() const {
     double missed = 0;
     for (std::size_t k = 0; k < count_; ++k) {
@@ -290,7 +291,7 @@ class VelocityStages {
     return missed;
   }
 
-  // Of all angles, one whose inertia nearly vanishes counted twice; and whose it is.
+  // The most that an angle turns in the step, where one whose inertia nearly vanishes counts twice; and which it is.
   std::pair<double, int> farthest_turn() const {
     std::pair<double, int> farthest{0, -1};
     for (std::size_t k = 0; k < count_; ++k) {
@@ -303,7 +304,7 @@ class VelocityStages {
     return farthest;
   }
 
-  // Of q and v, over the step, into numbers(0), numbers(1).
+  // What q and v change by over the step, into numbers(0) and numbers(1).
   void find_increments() {
     place_stages();
     for (std::size_t k = 0; k < count_; ++k) {
@@ -315,7 +316,7 @@ class VelocityStages {
     }
   }
 
-  // h and T.
+  // Energy, and kinetic energy.
   std::array<double, 2> energies(double time, const double* q, const double* v) const {
     double energy = 0, kinetic = 0;
     at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
@@ -329,13 +330,13 @@ class VelocityStages {
   Rows stages_;  // K, Q, V, E
   Rows last_a_;  // of the last step
   Place state_;
-  std::vector<double> acceleration_;  // at the start: the cold start of the predictor
+  std::vector<double> acceleration_;  // at the start of the run: predicts stages where no step does
   std::vector<double> weight_;
   MassScale<double> masses_;
   Pace<double> pace_;
   mutable std::vector<double> numbers_;  // workspace: four numbers of each coordinate
   double time_ = 0, most_kinetic_ = 0;
-  double last_h_ = 0;  // of the step that the last accelerations belong to; 0: they belong to none
+  double last_h_ = 0;  // size of the last accepted step; 0: its accelerations are not there
   bool is_predicted_ = false;
   double fastest_ = 0, fastest_here_ = 0;  // Σ M_kk v_k², of all steps so far and of the stages
 };
