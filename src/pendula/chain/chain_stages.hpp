@@ -207,7 +207,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
 
   /// How far the polynomials through the stages' rates miss the velocity of a bob at the start of the step, relative to
   /// the fastest bob so far.
-  double defect() {
+  [[gnu::noinline]] double defect() {
     Numbers bob{}, missed{}, last{};
     Real furthest(0);
     rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
@@ -223,7 +223,9 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / fastest_) : 0;
   }
   /// How much larger the error of the prediction is than that defect.
-  double predictor_gain() const { return prediction_.gain(static_cast<double>(columns_.predictor_gain())); }
+  double predictor_gain() const {
+    return prediction_.gain([&] { return columns_.predictor_gain(); });
+  }
 
   Tempo tempo() const {
     Real pace, quickening;

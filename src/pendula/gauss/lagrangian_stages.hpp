@@ -239,7 +239,9 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     return missed > 0 ? std::sqrt(missed / fastest_) : 0;
   }
   /// How much larger the error of the prediction is than that defect.
-  double predictor_gain() const { return prediction_.gain(columns_.predictor_gain()); }
+  double predictor_gain() const {
+    return prediction_.gain([&] { return columns_.predictor_gain(); });
+  }
 
   /// What the error of the step follows from. Sizes of rates are √(Σ M_kk v_k²).
   StepShape shape() {

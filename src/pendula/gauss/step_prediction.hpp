@@ -55,11 +55,12 @@ class StepPrediction {
   std::int64_t steps() const { return steps_; }  ///< accepted
 
   /// How much larger the error of the prediction is than that of the stage polynomial at the start of its own step: at
-  /// least `gain_of_polynomial`, where it is that polynomial. Predictions from many steps are better than that, so that
+  /// least gain_of_polynomial(), where it is that polynomial. Predictions from many steps are better than that, so that
   /// their first corrections tell nothing of it (0); one step in several is looked at.
-  double gain(double gain_of_polynomial) const {
+  template <class FindGain>
+  double gain(FindGain gain_of_polynomial) const {
     if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;
-    return is_predicted_ ? gain_of_polynomial : 1;
+    return is_predicted_ ? static_cast<double>(gain_of_polynomial()) : 1;
   }
 
   template <class Numbers>

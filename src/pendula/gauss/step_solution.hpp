@@ -47,7 +47,7 @@ class StepSolution {
 
   /// Predicts the stages of a step of size h from here, and iterates on them.
   Outcome solve(double h, PredictedFrom from, bool may_use_newton = true) {
-    solver_.prepare({time(), h, from, may_use_newton});
+    prepare({time(), h, from, may_use_newton});
     newton_stop_.restart();
     fixed_point_stop_.restart(1);
     Correction correction;
@@ -103,6 +103,9 @@ class StepSolution {
   // may have found a solution of the stage equations that is not the motion: its energy is looked at.
   static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
   static constexpr double largest_energy_defect = 0.02;
+
+  // Not inlined into the loop of iterations: there it would crowd out what every iteration calls.
+  [[gnu::noinline]] void prepare(const StepTask& task) { solver_.prepare(task); }
 
   bool is_at_roundoff(const Correction& correction) {
     const double change = correction.relative;
