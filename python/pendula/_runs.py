@@ -18,6 +18,7 @@ from . import _core
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
 
@@ -80,8 +81,12 @@ class Solution:
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """A column by its name; without an index, of all links, (links, rows)."""
+        found = self._columns(name)
+        return self._rows[:, found[0]] if name in self.columns else self._rows[:, found].T
+
+    def _columns(self, name: str) -> list[int]:
         if name in self.columns:
-            return self._rows[:, self.columns.index(name)]
+            return [self.columns.index(name)]
         links = [
             k
             for k, column in enumerate(self.columns)
@@ -89,7 +94,7 @@ class Solution:
         ]
         if not links:
             raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
-        return self._rows[:, links].T
+        return links
 
     @property
     def energy(self) -> NDArray[np.float64]:
@@ -109,6 +114,28 @@ class Solution:
             if self.t.size
             else f"<Solution: no rows: {self.message}>"
         )
+
+    def plot(self, *names: str, axes: Axes | None = None) -> Axes:
+        """Draws columns over time with matplotlib; without names, the coordinates.
+
+        >>> import pendula
+        >>> axes = pendula.Chain(links=2).simulate(1.0, theta=1.0).plot("theta", "x_2")
+        >>> [line.get_label() for line in axes.lines]
+        ['theta_1 [rad]', 'theta_2 [rad]', 'x_2 [m]']
+        """
+        if axes is None:
+            import matplotlib.pyplot as plt
+
+            axes = plt.figure().add_subplot()
+        if not names:
+            names = tuple(self.columns[k] for k in self._state[: len(self._state) // 2])
+        for name in names:
+            for column in self._columns(name):
+                unit = self.units[column]
+                axes.plot(self.t, self._rows[:, column], label=f"{self.columns[column]} [{unit}]")
+        axes.set_xlabel(f"t [{self.units[0]}]")
+        axes.legend()
+        return axes
 
     def to_xarray(self) -> xarray.Dataset:
         """All columns by name over ``t``, with their units."""

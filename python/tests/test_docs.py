@@ -5,12 +5,15 @@ import re
 from pathlib import Path
 
 import pendula
+import pendula._runs
 import pendula._simulation
 import pendula._systems
 import pytest
 
 
-@pytest.mark.parametrize("module", [pendula, pendula._systems, pendula._simulation], ids=lambda m: m.__name__)
+@pytest.mark.parametrize(
+    "module", [pendula, pendula._runs, pendula._systems, pendula._simulation], ids=lambda m: m.__name__
+)
 def test_examples_of_docstrings(module):
     assert doctest.testmod(module).failed == 0
 
