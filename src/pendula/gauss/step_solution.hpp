@@ -17,9 +17,9 @@ namespace pendula {
 
 struct StepperOptions {
   int max_iterations = 50;
-  double tolerance =
-      0;  ///< of the error of a step, relative to the size of the motion; 0: steps have the size asked for
-  /// How steps are chosen; unless it is given, symmetrically where energy is conserved.
+  /// Of the error of a step, relative to the size of the motion; 0: steps have the size that is asked for.
+  double tolerance = 0;
+  /// How steps are chosen; if it is not given, symmetrically where energy is conserved.
   std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
 };
 
