@@ -146,11 +146,12 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   void prepare(const StepTask& task) {
     if (task.from == PredictedFrom::same_step && !is_finished_) finish();
     const auto [ratio, kind] = prediction_.next(task, S, Base::Columns::most_depth);
-    const Real h(task.h);
+    const Real h = static_cast<Real>(task.h);
     const bool is_new = h != columns_.h();
     columns_.prepare(h);
     if (loaded() && (is_new || chain_.driven() || !torque_is_set_)) set_torques(task.time);
-    Base::predict(h, Real(ratio), {kind.follows, kind.again, kind.cold, Real(kind.depth), Real(kind.known)});
+    Base::predict(h, static_cast<Real>(ratio),
+                  {kind.follows, kind.again, kind.cold, Real(kind.depth), Real(kind.known)});
     is_first_ = true;
     is_finished_ = false;
   }
