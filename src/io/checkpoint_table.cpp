@@ -10,10 +10,13 @@
 namespace pendula::io {
 namespace {
 
-// First columns of the table. The numbers of the two members follow, then three numbers of RunSoFar, which older tables
-// lack.
+// First columns of the table. The numbers of the two members follow, then three numbers of RunSoFar and the layout of
+// the members, which older tables lack.
 enum Column : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
-constexpr std::size_t numbers_so_far = 3;
+constexpr std::size_t numbers_so_far = 4;
+
+// Raised where members of as many numbers have another order, or other meanings.
+constexpr double layout = 1;
 
 // Rows of the table, written in turn.
 constexpr std::size_t slots = 2;
@@ -34,7 +37,7 @@ std::vector<double> to_row(const Checkpoint& checkpoint, const RunSoFar& so_far,
   for (const Member* member : {&checkpoint.integrator, &checkpoint.record}) {
     row.insert(row.end(), member->numbers.begin(), member->numbers.end());
   }
-  row.insert(row.end(), {static_cast<double>(so_far.events), so_far.rows_check, so_far.events_check});
+  row.insert(row.end(), {static_cast<double>(so_far.events), so_far.rows_check, so_far.events_check, layout});
   row[check] = checksum(row);
   return row;
 }
@@ -43,8 +46,10 @@ std::vector<double> to_row(const Checkpoint& checkpoint, const RunSoFar& so_far,
 std::optional<RunSoFar> so_far_in(std::span<const double> row) {
   const auto before = static_cast<std::size_t>(row[integrator_size] + row[record_size]) + numbers;
   if (row.size() == before) return std::nullopt;
-  if (row.size() != before + numbers_so_far) throw ChangedFile("one whose places to go on from are of another layout");
   const auto last = row.last(numbers_so_far);
+  if (row.size() != before + numbers_so_far || last[3] != layout) {
+    throw ChangedFile("one of another version of pendula, whose places to go on from are of another layout");
+  }
   return RunSoFar{static_cast<std::size_t>(last[0]), last[1], last[2]};
 }
 

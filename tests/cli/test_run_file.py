@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import xarray
 from conftest import DOUBLE, SPHERICAL, Trajectory, program, settings
-from old_run_file import forget_checksums
+from old_run_file import checksum, forget_checksums
 
 WHIP = """\
 [chain]
@@ -561,6 +561,19 @@ def test_files_of_old_go_on(pendula, scenario, tmp_path):
     with h5py.File(tmp_path / "whole.h5", "a") as whole:
         del whole["events"]
     assert_same_rows(tmp_path / "whole.h5", tmp_path / "part.h5")
+
+
+def test_places_to_go_on_from_have_a_layout(pendula, scenario, tmp_path):
+    """Their numbers mean what they mean to this version, or the file is refused."""
+    pendula("simulate", scenario(DOUBLE), "-o", "run.h5")
+    with h5py.File(tmp_path / "run.h5", "a") as run:
+        places = run["run/checkpoint"][()]
+        places[:, -1] += 1
+        places[:, 0] = [checksum(place) for place in places]
+        run["run/checkpoint"][...] = places
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=8")
+    assert resumed.status == 2
+    assert "another version of pendula, whose places to go on from are of another layout" in resumed.err
 
 
 def test_what_files_of_old_lack_is_not_a_number(pendula, scenario, tmp_path):

@@ -16,7 +16,7 @@ def checksum(row: np.ndarray) -> float:
 def forget_checksums(run: h5py.File) -> None:
     """Nor did places to go on from count events."""
     del run["run"].attrs["checksum"]
-    places = run["run/checkpoint"][:, :-3].copy()
+    places = run["run/checkpoint"][:, :-4].copy()
     places[:, 0] = [checksum(place) for place in places]
     del run["run/checkpoint"]
     run["run/checkpoint"] = places
