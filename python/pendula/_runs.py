@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,11 +28,14 @@ class TrustWarning(UserWarning):
 
 
 class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
-    """The computation failed. ``partial`` is the solution up to there."""
+    """The computation failed. ``partial`` is the solution up to there; None of a :class:`Simulation`."""
 
-    def __init__(self, message: str, partial: Solution) -> None:
+    def __init__(self, message: str, partial: Solution | None = None) -> None:
         super().__init__(message)
         self.partial = partial
+
+    def __reduce__(self) -> tuple[type[RunFailed], tuple[str, Solution | None]]:
+        return RunFailed, (str(self), self.partial)
 
 
 class Solution:
@@ -42,7 +46,9 @@ class Solution:
     t : (rows,) array
         Times, in s.
     y : (coordinates + rates, rows) array
-        Coordinates, then their rates.
+        Coordinates, then their rates, in the order of ``names``: of a chain all theta, then all phi.
+    names : list of str
+        What the rows of ``y`` are; the order of :attr:`Simulation.state` and of :func:`linearize`, too.
     t_events, y_events : dict of arrays
         Times (events,) and states (events, coordinates + rates) of each event, by its name.
     status : int
@@ -53,6 +59,10 @@ class Solution:
         As ``pendula simulate --json``: method, steps, energy error, warnings and more.
     columns, units : list of str
         Of all numbers that a row has: ``run["theta_1"]``; ``run["theta"]`` of all links is (links, rows).
+
+    Notes
+    -----
+    Arrays are read-only. An event at the very start or end of the run is none.
     """
 
     def __init__(self, result: _core.Result) -> None:
@@ -60,12 +70,12 @@ class Solution:
         self.units: list[str] = result.units
         self.summary: dict[str, Any] = json.loads(result.summary)
         self._rows: NDArray[np.float64] = result.take_rows()
-        roles = np.array(result.roles)
-        self._state = np.flatnonzero((roles == "coordinate") | (roles == "rate"))
-        order = np.argsort([roles[k] == "rate" for k in self._state], kind="stable")
-        self._state = self._state[order]
+        self._rows.flags.writeable = False
+        self._state = np.array(result.state)
+        self.names = [self.columns[k] for k in self._state]
         self.t: NDArray[np.float64] = self._rows[:, 0]
         self.y: NDArray[np.float64] = self._rows[:, self._state].T
+        self.y.flags.writeable = False
         events = result.take_event_rows()
         happened = np.array(result.events, dtype=object)
         names = [event["name"] for event in self.summary.get("events", [])]
@@ -88,9 +98,7 @@ class Solution:
         if name in self.columns:
             return [self.columns.index(name)]
         links = [
-            k
-            for k, column in enumerate(self.columns)
-            if column.rpartition("_")[0] == name and column[-1:].isdigit()
+            k for k, column in enumerate(self.columns) if re.fullmatch(re.escape(name) + r"_\d+", column)
         ]
         if not links:
             raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
@@ -154,7 +162,9 @@ def plainly() -> Iterator[None]:
     """Errors about arguments name those, not lines of a text that nobody wrote."""
     try:
         yield
-    except _core.InputError as error:
+    except _core.StepFailed as error:
+        raise RunFailed(str(error)) from None
+    except ValueError as error:
         raise _core.InputError(_plain(str(error))) from None
 
 
@@ -167,6 +177,52 @@ def places() -> tuple[str, str]:
     return str(Path(__file__).parent / "bin"), os.environ.get("PENDULA_PYTHON") or sys.executable
 
 
+def warn(sentences: list[str], stacklevel: int) -> None:
+    """Each is a TrustWarning at who called pendula."""
+    for sentence in sentences:
+        warnings.warn(_plain(sentence), TrustWarning, stacklevel=stacklevel)
+
+
+def mapping(name: str, given: object) -> dict[str, Any]:
+    """What was given by names. Raises InputError."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise _core.InputError(f"{name}: expected a mapping by names, got {type(given).__name__}")
+    return {str(key): one for key, one in given.items()}
+
+
+def merged(name: str, given: object, more: Mapping[str, object]) -> dict[str, Any]:
+    """The same with keyword arguments, none of which may be there already."""
+    found = mapping(name, given)
+    for key in more:
+        if key in found:
+            raise _core.InputError(f"{name}: {key} is given twice")
+    return {**found, **more}
+
+
+def number(name: str, given: object) -> float:
+    """A finite number that is one. Raises InputError."""
+    if isinstance(given, (int, float, np.integer, np.floating)) and not isinstance(given, bool):
+        found = float(given)
+        if math.isfinite(found):
+            return found
+    raise _core.InputError(f"{name}: expected a finite number, got {given!r}")
+
+
+def numbers(name: str, given: object) -> NDArray[np.float64]:
+    """An array of numbers; NaN may be among them. Raises InputError."""
+    if isinstance(given, np.ma.MaskedArray):
+        raise _core.InputError(f"{name}: expected an array without a mask, got one with a mask")
+    try:
+        array = np.asarray(given)
+    except ValueError as error:
+        raise _core.InputError(f"{name}: expected an array of numbers, got {error}") from None
+    if array.dtype.kind not in "iuf" and array.size > 0:
+        raise _core.InputError(f"{name}: expected an array of numbers, got one of {array.dtype}")
+    return array.astype(float)
+
+
 def tell(what: str) -> None:
     print(f"pendula: {what}", file=sys.stderr)
 
@@ -176,8 +232,7 @@ def run_text(text: str, name: str = "pendula", overrides: list[str] | None = Non
     with plainly():
         result = _core.simulate(text, name, overrides or [], *places(), tell)
     solution = Solution(result)
-    for sentence in solution.summary["warnings"]:
-        warnings.warn(_plain(sentence), TrustWarning, stacklevel=3)
+    warn(solution.summary["warnings"], stacklevel=4)
     if solution.status < 0:
         raise RunFailed(solution.message, solution)
     return solution

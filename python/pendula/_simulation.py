@@ -2,47 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import hashlib
+import math
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _core, _toml
-from ._runs import places, plainly, tell
+from ._core import InputError
+from ._runs import mapping, merged, number, numbers, places, plainly, tell, warn
+from ._systems import System
 
 if TYPE_CHECKING:
     import xarray
-    from numpy.typing import ArrayLike, NDArray
-
-    from ._systems import System
+    from numpy.typing import NDArray
 
 RUN_OPTIONS = ("method", "stages", "form", "solver", "iteration")
 
 
-def _options(tolerance: float | None, step: float | None, options: Mapping[str, object]) -> dict[str, object]:
-    if step is None and tolerance is None:
-        tolerance = 1e-9
-    return {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
+class _Text(NamedTuple):
+    """What a simulation begins with, as it is pickled."""
+
+    scenario: str
+    remember: bool
+    model_file: str | None
+    model_hash: str | None
+
+    @classmethod
+    def of(
+        cls,
+        system: System,
+        start: Mapping[str, object],
+        *,
+        tolerance: float | None,
+        step: float | None,
+        options: Mapping[str, object],
+        remember: bool = True,
+    ) -> _Text:
+        if not isinstance(system, System):
+            raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
+        if step is None and tolerance is None:
+            tolerance = 1e-9
+        run = {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
+        text = _toml.document({**system.tables(), "start": start, "run": run})
+        file = system.model_file()
+        return cls(text, remember, None if file is None else str(file), _hash(file))
+
+    def prepare(self) -> _core.Prepared:
+        """Raises InputError, too, if a model is not what it was."""
+        if self.model_file is not None and _hash(self.model_file) != self.model_hash:
+            raise InputError(f"{self.model_file}: expected the model that was pickled, got another one")
+        with plainly():
+            return _core.prepare(self.scenario, *places(), tell, self.remember)
 
 
-def _prepare(
-    system: System, start: Mapping[str, object], run: Mapping[str, object]
-) -> tuple[str, _core.Prepared]:
-    text = _toml.document({**system.tables(), "start": dict(start), "run": run})
-    return text, _prepared(text)
+def _hash(file: object) -> str | None:
+    if file is None:
+        return None
+    try:
+        with open(str(file), "rb") as text:
+            return hashlib.sha256(text.read()).hexdigest()
+    except OSError:
+        return None  # the reader of scenarios says what is wrong
 
 
-def _prepared(text: str) -> _core.Prepared:
-    with plainly():
-        return _core.prepare(text, *places(), tell)
-
-
-def _split(
-    system_starts: Mapping[str, object], options: Mapping[str, object]
-) -> tuple[dict[str, object], dict[str, object]]:
-    runs = {name: one for name, one in options.items() if name in RUN_OPTIONS}
-    starts = {**system_starts, **{name: one for name, one in options.items() if name not in RUN_OPTIONS}}
-    return starts, runs
+def _split(start: object, given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, object]]:
+    runs = {name: one for name, one in given.items() if name in RUN_OPTIONS}
+    return merged("start", start, {name: one for name, one in given.items() if name not in runs}), runs
 
 
 class Simulation:
@@ -51,16 +80,27 @@ class Simulation:
     Parameters
     ----------
     system : Chain or Model
+        Models without drives; inputs may be held instead.
     start : mapping, optional
         As for :meth:`Chain.simulate`.
     tolerance, step : float, optional
         Steps of its own choice, to a tolerance of 1e-9 unless told otherwise; or constant ones, in s.
+    remember : bool
+        Whether earlier steps are kept, for :meth:`at`; so many numbers a step as the state has.
     method, stages, form, solver, iteration
         As ``[run]`` of a scenario.
 
+    Raises
+    ------
+    InputError
+        An argument is wrong.
+    RunFailed
+        The motion cannot begin.
+
     Notes
     -----
-    Copies and pickles go on as the first does, to the bit.
+    Copies and pickles go on as the first does, to the bit; pickles forget earlier steps. Nobody looks at the motion
+    again to see how far it can be trusted: :meth:`Chain.simulate` does. One thread at a time may use it.
 
     Examples
     --------
@@ -77,32 +117,62 @@ class Simulation:
         *,
         tolerance: float | None = None,
         step: float | None = None,
+        remember: bool = True,
         **options: object,
     ) -> None:
-        starts, runs = _split(start or {}, options)
-        self._text, self._made = _prepare(system, starts, _options(tolerance, step, runs))
+        starts, runs = _split(start, options)
+        self._text = _Text.of(
+            system, starts, tolerance=tolerance, step=step, options=runs, remember=bool(remember)
+        )
+        self._begin()
+        warn(self._made.warnings, stacklevel=3)
+
+    def _begin(self) -> None:
+        self._lock = threading.Lock()
+        self._made = self._text.prepare()
         with plainly():
             self._core = _core.Simulation(self._made)
+            self._inputs = self._made.inputs
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("simulation: expected one thread at a time, got a second one")
+        try:
+            with plainly():
+                yield
+        finally:
+            self._lock.release()
 
     @property
     def time(self) -> float:
         """In s."""
-        return self._core.time
+        with self._alone():
+            return self._core.time
 
     @property
     def steps(self) -> int:
-        """Steps that were taken."""
-        return self._core.steps
+        """Steps that were taken; of a pickle since then."""
+        with self._alone():
+            return self._core.steps
+
+    @property
+    def names(self) -> list[str]:
+        """What the numbers of the state are: coordinates, then their rates; of a chain all theta, then all phi."""
+        columns = self._made.columns
+        return [columns[k] for k in self._made.state]
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """Coordinates, then their rates."""
-        return self._core.state
+        """Coordinates, then their rates, in the order of ``names``."""
+        with self._alone():
+            return self._core.state
 
     @property
     def inputs(self) -> dict[str, float]:
-        """What is held, by name."""
-        return dict(zip(self._made.inputs, self._core.held.tolist(), strict=True))
+        """What is held, by name; drives of a chain are added to it."""
+        with self._alone():
+            return dict(zip(self._inputs, self._core.held, strict=True))
 
     @property
     def columns(self) -> list[str]:
@@ -111,40 +181,66 @@ class Simulation:
 
     def __getitem__(self, column: str) -> float:
         """A number of the row where it is: ``simulation["x_2"]``, ``simulation["energy"]``."""
-        with plainly():
+        if not isinstance(column, str):
+            raise InputError(f"column: expected a name, got {column!r}")
+        with self._alone():
             return self._core.number(column)
 
-    def hold(self, **inputs: float) -> Simulation:
-        """Holds inputs from now on, until others are held."""
-        with plainly():
-            for name, value in inputs.items():
-                self._core.hold(name, float(value))
+    def hold(self, inputs: Mapping[str, float] | None = None, **more: float) -> Simulation:
+        """Holds inputs from now on, until others are held. Raises InputError, and then holds what it did."""
+        given = merged("inputs", inputs, more)
+        unknown = [name for name in given if name not in self._inputs]
+        if unknown:
+            raise InputError(f"inputs: expected some of {', '.join(self._inputs)}, got {', '.join(unknown)}")
+        values = {name: number(name, one) for name, one in given.items()}
+        with self._alone():
+            before = dict(zip(self._inputs, self._core.held, strict=True))
+            if values:
+                self._core.hold([{**before, **values}[name] for name in self._inputs])
         return self
 
     def advance_to(self, time: float) -> Simulation:
-        """Goes on to ``time``, in s, where a step ends."""
-        with plainly():
-            self._core.advance_to(float(time))
+        """Goes on to ``time``, in s, where a step ends. Raises RunFailed where the mathematics fails."""
+        end = number("time", time)
+        with self._alone():
+            self._core.advance_to(end)
         return self
 
-    def step(self, duration: float, **inputs: float) -> Simulation:
+    def step(
+        self, duration: float, inputs: Mapping[str, float] | None = None, /, **more: float
+    ) -> Simulation:
         """Holds inputs, and goes on by ``duration``, in s: a zero-order hold, with steps chosen inside."""
-        return self.hold(**inputs).advance_to(self.time + duration)
+        end = self.time + number("duration", duration)
+        return self.hold(inputs, **more).advance_to(end)
 
     def at(self, time: float) -> NDArray[np.float64]:
         """The state at any time since the start, at the full order of the method."""
-        with plainly():
-            return self._core.at(float(time))
+        when = number("time", time)
+        with self._alone():
+            return self._core.at(when)
 
     def linearize(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A and B of d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly."""
-        with plainly():
-            return self._core.linearize()
+        """A and B of d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly.
+
+        Raises InputError where the equations are singular, as in space at a pole, where phi has no meaning; and
+        RuntimeError for a chain of more links than this build has kernels for.
+        """
+        with self._alone():
+            found = self._core.linearize()
+        if not all(np.isfinite(matrix).all() for matrix in found):
+            raise InputError(
+                "linearize: expected a state where the equations are regular, got one where they are not "
+                "(in space phi has no meaning where sin(theta) is 0)"
+            )
+        return found
 
     def copy(self) -> Simulation:
         """One that goes on as this one does, to the bit."""
         other = Simulation.__new__(Simulation)
-        other._text, other._made, other._core = self._text, self._made, self._core.copy()
+        other._lock = threading.Lock()
+        other._text, other._made, other._inputs = self._text, self._made, self._inputs
+        with self._alone():
+            other._core = self._core.copy()
         return other
 
     __copy__ = copy
@@ -153,13 +249,14 @@ class Simulation:
         return self.copy()
 
     def __getstate__(self) -> dict[str, object]:
-        return {"text": self._text, "saved": self._core.save()}
+        with self._alone():
+            return {"text": tuple(self._text), "saved": self._core.save()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._text = state["text"]
-        self._made = _prepared(self._text)
-        self._core = _core.Simulation(self._made)
-        self._core.resume(np.ascontiguousarray(state["saved"], dtype=float))
+        self._text = _Text(*state["text"])
+        self._begin()
+        with self._alone():
+            self._core.resume(np.ascontiguousarray(state["saved"], dtype=float))
 
     def __repr__(self) -> str:
         return f"<Simulation: t = {self.time:.6g} s after {self.steps} steps>"
@@ -174,15 +271,23 @@ def linearize(
     ----------
     system : Chain or Model
     at : mapping, optional
-        Coordinates and rates, as for :meth:`Chain.simulate`; left out, all are 0.
+        Coordinates and rates, as for :meth:`Chain.simulate`; what is left out is 0.
 
     Returns
     -------
     A : (2n, 2n) array
     B : (2n, inputs) array
-        d(q, v)/dt = A (q, v) + B inputs, of deviations from the state.
+        d(q, v)/dt = A (q, v) + B inputs, of deviations from the state, in the order of :attr:`Simulation.names` and
+        :attr:`Simulation.inputs`.
+
+    Raises
+    ------
+    InputError, RuntimeError
+        As :meth:`Simulation.linearize`.
     """
-    return Simulation(system, {**system.at_zero(), **(at or {})}).linearize()
+    if not isinstance(system, System):
+        raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
+    return Simulation(system, {**system.at_zero(), **mapping("at", at)}).linearize()
 
 
 class Lyapunov(NamedTuple):
@@ -212,19 +317,30 @@ def lyapunov(
     >>> pendula.lyapunov(pendula.Chain(links=1), 20.0, theta=0.5, step=0.02).exponents.shape
     (2,)
     """
-    given, runs = _split(start or {}, starts)
-    _, made = _prepare(system, given, _options(tolerance, step, runs))
+    how_long = number("duration", duration)
+    if how_long < 0:
+        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
+    if not isinstance(count, (int, np.integer)) or isinstance(count, bool):
+        raise InputError(f"count: expected how many exponents, got {count!r}")
+    given, runs = _split(start, starts)
+    made = _Text.of(system, given, tolerance=tolerance, step=step, options=runs).prepare()
+    warn(made.warnings, stacklevel=3)
     with plainly():
-        return Lyapunov(*_core.lyapunov(made, float(duration), count))
+        return Lyapunov(*_core.lyapunov(made, how_long, int(count)))
+
+
+# By RunEnd of C++.
+STATUSES = ("ok", "event", "stopped", "failed", "failed", "failed")
 
 
 def ensemble(
     system: System,
     duration: float,
-    start: Mapping[str, ArrayLike],
+    start: Mapping[str, object],
     *,
     tolerance: float | None = None,
     step: float | None = None,
+    estimate: bool = True,
     threads: int = 0,
     **options: object,
 ) -> xarray.Dataset:
@@ -236,97 +352,99 @@ def ensemble(
     duration : float
         In s.
     start : mapping of arrays
-        Coordinates and rates by name. An array is (members,), of a chain (members, links); a single number is that of
-        all members. What is left out is 0.
+        Coordinates and rates by name, in rad, m and their rates. An array is (members,), of all links of a chain
+        (members, links); a single number is that of all members. What is left out is 0.
     tolerance, step : float, optional
         As for :class:`Simulation`.
+    estimate : bool
+        Whether members are moved a second time to see how far they can be trusted.
     threads : int
         0: as many as there are processors.
 
     Returns
     -------
     xarray.Dataset
-        Where each member ends, by the names of columns over ``member``, with ``status`` (0: ok, 2: stopped, 3: failed)
-        and ``energy_error``, relative.
+        Where each member ends, by the names of columns over ``member``, with ``run_status`` ("ok", "failed"),
+        ``run_trusted`` (where it was estimated) and ``run_energy_error``, relative.
+
+    Warns
+    -----
+    TrustWarning
+        How many members cannot be trusted, and why the first one.
 
     Examples
     --------
     >>> import numpy, pendula
     >>> double = pendula.Chain(masses=[1, 1])
     >>> ends = pendula.ensemble(double, 1.0, {"theta": numpy.linspace(0, 1, 12).reshape(6, 2)})
-    >>> ends["theta_2"].shape
-    (6,)
+    >>> ends["theta_2"].shape, bool(ends["run_trusted"].all())
+    ((6,), True)
     """
     import xarray
 
-    unknown = set(options) - set(RUN_OPTIONS)
-    if unknown:
-        raise TypeError(f"ensemble: expected the options of a run, got {', '.join(sorted(unknown))}")
-    _, made = _prepare(system, system.at_zero(), _options(tolerance, step, options))
-    names = made.columns[1 : 1 + 2 * made.coordinates]
-    columns: dict[str, NDArray[np.float64]] = {}
-    for name, given in start.items():
-        for column, values in _columns_of(name, np.asarray(given, dtype=float), names):
-            if column in columns:
-                raise ValueError(f"start: {column} is given twice")
-            columns[column] = values
-    sizes = {values.size for values in columns.values() if values.ndim > 0}
-    if len(sizes) > 1:
-        raise ValueError(f"start: expected as many members of each, got {', '.join(map(str, sorted(sizes)))}")
-    members = sizes.pop() if sizes else 1
-    order = _state_order(names)
-    starts = np.zeros((members, len(names)))
-    for column, values in columns.items():
-        if not np.isfinite(values).all():
-            raise ValueError(
-                f"start: expected finite numbers for {column}, got {values[~np.isfinite(values)][0]}"
-            )
-        starts[:, order.index(column)] = values
+    how_long = number("duration", duration)
+    if how_long < 0:
+        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
+    if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 0:
+        raise InputError(f"threads: expected how many, 0 for all processors, got {threads!r}")
+    for name in options:
+        if name not in RUN_OPTIONS:
+            raise InputError(f"ensemble: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
+    at_zero = system.at_zero() if isinstance(system, System) else {}
+    made = _Text.of(system, at_zero, tolerance=tolerance, step=step, options=options).prepare()
+    columns = made.columns
+    names = [columns[k] for k in made.state]
+    starts = _starts(mapping("start", start), names)
     with plainly():
-        q, v, how, errors = _core.propagate(made, starts, float(duration), threads)
-    ends = np.hstack([q, v])
-    data: dict[str, Any] = {name: ("member", ends[:, k]) for k, name in enumerate(order)}
-    data["status"] = ("member", np.array(how))
-    data["energy_error"] = ("member", errors)
+        ends, how, errors, doubts = _core.propagate(made, starts, how_long, int(threads), bool(estimate))
+    data: dict[str, Any] = {name: ("member", ends[:, k]) for k, name in enumerate(names)}
+    if not data.keys().isdisjoint(("run_status", "run_trusted", "run_energy_error")):
+        raise InputError("system: expected coordinates with names that do not begin with run_")
+    data["run_status"] = ("member", np.array([STATUSES[one] for one in how]))
+    if estimate:
+        data["run_trusted"] = ("member", np.array([doubt == "" for doubt in doubts], dtype=bool))
+    data["run_energy_error"] = ("member", errors)
+    untrusted = [k for k, doubt in enumerate(doubts) if doubt]
+    if untrusted:
+        first = untrusted[0]
+        warn(
+            [f"{len(untrusted)} of {len(how)} members cannot be trusted; member {first}: {doubts[first]}"], 3
+        )
     return xarray.Dataset(data)
 
 
-def _state_order(names: Sequence[str]) -> list[str]:
-    """Columns of a file are link by link; the state has coordinate by coordinate, then rates."""
-    rates = [name for name in names if _is_rate(name)]
-    places = [name for name in names if not _is_rate(name)]
-
-    def by_coordinate(some: list[str]) -> list[str]:
-        stems: list[str] = []
-        for name in some:
-            if _stem(name) not in stems:
-                stems.append(_stem(name))
-        return sorted(some, key=lambda name: (stems.index(_stem(name)), some.index(name)))
-
-    return by_coordinate(places) + by_coordinate(rates)
-
-
-def _stem(name: str) -> str:
-    stem, _, index = name.rpartition("_")
-    return stem if index.isdigit() else name
-
-
-def _is_rate(name: str) -> bool:
-    return _stem(name).endswith("_dot")
+def _starts(given: Mapping[str, object], names: list[str]) -> NDArray[np.float64]:
+    """(members, state) of arrays by name. Raises InputError."""
+    columns: dict[str, NDArray[np.float64]] = {}
+    for name, values in given.items():
+        for column, one in _columns_of(name, numbers(f"start: {name}", values), names):
+            if column in columns:
+                raise InputError(f"start: {column} is given twice")
+            columns[column] = one
+    sizes = {one.size for one in columns.values() if one.ndim > 0}
+    if len(sizes) > 1:
+        raise InputError(f"start: expected as many members of each, got {', '.join(map(str, sorted(sizes)))}")
+    starts = np.zeros((sizes.pop() if sizes else 1, len(names)))
+    for column, one in columns.items():
+        if not np.isfinite(one).all():
+            wrong = next(x for x in one.ravel() if not math.isfinite(x))
+            raise InputError(f"start: expected finite numbers for {column}, got {wrong}")
+        starts[:, names.index(column)] = one
+    return starts
 
 
 def _columns_of(
-    name: str, values: NDArray[np.float64], names: Sequence[str]
+    name: str, values: NDArray[np.float64], names: list[str]
 ) -> list[tuple[str, NDArray[np.float64]]]:
     if name in names:
         if values.ndim > 1:
-            raise ValueError(f"start: expected a number or (members,) for {name}, got shape {values.shape}")
+            raise InputError(f"start: expected a number or (members,) for {name}, got shape {values.shape}")
         return [(name, values)]
-    links = [column for column in names if _stem(column) == name and column != name]
+    links = [column for column in (f"{name}_{k + 1}" for k in range(len(names))) if column in names]
     if not links:
-        raise ValueError(f"start: expected one of {', '.join(names)}, got {name}")
+        raise InputError(f"start: expected some of {', '.join(names)}, got {name}")
     if values.ndim == 0 or (len(links) == 1 and values.ndim == 1):
         return [(column, values) for column in links]
     if values.ndim != 2 or values.shape[1] != len(links):
-        raise ValueError(f"start: expected (members, {len(links)}) for {name}, got shape {values.shape}")
+        raise InputError(f"start: expected (members, {len(links)}) for {name}, got shape {values.shape}")
     return [(column, values[:, k]) for k, column in enumerate(links)]

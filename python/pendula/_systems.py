@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import copy
+import re
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from . import _toml
-from ._runs import Solution, run_text
+from ._core import InputError
+from ._runs import Solution, mapping, merged, number, numbers, run_text
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 Tables = dict[str, "dict[str, object] | list[dict[str, object]]"]
+
+
+def _drives(given: object) -> list[dict[str, object]]:
+    if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
+        raise InputError(f"drives: expected a sequence of mappings, got {type(given).__name__}")
+    drives = [mapping(f"drives[{k}]", drive) for k, drive in enumerate(given)]
+    return copy.deepcopy(drives)
 
 
 class System:
@@ -28,6 +36,10 @@ class System:
     def at_zero(self) -> dict[str, object]:
         """The start where all coordinates are 0."""
         return {}
+
+    def model_file(self) -> Path | None:
+        """The file that says what moves, if one does."""
+        return None
 
     def simulate(
         self,
@@ -85,17 +97,17 @@ class System:
         TrustWarning
             How far the rows can be trusted, where that is less than was asked for.
         """
-        times = None if t is None else np.asarray(t, dtype=float)
+        times = None if t is None else numbers("t", t)
         if times is not None and (times.ndim != 1 or times.size == 0):
-            raise ValueError(f"t: expected a vector of times, got an array of shape {times.shape}")
+            raise InputError(f"t: expected a vector of times, got an array of shape {times.shape}")
         if duration is None:
             if times is None:
                 raise TypeError("simulate: expected duration= or t=, got neither")
             duration = float(times[-1])
-        if not (step or tolerance or accuracy):
+        if step is None and tolerance is None and accuracy is None:
             accuracy = 1e-9
         tables = self.tables()
-        tables["start"] = {**(start or {}), **starts}
+        tables["start"] = merged("start", start, starts)
         tables["run"] = {
             "duration": duration,
             "method": method,
@@ -116,8 +128,11 @@ class System:
             "times": None if times is None else times.tolist(),
         }
         tables["event"] = [
-            {"name": name, **({"when": event} if isinstance(event, str) else dict(event))}
-            for name, event in (events or {}).items()
+            {
+                "name": name,
+                **({"when": event} if isinstance(event, str) else mapping(f"events.{name}", event)),
+            }
+            for name, event in mapping("events", events).items()
         ]
         return run_text(_toml.document(tables))
 
@@ -154,17 +169,19 @@ class Chain(System):
         drives: Sequence[Mapping[str, object]] = (),
         units: str | None = None,
     ) -> None:
-        self._numbers: dict[str, object] = {
-            "space": space,
-            "links": links,
-            "masses": masses,
-            "lengths": lengths,
-            "gravity": gravity,
-            "damping": damping,
-            "torque": torque,
-            "units": units,
-        }
-        self._drives = [dict(drive) for drive in drives]
+        self._numbers: dict[str, object] = copy.deepcopy(
+            {
+                "space": space,
+                "links": links,
+                "masses": masses,
+                "lengths": lengths,
+                "gravity": gravity,
+                "damping": damping,
+                "torque": torque,
+                "units": units,
+            }
+        )
+        self._drives = _drives(drives)
 
     def __repr__(self) -> str:
         given = ", ".join(f"{key}={one!r}" for key, one in self._numbers.items() if one is not None)
@@ -206,12 +223,18 @@ class Model(System):
         name = str(model)
         self._name = str(Path(name).resolve()) if name.endswith(".py") else name
         self._links = links
-        self._parameters = parameters
-        self._drives = [{"input": key, "constant": one} for key, one in (inputs or {}).items()]
-        self._drives += [dict(drive) for drive in drives]
+        self._parameters = copy.deepcopy(parameters)
+        self._drives = [
+            {"input": key, "constant": number(f"inputs.{key}", one)}
+            for key, one in mapping("inputs", inputs).items()
+        ]
+        self._drives += _drives(drives)
 
     def __repr__(self) -> str:
         return f"Model({self._name!r})"
+
+    def model_file(self) -> Path | None:
+        return Path(self._name) if self._name.endswith(".py") else None
 
     def tables(self) -> Tables:
         system: dict[str, object] = {
@@ -234,7 +257,11 @@ class Scenario:
 
     def __init__(self, file: str | PathLike[str], set: Mapping[str, object] | None = None) -> None:
         self.file = Path(file)
-        self._overrides = [f"{key}={_toml.value(one, key)}" for key, one in (set or {}).items()]
+        self._overrides = []
+        for key, one in mapping("set", set).items():
+            if not re.fullmatch(r"[A-Za-z_][\w.\[\]]*", key):
+                raise InputError(f"set: expected a key of a scenario, such as run.step, got {key!r}")
+            self._overrides.append(f"{key}={_toml.value(one, key)}")
 
     def __repr__(self) -> str:
         return f"Scenario({str(self.file)!r})"

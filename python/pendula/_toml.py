@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ def value(given: object, key: str) -> str:
     if isinstance(given, (bool, np.bool_)):
         return "true" if given else "false"
     if isinstance(given, (int, np.integer)):
-        return str(int(given))
+        return str(int(given)) if abs(int(given)) <= 2**53 else repr(float(given))
     if isinstance(given, (float, np.floating)):
         number = float(given)
         if math.isnan(number):
@@ -23,15 +24,26 @@ def value(given: object, key: str) -> str:
             return "inf" if number > 0 else "-inf"
         return repr(number)
     if isinstance(given, str):
-        return json.dumps(given)
+        return _text(given)
     if isinstance(given, Mapping):
-        inside = (f"{json.dumps(str(name))} = {value(one, f'{key}.{name}')}" for name, one in given.items())
+        inside = (f"{_text(str(name))} = {value(one, f'{key}.{name}')}" for name, one in given.items())
         return "{" + ", ".join(inside) + "}"
+    if isinstance(given, np.ma.MaskedArray):
+        raise TypeError(f"{key}: expected an array without a mask, got one with a mask")
     if isinstance(given, np.ndarray):
         return value(given.tolist(), key)
-    if isinstance(given, Sequence):
+    if isinstance(given, Sequence) and not isinstance(given, (bytes, bytearray)):
         return "[" + ", ".join(value(one, key) for one in given) + "]"
     raise TypeError(f"{key}: expected a number, a string, an array or a mapping, got {type(given).__name__}")
+
+
+def _text(given: str) -> str:
+    """A basic string; TOML knows no surrogates, which JSON would make of what is beyond 16 bits."""
+    return json.dumps(given, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
 
 
 def document(tables: Mapping[str, Mapping[str, object] | Sequence[Mapping[str, object]]]) -> str:
@@ -40,7 +52,11 @@ def document(tables: Mapping[str, Mapping[str, object] | Sequence[Mapping[str, o
 
     def table(name: str, heading: str, keys: Mapping[str, object]) -> None:
         lines.append(heading)
-        lines.extend(f"{key} = {value(one, f'{name}.{key}')}" for key, one in keys.items() if one is not None)
+        lines.extend(
+            f"{_key(str(key))} = {value(one, f'{name}.{key}')}"
+            for key, one in keys.items()
+            if one is not None
+        )
 
     for name, given in tables.items():
         if isinstance(given, Mapping):

@@ -5,6 +5,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
@@ -12,6 +13,7 @@
 #include <pendula/pendula.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
@@ -19,11 +21,14 @@
 #include <future>
 #include <memory>
 #include <optional>
+#include <pendula/ensemble/propagate.hpp>
 #include <pendula/pendula.hpp>
 #include <pendula/run/observer.hpp>
 #include <pendula/run/run.hpp>
+#include <pendula/run/system_subject.hpp>
 #include <stop_token>
 #include <string>
+#include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -68,12 +73,19 @@ class Recorder : public Observer {
   std::vector<int> ups;
 };
 
+/// Whether this thread is the one that Python's signal handlers run in. Others need not ask, and must not take Python's
+/// lock while Python ends.
+bool hears_signals() {
+  const nb::module_ threading = nb::module_::import_("threading");
+  return threading.attr("current_thread")().is(threading.attr("main_thread")());
+}
+
 /// Asks Python now and then whether Ctrl-C was pressed; the run holds no lock meanwhile.
 class Interruption {
  public:
   bool operator()() {
     const auto now = Clock::now();
-    if (is_requested_ || now - asked_ < std::chrono::milliseconds(50)) return is_requested_;
+    if (!hears_ || is_requested_ || now - asked_ < std::chrono::milliseconds(50)) return is_requested_;
     asked_ = now;
     const nb::gil_scoped_acquire lock;
     return is_requested_ = PyErr_CheckSignals() != 0;
@@ -84,7 +96,7 @@ class Interruption {
   using Clock = std::chrono::steady_clock;
 
   Clock::time_point asked_ = Clock::now();
-  bool is_requested_ = false;
+  bool hears_ = hears_signals(), is_requested_ = false;
 };
 
 template <class Space>
@@ -99,38 +111,37 @@ void describe(const io::SystemScenario& scenario, const std::string& name, io::S
 
 /// What came of a run.
 struct Result {
-  std::vector<std::string> columns, units, roles;
+  std::vector<std::string> columns, units;
+  std::vector<std::size_t> state;  ///< columns of the coordinates, then of their rates
   Recorder recorder;
   std::string summary;  ///< as `pendula simulate --json` prints it
 };
 
-const char* name_of(Role role) {
-  switch (role) {
-    case Role::time:
-      return "time";
-    case Role::coordinate:
-      return "coordinate";
-    case Role::rate:
-      return "rate";
-    case Role::input:
-      return "input";
-    case Role::point:
-      return "point";
-    case Role::energy:
-      return "energy";
+/// Columns of the numbers of a role in the order of a motion: of a chain all theta, then all phi; of another system as
+/// its columns come.
+std::vector<std::size_t> columns_of(const Subject& subject, Role role) {
+  std::vector<std::size_t> columns;
+  for (const Quantity& quantity : subject.quantities()) {
+    if (quantity.role != role) continue;
+    for (std::size_t k = 0; k < quantity.size(); ++k) columns.push_back(quantity.column(k));
   }
-  return "";
+  if (dynamic_cast<const SystemSubject*>(&subject) != nullptr) std::ranges::sort(columns);
+  return columns;
 }
 
-void name_columns(const Subject& subject, Result& result) {
+std::vector<std::size_t> state_columns(const Subject& subject) {
+  std::vector<std::size_t> columns = columns_of(subject, Role::coordinate);
+  for (const std::size_t column : columns_of(subject, Role::rate)) columns.push_back(column);
+  return columns;
+}
+
+void name_columns(const Subject& subject, const std::optional<io::NaturalUnits>& natural, Result& result) {
   result.columns = subject.columns();
+  result.state = state_columns(subject);
   result.units.resize(result.columns.size());
-  result.roles.resize(result.columns.size());
   for (const Quantity& quantity : subject.quantities()) {
-    for (std::size_t k = 0; k < quantity.size(); ++k) {
-      result.units[quantity.column(k)] = quantity.unit;
-      result.roles[quantity.column(k)] = name_of(quantity.role);
-    }
+    const std::string unit = io::in_units(natural, quantity.unit);
+    for (std::size_t k = 0; k < quantity.size(); ++k) result.units[quantity.column(k)] = unit;
   }
 }
 
@@ -147,7 +158,7 @@ void run(const Scenario& scenario, const std::string& name, const std::string& k
                        .accuracy = scenario.accuracy,
                        .estimate = scenario.estimate,
                        .events = io::events_of(scenario.events, subject, scenario.start)};
-  name_columns(*subject, result);
+  name_columns(*subject, scenario.natural, result);
   Run run = cli::told_at_keys(scenario, name, [&] { return Run(setup); });
   run.add(result.recorder);
   io::Summary summary;
@@ -226,13 +237,26 @@ Model model_of(const io::SystemScenario& scenario) {
 /// A system, its start and how it is moved, as a scenario says: what simulations and ensembles begin with.
 struct Prepared {
   io::AnyScenario scenario;  // it owns the kernel
-  Model model;
+  std::shared_ptr<const Subject> subject;
   Motion start;
   SimulationOptions options;
+  RunOptions run;
+  std::vector<std::string> warnings;
 };
 
-std::unique_ptr<Prepared> prepare(const std::string& text, const std::string& program, const std::string& python,
-                                  const Tell& tell) {
+/// The same as a model of the front, which has no drives of systems.
+Model model_of(const Prepared& made) {
+  return std::visit([](const auto& scenario) { return model_of(scenario); }, made.scenario);
+}
+
+/// A simulation, and what it needs; copies share that.
+struct Moved {
+  std::shared_ptr<const Prepared> made;
+  Simulation simulation;
+};
+
+std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& program, const std::string& python,
+                                  const Tell& tell, bool remembers) {
   const nb::gil_scoped_release others_may_go_on;
   Models models(program, python, tell);
   io::AnyScenario any = io::parse_scenario(text, "pendula", {}, models.finder());
@@ -245,10 +269,13 @@ std::unique_ptr<Prepared> prepare(const std::string& text, const std::string& pr
                                         .solver = run.solver,
                                         .iteration = run.iteration,
                                         .step = run.step,
-                                        .tolerance = run.tolerance};
-        Model model = model_of(scenario);
+                                        .tolerance = run.tolerance,
+                                        .remember = remembers};
+        std::shared_ptr<const Subject> subject = cli::subject_of(scenario);
         Motion start = scenario.start;
-        return std::unique_ptr<Prepared>(new Prepared{std::move(any), std::move(model), std::move(start), options});
+        std::vector<std::string> warnings = scenario.warnings;
+        return std::shared_ptr<Prepared>(
+            new Prepared{std::move(any), std::move(subject), std::move(start), options, run, std::move(warnings)});
       },
       any);
 }
@@ -286,11 +313,13 @@ using Starts = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::
 template <class Do>
 void interruptibly(Do act) {
   std::stop_source stop;
+  const bool hears = hears_signals();
   bool is_interrupted = false;
   {
     const nb::gil_scoped_release others_may_go_on;
     auto work = std::async(std::launch::async, [&] { act(stop.get_token()); });
     while (work.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
+      if (!hears) continue;
       const nb::gil_scoped_acquire lock;
       if (is_interrupted || PyErr_CheckSignals() == 0) continue;
       is_interrupted = true;
@@ -299,6 +328,39 @@ void interruptibly(Do act) {
     work.get();
   }
   if (is_interrupted) throw nb::python_error();
+}
+
+/// What became of the members of an ensemble: ends (members x state), how (RunEnd), energy errors, and why not to trust
+/// a member ("" where nothing speaks against it).
+using Propagated = nb::typed<nb::tuple, Array, std::vector<int>, Vector, std::vector<std::string>>;
+
+Propagated propagate_all(const Prepared& made, const Starts& starts, double duration, int threads, bool estimate) {
+  const std::size_t members = starts.shape(0), size = starts.shape(1);
+  const auto coordinates = static_cast<Eigen::Index>(size / 2);
+  std::vector<EnsembleMember> all;
+  for (std::size_t k = 0; k < members; ++k) {
+    const Eigen::Map<const Eigen::VectorXd> row(starts.data() + k * size, static_cast<Eigen::Index>(size));
+    all.push_back({made.subject, Motion(0, row.head(coordinates), row.tail(coordinates))});
+  }
+  std::vector<double> ends(starts.data(), starts.data() + members * size), errors(members);
+  std::vector<int> how(members);
+  std::vector<std::string> doubts(members);
+  interruptibly([&](const std::stop_token& stop) {
+    EnsembleSchedule schedule;
+    schedule.options = made.run;
+    schedule.duration = duration;
+    schedule.estimate = estimate;
+    schedule.threads = threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    schedule.stop = [&] { return stop.stop_requested(); };
+    propagate(all, schedule, [&](std::size_t k, const RunReport& report) {
+      how[k] = static_cast<int>(report.end);
+      errors[k] = report.energy_error.largest;
+      if (!report.warnings.empty()) doubts[k] = report.warnings.front();
+      if (report.last.q.size() == 0) return;
+      std::ranges::copy(state_of(report.last), ends.begin() + static_cast<std::ptrdiff_t>(k * size));
+    });
+  });
+  return nb::make_tuple(array_of(std::move(ends), size), how, vector_of(std::move(errors)), doubts);
 }
 
 }  // namespace
@@ -322,7 +384,7 @@ NB_MODULE(_core, module) {
   nb::class_<Result>(module, "Result")
       .def_ro("columns", &Result::columns)
       .def_ro("units", &Result::units)
-      .def_ro("roles", &Result::roles)
+      .def_ro("state", &Result::state)
       .def_ro("summary", &Result::summary)
       .def_prop_ro("events", [](const Result& result) { return result.recorder.events; })
       .def_prop_ro("ups", [](const Result& result) { return result.recorder.ups; })
@@ -334,81 +396,65 @@ NB_MODULE(_core, module) {
   module.def("simulate", &python::simulate, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
              nb::arg("python"), nb::arg("tell"));
 
+  using python::Moved;
   using python::Prepared;
   nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);
   nb::class_<Prepared>(module, "Prepared")
-      .def_prop_ro("columns", [](const Prepared& made) { return made.model.columns(); })
-      .def_prop_ro("inputs", [](const Prepared& made) { return made.model.input_names(); })
-      .def_prop_ro("coordinates", [](const Prepared& made) { return made.model.coordinates(); })
-      .def_prop_ro(
-          "start", [](const Prepared& made) { return python::vector_of(python::state_of(made.start)); },
-          nb::rv_policy::move);
-  module.def("prepare", &python::prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"));
+      .def_prop_ro("columns", [](const Prepared& made) { return made.subject->columns(); })
+      .def_prop_ro("state", [](const Prepared& made) { return python::state_columns(*made.subject); })
+      .def_prop_ro("inputs", [](const Prepared& made) { return python::model_of(made).input_names(); })
+      .def_ro("warnings", &Prepared::warnings);
+  module.def("prepare", &python::prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"),
+             nb::arg("remembers"));
 
-  nb::class_<Simulation>(module, "Simulation")
-      .def(
-          "__init__",
-          [](Simulation* self, const Prepared& made) { new (self) Simulation(made.model, made.start, made.options); },
-          nb::keep_alive<1, 2>())
-      .def(
-          "copy", [](const Simulation& self) { return Simulation(self); }, nb::keep_alive<0, 1>())
-      .def_prop_ro("time", &Simulation::time)
-      .def_prop_ro("steps", &Simulation::steps)
+  nb::class_<Moved>(module, "Simulation")
+      .def("__init__",
+           [](Moved* self, std::shared_ptr<const Prepared> made) {
+             new (self) Moved{made, Simulation(python::model_of(*made), made->start, made->options)};
+           })
+      .def("copy", [](const Moved& self) { return Moved(self); })
+      .def_prop_ro("time", [](const Moved& self) { return self.simulation.time(); })
+      .def_prop_ro("steps", [](const Moved& self) { return self.simulation.steps(); })
       .def_prop_ro(
-          "state", [](const Simulation& self) { return python::vector_of(python::state_of(self.motion())); },
+          "state", [](const Moved& self) { return python::vector_of(python::state_of(self.simulation.motion())); },
           nb::rv_policy::move)
       .def("advance_to",
-           [](Simulation& self, double time) {
+           [](Moved& self, double time) {
              python::interruptibly([&](const std::stop_token& stop) {
-               self.heed(stop);
-               self.advance_to(time);
+               self.simulation.heed(stop);
+               self.simulation.advance_to(time);
              });
            })
-      .def("at", [](Simulation& self, double time) { return python::vector_of(python::state_of(self.at(time))); })
-      .def("number", [](const Simulation& self, const std::string& column) { return self[column]; })
-      .def("hold", [](Simulation& self, const std::string& input, double value) { self.hold(input, value); })
-      .def_prop_ro(
-          "held",
-          [](const Simulation& self) {
-            const Eigen::VectorXd held = self.held();
-            return python::vector_of({held.data(), held.data() + held.size()});
-          },
-          nb::rv_policy::move)
+      .def("at", [](Moved& self, double time) { return python::vector_of(python::state_of(self.simulation.at(time))); })
+      .def("number", [](const Moved& self, const std::string& column) { return self.simulation[column]; })
+      .def("hold",
+           [](Moved& self, const std::vector<double>& inputs) {
+             self.simulation.hold(
+                 Eigen::Map<const Eigen::VectorXd>(inputs.data(), static_cast<Eigen::Index>(inputs.size())));
+           })
+      .def_prop_ro("held",
+                   [](const Moved& self) {
+                     const Eigen::VectorXd held = self.simulation.held();
+                     return std::vector<double>(held.data(), held.data() + held.size());
+                   })
       .def("linearize",
-           [](const Simulation& self) {
-             const auto [a, b] = self.linearize();
+           [](const Moved& self) {
+             const auto [a, b] = self.simulation.linearize();
              return std::pair(python::array_of(a), python::array_of(b));
            })
-      .def("save", [](const Simulation& self) { return python::vector_of(self.save().numbers); })
-      .def("resume", [](Simulation& self, const python::Numbers& saved) {
-        self.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
+      .def("save", [](const Moved& self) { return python::vector_of(self.simulation.save().numbers); })
+      .def("resume", [](Moved& self, const python::Numbers& saved) {
+        self.simulation.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
       });
 
-  module.def("propagate",
-             [](const Prepared& made, const python::Starts& starts, double duration,
-                int threads) -> nb::typed<nb::tuple, python::Array, python::Array, std::vector<int>, python::Vector> {
-               using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-               const Eigen::MatrixXd begins =
-                   Eigen::Map<const Rows>(starts.data(), static_cast<Eigen::Index>(starts.shape(0)),
-                                          static_cast<Eigen::Index>(starts.shape(1)));
-               Ends ends;
-               python::interruptibly([&](const std::stop_token& stop) {
-                 ends = propagate(made.model, begins,
-                                  {.duration = duration, .run = made.options, .threads = threads, .stop = stop});
-               });
-               std::vector<int> how(ends.how.begin(), ends.how.end());
-               const std::vector<double> errors(ends.energy_errors.data(),
-                                                ends.energy_errors.data() + ends.energy_errors.size());
-               return nb::make_tuple(python::array_of(Eigen::MatrixXd(ends.q)),
-                                     python::array_of(Eigen::MatrixXd(ends.v)), how, python::vector_of(errors));
-             });
+  module.def("propagate", &python::propagate_all);
 
   module.def("lyapunov",
              [](const Prepared& made, double duration,
                 int count) -> nb::typed<nb::tuple, python::Vector, python::Vector, double, double, double, double> {
                LyapunovSpectrum found;
                python::interruptibly([&](const std::stop_token& stop) {
-                 found = lyapunov(made.model, made.start,
+                 found = lyapunov(python::model_of(made), made.start,
                                   {.duration = duration, .count = count, .run = made.options, .stop = stop});
                });
                const auto numbers = [](const Eigen::VectorXd& x) {

@@ -54,7 +54,7 @@ def test_it_may_use_what_surrounds_it():
 
 def test_wrong_functions_are_named():
     with pytest.raises(
-        pendula.InputError, match=r"few: expected the arguments \(model, links\), got \['model'\]"
+        pendula.InputError, match=r"few: expected the arguments \(model, links\), got \(model\)"
     ):
 
         @pendula.model
@@ -77,3 +77,60 @@ def test_wrong_functions_are_named():
 
     with pytest.raises(pendula.InputError, match="lagrangian"):
         nothing().simulate(1.0)
+
+
+def test_a_name_has_one_meaning(tmp_path):
+    stiffness = 4.0
+
+    def potential(x):
+        return stiffness * x**2 / 2
+
+    def outer(stiffness):
+        def osc(model, links):
+            x = model.coordinate("x", "m")
+            model.lagrangian = model.rate(x) ** 2 / 2 - stiffness * x**2 / 2 - potential(x)
+
+        return osc
+
+    with pytest.raises(pendula.InputError, match="expected one meaning of stiffness in all functions"):
+        pendula.model(outer(16.0))
+    assert pendula.model(outer(4.0)).file.exists()
+
+
+def twice(function):
+    return lambda x: 2 * function(x)
+
+
+def test_decorators_and_changed_texts_are_refused(tmp_path, monkeypatch):
+    def plain(x):
+        return x**2
+
+    decorated = twice(plain)
+
+    @pendula.model
+    def fine(model, links):
+        x = model.coordinate("x", "m")
+        model.lagrangian = model.rate(x) ** 2 / 2 - plain(x)
+
+    with pytest.raises(pendula.InputError, match="by def"):
+
+        @pendula.model
+        def wrong(model, links):
+            x = model.coordinate("x", "m")
+            model.lagrangian = model.rate(x) ** 2 / 2 - decorated(x)
+
+    file = tmp_path / "changing.py"
+    text = "def osc(model, links):\n    x = model.coordinate('x', 'm')\n"
+    text += "    model.lagrangian = model.rate(x)**2 - {}*x**2\n"
+    file.write_text(text.format(4))
+    monkeypatch.syspath_prepend(tmp_path)
+    import changing
+
+    file.write_text(text.format(9))
+    with pytest.raises(pendula.InputError, match="osc: expected a function whose text has not changed"):
+        pendula.model(changing.osc)
+    file.write_text(text.format(4))
+    kept = pendula.model(changing.osc).file
+    before = kept.read_text()
+    kept.write_text("# changed")
+    assert pendula.model(changing.osc).file.read_text() == before

@@ -1,6 +1,7 @@
 """Runs of the package are those of the command line, with SciPy's names."""
 
 import csv
+import pickle
 import warnings
 from pathlib import Path
 
@@ -133,6 +134,53 @@ def test_wrong_arguments_are_named(given, message):
 def test_wrong_systems_are_named(make, message):
     with pytest.raises(pendula.InputError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"start": {"theta": 1.0, "theta_dot = 5.0 #": 0.0}},
+        {"start": {"theta = 1.0\n[[event]]\nname='z'\nwhen='t-.5'\n#": 3}},
+        {"theta": 1.0, "events": {"a": {"when": "t", "stop = true\n#": 1}}},
+        {"start": {"theta": 1.0, "": 1.0}},
+        {"start": {"theta": 1.0, "θ": 1.0}},
+        {"start": {"theta": 1.0, "a b": 1.0}},
+        {"start": {"theta": 1.0}, "theta": 2.0},
+        {"theta": 1.0, "accuracy": 0.0},
+        {"theta": 1.0, "events": {"a": 5}},
+        {"theta": 1.0, "events": ["theta_1"]},
+        {"start": [1.0]},
+        {"theta": "\U0001f600"},
+    ],
+)
+def test_keys_are_keys(given):
+    with pytest.raises(pendula.InputError, match=r"expected .* got |given twice|unknown key"):
+        pendula.Chain(links=2).simulate(1.0, **given)
+
+
+def test_arrays_are_kept_as_they_were():
+    masses = np.ones(2)
+    chain = pendula.Chain(masses=masses)
+    before = chain.simulate(1.0, theta=0.5).y
+    masses[1] = 100
+    run = chain.simulate(1.0, theta=0.5)
+    assert np.array_equal(run.y, before)
+    for array in (run.t, run.y, run.energy, run["theta_1"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 7
+    with pytest.raises(pendula.InputError, match="set: expected a key"):
+        pendula.Scenario("a.toml", {"run.step=0.1\n#": 0.01})
+
+
+def test_units_are_those_of_the_numbers():
+    run = pendula.Chain(links=1, units="natural").simulate(1.0, theta=0.5)
+    assert run.units[0] != "s" and run.units[run.columns.index("x_1")] != "m"
+    assert run.units[run.columns.index("theta_1")] == "rad"
+
+
+def test_failures_can_be_pickled():
+    failed = pickle.loads(pickle.dumps(pendula.RunFailed("no", None)))
+    assert str(failed) == "no" and failed.partial is None
 
 
 def test_what_is_no_value_is_a_type_error():

@@ -41,7 +41,7 @@ def test_inputs_are_held():
     cart.step(0.5, push=3.0)
     assert cart.inputs == {"push": 3.0} and cart.time == 0.5
     assert cart["x"] > 0
-    with pytest.raises(ValueError, match="input: expected one of push, got pull"):
+    with pytest.raises(ValueError, match="inputs: expected some of push, got pull"):
         cart.step(0.1, pull=1.0)
     with pytest.raises(ValueError, match="expected"):
         cart.hold(push=float("nan"))
@@ -74,7 +74,7 @@ def test_exponents_add_up_to_nothing():
 def test_members_are_simulations():
     starts = np.random.default_rng(3).uniform(-1, 1, (20, 2))
     ends = pendula.ensemble(DOUBLE, 2.0, {"theta": starts, "theta_dot_1": 0.5}, tolerance=1e-11)
-    assert ends.sizes == {"member": 20} and not ends["status"].values.any()
+    assert ends.sizes == {"member": 20} and (ends["run_status"] == "ok").all() and ends["run_trusted"].all()
     for k in (0, 7, 19):
         alone = pendula.Simulation(DOUBLE, {"theta": starts[k], "theta_dot": [0.5, 0]}, tolerance=1e-11)
         alone.advance_to(2.0)
@@ -110,15 +110,120 @@ def test_members_of_space_and_of_models():
         ),
         ({"theta": np.zeros((3, 2)), "theta_1": 1.0}, "start: theta_1 is given twice"),
         ({"theta": [[0, float("nan")]]}, "start: expected finite numbers for theta_2, got nan"),
-        ({"alpha": 1.0}, "start: expected one of theta_1, .*, got alpha"),
-        ({"theta": "ninety"}, "could not convert string to float"),
+        ({"alpha": 1.0}, "start: expected some of theta_1, .*, got alpha"),
+        ({"theta": "ninety"}, "start: theta: expected an array of numbers, got one of <U6"),
     ],
 )
 def test_wrong_starts_are_named(start, message):
     with pytest.raises(ValueError, match=message):
         pendula.ensemble(DOUBLE, 1.0, start)
-    with pytest.raises(TypeError, match="ensemble: expected the options of a run, got steps"):
-        pendula.ensemble(DOUBLE, 1.0, {}, steps=3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"steps": 3}, "ensemble: expected options among method, .*, got steps"),
+        ({"duration": -1.0}, r"duration: expected a number, not negative, got -1\.0"),
+        ({"duration": float("nan")}, "duration: expected a finite number, got nan"),
+        ({"duration": "1"}, "duration: expected a finite number, got '1'"),
+        ({"threads": -1}, "threads: expected how many"),
+        ({"start": [1, 2]}, "start: expected a mapping by names, got list"),
+        ({"system": "furuta"}, "system: expected a Chain or a Model, got str"),
+    ],
+)
+def test_wrong_ensembles_are_named(given, message):
+    with pytest.raises(pendula.InputError, match=message):
+        pendula.ensemble(**{"system": DOUBLE, "duration": 1.0, "start": {"theta": [[0.1, 0.2]]}, **given})
+
+
+def test_chaos_is_told_of_members():
+    with pytest.warns(pendula.TrustWarning, match="1 of 2 members cannot be trusted; member 1: "):
+        ends = pendula.ensemble(DOUBLE, 60.0, {"theta": [[0.1, 0.1], [2.5, 2.5]]})
+    assert ends["run_trusted"].values.tolist() == [True, False]
+    assert "run_trusted" not in pendula.ensemble(DOUBLE, 1.0, {"theta": [[0.1, 0.1]]}, estimate=False)
+
+
+# Of models whose names interleave, or end as rates do, and of chains in space.
+def test_every_order_is_that_of_names():
+    @pendula.model
+    def several(model, links):
+        names = ("a_1", "b_1", "a_2", "c_dot")
+        model.lagrangian = 0
+        for k, name in enumerate(names):
+            x = model.coordinate(name, "m")
+            model.lagrangian += model.rate(x) ** 2 / 2 - (k + 1) ** 2 * x**2 / 2
+            model.point(f"p{k}", (x, 0 * x))
+
+    starts = {"a_1": [1.0, 2.0], "b_1": [1.0, 2.0], "a_2": 1.0, "c_dot": 1.0}
+    ends = pendula.ensemble(several(), 1.0, starts)
+    for name, omega in (("a_1", 1), ("b_1", 2), ("a_2", 3), ("c_dot", 4)):
+        assert abs(ends[name].values[0] - np.cos(omega)) < 1e-7, name  # measured 4e-9
+    spatial = pendula.Chain(masses=[1, 2], space="spatial")
+    start = {"theta": [0.4, 0.5], "phi": [1.0, 2.0]}
+    run = spatial.simulate(1.0, **start)
+    simulation = pendula.Simulation(spatial, start).advance_to(1.0)
+    assert (
+        run.names
+        == simulation.names
+        == [*(f"{a}_{k}" for a in ("theta", "phi", "theta_dot", "phi_dot") for k in (1, 2))]
+    )
+    assert np.abs(run.y[:, -1] - simulation.state).max() < 1e-7  # measured 1e-9
+    assert all(np.array_equal(run[name], run.y[k]) for k, name in enumerate(run.names))
+
+
+def test_a_pole_has_no_linearization():
+    with pytest.raises(
+        pendula.InputError, match="linearize: expected a state where the equations are regular"
+    ):
+        pendula.linearize(pendula.Chain(links=1, space="spatial"))
+
+
+def test_a_pickle_knows_its_model(tmp_path):
+    file = tmp_path / "osc.py"
+    text = "def define(model, links):\n    x = model.coordinate('x', 'm')\n"
+    text += "    model.lagrangian = model.rate(x)**2/2 - {}*x**2/2\n"
+    file.write_text(text.format(4))
+    pickled = pickle.dumps(pendula.Simulation(pendula.Model(file), x=1.0))
+    assert pickle.loads(pickled).advance_to(0.1).time == 0.1
+    file.write_text(text.format(9))
+    with pytest.raises(pendula.InputError, match="expected the model that was pickled, got another one"):
+        pickle.loads(pickled)
+
+
+def test_one_thread_at_a_time():
+    simulation = pendula.Simulation(DOUBLE, theta=1.5, step=1e-3)
+    refused, done = [], threading.Event()
+
+    def read() -> None:
+        while not done.is_set():
+            try:
+                simulation.at(simulation.time / 2)
+                simulation.copy()
+            except RuntimeError as error:
+                refused.append(str(error))
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    ended = 0.0
+    while ended < 50:
+        try:
+            simulation.step(5.0)
+            ended += 5
+        except RuntimeError as error:
+            refused.append(str(error))
+    done.set()
+    thread.join()
+    assert set(refused) <= {"simulation: expected one thread at a time, got a second one"}
+
+
+def test_inputs_are_held_all_or_none():
+    simulation = pendula.Simulation(DOUBLE, theta=0.1)
+    with pytest.raises(pendula.InputError, match="got bogus"):
+        simulation.hold(torque_2=7.0, bogus=3.0)
+    with pytest.raises(pendula.InputError, match=r"torque_1: expected a finite number, got '3'"):
+        simulation.hold({"torque_2": 7.0, "torque_1": "3"})
+    assert simulation.inputs == {"torque_1": 0.0, "torque_2": 0.0}
+    assert simulation.hold({"torque_1": 1}, torque_2=2.0).inputs == {"torque_1": 1.0, "torque_2": 2.0}
 
 
 # Ctrl-C within a tenth of a second: seen 0.05 s; with room for a machine that does other things, too.

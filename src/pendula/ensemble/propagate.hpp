@@ -32,6 +32,7 @@ struct EnsembleSchedule {
   std::int64_t every = 1;  ///< steps from one look at the energy to the next
   /// Looked for in each member.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
+  bool estimate = false;           ///< whether to look at members again, and warn in their reports
   MemberMethod method = MemberMethod::asked;  ///< that of `options`, or the quickest that serves
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
@@ -62,7 +63,7 @@ inline void propagate(std::span<const EnsembleMember> members, const EnsembleSch
                         .options = schedule.options,
                         .duration = schedule.duration,
                         .every = schedule.every,
-                        .doubted = false,
+                        .doubted = schedule.estimate,
                         .events = schedule.events});
     }
     const std::vector<RunReport> reports = run_members(setups, schedule.stop, schedule.method);
