@@ -5,6 +5,7 @@
 #include <pendula/chain/space.hpp>
 #include <pendula/version.hpp>
 #include <sstream>
+#include <utility>
 
 #include "io/provenance.hpp"
 #include "io/summary.hpp"
@@ -40,9 +41,14 @@ Json columns(const Eigen::MatrixXd& matrix) {
   return array;
 }
 
+/// Adds a key that an object does not have. By json[key] it would look at all keys that it has: of long chains forever.
+void add(Json& json, std::string key, Json value) {
+  json.get_ref<Json::object_t&>().emplace_back(std::move(key), std::move(value));
+}
+
 /// Adds the numbers of all links by name, theta_1, theta_2, …
 void add_named(Json& json, const std::string& name, const Eigen::VectorXd& values) {
-  for (Eigen::Index i = 0; i < values.size(); ++i) json[name + "_" + std::to_string(i + 1)] = values[i];
+  for (Eigen::Index i = 0; i < values.size(); ++i) add(json, name + "_" + std::to_string(i + 1), values[i]);
 }
 
 /// The final state of a chain, by name, and in arrays with one element for each link.
@@ -54,7 +60,7 @@ Json to_json(const Snapshot& snapshot) {
   add_named(v, "theta", snapshot.theta_dot);
   add_named(v, "phi", snapshot.phi_dot);
   for (Eigen::Index i = 0; i < snapshot.bobs.cols(); ++i) {
-    points["bob_" + std::to_string(i + 1)] = to_array(snapshot.bobs.col(i));
+    add(points, "bob_" + std::to_string(i + 1), to_array(snapshot.bobs.col(i)));
   }
   Json json{{"t", snapshot.time}, {"q", q}, {"v", v}, {"points", points}, {"theta", to_array(snapshot.theta)}};
   if (!planar) json["phi"] = to_array(snapshot.phi);
@@ -74,7 +80,7 @@ Json to_json(const std::optional<NaturalUnits>& natural) {
 template <class Value>
 Json named(const std::vector<std::pair<std::string, Value>>& values) {
   Json json = Json::object();
-  for (const auto& [name, value] : values) json[name] = value;
+  for (const auto& [name, value] : values) add(json, name, value);
   return json;
 }
 
