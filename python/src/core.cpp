@@ -370,6 +370,7 @@ NB_MODULE(_core, module) {
   using namespace pendula;
   using python::Result;
 
+  nb::set_leak_warnings(false);  // of threads that run when Python ends: nobody can help that
   module.def("version", &pendula_version);
   module.def("instruction_set", &pendula_instruction_set);
   nb::exception<io::InputError>(module, "InputError", PyExc_ValueError);
