@@ -7,6 +7,7 @@ import math
 import os
 import re
 import sys
+import tomllib
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from . import _core
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 
 class TrustWarning(UserWarning):
@@ -65,7 +66,8 @@ class Solution:
     Arrays are read-only. An event at the very start or end of the run is none.
     """
 
-    def __init__(self, result: _core.Result) -> None:
+    def __init__(self, result: _core.Result, scenario: tuple[str, str, list[str]] | None = None) -> None:
+        self._scenario = scenario
         self.columns: list[str] = result.columns
         self.units: list[str] = result.units
         self.summary: dict[str, Any] = json.loads(result.summary)
@@ -103,6 +105,41 @@ class Solution:
         if not links:
             raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
         return links
+
+    def sol(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The motion at any times of the run, in any order, at the full order of the method.
+
+        The run is made again for it, by the same steps.
+
+        Parameters
+        ----------
+        t : float or (m,) array_like
+            In s.
+
+        Returns
+        -------
+        (coordinates + rates,) or (coordinates + rates, m) array
+            In the order of ``names``.
+        """
+        when = numbers("t", t)
+        if when.ndim > 1 or not np.all((when >= self.t[0]) & (when <= self.t[-1])):
+            raise _core.InputError(f"t: expected times from {self.t[0]} to {self.t[-1]} s, got {t!r}")
+        if self._scenario is None:
+            raise RuntimeError("sol: expected a solution of this process, got one that was not made here")
+        times, order = np.unique(when, return_inverse=True)
+        text, name, overrides = self._scenario
+        others = {*tomllib.loads(text).get("output", {}), *(one.split("=")[0][7:] for one in overrides)}
+        rows = [f"output.{key}=" for key in ("every", "interval") if key in others]
+        rows.append(f"output.times={(times - self.t[0]).tolist()}")
+        with plainly():
+            again = _core.simulate(text, name, [*overrides, *rows, "run.estimate=false"], *places(), tell)
+        states = again.take_rows()[:, self._state].T
+        return states[:, order.reshape(when.shape)]
+
+    @property
+    def nfev(self) -> int:
+        """Iterations on the stages of implicit steps, which evaluate the equations at all of them."""
+        return int(self.summary.get("newton_iterations") or 0)
 
     @property
     def energy(self) -> NDArray[np.float64]:
@@ -231,7 +268,7 @@ def run_text(text: str, name: str = "pendula", overrides: list[str] | None = Non
     """Runs a scenario's text; ``name`` stands for its file in messages."""
     with plainly():
         result = _core.simulate(text, name, overrides or [], *places(), tell)
-    solution = Solution(result)
+    solution = Solution(result, (text, name, overrides or []))
     warn(solution.summary["warnings"], stacklevel=4)
     if solution.status < 0:
         raise RunFailed(solution.message, solution)

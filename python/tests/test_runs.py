@@ -60,6 +60,21 @@ def test_a_solution_has_scipys_names():
         run["thetas"]
 
 
+def test_a_solution_is_known_at_any_time():
+    run = pendula.Chain(masses=[1, 2]).simulate(2.0, theta=[0.5, -0.2])
+    assert np.abs(run.sol(run.t[::-1]) - run.y[:, ::-1]).max() < 1e-12  # measured 0
+    fine = pendula.Chain(masses=[1, 2]).simulate(t=[0, 0.7, 2], theta=[0.5, -0.2], accuracy=1e-12)
+    assert np.abs(run.sol(0.7) - fine.y[:, 1]).max() < 1e-8  # measured 1.2e-10
+    assert run.sol([0.7, 0.7]).shape == (4, 2) and run.nfev > run.nsteps
+    stopped = pendula.Chain(links=1).simulate(
+        5.0, theta=0.5, step=0.1, events={"low": {"when": "theta_1", "stop": True}}
+    )
+    assert abs(stopped.sol(stopped.t[-1])[0]) < 1e-6
+    for wrong in (2.5, -0.1, [[0.1]], float("nan"), "0.1"):
+        with pytest.raises(pendula.InputError, match="t: expected"):
+            run.sol(wrong)
+
+
 def test_columns_of_a_model_have_their_names():
     run = pendula.Model("furuta").simulate(0.5)
     assert run.y.shape[0] == 4 and run["energy"].shape == run.t.shape
