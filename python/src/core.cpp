@@ -19,6 +19,7 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <pendula/ensemble/propagate.hpp>
@@ -33,11 +34,11 @@
 #include <variant>
 #include <vector>
 
-#include "cli/scenario_subject.hpp"
 #include "io/event_reader.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
+#include "io/scenario_run.hpp"
 #include "io/summary.hpp"
 
 namespace nb = nanobind;
@@ -49,13 +50,32 @@ using Array = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 using Vector = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
 using Tell = nb::typed<nb::callable, void(const std::string&)>;
 
-/// (rows x columns), which Python owns from now on.
-Array array_of(std::vector<double> numbers, std::size_t columns) {
+/// An array of numbers, which Python owns from now on.
+template <class ArrayType>
+ArrayType owned(std::vector<double> numbers, std::initializer_list<std::size_t> shape) {
   auto kept = std::make_unique<std::vector<double>>(std::move(numbers));
-  const std::size_t rows = columns == 0 ? 0 : kept->size() / columns;
   double* const data = kept->data();
   nb::capsule owner(kept.release(), [](void* made) noexcept { delete static_cast<std::vector<double>*>(made); });
-  return Array(data, {rows, columns}, owner);
+  return ArrayType(data, shape, owner);
+}
+Vector vector_of(std::vector<double> numbers) {
+  const std::size_t size = numbers.size();
+  return owned<Vector>(std::move(numbers), {size});
+}
+Vector vector_of(const Eigen::VectorXd& numbers) {
+  return vector_of(std::vector<double>(numbers.data(), numbers.data() + numbers.size()));
+}
+/// (rows x columns)
+Array array_of(std::vector<double> numbers, std::size_t columns) {
+  const std::size_t rows = columns == 0 ? 0 : numbers.size() / columns;
+  return owned<Array>(std::move(numbers), {rows, columns});
+}
+Array array_of(const Eigen::MatrixXd& matrix) {
+  const auto rows = static_cast<std::size_t>(matrix.rows()), columns = static_cast<std::size_t>(matrix.cols());
+  std::vector<double> numbers(rows * columns);
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::Map<RowMajor>(numbers.data(), matrix.rows(), matrix.cols()) = matrix;
+  return owned<Array>(std::move(numbers), {rows, columns});
 }
 
 /// Keeps rows and events of a run.
@@ -64,13 +84,11 @@ class Recorder : public Observer {
   void take(const Row& row) override { rows.insert(rows.end(), row.numbers.begin(), row.numbers.end()); }
   void happen(const EventRow& happened) override {
     events.push_back(happened.event.name);
-    ups.push_back(happened.up ? 1 : 0);
     event_rows.insert(event_rows.end(), happened.row.numbers.begin(), happened.row.numbers.end());
   }
 
   std::vector<double> rows, event_rows;
-  std::vector<std::string> events;
-  std::vector<int> ups;
+  std::vector<std::string> events;  ///< names, one for each of event_rows
 };
 
 /// Whether this thread is the one that Python's signal handlers run in. Others need not ask, and must not take Python's
@@ -98,16 +116,6 @@ class Interruption {
   Clock::time_point asked_ = Clock::now();
   bool hears_ = hears_signals(), is_requested_ = false;
 };
-
-template <class Space>
-void describe(const io::Scenario<Space>& scenario, const std::string& name, io::Summary& summary) {
-  summary.model = io::model_summary(name, scenario.chain, scenario.natural);
-  summary.final = io::snapshot(scenario.chain, summary.last);
-}
-void describe(const io::SystemScenario& scenario, const std::string& name, io::Summary& summary) {
-  summary.model = io::model_summary(name, *scenario.system);
-  summary.system = io::snapshot(*scenario.system, summary.last);
-}
 
 /// What came of a run.
 struct Result {
@@ -148,18 +156,9 @@ void name_columns(const Subject& subject, const std::optional<io::NaturalUnits>&
 template <class Scenario>
 void run(const Scenario& scenario, const std::string& name, const std::string& kernel_by,
          const std::function<bool()>& stop, Result& result) {
-  const std::shared_ptr<const Subject> subject = cli::subject_of(scenario);
-  const RunSetup setup{.subject = subject,
-                       .start = scenario.start,
-                       .options = scenario.run,
-                       .duration = scenario.duration,
-                       .every = scenario.every,
-                       .rows = scenario.rows,
-                       .accuracy = scenario.accuracy,
-                       .estimate = scenario.estimate,
-                       .events = io::events_of(scenario.events, subject, scenario.start)};
-  name_columns(*subject, scenario.natural, result);
-  Run run = cli::told_at_keys(scenario, name, [&] { return Run(setup); });
+  const RunSetup setup = io::setup_of(scenario);
+  name_columns(*setup.subject, scenario.natural, result);
+  Run run = io::told_at_keys(scenario, name, [&] { return Run(setup); });
   run.add(result.recorder);
   io::Summary summary;
   std::vector<std::string> warnings = scenario.warnings;
@@ -167,14 +166,9 @@ void run(const Scenario& scenario, const std::string& name, const std::string& k
   static_cast<RunReport&>(summary) = run.go(stop);
   for (std::string& warning : summary.warnings) warnings.push_back(std::move(warning));
   summary.warnings = std::move(warnings);
-  summary.accuracy = setup.accuracy.error;
-  summary.duration = setup.duration;
-  summary.every = setup.every;
-  summary.at = setup.rows;
-  for (const Event& event : setup.events) summary.event_names.push_back(event.name);
-  summary.ending = io::ending_of(summary, subject->coordinates(), summary.event_names);
+  io::describe(setup, summary);
   summary.kernel_by = kernel_by;
-  describe(scenario, name, summary);
+  io::describe(scenario, name, summary);
   result.summary = io::to_json(summary);
 }
 
@@ -271,7 +265,7 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& pr
                                         .step = run.step,
                                         .tolerance = run.tolerance,
                                         .remember = remembers};
-        std::shared_ptr<const Subject> subject = cli::subject_of(scenario);
+        std::shared_ptr<const Subject> subject = io::subject_of(scenario);
         Motion start = scenario.start;
         std::vector<std::string> warnings = scenario.warnings;
         return std::shared_ptr<Prepared>(
@@ -286,27 +280,25 @@ std::vector<double> state_of(const Motion& motion) {
   return state;
 }
 
-Vector vector_of(std::vector<double> numbers) {
-  auto kept = std::make_unique<std::vector<double>>(std::move(numbers));
-  const std::size_t size = kept->size();
-  double* const data = kept->data();
-  nb::capsule owner(kept.release(), [](void* made) noexcept { delete static_cast<std::vector<double>*>(made); });
-  return Vector(data, {size}, owner);
-}
-
-Array array_of(const Eigen::MatrixXd& matrix) {
-  std::vector<double> numbers;
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) numbers.push_back(matrix(i, j));
-  }
-  auto kept = std::make_unique<std::vector<double>>(std::move(numbers));
-  double* const data = kept->data();
-  nb::capsule owner(kept.release(), [](void* made) noexcept { delete static_cast<std::vector<double>*>(made); });
-  return Array(data, {static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols())}, owner);
-}
-
 using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Starts = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+/// While it lives, an interruption stops the simulation.
+class Heeding {
+ public:
+  Heeding(Simulation& simulation, Interruption& interruption) : simulation_(simulation) {
+    const auto ask = [](void* context) { return (*static_cast<Interruption*>(context))() ? 1 : 0; };
+    heed(ask, &interruption);
+  }
+  Heeding(const Heeding&) = delete;
+  Heeding& operator=(const Heeding&) = delete;
+  ~Heeding() { heed(nullptr, nullptr); }
+
+ private:
+  void heed(int (*ask)(void*), void* context) { pendula_heed(simulation_.get(), ask, context); }
+
+  Simulation& simulation_;
+};
 
 /// Asks Python from time to time, while others work, whether Ctrl-C was pressed; then `stop` is requested. Throws what
 /// the work does, and what Python has raised.
@@ -388,7 +380,6 @@ NB_MODULE(_core, module) {
       .def_ro("state", &Result::state)
       .def_ro("summary", &Result::summary)
       .def_prop_ro("events", [](const Result& result) { return result.recorder.events; })
-      .def_prop_ro("ups", [](const Result& result) { return result.recorder.ups; })
       .def("take_rows",
            [](Result& result) { return python::array_of(std::move(result.recorder.rows), result.columns.size()); })
       .def("take_event_rows", [](Result& result) {
@@ -421,10 +412,13 @@ NB_MODULE(_core, module) {
           nb::rv_policy::move)
       .def("advance_to",
            [](Moved& self, double time) {
-             python::interruptibly([&](const std::stop_token& stop) {
-               self.simulation.heed(stop);
+             python::Interruption interruption;
+             {
+               const nb::gil_scoped_release others_may_go_on;
+               const python::Heeding heeding(self.simulation, interruption);
                self.simulation.advance_to(time);
-             });
+             }
+             if (interruption.is_requested()) throw nb::python_error();
            })
       .def("at", [](Moved& self, double time) { return python::vector_of(python::state_of(self.simulation.at(time))); })
       .def("number", [](const Moved& self, const std::string& column) { return self.simulation[column]; })
@@ -458,10 +452,7 @@ NB_MODULE(_core, module) {
                  found = lyapunov(python::model_of(made), made.start,
                                   {.duration = duration, .count = count, .run = made.options, .stop = stop});
                });
-               const auto numbers = [](const Eigen::VectorXd& x) {
-                 return python::vector_of(std::vector<double>(x.data(), x.data() + x.size()));
-               };
-               return nb::make_tuple(numbers(found.exponents), numbers(found.errors), found.sum, found.duration,
-                                     found.ftle, found.megno);
+               return nb::make_tuple(python::vector_of(found.exponents), python::vector_of(found.errors), found.sum,
+                                     found.duration, found.ftle, found.megno);
              });
 }

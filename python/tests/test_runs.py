@@ -50,7 +50,7 @@ def test_a_solution_has_scipys_names():
     assert run.y.shape == (4, 21) and np.allclose(run.t, np.linspace(0, 2, 21), atol=1e-15)
     assert np.array_equal(run.y[:2], run["theta"]) and np.array_equal(run.y[2:], run["theta_dot"])
     assert run["x"].shape == (2, 21) and run.nsteps > 0
-    assert np.ptp(run.energy) < 1e-8 * 30  # measured 1.4e-9 J, of 29 J
+    assert np.ptp(run.energy) < 1e-7  # measured 1.5e-9 J, of 35 J
     assert run.t_events["low"].size == run.y_events["low"].shape[0] > 0
     assert run.y_events["low"].shape[1] == 4
     data = run.to_xarray()
@@ -84,7 +84,7 @@ def test_an_event_may_end_a_run():
     run = pendula.Chain(links=1).simulate(10.0, theta=0.5, events={"low": {"when": "theta_1", "stop": True}})
     assert run.status == 1 and run.success and "low" in run.message
     assert abs(run.t[-1] - run.t_events["low"][0]) < 1e-15
-    assert abs(run["theta_1"][-1]) < 1e-12  # measured 1e-16
+    assert abs(run["theta_1"][-1]) < 1e-12  # measured 1.9e-16
 
 
 def test_a_run_that_fails_keeps_its_rows():

@@ -22,8 +22,8 @@ def test_a_simulation_is_a_run():
     for _ in range(100):
         simulation.step(0.01)
     assert simulation.steps == 100
-    assert np.abs(simulation.state - run.y[:, -1]).max() < 1e-12  # measured 0
-    assert abs(simulation["energy"] - run.energy[-1]) < 1e-12
+    assert np.abs(simulation.state - run.y[:, -1]).max() < 1e-12  # measured 1.0e-14
+    assert abs(simulation["energy"] - run.energy[-1]) < 1e-12  # measured 1.8e-15
     assert np.abs(simulation.at(0.505) - DOUBLE.simulate(0.505, theta=[1.5, 1.0]).y[:, -1]).max() < 1e-8
 
 
@@ -58,17 +58,18 @@ def test_linearization_is_exact():
     A, B = pendula.linearize(DOUBLE)
     g = 9.81
     expected = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-2 * g, g, 0, 0], [2 * g, -2 * g, 0, 0]])
-    assert np.abs(A - expected).max() < 1e-12  # measured 7e-15
+    assert np.abs(A - expected).max() < 1e-12  # measured 0
     assert np.abs(B[2:] - [[1, -1], [-1, 2]]).max() < 1e-12
     A, _ = pendula.linearize(pendula.Chain(links=1), {"theta": "180 deg"})
     assert abs(A[1, 0] - g) < 1e-12
 
 
-def test_exponents_add_up_to_nothing():
-    found = pendula.lyapunov(DOUBLE, 100.0, theta="90 deg", step=0.01, stages=4)
+# Of a motion that is regular: one chaotic run's exponent is no truth.
+def test_exponents_are_those_of_a_regular_motion():
+    found = pendula.lyapunov(DOUBLE, 100.0, theta=0.1, step=0.01, stages=4)
     assert found.exponents.shape == (4,) and found.duration == 100.0
-    assert abs(found.sum) < 1e-10  # measured 1e-12
-    assert 0.5 < found.exponents[0] < 1.5  # measured 0.79
+    assert abs(found.sum) < 1e-10  # measured 7e-18
+    assert abs(found.exponents[0]) < 0.2  # measured 0.0019
     assert pendula.lyapunov(DOUBLE, 10.0, theta="90 deg", count=1).exponents.shape == (1,)
     with pytest.raises(ValueError, match="count: expected 1 to 4 exponents, got 7"):
         pendula.lyapunov(DOUBLE, 10.0, theta="90 deg", count=7)
@@ -84,7 +85,7 @@ def test_members_are_simulations():
         found = np.array(
             [ends[name].values[k] for name in ("theta_1", "theta_2", "theta_dot_1", "theta_dot_2")]
         )
-        assert np.abs(found - alone.state).max() < 1e-8  # measured 3e-10
+        assert np.abs(found - alone.state).max() < 1e-9  # measured 1.2e-11
     one, two = (pendula.ensemble(DOUBLE, 2.0, {"theta": starts}, threads=n) for n in (1, 2))
     assert one.equals(two)
 
@@ -96,7 +97,7 @@ def test_members_of_space_and_of_models():
     )
     alone = pendula.Simulation(spatial, {"theta": 0.4, "phi": [2, 3]}).advance_to(0.5)
     names = ["theta_1", "theta_2", "phi_1", "phi_2", "theta_dot_1", "theta_dot_2", "phi_dot_1", "phi_dot_2"]
-    assert np.abs([ends[name].values[1] for name in names] - alone.state).max() < 1e-7  # measured 3e-10
+    assert np.abs([ends[name].values[1] for name in names] - alone.state).max() < 1e-11  # measured 7.6e-14
     ends = pendula.ensemble(pendula.Model("cart_chain"), 0.5, {"theta": [0.1, 0.2, 0.3]})
     assert ends["x"].shape == (3,)
 
@@ -160,7 +161,7 @@ def test_every_order_is_that_of_names():
     starts = {"a_1": [1.0, 2.0], "b_1": [1.0, 2.0], "a_2": 1.0, "c_dot": 1.0}
     ends = pendula.ensemble(several(), 1.0, starts)
     for name, omega in (("a_1", 1), ("b_1", 2), ("a_2", 3), ("c_dot", 4)):
-        assert abs(ends[name].values[0] - np.cos(omega)) < 1e-7, name  # measured 4e-9
+        assert abs(ends[name].values[0] - np.cos(omega)) < 1e-11, name  # measured 1.7e-14
     spatial = pendula.Chain(masses=[1, 2], space="spatial")
     start = {"theta": [0.4, 0.5], "phi": [1.0, 2.0]}
     run = spatial.simulate(1.0, **start)
@@ -170,7 +171,7 @@ def test_every_order_is_that_of_names():
         == simulation.names
         == [*(f"{a}_{k}" for a in ("theta", "phi", "theta_dot", "phi_dot") for k in (1, 2))]
     )
-    assert np.abs(run.y[:, -1] - simulation.state).max() < 1e-7  # measured 1e-9
+    assert np.abs(run.y[:, -1] - simulation.state).max() < 1e-7  # measured 2.1e-9
     assert all(np.array_equal(run[name], run.y[k]) for k, name in enumerate(run.names))
 
 
@@ -242,7 +243,7 @@ def test_copies_do_not_keep_what_they_are_copies_of():
             before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     assert (
         resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
-    )  # kB; measured 300; with all 200,000
+    )  # kB; measured 128; with all of them 370,000
 
 
 def test_inputs_are_held_all_or_none():
@@ -297,4 +298,4 @@ def test_other_threads_go_on_meanwhile():
     ended = time.monotonic()
     stop.set()
     thread.join()
-    assert sum(began < at < ended for at in ticks) > 5  # of 0.1 s and more
+    assert sum(began < at < ended for at in ticks) > 5  # seen 257

@@ -27,7 +27,6 @@
 #include "cli/kept.hpp"
 #include "cli/members.hpp"
 #include "cli/ranks.hpp"
-#include "cli/scenario_subject.hpp"
 #include "cli/terminal_line.hpp"
 #include "io/ensemble_file.hpp"
 #include "io/ensemble_plan.hpp"
@@ -76,7 +75,7 @@ std::int64_t chunk_of(std::int64_t members, bool in_lanes) {
 
 template <class Scenario>
 Kept kept_of(const Scenario& scenario, const io::EnsemblePlan& plan) {
-  return Kept(plan, *subject_of(scenario), scenario.events);
+  return Kept(plan, *io::subject_of(scenario), scenario.events);
 }
 
 /// An ensemble from its scenario to its file.

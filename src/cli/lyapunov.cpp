@@ -13,11 +13,11 @@
 
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/scenario_subject.hpp"
 #include "io/file_format.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/line_file.hpp"
 #include "io/scenario.hpp"
+#include "io/scenario_run.hpp"
 
 namespace pendula::cli {
 namespace {
@@ -89,7 +89,7 @@ void print_text(const LyapunovSpectrum& found, const Statistics& statistics, con
 
 template <class Scenario>
 ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
-  const std::shared_ptr<const Subject> subject = subject_of(scenario);
+  const std::shared_ptr<const Subject> subject = io::subject_of(scenario);
   const InterruptGuard guard;
   const std::unique_ptr<Integrator> integrator = subject->make_integrator(scenario.run);
   const int all = 2 * static_cast<int>(scenario.start.q.size());
@@ -124,7 +124,7 @@ ExitStatus lyapunov(const LyapunovOptions& options) {
   if (options.output) io::require_format(*options.output, io::FileFormat::csv, "exponents as they converge");
   return std::visit(
       [&](const auto& scenario) {
-        return told_at_keys(scenario, options.scenario, [&] { return run(scenario, options); });
+        return io::told_at_keys(scenario, options.scenario, [&] { return run(scenario, options); });
       },
       read_scenario(options));
 }

@@ -174,7 +174,7 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
 
 template <class Scenario>
 RunReport MemberRuns::run_alone(const Scenario& scenario, RunSetup setup) const {
-  Run one = told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
+  Run one = io::told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
   return one.go([&] { return guard_.interrupted(); });
 }
 
@@ -184,7 +184,7 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
   const auto add = [&](const auto& scenario) {
     const RunReport& report = member.report;
     if (report.end == RunEnd::stopped) throw Interrupted();
-    const std::shared_ptr<const Subject> subject = subject_of(scenario);
+    const std::shared_ptr<const Subject> subject = io::subject_of(scenario);
     std::vector<std::string> events;
     events.reserve(scenario.events.size());
     for (const io::EventPlan& event : scenario.events) events.push_back(event.name);
@@ -213,8 +213,8 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
 template <class Scenario>
 LyapunovSpectrum MemberRuns::leading_exponent(const Scenario& scenario) const {
   const double step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  LyapunovRun found = told_at_keys(scenario, scenarios_.text().name, [&] {
-    const auto integrator = subject_of(scenario)->make_integrator(scenario.run);
+  LyapunovRun found = io::told_at_keys(scenario, scenarios_.text().name, [&] {
+    const auto integrator = io::subject_of(scenario)->make_integrator(scenario.run);
     return find_lyapunov_spectrum(
         *integrator, scenario.start, step, scenario.duration, 1, [](const LyapunovProgress&) {},
         [&] { return guard_.interrupted(); });

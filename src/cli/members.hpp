@@ -17,11 +17,11 @@
 
 #include "cli/interrupt.hpp"
 #include "cli/kept.hpp"
-#include "cli/scenario_subject.hpp"
 #include "io/ensemble_plan.hpp"
 #include "io/event_reader.hpp"
 #include "io/journal.hpp"
 #include "io/scenario.hpp"
+#include "io/scenario_run.hpp"
 
 namespace pendula::cli {
 
@@ -31,7 +31,7 @@ struct Interrupted {};
 /// The setup of a member's run, without events. Trials for an accuracy are made only if one is asked for.
 template <class Scenario>
 RunSetup member_setup(const Scenario& scenario) {
-  return {.subject = subject_of(scenario),
+  return {.subject = io::subject_of(scenario),
           .start = scenario.start,
           .options = scenario.run,
           .duration = scenario.duration,

@@ -11,7 +11,6 @@
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/run.hpp>
-#include <pendula/run/system_subject.hpp>
 #include <pendula/version.hpp>
 #include <stdexcept>
 #include <string>
@@ -25,14 +24,13 @@
 #include "cli/output_files.hpp"
 #include "cli/progress.hpp"
 #include "cli/run_source.hpp"
-#include "cli/scenario_subject.hpp"
 #include "io/event_file.hpp"
-#include "io/event_reader.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/natural_units.hpp"
 #include "io/run_file.hpp"
 #include "io/scenario.hpp"
+#include "io/scenario_run.hpp"
 #include "io/summary.hpp"
 #include "view/page.hpp"
 #include "view/scene.hpp"
@@ -47,17 +45,6 @@ view::Scene page_scene(const io::Scenario<Space>& scenario) {
 }
 view::Scene page_scene(const io::SystemScenario& scenario) {
   return view::scene_of(*scenario.system);
-}
-
-/// The description of a subject for a summary.
-template <class Space>
-void describe(const io::Scenario<Space>& scenario, const std::string& file, const Motion& last, io::Summary& summary) {
-  summary.model = io::model_summary(file, scenario.chain, scenario.natural);
-  summary.final = io::snapshot(scenario.chain, last);
-}
-void describe(const io::SystemScenario& scenario, const std::string& file, const Motion& last, io::Summary& summary) {
-  summary.model = io::model_summary(file, *scenario.system);
-  summary.system = io::snapshot(*scenario.system, last);
 }
 
 std::vector<std::string> event_names(const RunSetup& setup) {
@@ -106,7 +93,7 @@ class RunSession {
       : setup_(std::move(setup)),
         options_(options),
         from_(checkpoint_of(source, setup_.start.time + setup_.duration)),
-        run_(told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
+        run_(io::told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
         origin_(origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
@@ -130,13 +117,8 @@ class RunSession {
     io::Summary summary;
     if (page_) page_->begin_run(options_.copies > 0 ? "start" : "");
     static_cast<RunReport&>(summary) = from_ ? go_on(interrupted) : run_.go(interrupted);
-    summary.accuracy = setup_.accuracy.error;
-    summary.duration = setup_.duration;
-    summary.every = setup_.every;
-    summary.at = setup_.rows;
-    summary.event_names = event_names(setup_);
+    io::describe(setup_, summary);
     summary.event_file = options_.events;
-    summary.ending = io::ending_of(summary, setup_.subject->coordinates(), summary.event_names);
     if (page_) finish_page(interrupted, summary);
     if (options_.video) make_film(summary);
     if (summary.end == RunEnd::stopped) tell_how_to_go_on(summary);
@@ -292,22 +274,12 @@ ExitStatus simulate(const SimulateOptions& options) {
   const io::AnyScenario any = io::parse_scenario(source.text.text, source.text.name, source.overrides, find);
   return std::visit(
       [&](const auto& scenario) {
-        const std::shared_ptr<const Subject> subject = subject_of(scenario);
-        const RunSetup setup{.subject = subject,
-                             .start = scenario.start,
-                             .options = scenario.run,
-                             .duration = scenario.duration,
-                             .every = scenario.every,
-                             .rows = scenario.rows,
-                             .accuracy = scenario.accuracy,
-                             .estimate = scenario.estimate,
-                             .checkpoint = scenario.checkpoint,
-                             .events = io::events_of(scenario.events, subject, scenario.start)};
+        const RunSetup setup = io::setup_of(scenario);
         check_events(options, setup);
         RunSession session(setup, scene_of(scenario, source), scenario, source, model, options);
         io::Summary summary = session.run();
         summary.kernel_by = kernel_by;
-        describe(scenario, options.resume ? source.text.name : options.scenario, summary.last, summary);
+        io::describe(scenario, options.resume ? source.text.name : options.scenario, summary);
         session.conclude(summary);
         std::ostream& out = options.output == "-" ? std::cerr : std::cout;
         if (options.json) {

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/run.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "io/event_reader.hpp"
+#include "io/input_error.hpp"
+#include "io/scenario.hpp"
+#include "io/summary.hpp"
+
+/// From scenarios to runs, and from their reports to summaries.
+namespace pendula::io {
+
+/// The subject of a scenario.
+template <class Space>
+std::shared_ptr<const Subject> subject_of(const Scenario<Space>& scenario) {
+  return std::make_shared<ChainSubject<Space>>(scenario.chain);
+}
+inline std::shared_ptr<const Subject> subject_of(const SystemScenario& scenario) {
+  return scenario.system;
+}
+
+/// The run that a scenario asks for. Throws InputError if its events cannot be read.
+template <class ScenarioType>
+RunSetup setup_of(const ScenarioType& scenario) {
+  const std::shared_ptr<const Subject> subject = subject_of(scenario);
+  return {.subject = subject,
+          .start = scenario.start,
+          .options = scenario.run,
+          .duration = scenario.duration,
+          .every = scenario.every,
+          .rows = scenario.rows,
+          .accuracy = scenario.accuracy,
+          .estimate = scenario.estimate,
+          .checkpoint = scenario.checkpoint,
+          .events = events_of(scenario.events, subject, scenario.start)};
+}
+
+/// Calls act(). Errors of the runtime about an option, `key: …`, become InputError with the place of that key.
+template <class Do>
+auto told_at_keys(const RunPlan& plan, const std::string& file, Do act) {
+  try {
+    return act();
+  } catch (const NoKernel& error) {
+    throw InputError(plan.places.at("links") + ": " + error.what());
+  } catch (const std::invalid_argument& error) {
+    const std::string what = error.what();
+    const std::size_t colon = std::min(what.find(':'), what.size());
+    const auto place = plan.places.find(what.substr(0, colon));
+    throw InputError(place == plan.places.end() ? file + ": " + what : place->second + what.substr(colon));
+  }
+}
+
+/// Adds to a summary, which has the report of a run, what was asked for and how the run ended.
+inline void describe(const RunSetup& setup, Summary& summary) {
+  summary.accuracy = setup.accuracy.error;
+  summary.duration = setup.duration;
+  summary.every = setup.every;
+  summary.at = setup.rows;
+  summary.event_names.clear();
+  for (const Event& event : setup.events) summary.event_names.push_back(event.name);
+  summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names);
+}
+
+/// Adds what moved, by a scenario in `file`, and its last state.
+template <class Space>
+void describe(const Scenario<Space>& scenario, const std::string& file, Summary& summary) {
+  summary.model = model_summary(file, scenario.chain, scenario.natural);
+  summary.final = snapshot(scenario.chain, summary.last);
+}
+inline void describe(const SystemScenario& scenario, const std::string& file, Summary& summary) {
+  summary.model = model_summary(file, *scenario.system);
+  summary.system = snapshot(*scenario.system, summary.last);
+}
+
+}  // namespace pendula::io
