@@ -355,17 +355,11 @@ Propagated propagate_all(const Prepared& made, const Starts& starts, double dura
   return nb::make_tuple(array_of(std::move(ends), size), how, vector_of(std::move(errors)), doubts);
 }
 
-}  // namespace
-}  // namespace pendula::python
-
-NB_MODULE(_core, module) {
-  using namespace pendula;
-  using python::Result;
-
+void define(nb::module_& module) {
   nb::set_leak_warnings(false);  // of threads that run when Python ends: nobody can help that
   module.def("version", &pendula_version);
   module.def("instruction_set", &pendula_instruction_set);
-  nb::exception<io::InputError>(module, "InputError", PyExc_ValueError);
+  nb::exception<io::InputError>(module, "InputError", PyExc_ValueError);  // NOLINT(bugprone-unused-raii)
   nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
     try {
       std::rethrow_exception(thrown);
@@ -380,47 +374,42 @@ NB_MODULE(_core, module) {
       .def_ro("state", &Result::state)
       .def_ro("summary", &Result::summary)
       .def_prop_ro("events", [](const Result& result) { return result.recorder.events; })
-      .def("take_rows",
-           [](Result& result) { return python::array_of(std::move(result.recorder.rows), result.columns.size()); })
-      .def("take_event_rows", [](Result& result) {
-        return python::array_of(std::move(result.recorder.event_rows), result.columns.size());
-      });
-  module.def("simulate", &python::simulate, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
+      .def("take_rows", [](Result& result) { return array_of(std::move(result.recorder.rows), result.columns.size()); })
+      .def("take_event_rows",
+           [](Result& result) { return array_of(std::move(result.recorder.event_rows), result.columns.size()); });
+  module.def("simulate", &simulate, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
              nb::arg("python"), nb::arg("tell"));
 
-  using python::Moved;
-  using python::Prepared;
-  nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);
+  nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);  // NOLINT(bugprone-unused-raii)
   nb::class_<Prepared>(module, "Prepared")
       .def_prop_ro("columns", [](const Prepared& made) { return made.subject->columns(); })
-      .def_prop_ro("state", [](const Prepared& made) { return python::state_columns(*made.subject); })
-      .def_prop_ro("inputs", [](const Prepared& made) { return python::model_of(made).input_names(); })
+      .def_prop_ro("state", [](const Prepared& made) { return state_columns(*made.subject); })
+      .def_prop_ro("inputs", [](const Prepared& made) { return model_of(made).input_names(); })
       .def_ro("warnings", &Prepared::warnings);
-  module.def("prepare", &python::prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"),
+  module.def("prepare", &prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"),
              nb::arg("remembers"));
 
   nb::class_<Moved>(module, "Simulation")
       .def("__init__",
-           [](Moved* self, std::shared_ptr<const Prepared> made) {
-             new (self) Moved{made, Simulation(python::model_of(*made), made->start, made->options)};
+           [](Moved* self, const std::shared_ptr<const Prepared>& made) {
+             new (self) Moved{made, Simulation(model_of(*made), made->start, made->options)};
            })
       .def("copy", [](const Moved& self) { return Moved(self); })
       .def_prop_ro("time", [](const Moved& self) { return self.simulation.time(); })
       .def_prop_ro("steps", [](const Moved& self) { return self.simulation.steps(); })
       .def_prop_ro(
-          "state", [](const Moved& self) { return python::vector_of(python::state_of(self.simulation.motion())); },
-          nb::rv_policy::move)
+          "state", [](const Moved& self) { return vector_of(state_of(self.simulation.motion())); }, nb::rv_policy::move)
       .def("advance_to",
            [](Moved& self, double time) {
-             python::Interruption interruption;
+             Interruption interruption;
              {
                const nb::gil_scoped_release others_may_go_on;
-               const python::Heeding heeding(self.simulation, interruption);
+               const Heeding heeding(self.simulation, interruption);
                self.simulation.advance_to(time);
              }
              if (interruption.is_requested()) throw nb::python_error();
            })
-      .def("at", [](Moved& self, double time) { return python::vector_of(python::state_of(self.simulation.at(time))); })
+      .def("at", [](Moved& self, double time) { return vector_of(state_of(self.simulation.at(time))); })
       .def("number", [](const Moved& self, const std::string& column) { return self.simulation[column]; })
       .def("hold",
            [](Moved& self, const std::vector<double>& inputs) {
@@ -435,24 +424,31 @@ NB_MODULE(_core, module) {
       .def("linearize",
            [](const Moved& self) {
              const auto [a, b] = self.simulation.linearize();
-             return std::pair(python::array_of(a), python::array_of(b));
+             return std::pair(array_of(a), array_of(b));
            })
-      .def("save", [](const Moved& self) { return python::vector_of(self.simulation.save().numbers); })
-      .def("resume", [](Moved& self, const python::Numbers& saved) {
+      .def("save", [](const Moved& self) { return vector_of(self.simulation.save().numbers); })
+      .def("resume", [](Moved& self, const Numbers& saved) {
         self.simulation.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
       });
 
-  module.def("propagate", &python::propagate_all);
+  module.def("propagate", &propagate_all);
 
   module.def("lyapunov",
              [](const Prepared& made, double duration,
-                int count) -> nb::typed<nb::tuple, python::Vector, python::Vector, double, double, double, double> {
+                int count) -> nb::typed<nb::tuple, Vector, Vector, double, double, double, double> {
                LyapunovSpectrum found;
-               python::interruptibly([&](const std::stop_token& stop) {
-                 found = lyapunov(python::model_of(made), made.start,
+               interruptibly([&](const std::stop_token& stop) {
+                 found = lyapunov(model_of(made), made.start,
                                   {.duration = duration, .count = count, .run = made.options, .stop = stop});
                });
-               return nb::make_tuple(python::vector_of(found.exponents), python::vector_of(found.errors), found.sum,
-                                     found.duration, found.ftle, found.megno);
+               return nb::make_tuple(vector_of(found.exponents), vector_of(found.errors), found.sum, found.duration,
+                                     found.ftle, found.megno);
              });
+}
+
+}  // namespace
+}  // namespace pendula::python
+
+NB_MODULE(_core, module) {
+  pendula::python::define(module);
 }
