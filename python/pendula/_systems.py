@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -26,12 +27,12 @@ def _drives(given: object) -> list[dict[str, object]]:
     return copy.deepcopy(drives)
 
 
-class System:
+class System(ABC):
     """What chains and models have in common: how they are run."""
 
+    @abstractmethod
     def tables(self) -> Tables:
         """Those of a scenario that say what moves."""
-        raise NotImplementedError
 
     def at_zero(self) -> dict[str, object]:
         """The start where all coordinates are 0."""

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pendula
+import pendula._ensemble
 import pendula._runs
 import pendula._simulation
 import pendula._systems
@@ -12,7 +13,9 @@ import pytest
 
 
 @pytest.mark.parametrize(
-    "module", [pendula, pendula._runs, pendula._systems, pendula._simulation], ids=lambda m: m.__name__
+    "module",
+    [pendula, pendula._ensemble, pendula._runs, pendula._systems, pendula._simulation],
+    ids=lambda m: m.__name__,
 )
 def test_examples_of_docstrings(module):
     assert doctest.testmod(module).failed == 0
