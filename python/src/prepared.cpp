@@ -1,0 +1,109 @@
+#include "prepared.hpp"
+
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <pendula/run/system_subject.hpp>
+#include <stdexcept>
+#include <utility>
+#include <variant>
+
+#include "bindings.hpp"
+#include "io/kernel_cache.hpp"
+#include "io/scenario_run.hpp"
+
+namespace pendula::python {
+namespace {
+
+template <class Space>
+Model model_of(const io::Scenario<Space>& scenario) {
+  return Model(scenario.chain);
+}
+Model model_of(const io::SystemScenario& scenario) {
+  const PlainSystem numbers = scenario.system->numbers().plain();
+  if (!numbers.sines.empty()) throw std::invalid_argument("drives: expected none here, inputs may be held instead");
+  std::size_t count = 0;
+  for (const auto size : scenario.system->info().parameter_sizes) count += static_cast<std::size_t>(size);
+  return Model(pendula_model_of_table(&scenario.system->table(), numbers.parameters, count, numbers.inputs,
+                                      scenario.system->info().inputs.size()));
+}
+
+/// Columns of the numbers of a role in the order of a motion: of a chain all theta, then all phi; of another system as
+/// its columns come.
+std::vector<std::size_t> columns_of(const Subject& subject, Role role) {
+  std::vector<std::size_t> columns;
+  for (const Quantity& quantity : subject.quantities()) {
+    if (quantity.role != role) continue;
+    for (std::size_t k = 0; k < quantity.size(); ++k) columns.push_back(quantity.column(k));
+  }
+  if (dynamic_cast<const SystemSubject*>(&subject) != nullptr) std::ranges::sort(columns);
+  return columns;
+}
+
+std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& program, const std::string& python,
+                                  const Tell& tell, bool remembers) {
+  const nb::gil_scoped_release others_may_go_on;
+  Models models(program, python, tell);
+  io::AnyScenario any = io::parse_scenario(text, "pendula", {}, models.finder());
+  return std::visit(
+      [&](const auto& scenario) {
+        const RunOptions& run = scenario.run;
+        const SimulationOptions options{.method = run.method,
+                                        .stages = scenario.places.contains("stages") ? run.stages : 0,
+                                        .form = run.form,
+                                        .solver = run.solver,
+                                        .iteration = run.iteration,
+                                        .step = run.step,
+                                        .tolerance = run.tolerance,
+                                        .remember = remembers};
+        std::shared_ptr<const Subject> subject = io::subject_of(scenario);
+        Motion start = scenario.start;
+        std::vector<std::string> warnings = scenario.warnings;
+        return std::shared_ptr<Prepared>(
+            new Prepared{std::move(any), std::move(subject), std::move(start), options, run, std::move(warnings)});
+      },
+      any);
+}
+
+}  // namespace
+
+Models::Models(const std::string& program, std::string python, const Tell& tell)
+    : toolchain_(io::Toolchain::of(program)), tell_(tell) {
+  toolchain_.python = std::move(python);
+}
+
+io::FindSystem Models::finder() {
+  return [this](const std::string& model, std::optional<int> links, const std::filesystem::path& folder) {
+    const io::ModelKernel kernel = io::find_kernel(model, links, folder, toolchain_, [&](const std::string& what) {
+      const nb::gil_scoped_acquire lock;
+      tell_(what);
+    });
+    by_ = kernel.by();
+    return kernel.table;
+  };
+}
+
+Model model_of(const Prepared& made) {
+  return std::visit([](const auto& scenario) { return model_of(scenario); }, made.scenario);
+}
+
+std::vector<std::size_t> state_columns(const Subject& subject) {
+  std::vector<std::size_t> columns = columns_of(subject, Role::coordinate);
+  for (const std::size_t column : columns_of(subject, Role::rate)) columns.push_back(column);
+  return columns;
+}
+
+void define_prepared(nb::module_& module) {
+  nb::class_<Prepared>(module, "Prepared")
+      .def_prop_ro("columns", [](const Prepared& made) { return made.subject->columns(); })
+      .def_prop_ro("state", [](const Prepared& made) { return state_columns(*made.subject); })
+      .def_prop_ro("inputs", [](const Prepared& made) { return model_of(made).input_names(); })
+      .def_ro("warnings", &Prepared::warnings);
+  module.def("prepare", &prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"),
+             nb::arg("remembers"));
+}
+
+}  // namespace pendula::python

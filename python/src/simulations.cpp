@@ -1,0 +1,107 @@
+// Simulations, step by step, and what is known of motions nearby.
+
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <pendula/pendula.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <pendula/pendula.hpp>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "interruption.hpp"
+#include "prepared.hpp"
+
+namespace pendula::python {
+namespace {
+
+/// A simulation, and what it needs; copies share that.
+struct Moved {
+  std::shared_ptr<const Prepared> made;
+  Simulation simulation;
+};
+
+/// While it lives, an interruption stops the simulation.
+class Heeding {
+ public:
+  Heeding(Simulation& simulation, Interruption& interruption) : simulation_(simulation) {
+    const auto ask = [](void* context) { return (*static_cast<Interruption*>(context))() ? 1 : 0; };
+    heed(ask, &interruption);
+  }
+  Heeding(const Heeding&) = delete;
+  Heeding& operator=(const Heeding&) = delete;
+  ~Heeding() { heed(nullptr, nullptr); }
+
+ private:
+  void heed(int (*ask)(void*), void* context) { pendula_heed(simulation_.get(), ask, context); }
+
+  Simulation& simulation_;
+};
+
+}  // namespace
+
+void define_simulations(nb::module_& module) {
+  nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);  // NOLINT(bugprone-unused-raii)
+  nb::class_<Moved>(module, "Simulation")
+      .def("__init__",
+           [](Moved* self, const std::shared_ptr<const Prepared>& made) {
+             new (self) Moved{made, Simulation(model_of(*made), made->start, made->options)};
+           })
+      .def("copy", [](const Moved& self) { return Moved(self); })
+      .def_prop_ro("time", [](const Moved& self) { return self.simulation.time(); })
+      .def_prop_ro("steps", [](const Moved& self) { return self.simulation.steps(); })
+      .def_prop_ro(
+          "state", [](const Moved& self) { return vector_of(state_of(self.simulation.motion())); }, nb::rv_policy::move)
+      .def("advance_to",
+           [](Moved& self, double time) {
+             Interruption interruption;
+             {
+               const nb::gil_scoped_release others_may_go_on;
+               const Heeding heeding(self.simulation, interruption);
+               self.simulation.advance_to(time);
+             }
+             if (interruption.is_requested()) throw nb::python_error();
+           })
+      .def("at", [](Moved& self, double time) { return vector_of(state_of(self.simulation.at(time))); })
+      .def("number", [](const Moved& self, const std::string& column) { return self.simulation[column]; })
+      .def("hold",
+           [](Moved& self, const std::vector<double>& inputs) {
+             self.simulation.hold(
+                 Eigen::Map<const Eigen::VectorXd>(inputs.data(), static_cast<Eigen::Index>(inputs.size())));
+           })
+      .def_prop_ro("held",
+                   [](const Moved& self) {
+                     const Eigen::VectorXd held = self.simulation.held();
+                     return std::vector<double>(held.data(), held.data() + held.size());
+                   })
+      .def("linearize",
+           [](const Moved& self) {
+             const auto [a, b] = self.simulation.linearize();
+             return std::pair(array_of(a), array_of(b));
+           })
+      .def("save", [](const Moved& self) { return vector_of(self.simulation.save().numbers); })
+      .def("resume", [](Moved& self, const Numbers& saved) {
+        self.simulation.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
+      });
+  module.def("lyapunov",
+             [](const Prepared& made, double duration,
+                int count) -> nb::typed<nb::tuple, Vector, Vector, double, double, double, double> {
+               LyapunovSpectrum found;
+               interruptibly([&](const std::stop_token& stop) {
+                 found = lyapunov(model_of(made), made.start,
+                                  {.duration = duration, .count = count, .run = made.options, .stop = stop});
+               });
+               return nb::make_tuple(vector_of(found.exponents), vector_of(found.errors), found.sum, found.duration,
+                                     found.ftle, found.megno);
+             });
+}
+
+}  // namespace pendula::python
