@@ -11,6 +11,7 @@ Units are SI, angles radians, unless a system says ``units="natural"``.
 
 from ._core import InputError, instruction_set
 from ._core import version as _version
+from ._derivatives import Derivatives, Gradient, differentiate
 from ._ensemble import ensemble
 from ._functions import ModelFunction, model
 from ._runs import RunFailed, Solution, TrustWarning
@@ -24,6 +25,8 @@ InputError.__doc__ = (
 
 __all__ = [
     "Chain",
+    "Derivatives",
+    "Gradient",
     "InputError",
     "Lyapunov",
     "Model",
@@ -34,6 +37,7 @@ __all__ = [
     "Solution",
     "TrustWarning",
     "__version__",
+    "differentiate",
     "ensemble",
     "instruction_set",
     "linearize",

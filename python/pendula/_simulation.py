@@ -54,7 +54,7 @@ class Beginning(NamedTuple):
         if self.model_file is not None and _hash(self.model_file) != self.model_hash:
             raise InputError(f"{self.model_file}: expected the model that was pickled, got another one")
         with plainly():
-            return _core.prepare(self.scenario, *places(), tell, self.remember)
+            return _core.prepare(self.scenario, "pendula", [], *places(), tell, self.remember)
 
 
 def _hash(file: object) -> str | None:

@@ -10,5 +10,6 @@ void define_prepared(nanobind::module_& module);
 void define_runs(nanobind::module_& module);
 void define_simulations(nanobind::module_& module);
 void define_ensembles(nanobind::module_& module);
+void define_derivatives(nanobind::module_& module);
 
 }  // namespace pendula::python

@@ -28,4 +28,5 @@ NB_MODULE(_core, module) {
   python::define_prepared(module);
   python::define_simulations(module);
   python::define_ensembles(module);
+  python::define_derivatives(module);
 }

@@ -11,6 +11,7 @@
 #include <utility>
 #include <variant>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario_run.hpp"
@@ -43,11 +44,12 @@ std::vector<std::size_t> columns_of(const Subject& subject, Role role) {
   return columns;
 }
 
-std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& program, const std::string& python,
-                                  const Tell& tell, bool remembers) {
+std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& name,
+                                  const std::vector<std::string>& overrides, const std::string& program,
+                                  const std::string& python, const Tell& tell, bool remembers) {
   const nb::gil_scoped_release others_may_go_on;
   Models models(program, python, tell);
-  io::AnyScenario any = io::parse_scenario(text, "pendula", {}, models.finder());
+  io::AnyScenario any = io::parse_scenario(text, name, overrides, models.finder());
   return std::visit(
       [&](const auto& scenario) {
         const RunOptions& run = scenario.run;
@@ -101,9 +103,12 @@ void define_prepared(nb::module_& module) {
       .def_prop_ro("columns", [](const Prepared& made) { return made.subject->columns(); })
       .def_prop_ro("state", [](const Prepared& made) { return state_columns(*made.subject); })
       .def_prop_ro("inputs", [](const Prepared& made) { return model_of(made).input_names(); })
+      .def_prop_ro(
+          "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
+      .def_prop_ro("time", [](const Prepared& made) { return made.start.time; })
       .def_ro("warnings", &Prepared::warnings);
-  module.def("prepare", &prepare, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"),
-             nb::arg("remembers"));
+  module.def("prepare", &prepare, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
+             nb::arg("python"), nb::arg("tell"), nb::arg("remembers"));
 }
 
 }  // namespace pendula::python

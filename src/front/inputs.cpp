@@ -5,10 +5,9 @@
 #include <cstddef>
 #include <pendula/chain/chain.hpp>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/subject_kinds.hpp>
 #include <stdexcept>
 #include <utility>
-
-#include "front/subject_kinds.hpp"
 
 namespace pendula::front {
 namespace {

@@ -3,37 +3,15 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cstddef>
-#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
-#include <pendula/run/library.hpp>
-#include <pendula/run/no_kernel.hpp>
+#include <pendula/run/subject_model.hpp>
 #include <pendula/system/system_model.hpp>
-#include <stdexcept>
-#include <string>
-
-#include "front/subject_kinds.hpp"
 
 namespace pendula::front {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-template <class Space>
-SystemModel model_of(const ChainSubject<Space>& subject) {
-  const Chain<Space>& chain = subject.chain();
-  for (const SystemTable* kernel : library_of<Space>().kernels) {
-    if (kernel->info.links != chain.links()) continue;
-    const std::vector<PlainChain::Drive> drives = plain_drives(chain);
-    return {*kernel, ChainSystem(plain(chain, drives), Space::torque_components).plain()};
-  }
-  throw NoKernel("no kernel for a " + std::string(Space::name) + " chain of " + std::to_string(chain.links()) +
-                 " links in this build; its linearization needs one");
-}
-
-SystemModel model_of(const SystemSubject& subject) {
-  return {subject.table(), subject.numbers().plain()};
-}
 
 /// A column for each coordinate, then for each rate; so many at once as a kernel's functions take.
 void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
@@ -78,7 +56,7 @@ void find_b(const SystemModel& model, const Motion& motion, double* b) {
 }  // namespace
 
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
-  const SystemModel model = as_its_kind(subject, [](const auto& kind) { return model_of(kind); });
+  const SystemModel model = as_its_kind(subject, [](const auto& kind) { return system_model_of(kind); });
   if (a != nullptr) {
     SystemAt<8> here(model);
     here.set_time(motion.time);

@@ -29,4 +29,8 @@ Reach Expression::operator()(std::span<const Reach> numbers) {
   return of(numbers, reaches_);
 }
 
+Dual<double> Expression::operator()(std::span<const Dual<double>> numbers) {
+  return of(numbers, slopes_);
+}
+
 }  // namespace pendula::io

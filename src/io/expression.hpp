@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <pendula/numeric/dual.hpp>
 #include <pendula/numeric/reach.hpp>
 #include <span>
 #include <stdexcept>
@@ -35,6 +36,8 @@ class Expression {
   double operator()(std::span<const double> numbers);
   /// Bounds of its value over a time, from bounds of the numbers.
   Reach operator()(std::span<const Reach> numbers);
+  /// Its value, and its derivative along that of the numbers.
+  Dual<double> operator()(std::span<const Dual<double>> numbers);
 
  private:
   template <class Number>
@@ -43,6 +46,7 @@ class Expression {
   ExpressionProgram program_;
   std::vector<double> values_;  // values of the nodes
   std::vector<Reach> reaches_;
+  std::vector<Dual<double>> slopes_;
 };
 
 }  // namespace pendula::io

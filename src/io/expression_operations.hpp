@@ -2,9 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <pendula/numeric/dual.hpp>
+#include <pendula/numeric/dual_functions.hpp>
 #include <pendula/numeric/reach.hpp>
 
 #include "io/expression_program.hpp"
+
+namespace pendula {
+
+// Functions of dual numbers that expressions have, and kernels do not.
+inline Dual<double> floor(const Dual<double>& x) {
+  return Dual<double>(std::floor(x.value));
+}
+inline Dual<double> abs(const Dual<double>& x) {
+  return x.value < 0 ? -x : x;
+}
+inline Dual<double> atan2(const Dual<double>& y, const Dual<double>& x) {
+  const double squared = x.value * x.value + y.value * y.value;
+  return {std::atan2(y.value, x.value), (x.value * y.slope - y.value * x.slope) / squared};
+}
+inline Dual<double> fmod(const Dual<double>& a, const Dual<double>& b) {
+  return {std::fmod(a.value, b.value), a.slope - std::trunc(a.value / b.value) * b.slope};
+}
+inline Dual<double> log2(const Dual<double>& x) {
+  return {std::log2(x.value), x.slope / (x.value * std::numbers::ln2)};
+}
+inline Dual<double> log10(const Dual<double>& x) {
+  return {std::log10(x.value), x.slope / (x.value * std::numbers::ln10)};
+}
+
+}  // namespace pendula
 
 namespace pendula::io::detail {
 
@@ -43,7 +71,47 @@ inline double choose(double condition, double yes, double no) {
   return condition != 0 ? yes : no;
 }
 
-/// Applies an operation to doubles or to Reach.
+// The same of dual numbers: what jumps has no slope.
+using Slope = Dual<double>;
+
+inline Slope without_slope(double value) {
+  return Slope(value);
+}
+inline Slope sign(const Slope& x) {
+  return without_slope(sign(x.value));
+}
+inline Slope rint(const Slope& x) {
+  return without_slope(rint(x.value));
+}
+inline Slope min(const Slope& a, const Slope& b) {
+  return b.value < a.value ? b : a;
+}
+inline Slope max(const Slope& a, const Slope& b) {
+  return a.value < b.value ? b : a;
+}
+inline Slope less(const Slope& a, const Slope& b) {
+  return without_slope(less(a.value, b.value));
+}
+inline Slope at_most(const Slope& a, const Slope& b) {
+  return without_slope(at_most(a.value, b.value));
+}
+inline Slope equal(const Slope& a, const Slope& b) {
+  return without_slope(equal(a.value, b.value));
+}
+inline Slope unequal(const Slope& a, const Slope& b) {
+  return without_slope(unequal(a.value, b.value));
+}
+inline Slope both(const Slope& a, const Slope& b) {
+  return without_slope(both(a.value, b.value));
+}
+inline Slope either(const Slope& a, const Slope& b) {
+  return without_slope(either(a.value, b.value));
+}
+inline Slope choose(const Slope& condition, const Slope& yes, const Slope& no) {
+  return condition.value != 0 ? yes : no;
+}
+
+/// Applies an operation to doubles, to Reach or to Slope.
 template <class Number>
 Number applied(Operation operation, const Number& a, const Number& b, const Number& c) {
   using std::sin, std::cos, std::tan, std::asin, std::acos, std::atan, std::atan2, std::sinh, std::cosh, std::tanh,

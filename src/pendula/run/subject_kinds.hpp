@@ -5,7 +5,7 @@
 #include <pendula/run/subject.hpp>
 #include <pendula/run/system_subject.hpp>
 
-namespace pendula::front {
+namespace pendula {
 
 /// Calls act(subject) with what a subject is: a SystemSubject or a ChainSubject.
 template <class Act>
@@ -15,4 +15,4 @@ auto as_its_kind(const Subject& subject, Act act) {
   return act(dynamic_cast<const ChainSubject<Spatial>&>(subject));
 }
 
-}  // namespace pendula::front
+}  // namespace pendula

@@ -1,0 +1,199 @@
+"""What motions depend on: derivatives by the start, by parameters and by inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import _core
+from ._core import InputError
+from ._runs import mapping, number, numbers, plainly, warn
+from ._simulation import RUN_OPTIONS, Beginning
+from ._systems import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+class Derivatives(NamedTuple):
+    """A motion, and its derivatives: exactly those of its steps, whose sizes are held.
+
+    What ends at an event ends at another time from another start: the last row is differentiated along with that time.
+    """
+
+    t: NDArray[np.float64]  #: (rows,) times, in s
+    y: NDArray[np.float64]  #: (coordinates + rates, rows), in the order of ``names``
+    names: list[str]  #: what the rows of ``y`` are
+    by_start: NDArray[np.float64]  #: (rows, coordinates + rates, coordinates + rates)
+    by_parameters: dict[str, NDArray[np.float64]]  #: (rows, coordinates + rates, numbers of it), by name
+    by_inputs: dict[str, NDArray[np.float64]]  #: the same; inputs are varied by constants
+    time_by_start: NDArray[np.float64]  #: (coordinates + rates,) of the last time; zeros without an event
+    time_by_parameters: dict[str, NDArray[np.float64]]  #: (numbers of it,)
+    time_by_inputs: dict[str, NDArray[np.float64]]  #: the same
+
+
+class Gradient(NamedTuple):
+    """What a number that depends on a motion changes by."""
+
+    start: NDArray[np.float64]  #: (coordinates + rates,)
+    parameters: dict[str, NDArray[np.float64]]  #: (numbers of it,), by name
+    inputs: dict[str, NDArray[np.float64]]  #: the same
+
+
+class Varied:
+    """Names of parameters and inputs, and their places among all numbers."""
+
+    def __init__(self, made: _core.Prepared) -> None:
+        self.parameters: dict[str, slice] = {}
+        self.inputs: dict[str, slice] = {}
+        self.count = 0
+        for name, size, is_input in _core.varied_by(made):
+            group = self.inputs if is_input else self.parameters
+            group[name] = slice(self.count, self.count + size)
+            self.count += size
+
+
+def differentiate(
+    system: System,
+    duration: float | None = None,
+    *,
+    t: ArrayLike | None = None,
+    start: Mapping[str, object] | None = None,
+    until: str | None = None,
+    direction: str = "both",
+    tolerance: float | None = None,
+    step: float | None = None,
+    **options: object,
+) -> Derivatives:
+    """Moves a system, and differentiates where it comes by where it starts, its parameters and its inputs.
+
+    Parameters
+    ----------
+    system : Chain or Model
+    duration : float, optional
+        In s; the last of the times ``t`` if left out.
+    t : array_like, optional
+        Times of the rows, in s, from 0 on, at which steps end; if left out, the duration alone.
+    start : mapping, optional
+        As for :meth:`Chain.simulate`.
+    until : str, optional
+        An expression of ``t``, coordinates and rates. The last row is where it first crosses zero.
+    direction : {"both", "up", "down"}
+        How it crosses zero.
+    tolerance, step : float, optional
+        As for :class:`Simulation`.
+    method, stages, solver, iteration
+        As ``[run]`` of a scenario: Gauss or Radau steps, in momentum form.
+
+    Returns
+    -------
+    Derivatives
+
+    Raises
+    ------
+    InputError
+        An argument is wrong, or a chain has more links than this build has kernels for (with ``until`` alone).
+    RunFailed
+        The computation failed.
+
+    Examples
+    --------
+    >>> import numpy, pendula
+    >>> chain = pendula.Chain(masses=[1, 2])
+    >>> moved = pendula.differentiate(chain, 1.0, start={"theta": [1.0, 0.5]}, step=0.01)
+    >>> moved.by_start.shape, moved.by_parameters["lengths"].shape
+    ((1, 4, 4), (1, 4, 2))
+    >>> round(float(numpy.linalg.det(moved.by_start[0])), 9) > 0
+    True
+    """
+    times = _times(duration, t)
+    given = mapping("start", start)
+    made = Beginning.of(system, given, tolerance=tolerance, step=step, options=options).prepare()
+    warn(made.warnings, stacklevel=3)
+    if until is not None:
+        run = {name: one for name, one in options.items() if name in RUN_OPTIONS}
+        found = system.simulate(
+            float(times[-1]),
+            start=given,
+            events={"until": {"when": until, "direction": direction, "stop": True}},
+            tolerance=1e-9 if tolerance is None and step is None else tolerance,
+            step=step,
+            estimate=False,
+            **run,  # type: ignore[arg-type]
+        )
+        if found.status != 1:
+            raise InputError(
+                f"until: expected {until} to cross zero within {times[-1]:.6g} s, got no crossing"
+            )
+        times = np.append(times[times < found.t[-1]], found.t[-1])
+    varied = Varied(made)
+    size = made.start.size
+    seeds = np.eye(size + varied.count)
+    with plainly():
+        states, flat = _core.forward(
+            made, made.time, made.start, made.time + times, seeds[:size].copy(), seeds[size:].copy()
+        )
+    by_all = flat.reshape(times.size, size, size + varied.count)
+    of_time = np.zeros(size + varied.count)
+    if until is not None:
+        of_time = _at_event(made, until, float(made.time + times[-1]), states[-1], by_all[-1])
+    columns = made.columns
+    by_varied, time_by_varied = by_all[:, :, size:], of_time[size:]
+    return Derivatives(
+        times,
+        states.T,
+        [columns[k] for k in made.state],
+        by_all[:, :, :size],
+        {name: by_varied[:, :, place] for name, place in varied.parameters.items()},
+        {name: by_varied[:, :, place] for name, place in varied.inputs.items()},
+        of_time[:size],
+        {name: time_by_varied[place] for name, place in varied.parameters.items()},
+        {name: time_by_varied[place] for name, place in varied.inputs.items()},
+    )
+
+
+def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:
+    if t is None and duration is None:
+        raise TypeError("differentiate: expected duration= or t=, got neither")
+    times = numbers("t", t) if t is not None else np.array([number("duration", duration)])
+    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
+        raise InputError(f"t: expected a vector of finite times, got {t!r}")
+    if np.any(times < 0) or np.any(np.diff(times) < 0):
+        raise InputError("t: expected times from 0 on, ascending, got others")
+    if t is not None and duration is not None:
+        raise InputError("duration: expected none beside t, got both")
+    return times
+
+
+def _at_event(
+    made: _core.Prepared, until: str, time: float, state: NDArray[np.float64], by_all: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The derivative of the time of an event; adds what it makes of the state there.
+
+    With g the expression, f the field and Phi the derivative at that time: dt = -(g_x Phi) / (g_x f + g_t).
+    """
+    with plainly():
+        slopes = _core.gradient(made, until, time, state)
+        field = _core.field(made, time, state)
+    speed = slopes[0] + slopes[1:] @ field
+    if speed == 0:
+        raise InputError(f"until: expected {until} to cross zero, got one that only touches it")
+    of_time: NDArray[np.float64] = -(slopes[1:] @ by_all) / speed
+    by_all += np.outer(field, of_time)
+    return of_time
+
+
+def gradient(made: _core.Prepared, times: NDArray[np.float64], by_states: NDArray[np.float64]) -> Gradient:
+    """Backward: from a number's gradient by the states at the times, (coordinates + rates, times)."""
+    varied = Varied(made)
+    with plainly():
+        _, start, all_varied = _core.backward(
+            made, made.time, made.start, np.ascontiguousarray(times), np.ascontiguousarray(by_states)
+        )
+    return Gradient(
+        start,
+        {name: all_varied[place] for name, place in varied.parameters.items()},
+        {name: all_varied[place] for name, place in varied.inputs.items()},
+    )
