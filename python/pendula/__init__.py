@@ -11,11 +11,11 @@ Units are SI, angles radians, unless a system says ``units="natural"``.
 
 from ._core import InputError, instruction_set
 from ._core import version as _version
-from ._derivatives import Derivatives, Gradient, differentiate
+from ._derivatives import Derivatives, Gradient, differentiate, linearize
 from ._ensemble import ensemble
 from ._functions import ModelFunction, model
 from ._runs import RunFailed, Solution, TrustWarning
-from ._simulation import Lyapunov, Simulation, linearize, lyapunov
+from ._simulation import Lyapunov, Simulation, lyapunov
 from ._systems import Chain, Model, Scenario
 
 __version__ = _version()

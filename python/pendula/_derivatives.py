@@ -10,7 +10,7 @@ import numpy as np
 from . import _core
 from ._core import InputError
 from ._runs import mapping, number, numbers, plainly, warn
-from ._simulation import RUN_OPTIONS, Beginning
+from ._simulation import RUN_OPTIONS, Beginning, Simulation
 from ._systems import System
 
 if TYPE_CHECKING:
@@ -152,6 +152,56 @@ def differentiate(
         {name: time_by_varied[place] for name, place in varied.parameters.items()},
         {name: time_by_varied[place] for name, place in varied.inputs.items()},
     )
+
+
+def linearize(
+    system: System,
+    at: Mapping[str, object] | None = None,
+    *,
+    step: float | None = None,
+    tolerance: float | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The linear system beside a state, exactly.
+
+    Parameters
+    ----------
+    system : Chain or Model
+    at : mapping, optional
+        Coordinates and rates, as for :meth:`Chain.simulate`; what is left out is 0.
+    step : float, optional
+        In s: the discrete system, from one time to the next, while inputs are held.
+    tolerance : float, optional
+        Of the steps inside one, as for :class:`Simulation`.
+
+    Returns
+    -------
+    A : (2n, 2n) array
+    B : (2n, inputs) array
+        Of deviations x from the state, in the order of :attr:`Simulation.names` and :attr:`Simulation.inputs`:
+        dx/dt = A x + B inputs, or with ``step`` x(t + step) = A x(t) + B inputs.
+
+    Raises
+    ------
+    InputError, RuntimeError
+        As :meth:`Simulation.linearize`.
+
+    Examples
+    --------
+    >>> import pendula
+    >>> A, B = pendula.linearize(pendula.Chain(links=1), {"theta": 0.0}, step=0.1)
+    >>> A.shape, B.shape
+    ((2, 2), (2, 1))
+    """
+    if not isinstance(system, System):
+        raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
+    start = {**system.at_zero(), **mapping("at", at)}
+    if step is None:
+        return Simulation(system, start).linearize()
+    if number("step", step) <= 0:
+        raise InputError(f"step: expected a positive number, got {step!r}")
+    moved = differentiate(system, step, start=start, tolerance=tolerance)
+    inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
+    return moved.by_start[0], np.hstack([np.empty((moved.y.shape[0], 0)), *inputs])
 
 
 def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:

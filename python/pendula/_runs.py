@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
+    from ._derivatives import Gradient
+
 
 class TrustWarning(UserWarning):
     """The rows of a run can be trusted less far than was asked for; the sentence says how far, and what helps."""
@@ -135,6 +137,51 @@ class Solution:
             again = _core.simulate(text, name, [*overrides, *rows, "run.estimate=false"], *places(), tell)
         states = again.take_rows()[:, self._state].T
         return states[:, order.reshape(when.shape)]
+
+    def gradient(self, by_end: ArrayLike) -> Gradient:
+        """What a number that depends on where the run ends changes by.
+
+        The run is made again for it, forth and back, by steps of the same sizes.
+
+        Parameters
+        ----------
+        by_end : (coordinates + rates,) or (coordinates + rates, rows) array_like
+            The number's gradient by the last state, or by those of all rows, in the order of ``names``.
+
+        Returns
+        -------
+        Gradient
+            By the start, by parameters and by inputs.
+
+        Raises
+        ------
+        InputError
+            An argument is wrong, or the method's steps have no derivative.
+
+        Examples
+        --------
+        >>> import pendula
+        >>> run = pendula.Chain(links=1).simulate(1.0, theta=0.5, step=0.01)
+        >>> by_length = run.gradient([1, 0]).parameters["lengths"]  # of theta at the end
+        """
+        from ._derivatives import gradient
+
+        given = numbers("by_end", by_end)
+        if given.shape not in ((len(self.names),), self.y.shape):
+            raise _core.InputError(
+                f"by_end: expected shape ({len(self.names)},) or {self.y.shape}, got {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            raise _core.InputError("by_end: expected finite numbers, got others")
+        if self._scenario is None:
+            raise RuntimeError(
+                "gradient: expected a solution of this process, got one that was not made here"
+            )
+        text, name, overrides = self._scenario
+        with plainly():
+            made = _core.prepare(text, name, overrides, *places(), tell, False)
+        last = given.ndim == 1
+        return gradient(made, self.t[-1:] if last else self.t, given[:, None] if last else given)
 
     @property
     def nfev(self) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _core, _toml
 from ._core import InputError
-from ._runs import mapping, merged, number, places, plainly, tell, warn
+from ._runs import merged, number, places, plainly, tell, warn
 from ._systems import System
 
 if TYPE_CHECKING:
@@ -258,34 +258,6 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"<Simulation: t = {self.time:.6g} s after {self.steps} steps>"
-
-
-def linearize(
-    system: System, at: Mapping[str, object] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The linear system beside a state, exactly.
-
-    Parameters
-    ----------
-    system : Chain or Model
-    at : mapping, optional
-        Coordinates and rates, as for :meth:`Chain.simulate`; what is left out is 0.
-
-    Returns
-    -------
-    A : (2n, 2n) array
-    B : (2n, inputs) array
-        d(q, v)/dt = A (q, v) + B inputs, of deviations from the state, in the order of :attr:`Simulation.names` and
-        :attr:`Simulation.inputs`.
-
-    Raises
-    ------
-    InputError, RuntimeError
-        As :meth:`Simulation.linearize`.
-    """
-    if not isinstance(system, System):
-        raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
-    return Simulation(system, {**system.at_zero(), **mapping("at", at)}).linearize()
 
 
 class Lyapunov(NamedTuple):
