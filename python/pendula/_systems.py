@@ -10,12 +10,14 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from . import _toml
 from ._core import InputError
 from ._runs import Solution, mapping, merged, number, numbers, run_text
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 Tables = dict[str, "dict[str, object] | list[dict[str, object]]"]
 
@@ -41,6 +43,12 @@ class System(ABC):
     def model_file(self) -> Path | None:
         """The file that says what moves, if one does."""
         return None
+
+    @abstractmethod
+    def replaced(
+        self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]
+    ) -> System:
+        """The same system with other values of parameters, and of what is constant of inputs."""
 
     def simulate(
         self,
@@ -191,6 +199,19 @@ class Chain(System):
     def tables(self) -> Tables:
         return {"chain": dict(self._numbers), "chain.drive": list(self._drives)}
 
+    def replaced(
+        self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]
+    ) -> Chain:
+        other = copy.copy(self)
+        other._numbers = {
+            **self._numbers,
+            **{name: float(one[0]) if name == "gravity" else one for name, one in parameters.items()},
+        }
+        if "torque" in inputs:
+            per_link = (-1, 3) if self._numbers["space"] == "spatial" else (-1,)
+            other._numbers["torque"] = inputs["torque"].reshape(per_link)
+        return other
+
     def at_zero(self) -> dict[str, object]:
         return {"theta": 0.0, "phi": 0.0} if self._numbers["space"] == "spatial" else {"theta": 0.0}
 
@@ -236,6 +257,18 @@ class Model(System):
 
     def model_file(self) -> Path | None:
         return Path(self._name) if self._name.endswith(".py") else None
+
+    def replaced(
+        self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]
+    ) -> Model:
+        other = copy.copy(self)
+        sizes = {name: float(one[0]) if one.size == 1 else one for name, one in parameters.items()}
+        other._parameters = {**self._parameters, **sizes}
+        others = [
+            {**drive, "constant": 0.0} if drive.get("input") in inputs else drive for drive in self._drives
+        ]
+        other._drives = others + [{"input": name, "constant": float(one[0])} for name, one in inputs.items()]
+        return other
 
     def tables(self) -> Tables:
         system: dict[str, object] = {

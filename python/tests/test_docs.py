@@ -1,20 +1,33 @@
 """Examples of docstrings do what they say."""
 
 import doctest
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pendula
+import pendula._derivatives
 import pendula._ensemble
 import pendula._runs
 import pendula._simulation
 import pendula._systems
+import pendula.jax
 import pytest
 
 
 @pytest.mark.parametrize(
     "module",
-    [pendula, pendula._ensemble, pendula._runs, pendula._systems, pendula._simulation],
+    [
+        pendula,
+        pendula._derivatives,
+        pendula._ensemble,
+        pendula._runs,
+        pendula._simulation,
+        pendula._systems,
+        pendula.jax,
+    ],
     ids=lambda m: m.__name__,
 )
 def test_examples_of_docstrings(module):
@@ -26,6 +39,17 @@ def test_the_readme_shows_what_happens():
     [session] = re.findall(r"^```pycon\n(.*?)^```$", readme, re.DOTALL | re.MULTILINE)
     examples = doctest.DocTestParser().get_doctest(session, {}, "README.md", "README.md", 0)
     assert doctest.DocTestRunner().run(examples).failed == 0
+
+
+def test_the_page_about_python_is_a_script(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    script = tmp_path / "page.py"
+    script.write_text("\n".join(re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)))
+    found = {**os.environ, "PYTHONPATH": str(Path(pendula.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, script], cwd=tmp_path, env=found, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0 and "Warning" not in done.stderr, done.stderr
 
 
 def test_everything_public_is_documented():

@@ -5,9 +5,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iomanip>
@@ -47,20 +49,26 @@ bool is_sealed(std::string_view file) {
   return file.substr(file.size() - size) == seal_of(file.substr(0, file.size() - size));
 }
 
-/// A loaded shared object and its file. While the file is open, no other has its name.
+/// A path to an open file, each time another one. The loader takes objects of one name for one, and need not unload what
+/// is closed: if the path were that of the descriptor alone, a later kernel could turn out to be an earlier one.
+std::string new_path(const Descriptor& file) {
+  static std::atomic<std::uint64_t> paths = 0;
+  std::string path = "/proc/self/fd";
+  for (std::uint64_t rest = paths++; rest > 0; rest /= 2) path += rest % 2 == 0 ? "/." : "//.";
+  return path + '/' + std::to_string(file.get());
+}
+
+/// A loaded shared object and its file.
 struct Loaded {
   Descriptor file;
   void* handle = nullptr;
 
-  explicit Loaded(Descriptor opened) : file(std::move(opened)), handle(dlopen(name().c_str(), RTLD_NOW | RTLD_LOCAL)) {}
+  explicit Loaded(Descriptor opened) : file(std::move(opened)), handle(dlopen(new_path(file).c_str(), RTLD_NOW | RTLD_LOCAL)) {}
   Loaded(const Loaded&) = delete;
   Loaded& operator=(const Loaded&) = delete;
   ~Loaded() {
     if (handle != nullptr) dlclose(handle);
   }
-
-  /// The name of the open file, whatever its path leads to by now.
-  std::string name() const { return "/proc/self/fd/" + std::to_string(file.get()); }
 };
 
 std::shared_ptr<const SystemTable> table_of_object(Descriptor file) {
