@@ -94,6 +94,7 @@ CommandLine::CommandLine()
   add_simulate();
   add_ensemble();
   add_lyapunov();
+  add_linearize();
   add_pictures();
   add_models();
   add_help();
@@ -206,6 +207,23 @@ void CommandLine::add_lyapunov() {
   add_set(lyapunov, options.overrides);
   takes_file(lyapunov->add_option("-o,--output", options.output, "Write how they converge to this file"), {".csv"});
   lyapunov->add_flag("--json", options.json, "Print them as one JSON object");
+}
+
+void CommandLine::add_linearize() {
+  LinearizeOptions& options = linearize_options;
+  linearize = app.add_subcommand("linearize", "Print the linear system beside a scenario's start");
+  add_scenario(linearize, options.scenario);
+  linearize->get_option("SCENARIO")->required();
+  takes_words(linearize->add_option("--at", options.at, "Beside the start, or the equilibrium that is nearest to it"),
+              "PLACE", {"start", "equilibrium"});
+  linearize->add_option("--step", options.step, "The discrete system, over so many seconds, while inputs are held")
+      ->type_name("SECONDS")
+      ->check(expect("a positive number", [](const std::string& text) {
+        const double step = read_number<double>(text).value_or(0);
+        return step > 0 && std::isfinite(step);
+      }));
+  add_set(linearize, options.overrides);
+  linearize->add_flag("--json", options.json, "Print it as one JSON object");
 }
 
 void CommandLine::add_pictures() {

@@ -40,6 +40,7 @@ struct CommandLine {
   CLI::App* simulate;
   CLI::App* ensemble;
   CLI::App* lyapunov;
+  CLI::App* linearize;
   CLI::App* plot;
   CLI::App* map;
   CLI::App* gallery;
@@ -54,6 +55,7 @@ struct CommandLine {
   SimulateOptions simulate_options;
   EnsembleOptions ensemble_options;
   LyapunovOptions lyapunov_options;
+  LinearizeOptions linearize_options;
   PlotOptions plot_options;
   MapOptions map_options;
   std::string gallery_folder;
@@ -70,6 +72,7 @@ struct CommandLine {
   void add_simulate();
   void add_ensemble();
   void add_lyapunov();
+  void add_linearize();
   void add_pictures();
   void add_models();
   void add_help();

@@ -109,6 +109,17 @@ struct LyapunovOptions {
 /// Runs a scenario and prints its Lyapunov exponents. Throws io::InputError.
 ExitStatus lyapunov(const LyapunovOptions& options);
 
+struct LinearizeOptions {
+  std::string scenario;                ///< the file
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  std::string at = "start";            ///< or "equilibrium"
+  std::optional<double> step;          ///< of the discrete system; else the continuous one  [s]
+  bool json = false;
+};
+
+/// Prints the linear system beside a scenario's start, or the equilibrium near it. Throws io::InputError.
+ExitStatus linearize(const LinearizeOptions& options);
+
 /// A part of an ensemble that runs by itself.
 struct Shard {
   int number = 1, of = 1;

@@ -16,7 +16,7 @@
 namespace pendula::cli {
 namespace {
 
-constexpr std::array<Example, 23> examples = {{
+constexpr std::array<Example, 25> examples = {{
     {"simulate", "pendula simulate examples/double_pendulum.toml -o run.csv", "write a trajectory, print a summary"},
     {"simulate", "pendula simulate examples/double_pendulum.toml --set run.accuracy=1e-12 --json",
      "with another accuracy; the summary as JSON"},
@@ -32,6 +32,9 @@ constexpr std::array<Example, 23> examples = {{
      "all exponents, and how they converge"},
     {"lyapunov", "pendula lyapunov examples/poincare.toml --set run.duration=100 --count 1 --json",
      "the leading one as JSON"},
+    {"linearize", "pendula linearize examples/double_pendulum.toml --at equilibrium",
+     "A, B and eigenvalues where it hangs"},
+    {"linearize", "pendula linearize examples/double_pendulum.toml --step 0.01 --json", "the discrete system, as JSON"},
     {"plot", "pendula plot run.h5 -o run.svg --show series,energy", "coordinates and energy errors"},
     {"plot", "pendula plot section.csv -o section.svg", "a Poincare section"},
     {"map", "pendula map flips.h5 event_flip -o flips.png", "when an event happened, over the axes"},
@@ -122,7 +125,7 @@ std::string version_text() {
 std::vector<Example> examples_of(std::string_view command) {
   std::vector<Example> some;
   if (command == "pendula") {
-    for (const std::size_t k : {0U, 2U, 6U, 12U, 15U}) some.push_back(examples[k]);
+    for (const std::size_t k : {0U, 2U, 6U, 14U, 17U}) some.push_back(examples[k]);
     return some;
   }
   std::ranges::copy_if(examples, std::back_inserter(some), [&](const Example& one) { return one.command == command; });

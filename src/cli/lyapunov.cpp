@@ -1,4 +1,3 @@
-#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <limits>
@@ -13,27 +12,14 @@
 
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/read_scenario.hpp"
 #include "io/file_format.hpp"
-#include "io/kernel_cache.hpp"
 #include "io/line_file.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
 
 namespace pendula::cli {
 namespace {
-
-io::AnyScenario read_scenario(const LyapunovOptions& options) {
-  const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
-                                  const std::filesystem::path& folder) {
-    return io::find_kernel(name, links, folder, io::Toolchain::of_this_program(),
-                           [&](const std::string& what) {
-                             if (!options.json) std::cerr << "pendula: " << what << '\n';
-                           })
-        .table;
-  };
-  const io::ScenarioText text = io::read_scenario_text(options.scenario);
-  return io::parse_scenario(text.text, text.name, options.overrides, find);
-}
 
 /// The exponents as they converge: t, then one a column.
 class HistoryFile {
@@ -126,7 +112,7 @@ ExitStatus lyapunov(const LyapunovOptions& options) {
       [&](const auto& scenario) {
         return io::told_at_keys(scenario, options.scenario, [&] { return run(scenario, options); });
       },
-      read_scenario(options));
+      read_scenario(options.scenario, options.overrides, options.json));
 }
 
 }  // namespace pendula::cli

@@ -74,6 +74,7 @@ ExitStatus dispatch(CommandLine& line, const std::string& command) {
   if (*line.new_model) return new_model(line.model_name);
   if (*line.plot) return plot(line.plot_options);
   if (*line.lyapunov) return lyapunov(line.lyapunov_options);
+  if (*line.linearize) return linearize(line.linearize_options);
   if (*line.ensemble) return ensemble(line.ensemble_options);
   if (*line.map) return map(line.map_options);
   if (*line.gallery) return gallery(line.gallery_folder);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/inputs.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/no_kernel.hpp>
 #include <pendula/run/quantity.hpp>
@@ -16,12 +17,11 @@
 #include <utility>
 
 #include "front/errors.hpp"
-#include "front/inputs.hpp"
 
 pendula_model::pendula_model(std::shared_ptr<const pendula::Subject> moved, std::size_t coordinate_count)
     : subject(std::move(moved)),
       coordinates(coordinate_count),
-      inputs(pendula::front::input_names(*subject)),
+      inputs(input_names(*subject)),
       names(subject->columns()),
       units(names.size()) {
   for (const pendula::Quantity& quantity : subject->quantities()) {

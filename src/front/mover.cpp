@@ -5,12 +5,11 @@
 #include <cstdint>
 #include <limits>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/inputs.hpp>
 #include <pendula/run/schedule.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
-
-#include "front/inputs.hpp"
 
 namespace pendula::front {
 namespace {

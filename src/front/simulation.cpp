@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <memory>
+#include <pendula/run/linearize.hpp>
 #include <pendula/system/outcome.hpp>
 #include <span>
 #include <stdexcept>
@@ -11,7 +12,6 @@
 #include <vector>
 
 #include "front/errors.hpp"
-#include "front/linearize.hpp"
 #include "front/model.hpp"
 #include "front/mover.hpp"
 #include "front/options.hpp"

@@ -177,7 +177,7 @@ constexpr std::array<ScenarioKey, 5> ensemble_random = {
     a_number("deviation", "", not_negative, InWords{"must be given with mean"}, "a finite number >= 0"),
 };
 
-constexpr std::array<std::string_view, 3> commands = {"simulate", "ensemble", "lyapunov"};
+constexpr std::array<std::string_view, 4> commands = {"simulate", "ensemble", "lyapunov", "linearize"};
 constexpr Names all_commands = commands, of_rows = Names(commands).first(2), of_members = Names(commands).subspan(1, 1);
 
 constexpr std::array<ScenarioTable, 12> tables_of_scenarios = {{

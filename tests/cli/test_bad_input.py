@@ -186,8 +186,8 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
         (
             [],
             "",
-            "expected a command: simulate, ensemble, lyapunov, plot, map, gallery, models, describe, new-model, "
-            "check, build, kernels, help, completion",
+            "expected a command: simulate, ensemble, lyapunov, linearize, plot, map, gallery, models, describe, "
+            "new-model, check, build, kernels, help, completion",
         ),
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),

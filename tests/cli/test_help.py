@@ -22,7 +22,7 @@ def examples(text: str) -> list[str]:
 
 
 def test_every_command_has_help_and_examples(pendula):
-    assert len(commands(pendula)) == 14
+    assert len(commands(pendula)) == 15
     for command in commands(pendula):
         text = pendula("help", command).out
         assert f"\nUsage: pendula {command}" in text
@@ -63,6 +63,7 @@ def test_the_examples_run(pendula, tmp_path):
         ("simulate", "[ensemble]", False),
         ("ensemble", "[[ensemble.axis]]", True),
         ("lyapunov", "[run]", True),
+        ("linearize", "[start]", True),
         ("lyapunov", "[output]", False),
         ("plot", "[run]", False),
     ],

@@ -1,14 +1,16 @@
-#include "front/linearize.hpp"
-
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cstddef>
 #include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/run/derivatives.hpp>
+#include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_model.hpp>
 #include <pendula/system/system_model.hpp>
+#include <stdexcept>
 
-namespace pendula::front {
+namespace pendula {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -39,6 +41,16 @@ void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
   }
 }
 
+bool changes_with_time(const Subject& subject) {
+  return as_its_kind(subject, [](const auto& kind) {
+    if constexpr (requires { kind.chain(); }) {
+      return !kind.chain().drives().empty();
+    } else {
+      return kind.info().depends_on_time || !kind.numbers().sines.empty();
+    }
+  });
+}
+
 // Inputs stand in forces alone: M δa = δf.
 void find_b(const SystemModel& model, const Motion& motion, double* b) {
   const Eigen::Index n = motion.q.size(), inputs = static_cast<Eigen::Index>(model.inputs());
@@ -65,4 +77,28 @@ void linearize(const Subject& subject, const Motion& motion, double* a, double* 
   if (b != nullptr && model.inputs() > 0) find_b(model, motion, b);
 }
 
-}  // namespace pendula::front
+Motion equilibrium(const Subject& subject, const Motion& near) {
+  if (changes_with_time(subject)) {
+    throw std::invalid_argument("at: expected start for a system that changes with time, got equilibrium");
+  }
+  constexpr int most = 100;
+  constexpr double largest = 0.5, smallest = 1e-13;  // changes of a step, relative to the size of the coordinates
+  const Eigen::Index n = near.q.size();
+  Motion at(near.time, near.q, Eigen::VectorXd::Zero(n));
+  RowMajor a(2 * n, 2 * n);
+  for (int k = 0; k < most; ++k) {
+    linearize(subject, at, a.data(), nullptr);
+    const Eigen::VectorXd acceleration = field_at(subject, at).tail(n);
+    if (!acceleration.allFinite() || !a.allFinite()) break;
+    Eigen::VectorXd change = -a.bottomLeftCorner(n, n).completeOrthogonalDecomposition().solve(acceleration);
+    const double size = change.cwiseAbs().maxCoeff(), scale = std::max(1.0, at.q.cwiseAbs().maxCoeff());
+    if (size > largest * scale) change *= largest * scale / size;
+    at.q += change;
+    if (size > smallest * scale) continue;
+    at.q = (at.q.array().abs() < smallest * scale).select(0, at.q);
+    return at;
+  }
+  throw std::invalid_argument("at: expected a start near an equilibrium, got one from which none was found");
+}
+
+}  // namespace pendula

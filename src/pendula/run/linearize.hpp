@@ -3,11 +3,16 @@
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 
-namespace pendula::front {
+namespace pendula {
 
 /// How a motion changes beside where it is: d(q, v)/dt = A (q, v) + B inputs, row by row, A (2n, 2n) and B (2n,
 /// inputs), exactly, by the kernel's derivatives. Either may be null. Throws NoKernel for a chain without one,
 /// std::invalid_argument where the mass matrix is singular.
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b);
 
-}  // namespace pendula::front
+/// The motion at rest nearest to where one is, by Newton's method on the accelerations: of coordinates that these do
+/// not depend on, none changes. Throws NoKernel as linearize, std::invalid_argument where a system changes with time,
+/// or where none is found.
+Motion equilibrium(const Subject& subject, const Motion& near);
+
+}  // namespace pendula

@@ -1,15 +1,14 @@
-#include "front/inputs.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <pendula/chain/chain.hpp>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/inputs.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <stdexcept>
 #include <utility>
 
-namespace pendula::front {
+namespace pendula {
 namespace {
 
 std::vector<std::string> names(const SystemSubject& system) {
@@ -81,4 +80,4 @@ std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>&
   return as_its_kind(*subject, [&](const auto& kind) { return with(kind, subject, inputs); });
 }
 
-}  // namespace pendula::front
+}  // namespace pendula

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace pendula::front {
+namespace pendula {
 
 /// Names of a subject's inputs; of a chain its torques, link by link: "torque_1", in space "torque_x_1".
 std::vector<std::string> input_names(const Subject& subject);
@@ -19,4 +19,4 @@ std::vector<double> inputs_of(const Subject& subject);
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
                                            std::span<const double> inputs);
 
-}  // namespace pendula::front
+}  // namespace pendula

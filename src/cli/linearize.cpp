@@ -1,0 +1,167 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <pendula/numeric/directions.hpp>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/derivatives.hpp>
+#include <pendula/run/inputs.hpp>
+#include <pendula/run/linearize.hpp>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/read_scenario.hpp"
+#include "io/input_error.hpp"
+#include "io/scenario_run.hpp"
+
+namespace pendula::cli {
+namespace {
+
+/// A linear system beside a motion, and what its numbers are.
+struct Linear {
+  Motion at;
+  std::vector<std::string> names, inputs;
+  Directions<> a, b;
+};
+
+/// Names of coordinates, then of rates, in the order of a motion.
+std::vector<std::string> state_names(const Subject& subject) {
+  std::vector<std::string> names;
+  const std::vector<std::string> columns = subject.columns();
+  for (const Role role : {Role::coordinate, Role::rate}) {
+    std::vector<std::size_t> places;
+    for (const Quantity& quantity : subject.quantities()) {
+      if (quantity.role != role) continue;
+      for (std::size_t k = 0; k < quantity.size(); ++k) places.push_back(quantity.column(k));
+    }
+    for (const std::size_t place : places) names.push_back(columns[place]);
+  }
+  return names;
+}
+
+/// From one time to the next, while inputs are held.
+void make_discrete(const Subject& subject, const RunOptions& options, double step, const InterruptGuard& guard,
+                   Linear& linear) {
+  const Eigen::Index n = linear.a.rows(), inputs = linear.b.cols();
+  Eigen::Index varied = 0;
+  for (const Varied& one : varied_by(subject)) varied += one.size;
+  Directions<> of_start = Directions<>::Zero(n, n + inputs), of_parameters = Directions<>::Zero(varied, n + inputs);
+  of_start.leftCols(n).setIdentity();
+  of_parameters.bottomRightCorner(inputs, inputs).setIdentity();  // inputs are the last
+  const std::array<double, 1> times = {linear.at.time + step};
+  const Forward moved = move_variations({.subject = subject,
+                                         .options = options,
+                                         .start = linear.at,
+                                         .times = times,
+                                         .stop = [&] { return guard.interrupted(); }},
+                                        of_start, of_parameters);
+  if (!moved.outcome) throw io::InputError(message(moved.outcome, subject.coordinates()));
+  linear.a = moved.variations.front().leftCols(n);
+  linear.b = moved.variations.front().rightCols(inputs);
+}
+
+template <class Scenario>
+Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, const InterruptGuard& guard) {
+  const std::shared_ptr<const Subject> subject = io::subject_of(scenario);
+  const Motion start = scenario.start;
+  Linear linear{.at = options.at == "equilibrium" ? equilibrium(*subject, start) : start,
+                .names = state_names(*subject),
+                .inputs = input_names(*subject),
+                .a = {},
+                .b = {}};
+  const Eigen::Index n = 2 * linear.at.q.size();
+  linear.a.resize(n, n);
+  linear.b.resize(n, static_cast<Eigen::Index>(linear.inputs.size()));
+  linearize(*subject, linear.at, linear.a.data(), linear.b.data());
+  if (!linear.a.allFinite() || !linear.b.allFinite()) {
+    throw io::InputError(options.scenario +
+                         ": expected a state where the equations are regular, got one where they are "
+                         "not (in space phi has no meaning where sin(theta) is 0)");
+  }
+  if (options.step) make_discrete(*subject, scenario.run, *options.step, guard, linear);
+  return linear;
+}
+
+std::vector<double> state_of(const Motion& motion) {
+  std::vector<double> state(motion.q.begin(), motion.q.end());
+  state.insert(state.end(), motion.v.begin(), motion.v.end());
+  return state;
+}
+
+std::vector<std::vector<double>> rows_of(const Directions<>& matrix) {
+  std::vector<std::vector<double>> rows;
+  for (const auto& row : matrix.rowwise()) rows.emplace_back(row.begin(), row.end());
+  return rows;
+}
+
+void print_json(const Linear& linear, const LinearizeOptions& options, const Eigen::VectorXcd& eigenvalues) {
+  nlohmann::ordered_json json{{"scenario", options.scenario}, {"at", options.at},       {"step", nullptr},
+                              {"t", linear.at.time},          {"names", linear.names},  {"inputs", linear.inputs},
+                              {"state", state_of(linear.at)}, {"A", rows_of(linear.a)}, {"B", rows_of(linear.b)}};
+  if (options.step) json["step"] = *options.step;
+  for (const std::complex<double>& one : eigenvalues) json["eigenvalues"].push_back({one.real(), one.imag()});
+  std::cout << json.dump(2) << '\n';
+}
+
+void print_matrix(const Directions<>& matrix, const std::vector<std::string>& rows,
+                  const std::vector<std::string>& columns) {
+  constexpr int width = 14;
+  std::size_t longest = 0;
+  for (const std::string& name : rows) longest = std::max(longest, name.size());
+  std::cout << std::string(longest, ' ');
+  for (const std::string& name : columns) std::cout << std::setw(width) << name;
+  std::cout << '\n';
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    const std::string& name = rows[static_cast<std::size_t>(i)];
+    std::cout << name << std::string(longest - name.size(), ' ');
+    for (const double number : matrix.row(i)) std::cout << std::setw(width) << rounded(number, 6);
+    std::cout << '\n';
+  }
+}
+
+void print_text(const Linear& linear, const LinearizeOptions& options, const Eigen::VectorXcd& eigenvalues) {
+  std::cout << (options.step ? "x(t + " + shortest(*options.step) + ") = A x(t) + B u" : "dx/dt = A x + B u")
+            << ", x a deviation from\n\n";
+  const std::vector<double> state = state_of(linear.at);
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    std::cout << "  " << std::left << std::setw(17) << linear.names[k] << shortest(state[k]) << '\n';
+  }
+  std::cout << std::right << "\nA\n";
+  print_matrix(linear.a, linear.names, linear.names);
+  if (linear.b.cols() > 0) {
+    std::cout << "\nB\n";
+    print_matrix(linear.b, linear.names, linear.inputs);
+  }
+  std::cout << "\neigenvalues of A\n";
+  const double smallest = 1e-13 * eigenvalues.cwiseAbs().maxCoeff();  // less is rounding
+  for (const std::complex<double>& one : eigenvalues) {
+    std::cout << std::setw(15) << (std::abs(one.real()) < smallest ? "0" : rounded(one.real(), 6));
+    if (std::abs(one.imag()) >= smallest) std::cout << (one.imag() < 0 ? " - " : " + ") << rounded(std::abs(one.imag()), 6) << " i";
+    std::cout << '\n';
+  }
+}
+
+}  // namespace
+
+ExitStatus linearize(const LinearizeOptions& options) {
+  const InterruptGuard guard;
+  const Linear linear = std::visit(
+      [&](const auto& scenario) {
+        return io::told_at_keys(scenario, options.scenario, [&] { return linear_of(scenario, options, guard); });
+      },
+      read_scenario(options.scenario, options.overrides, options.json));
+  const Eigen::VectorXcd eigenvalues = Eigen::MatrixXd(linear.a).eigenvalues();
+  if (options.json)
+    print_json(linear, options, eigenvalues);
+  else
+    print_text(linear, options, eigenvalues);
+  return done;
+}
+
+}  // namespace pendula::cli

@@ -1,0 +1,73 @@
+"""Linear systems beside a start or an equilibrium."""
+
+import math
+
+import pytest
+
+CART = '[system]\nmodel = "cart_chain"\nlinks = 1\n[start]\ntheta = 3.0\nx = 0.7\n[run]\nduration = 1.0\n'
+
+
+def test_a_double_pendulum_swings_by_its_two_frequencies(pendula, double):
+    run = pendula("linearize", double, "--at", "equilibrium", "--json")
+    assert run.status == 0, run.err
+    assert run.json["names"] == ["theta_1", "theta_2", "theta_dot_1", "theta_dot_2"]
+    assert run.json["state"] == [0, 0, 0, 0]
+    found = sorted({round(abs(imaginary), 12) for _, imaginary in run.json["eigenvalues"]})
+    wanted = [math.sqrt(9.81 * (2 - math.sqrt(2))), math.sqrt(9.81 * (2 + math.sqrt(2)))]
+    assert found == pytest.approx(wanted, rel=1e-12)  # measured 1e-13
+    assert [row[:2] for row in run.json["B"]] == [[0, 0], [0, 0], [1, -1], [-1, 2]]
+
+
+def test_the_discrete_system_has_the_exponentials_of_its_eigenvalues(pendula, double):
+    continuous, discrete = (
+        pendula("linearize", double, "--at", "equilibrium", "--json", *step).json
+        for step in ([], ["--step", "0.1"])
+    )
+    found = sorted(complex(*one).real for one in discrete["eigenvalues"])
+    wanted = sorted(math.cos(0.1 * imaginary) for _, imaginary in continuous["eigenvalues"])
+    assert found == pytest.approx(wanted, abs=1e-8)  # measured 1e-11: its steps are those of the scenario
+    assert discrete["step"] == 0.1
+
+
+def test_an_equilibrium_is_that_near_the_start_and_leaves_what_does_not_matter(pendula, tmp_path):
+    (tmp_path / "cart.toml").write_text(CART)
+    run = pendula("linearize", "cart.toml", "--at", "equilibrium", "--json")
+    assert run.status == 0, run.err
+    assert run.json["state"] == pytest.approx([0.7, math.pi, 0, 0], abs=1e-14)  # measured 0
+    assert run.json["inputs"] == ["push"]
+    assert max(real for real, _ in run.json["eigenvalues"]) > 1
+    text = pendula("linearize", "cart.toml").out
+    assert "dx/dt = A x + B u" in text and "theta_1          3" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (["--step", "0"], 2, "--step: expected a positive number, got 0"),
+        (
+            ["--step", "0.1", "--set", "run.method=rk4"],
+            2,
+            "expected method = gauss or radau in momentum form",
+        ),
+        (
+            ["--at", "equilibrium", "--set", "chain.drive=[{link=1,amplitude=1.0,frequency=1.0}]"],
+            2,
+            "expected start for a system that changes with time, got equilibrium",
+        ),
+        (["--set", "chain.links=40"], 2, "expected"),
+    ],
+)
+def test_what_has_none_is_refused(arguments, status, said, pendula, double):
+    run = pendula("linearize", double, *arguments)
+    assert run.status == status
+    assert said in run.err
+
+
+def test_a_pole_is_refused(pendula, tmp_path):
+    (tmp_path / "pole.toml").write_text(
+        '[chain]\nspace = "spatial"\nmasses = [1.0]\nlengths = 1.0\n'
+        "[start]\ntheta = 0.0\nphi = 0.0\n[run]\nduration = 1.0\n"
+    )
+    run = pendula("linearize", "pole.toml")
+    assert run.status == 2
+    assert "expected a state where the equations are regular" in run.err
