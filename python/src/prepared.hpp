@@ -43,7 +43,6 @@ struct Prepared {
   std::shared_ptr<const Subject> subject;
   Motion start;
   SimulationOptions options;
-  RunOptions run;
   std::vector<std::string> warnings;
 };
 
