@@ -69,8 +69,9 @@ def move(
         distributed = importlib.import_module("distributed")
     except ImportError as error:
         raise missing("dask", error) from None
-    if not hasattr(client, "submit"):
-        raise InputError(f"client: expected a Client of dask.distributed, got {type(client).__name__}")
+    if not hasattr(client, "submit") or getattr(client, "asynchronous", False):
+        kind = "an asynchronous one" if hasattr(client, "submit") else type(client).__name__
+        raise InputError(f"client: expected a Client of dask.distributed that waits, got {kind}")
     # A task of its own, so that the scheduler can make it again where the workers that had it are gone.
     begun = client.submit(Beginning, *beginning, pure=False)
     futures = {client.submit(_move, begun, k, pure=False): k for k in range(made.chunks)}

@@ -272,7 +272,7 @@ def test_wrong_starts_are_named(start, message):
         ({"shard": (3, 2), "file": "x.h5"}, r"shard: expected \(I, N\) .* got \(3, 2\)"),
         ({"file": "x.csv"}, "x.csv: expected .*HDF5"),
         ({"client": 5, "file": "x.h5"}, "client: expected no file beside it"),
-        ({"client": 5}, "client: expected a Client of dask.distributed, got int"),
+        ({"client": 5}, "client: expected a Client of dask.distributed that waits, got int"),
         ({"method": "euler"}, "run.method: expected"),
         ({"tolerance": 0.0}, "run.tolerance: expected"),
     ],
