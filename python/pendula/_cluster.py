@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Chunk = tuple[NDArray[Any], list[tuple[int, str]]]
 
 
-class Beginning(NamedTuple):
+class Work(NamedTuple):
     """What a worker makes an ensemble of."""
 
     text: str
@@ -30,7 +30,7 @@ class Beginning(NamedTuple):
     program: tuple[str, str]  # version and instruction set, which decide the last bits
 
     @classmethod
-    def of(cls, made: _core.Ensemble, text: str, name: str, overrides: list[str]) -> Beginning:
+    def of(cls, made: _core.Ensemble, text: str, name: str, overrides: list[str]) -> Work:
         return cls(text, name, tuple(overrides), made.model, _program())
 
     def make(self) -> _core.Ensemble:
@@ -51,19 +51,17 @@ def _program() -> tuple[str, str]:
 
 
 _one_at_a_time = threading.Lock()
-_made = functools.lru_cache(maxsize=2)(Beginning.make)
+_made = functools.lru_cache(maxsize=2)(Work.make)
 
 
-def _move(beginning: Beginning, chunk: int) -> Chunk:
+def _move(work: Work, chunk: int) -> Chunk:
     """Runs on a worker."""
     with _one_at_a_time:
-        made = _made(beginning)
+        made = _made(work)
     return made.chunk(chunk)
 
 
-def move(
-    made: _core.Ensemble, beginning: Beginning, client: Any, shown: Callable[[int], None] | None
-) -> None:
+def move(made: _core.Ensemble, work: Work, client: Any, shown: Callable[[int], None] | None) -> None:
     """Has the workers of a cluster move all members. What a worker that dies had is moved again by others."""
     try:
         distributed = importlib.import_module("distributed")
@@ -73,8 +71,8 @@ def move(
         kind = "an asynchronous one" if hasattr(client, "submit") else type(client).__name__
         raise InputError(f"client: expected a Client of dask.distributed that waits, got {kind}")
     # A task of its own, so that the scheduler can make it again where the workers that had it are gone.
-    begun = client.submit(Beginning, *beginning, pure=False)
-    futures = {client.submit(_move, begun, k, pure=False): k for k in range(made.chunks)}
+    known = client.submit(Work, *work, pure=False)
+    futures = {client.submit(_move, known, k, pure=False): k for k in range(made.chunks)}
     done = 0
     try:
         for future in distributed.as_completed(list(futures)):
@@ -86,4 +84,4 @@ def move(
     except distributed.KilledWorker as error:
         raise RunFailed(f"client: {error}") from None
     finally:
-        client.cancel([*futures, begun])
+        client.cancel([*futures, known])

@@ -182,7 +182,7 @@ def move_members(
         if client is not None:
             from . import _cluster
 
-            _cluster.move(made, _cluster.Beginning.of(made, text, name, overrides), client, shown)
+            _cluster.move(made, _cluster.Work.of(made, text, name, overrides), client, shown)
         elif file is None:
             with plainly():
                 made.move(how_many, shown)

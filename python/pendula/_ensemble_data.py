@@ -86,7 +86,9 @@ def open_ensemble(file: str | PathLike[str]) -> xarray.Dataset:
                 own = {word: _plain(array.attrs[word]) for word in OWN if word in array.attrs}
                 dims = (key,) if array.is_scale else tuple(dim[0].name[1:] for dim in array.dims)
                 (scales if array.is_scale else data)[key] = (dims, values, own)
-    except (OSError, KeyError, RuntimeError) as error:
+    except InputError:
+        raise
+    except (OSError, LookupError, RuntimeError, ValueError) as error:
         raise InputError(f"{name}: expected a file of an ensemble that can be read, got: {error}") from None
     return _dataset(data, scales, attrs)
 

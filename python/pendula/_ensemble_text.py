@@ -45,12 +45,14 @@ class Design:
 
     def add_axes(self, axes: Mapping[str, object]) -> None:
         for key, given in axes.items():
+            if key in self._axes:
+                raise InputError(f"axes: {key} is given twice")
             self._axes[key] = _values(f"axes: {key}", given)
 
     def add_random(self, random: Mapping[str, object]) -> None:
         for key, given in random.items():
             expected = f'random: expected ("normal", mean, deviation) or ("uniform", from, to) for {key}'
-            if not isinstance(given, Sequence) or len(given) != 3 or given[0] not in DRAWN:
+            if not isinstance(given, Sequence) or len(given) != 3 or str(given[0]) not in DRAWN:
                 raise InputError(f"{expected}, got {given!r}")
             self._random.append({"key": key, **dict(zip(DRAWN[given[0]], given[1:], strict=True))})
 

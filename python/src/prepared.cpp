@@ -65,7 +65,7 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& na
         Motion start = scenario.start;
         std::vector<std::string> warnings = scenario.warnings;
         return std::shared_ptr<Prepared>(
-            new Prepared{std::move(any), std::move(subject), std::move(start), options, std::move(warnings)});
+            new Prepared{std::move(any), std::move(subject), std::move(start), options, run, std::move(warnings)});
       },
       any);
 }

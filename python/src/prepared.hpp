@@ -43,6 +43,7 @@ struct Prepared {
   std::shared_ptr<const Subject> subject;
   Motion start;
   SimulationOptions options;
+  RunOptions run;
   std::vector<std::string> warnings;
 };
 

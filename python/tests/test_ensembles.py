@@ -17,7 +17,7 @@ import pendula
 import pytest
 import xarray
 from pendula import _core
-from pendula._cluster import Beginning
+from pendula._cluster import Work
 from pendula._runs import places, tell
 
 DOUBLE = pendula.Chain(masses=[1, 1])
@@ -265,6 +265,11 @@ def test_wrong_starts_are_named(start, message):
         ({"random": {"chain.gravity": ("normal", 1, -2)}}, "ensemble.random.*deviation: expected .* got -2"),
         ({"random": {"chain.gravty": ("normal", 1, 2)}}, "gravty"),
         ({"axes": {"chain.gravity": [1.0]}}, "expected axes .*, got both"),
+        ({"random": {"chain.gravity": ([], 1, 2)}}, "random: expected"),
+        (
+            {"start": {"theta": (GRID, 0)}, "axes": {"start.theta[1]": GRID}},
+            r"axes: start.theta\[1\] is given twice",
+        ),
         ({"members": 3}, "ensemble.count: expected a count of each list"),
         ({"seed": -1}, "ensemble.seed: expected"),
         ({"shard": (1, 2)}, "file: expected the file that shards share"),
@@ -519,7 +524,7 @@ def test_a_worker_that_dies_loses_nothing():
         assert_same(pendula.ensemble(DOUBLE, 10.0, start, client=Telling(), **given), whole)
         assert killed and victim not in client.run(os.getpid).values()
         with pytest.raises(pendula.InputError, match=r"expected workers with pendula .* for another, got"):
-            client.submit(Beginning.make, Beginning("", "", (), "", ("0", "another"))).result()
+            client.submit(Work.make, Work("", "", (), "", ("0", "another"))).result()
 
 
 def test_workers_need_no_file_of_a_model(tmp_path):
@@ -532,7 +537,7 @@ def test_workers_need_no_file_of_a_model(tmp_path):
     )
     scenario += "values = [1, 2]}]}\n"
     made = _core.Ensemble(scenario, "pendula", [], "", *places(), tell)
-    beginning = Beginning.of(made, scenario, "pendula", [])
+    beginning = Work.of(made, scenario, "pendula", [])
     file.unlink()
     rows, messages = beginning.make().chunk(0)
     here, _ = made.chunk(0)
