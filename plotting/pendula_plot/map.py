@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
@@ -47,7 +47,7 @@ class Ensemble:
         return ~np.isin(self.status, (0, 1))
 
 
-def reject(path: Path, expected: str, got: str) -> PlotError:
+def reject(path: Path | str, expected: str, got: str) -> PlotError:
     return PlotError(f"{path}: expected {expected}, got {got}")
 
 
@@ -91,8 +91,10 @@ def duration_of(attributes: Mapping, axes: list[str], unit: str) -> str:
     return f"{float(keys.get('run.duration') or DURATION):g} {time}"
 
 
-def called(path: Path, kept: Mapping[str, Any], name: str) -> str:
-    """The data set of that name; or of what the scenario calls it, `event:flip` of event_flip. Raises PlotError."""
+def called(path: Path | str, kept: Mapping[str, Any], name: str) -> str:
+    """The data set of that name; or of what the scenario calls it, `event:flip` of event_flip, `final:theta_1` of
+    theta_1. Raises PlotError."""
+    name = name.removeprefix("final:").removeprefix("points:")
     if name in kept:
         return name
     typed = {str(data.attrs.get("long_name", "")): word for word, data in kept.items()}
@@ -149,29 +151,66 @@ def colours(ensemble: Ensemble, values: np.ndarray, choice: MapChoice) -> tuple[
     return "viridis", Normalize(found.min(), found.max())
 
 
-def edges(values: np.ndarray) -> tuple[float, float]:
-    """Of an axis whose members are the middles of cells."""
+def ends(values: np.ndarray) -> tuple[float, float]:
+    """Of an axis whose members are the middles of cells, all as wide."""
     half = (values[-1] - values[0]) / (len(values) - 1) / 2 if len(values) > 1 else 0.5
     return values[0] - half, values[-1] + half
 
 
+def edges(values: np.ndarray) -> np.ndarray:
+    """Of the cells of an axis that ascends, half way between the members."""
+    first, last = ends(values[:2])[0], ends(values[-2:])[1]
+    return np.concatenate([[first], (values[1:] + values[:-1]) / 2, [last]])
+
+
+def is_even(values: np.ndarray) -> bool:
+    steps = np.diff(values)
+    return steps.size < 2 or bool(np.ptp(steps) <= 1e-6 * np.abs(steps).max())
+
+
+def ascending(ensemble: Ensemble) -> Ensemble:
+    """The same with axes in order, where they are not even. Raises PlotError where a value is there twice."""
+    for k, (name, unit, values) in enumerate(ensemble.axes):
+        if is_even(values) and (len(values) < 2 or values[0] != values[1]):
+            continue
+        order = np.argsort(values)
+        if np.any(np.diff(values[order]) == 0):
+            raise PlotError(f"{ensemble.name}: expected different values of {name}, got one twice")
+        axes = list(ensemble.axes)
+        axes[k] = name, unit, values[order]
+        ensemble = replace(
+            ensemble,
+            axes=axes,
+            values=ensemble.values.take(order, k),
+            status=ensemble.status.take(order, k),
+            contour=None if ensemble.contour is None else ensemble.contour.take(order, k),
+        )
+    return ensemble
+
+
 def draw_map(drawn: Figure, axes: Axes, ensemble: Ensemble, choice: MapChoice) -> None:
     """Two axes: the first one of the scenario to the right, the second upwards."""
+    ensemble = ascending(ensemble)
     values = shown(ensemble)
     if not np.isfinite(values).any():
         raise PlotError(f"{ensemble.name}: expected numbers of {ensemble.key}, got none")
-    extent = (*edges(ensemble.axes[0][2]), *edges(ensemble.axes[1][2]))
     cmap, norm = colours(ensemble, values, choice)
-    place = {"origin": "lower", "extent": extent, "aspect": "auto", "interpolation": "nearest"}
-    marks = np.where(ensemble.lost().T[..., None], rgba(FAILED), rgba(NEVER))
-    axes.imshow(marks, **place)
-    image = axes.imshow(np.ma.masked_invalid(values.T), cmap=cmap, norm=norm, **place)
+    failed, kinds = ensemble.lost().T.astype(int), ListedColormap([NEVER, FAILED])
+    numbers, colour = np.ma.masked_invalid(values.T), {"cmap": cmap, "norm": norm}
+    across, upwards = (axis[2] for axis in ensemble.axes)
+    if is_even(across) and is_even(upwards):
+        extent = (*ends(across), *ends(upwards))
+        place = {"origin": "lower", "extent": extent, "aspect": "auto", "interpolation": "nearest"}
+        axes.imshow(kinds(failed), **place)
+        image = axes.imshow(numbers, **colour, **place)
+    else:
+        axes.pcolormesh(edges(across), edges(upwards), failed, cmap=kinds, vmin=0, vmax=1)
+        image = axes.pcolormesh(edges(across), edges(upwards), numbers, **colour)
     few_decades = isinstance(norm, LogNorm) and norm.vmax < FEW_DECADES * norm.vmin
     ticks = {"ticks": LogLocator(subs=(1, 2, 5)), "format": "%g"} if few_decades else {}
     drawn.colorbar(image, ax=axes, label=named(ensemble.key, ensemble.unit), **ticks)
     if choice.level is not None:
-        first, second = (axis[2] for axis in ensemble.axes)
-        axes.contour(first, second, ensemble.contour.T, levels=[choice.level], colors="k", linewidths=0.8)
+        axes.contour(across, upwards, ensemble.contour.T, levels=[choice.level], colors="k", linewidths=0.8)
     axes.grid(visible=False)
     axes.set_xlabel(named(*ensemble.axes[0][:2]))
     axes.set_ylabel(named(*ensemble.axes[1][:2]))
@@ -182,12 +221,6 @@ def shown(ensemble: Ensemble) -> np.ndarray:
     """Angles within a turn; nothing of members that failed."""
     values = np.where(ensemble.lost(), np.nan, ensemble.values)
     return np.mod(values + np.pi, 2 * np.pi) - np.pi if ensemble.unit == "rad" else values
-
-
-def rgba(colour: str) -> np.ndarray:
-    from matplotlib.colors import to_rgba
-
-    return np.array(to_rgba(colour))
 
 
 def legend(axes: Axes, ensemble: Ensemble, values: np.ndarray) -> None:

@@ -13,7 +13,9 @@ from ._core import InputError, instruction_set
 from ._core import version as _version
 from ._derivatives import Derivatives, Gradient, differentiate, linearize
 from ._ensemble import ensemble
+from ._ensemble_data import merge, open_ensemble
 from ._functions import ModelFunction, model
+from ._map import map as map  # not in __all__: `from pendula import *` leaves Python its own
 from ._runs import RunFailed, Solution, TrustWarning
 from ._simulation import Lyapunov, Simulation, lyapunov
 from ._systems import Chain, Model, Scenario
@@ -42,5 +44,7 @@ __all__ = [
     "instruction_set",
     "linearize",
     "lyapunov",
+    "merge",
     "model",
+    "open_ensemble",
 ]

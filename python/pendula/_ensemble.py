@@ -2,138 +2,212 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._runs import mapping, number, numbers, plainly, warn
+from ._ensemble_data import dataset_of, open_ensemble, progress_line
+from ._ensemble_text import Design, ensemble_text
+from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
 from ._simulation import RUN_OPTIONS, Beginning
-from ._systems import System
+from ._systems import System, event_tables
 
 if TYPE_CHECKING:
     import xarray
-    from numpy.typing import NDArray
-
-# By RunEnd of C++.
-STATUSES = ("ok", "event", "stopped", "failed", "failed", "failed")
 
 
 def ensemble(
     system: System,
     duration: float,
-    start: Mapping[str, object],
+    start: Mapping[str, object] | None = None,
     *,
+    axes: Mapping[str, object] | None = None,
+    random: Mapping[str, object] | None = None,
+    members: int | None = None,
+    seed: int | None = None,
+    keep: Sequence[str] | None = None,
+    events: Mapping[str, str | Mapping[str, object]] | None = None,
     tolerance: float | None = None,
     step: float | None = None,
-    estimate: bool = True,
+    accuracy: float | None = None,
+    estimate: bool | None = None,
     threads: int = 0,
+    file: str | PathLike[str] | None = None,
+    shard: tuple[int, int] | None = None,
+    resume: bool = False,
+    client: Any = None,
+    progress: bool = False,
     **options: object,
 ) -> xarray.Dataset:
-    """Moves many motions of one system at once.
+    """Moves many motions of one system at once, as ``pendula ensemble`` does, to the bit.
 
     Parameters
     ----------
     system : Chain or Model
     duration : float
         In s.
-    start : mapping of arrays
-        Coordinates and rates by name, in rad, m and their rates. An array is (members,), of all links of a chain
-        (members, links); a single number is that of all members. What is left out is 0.
-    tolerance, step : float, optional
-        As for :class:`Simulation`.
-    estimate : bool
-        Whether members are moved a second time to see how far they can be trusted.
+    start : mapping, optional
+        Coordinates and rates (or momenta, ``p_theta``) by name, in rad, m and their rates. What is left out is 0.
+
+        A number, or a text such as ``"90 deg"``: that of all members. An array lists them: (members,), of all links
+        of a chain (members, links). A tuple has a number or an axis of a grid for each link: ``{"theta": (grid_1,
+        grid_2)}`` is the outer product of two vectors.
+    axes : mapping, optional
+        Further axes of the grid: values of any key of the scenario that takes a number, elements from 1:
+        ``{"chain.lengths[1]": array, "run.duration": array}``.
+    random : mapping, optional
+        Keys that are drawn for each member: ``{"start.theta[1]": ("normal", mean, deviation)}`` or ``("uniform", from,
+        to)``. Not beside axes.
+    members, seed : int, optional
+        Of what is drawn.
+    keep : sequence of str, optional
+        As in a scenario: "final", "points", "energy", "energy_error", "steps", "lyapunov", "ftle", "megno",
+        "event:NAME". Left out: final, energy_error, steps and all events.
+    events : mapping, optional
+        As for :meth:`Chain.simulate`.
+    tolerance, step, accuracy, method, stages, form, solver, iteration, estimate
+        As ``[run]`` of a scenario; a tolerance of 1e-9 where nothing says otherwise. ``method="auto"``: an explicit
+        one where that is over sooner.
     threads : int
         0: as many as there are processors.
+    file : path, optional
+        An HDF5 file for the result, with journals beside it, so that nothing is lost whatever ends the process.
+    shard : (int, int), optional
+        ``(2, 8)``: only the second eighth. All shards name one file, which the last one completes; or one each, for
+        :func:`merge`.
+    resume : bool
+        Whether to go on with what an interrupted one has left beside ``file``.
+    client : distributed.Client, optional
+        Workers of a cluster move the members, one thread each; the same bytes come back. A worker that dies loses
+        nothing.
+    progress : bool
+        Whether to show on the way how many members are done.
 
     Returns
     -------
     xarray.Dataset
-        Where each member ends, by the names of columns over ``member``, with ``run_status`` ("ok", "failed"),
-        ``run_trusted`` (where it was estimated) and ``run_energy_error``, relative.
+        Over the axes, or over ``member``; names, units and attributes as in the file (docs/ensembles.md):
+        ``status`` is 0 of members that came to their end, ``trusted`` 1 or 0 of those that were looked at again, else
+        -1. With ``shard`` members that are not done have status -1, and the attribute ``complete`` is 0 until all are.
+
+    Raises
+    ------
+    InputError
+        An argument is wrong.
+    RunFailed
+        All members failed; ``partial`` is the dataset.
 
     Warns
     -----
     TrustWarning
-        How many members cannot be trusted, and why the first one.
+        How many members failed or cannot be trusted, and the first one.
 
     Examples
     --------
     >>> import numpy, pendula
     >>> double = pendula.Chain(masses=[1, 1])
-    >>> ends = pendula.ensemble(double, 1.0, {"theta": numpy.linspace(0, 1, 12).reshape(6, 2)})
-    >>> ends["theta_2"].shape, bool(ends["run_trusted"].all())
-    ((6,), True)
+    >>> grid = numpy.linspace(-1, 1, 5)
+    >>> data = pendula.ensemble(double, 1.0, {"theta": (grid, grid[:3])}, keep=["final", "energy"])
+    >>> data["theta_2"].dims, data["theta_2"].shape, data["energy_start"].attrs["units"]
+    (('start_theta_1', 'start_theta_2'), (5, 3), 'J')
+    >>> data = pendula.ensemble(double, 1.0, {"theta": numpy.zeros((4, 2))})
+    >>> data.sizes["member"], int(data["trusted"].sum())
+    (4, 4)
     """
-    import xarray
-
     how_long = number("duration", duration)
     if how_long < 0:
         raise InputError(f"duration: expected a number, not negative, got {duration!r}")
-    if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 0:
-        raise InputError(f"threads: expected how many, 0 for all processors, got {threads!r}")
     for name in options:
         if name not in RUN_OPTIONS:
             raise InputError(f"ensemble: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
+    method = options.pop("method", None)
     at_zero = system.at_zero() if isinstance(system, System) else {}
-    made = Beginning.of(system, at_zero, tolerance=tolerance, step=step, options=options).prepare()
-    columns = made.columns
-    names = [columns[k] for k in made.state]
-    starts = _starts(mapping("start", start), names)
+    made = Beginning.of(system, at_zero, tolerance=None, step=None, options={}).prepare()
+    design = Design(system, [made.columns[k] for k in made.state])
+    design.add_start(mapping("start", start))
+    design.add_axes(mapping("axes", axes))
+    design.add_random(mapping("random", random))
+    if step is None and tolerance is None and accuracy is None:
+        tolerance = 1e-9
+    run = {
+        "duration": how_long,
+        "method": None if method == "auto" else method,
+        "tolerance": tolerance,
+        "step": step,
+        "accuracy": accuracy,
+        "estimate": estimate,
+        **options,
+    }
+    tables = {**design.tables(), "run": run, "event": event_tables(events)}
+    text = ensemble_text(tables, method=method, members=members, seed=seed, keep=keep)
+    return move_members(
+        text,
+        "pendula",
+        [],
+        threads=threads,
+        file=file,
+        shard=shard,
+        resume=resume,
+        client=client,
+        progress=progress,
+    )
+
+
+def move_members(
+    text: str,
+    name: str,
+    overrides: list[str],
+    *,
+    threads: int,
+    file: str | PathLike[str] | None,
+    shard: tuple[int, int] | None,
+    resume: bool,
+    client: Any,
+    progress: bool,
+) -> xarray.Dataset:
+    """Moves the members of a scenario's text, for whoever was called from outside."""
+    how_many = _threads(threads)
+    part = None if shard is None else _shard(shard)
+    if file is None and (part or resume):
+        raise InputError("file: expected the file that shards share, or that is resumed, got none")
+    if client is not None and file is not None:
+        raise InputError("client: expected no file beside it, got one; the dataset has .to_netcdf")
     with plainly():
-        ends, how, errors, doubts = _core.propagate(made, starts, how_long, int(threads), bool(estimate))
-    data: dict[str, Any] = {name: ("member", ends[:, k]) for k, name in enumerate(names)}
-    if not data.keys().isdisjoint(("run_status", "run_trusted", "run_energy_error")):
-        raise InputError("system: expected coordinates with names that do not begin with run_")
-    data["run_status"] = ("member", np.array([STATUSES[one] for one in how]))
-    if estimate:
-        data["run_trusted"] = ("member", np.array([doubt == "" for doubt in doubts], dtype=bool))
-    data["run_energy_error"] = ("member", errors)
-    untrusted = [k for k, doubt in enumerate(doubts) if doubt]
-    if untrusted:
-        first = untrusted[0]
-        warn(
-            [f"{len(untrusted)} of {len(how)} members cannot be trusted; member {first}: {doubts[first]}"], 3
-        )
-    return xarray.Dataset(data)
+        made = _core.Ensemble(text, name, overrides, "pendula.ensemble", *places(), tell)
+    with progress_line(bool(progress), made.members) as shown:
+        if client is not None:
+            from . import _cluster
+
+            _cluster.move(made, _cluster.Work.of(made, text, name, overrides), client, shown)
+        elif file is None:
+            with plainly():
+                made.move(how_many, shown)
+        else:
+            with plainly():
+                is_complete = made.write(fspath(file), part, bool(resume), how_many, shown)
+        if shown and (file is None or is_complete):
+            shown(made.members)
+    data = dataset_of(made) if file is None else open_ensemble(file)
+    if data.attrs["complete"]:
+        warn(made.warnings, stacklevel=4)
+    if made.has_failed:
+        raise RunFailed(f"all {made.members} members failed; {made.warnings[-1]}", data)
+    return data
 
 
-def _starts(given: Mapping[str, object], names: list[str]) -> NDArray[np.float64]:
-    """(members, state) of arrays by name. Raises InputError."""
-    columns: dict[str, NDArray[np.float64]] = {}
-    for name, values in given.items():
-        for column, one in _columns_of(name, numbers(f"start: {name}", values), names):
-            if column in columns:
-                raise InputError(f"start: {column} is given twice")
-            columns[column] = one
-    sizes = {one.size for one in columns.values() if one.ndim > 0}
-    if len(sizes) > 1:
-        raise InputError(f"start: expected as many members of each, got {', '.join(map(str, sorted(sizes)))}")
-    starts = np.zeros((sizes.pop() if sizes else 1, len(names)))
-    for column, one in columns.items():
-        if not np.isfinite(one).all():
-            wrong = next(x for x in one.ravel() if not math.isfinite(x))
-            raise InputError(f"start: expected finite numbers for {column}, got {wrong}")
-        starts[:, names.index(column)] = one
-    return starts
+def _threads(given: object) -> int:
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and 0 <= given <= 1024:
+        return int(given)
+    raise InputError(f"threads: expected how many up to 1024, 0 for all processors, got {given!r}")
 
 
-def _columns_of(
-    name: str, values: NDArray[np.float64], names: list[str]
-) -> list[tuple[str, NDArray[np.float64]]]:
-    if name in names:
-        if values.ndim > 1:
-            raise InputError(f"start: expected a number or (members,) for {name}, got shape {values.shape}")
-        return [(name, values)]
-    links = [column for column in (f"{name}_{k + 1}" for k in range(len(names))) if column in names]
-    if not links:
-        raise InputError(f"start: expected some of {', '.join(names)}, got {name}")
-    if values.ndim == 0 or (len(links) == 1 and values.ndim == 1):
-        return [(column, values) for column in links]
-    if values.ndim != 2 or values.shape[1] != len(links):
-        raise InputError(f"start: expected (members, {len(links)}) for {name}, got shape {values.shape}")
-    return [(column, values[:, k]) for k, column in enumerate(links)]
+def _shard(given: object) -> tuple[int, int]:
+    if isinstance(given, Sequence) and len(given) == 2 and all(type(one) is int for one in given):
+        which, of = given
+        if 1 <= which <= of:
+            return which, of
+    raise InputError(f"shard: expected (I, N) with 1 <= I <= N, got {given!r}")

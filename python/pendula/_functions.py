@@ -189,7 +189,7 @@ def _cache() -> Path:
     return (Path(kept) if os.path.isabs(kept) else Path.home() / ".cache") / "pendula" / "functions"
 
 
-def _kept(name: str, text: str) -> Path:
+def kept_model(name: str, text: str) -> Path:
     """A file with that text."""
     folder = _cache() / hashlib.sha256(text.encode()).hexdigest()[:16]
     file = folder / f"{name}.py"
@@ -233,7 +233,7 @@ class ModelFunction:
             )
         given = list(arguments.values())[1].default
         self._links = given if isinstance(given, int) else None
-        self.file = _kept(name, _Text(function).text())
+        self.file = kept_model(name, _Text(function).text())
         functools.update_wrapper(self, function)
 
     def __call__(

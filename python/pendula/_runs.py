@@ -31,13 +31,14 @@ class TrustWarning(UserWarning):
 
 
 class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
-    """The computation failed. ``partial`` is the solution up to there; None of a :class:`Simulation`."""
+    """The computation failed. ``partial`` is the solution up to there, or the dataset of an ensemble none of whose
+    members came to its end; None of a :class:`Simulation`."""
 
-    def __init__(self, message: str, partial: Solution | None = None) -> None:
+    def __init__(self, message: str, partial: Any = None) -> None:
         super().__init__(message)
         self.partial = partial
 
-    def __reduce__(self) -> tuple[type[RunFailed], tuple[str, Solution | None]]:
+    def __reduce__(self) -> tuple[type[RunFailed], tuple[str, Any]]:
         return RunFailed, (str(self), self.partial)
 
 
@@ -253,7 +254,7 @@ def plainly() -> Iterator[None]:
 
 
 def _plain(sentence: str) -> str:
-    return re.sub(r"^pendula(:\d+)?: ", "", sentence)
+    return re.sub(r"^pendula(:\d+)?: ", "", sentence).replace("--resume", "resume=True")
 
 
 def places() -> tuple[str, str]:

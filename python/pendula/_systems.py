@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ._core import InputError
 from ._runs import Solution, mapping, merged, number, numbers, run_text
 
 if TYPE_CHECKING:
+    import xarray
     from numpy.typing import ArrayLike, NDArray
 
 Tables = dict[str, "dict[str, object] | list[dict[str, object]]"]
@@ -27,6 +28,14 @@ def _drives(given: object) -> list[dict[str, object]]:
         raise InputError(f"drives: expected a sequence of mappings, got {type(given).__name__}")
     drives = [mapping(f"drives[{k}]", drive) for k, drive in enumerate(given)]
     return copy.deepcopy(drives)
+
+
+def event_tables(events: object) -> list[dict[str, object]]:
+    """Events as a scenario has them: expressions, or mappings with ``when``, by name."""
+    return [
+        {"name": name, **({"when": event} if isinstance(event, str) else mapping(f"events.{name}", event))}
+        for name, event in mapping("events", events).items()
+    ]
 
 
 class System(ABC):
@@ -136,13 +145,7 @@ class System(ABC):
             "interval": interval,
             "times": None if times is None else times.tolist(),
         }
-        tables["event"] = [
-            {
-                "name": name,
-                **({"when": event} if isinstance(event, str) else mapping(f"events.{name}", event)),
-            }
-            for name, event in mapping("events", events).items()
-        ]
+        tables["event"] = event_tables(events)
         return run_text(_toml.document(tables))
 
 
@@ -303,3 +306,29 @@ class Scenario:
     def run(self) -> Solution:
         """Runs it; as :meth:`Chain.simulate`, and to the bit as ``pendula simulate``."""
         return run_text(self.file.read_text(encoding="utf-8"), str(self.file), self._overrides)
+
+    def ensemble(
+        self,
+        *,
+        threads: int = 0,
+        file: str | PathLike[str] | None = None,
+        shard: tuple[int, int] | None = None,
+        resume: bool = False,
+        client: Any = None,
+        progress: bool = False,
+    ) -> xarray.Dataset:
+        """Moves all members of a scenario with ``[ensemble]``; as :func:`ensemble`, and to the bit as ``pendula
+        ensemble``."""
+        from ._ensemble import move_members
+
+        return move_members(
+            self.file.read_text(encoding="utf-8"),
+            str(self.file),
+            self._overrides,
+            threads=threads,
+            file=file,
+            shard=shard,
+            resume=resume,
+            client=client,
+            progress=progress,
+        )

@@ -31,6 +31,8 @@ def value(given: object, key: str) -> str:
     if isinstance(given, np.ma.MaskedArray):
         raise TypeError(f"{key}: expected an array without a mask, got one with a mask")
     if isinstance(given, np.ndarray):
+        if given.dtype == np.float64 and given.ndim > 0:
+            return str(given.tolist())  # as TOML has them, and fast
         return value(given.tolist(), key)
     if isinstance(given, Sequence) and not isinstance(given, (bytes, bytearray)):
         return "[" + ", ".join(value(one, key) for one in given) + "]"

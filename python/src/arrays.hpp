@@ -23,11 +23,11 @@ using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device:
 using Starts = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 /// An array of numbers, which Python owns from now on.
-template <class ArrayType>
-ArrayType owned(std::vector<double> numbers, std::initializer_list<std::size_t> shape) {
-  auto kept = std::make_unique<std::vector<double>>(std::move(numbers));
-  double* const data = kept->data();
-  nb::capsule owner(kept.release(), [](void* made) noexcept { delete static_cast<std::vector<double>*>(made); });
+template <class ArrayType, class Number>
+ArrayType owned(std::vector<Number> numbers, std::initializer_list<std::size_t> shape) {
+  auto kept = std::make_unique<std::vector<Number>>(std::move(numbers));
+  Number* const data = kept->data();
+  nb::capsule owner(kept.release(), [](void* made) noexcept { delete static_cast<std::vector<Number>*>(made); });
   return ArrayType(data, shape, owner);
 }
 inline Vector vector_of(std::vector<double> numbers) {

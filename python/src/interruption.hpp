@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 
 #include <chrono>
+#include <exception>
 #include <future>
 #include <stop_token>
 
@@ -38,26 +39,35 @@ class Interruption {
   bool hears_ = hears_signals(), is_requested_ = false;
 };
 
-/// Asks Python from time to time, while others work, whether Ctrl-C was pressed; then `stop` is requested. Throws what
-/// the work does, and what Python has raised.
-template <class Do>
-void interruptibly(Do act) {
+/// Asks Python from time to time, while others work, whether Ctrl-C was pressed, and calls `tick`; where either raises,
+/// `stop` is requested. Throws what the work does, and what Python has raised.
+template <class Do, class Tick>
+void interruptibly(Do act, Tick tick) {
   std::stop_source stop;
   const bool hears = hears_signals();
-  bool is_interrupted = false;
+  std::exception_ptr raised;
   {
     const nb::gil_scoped_release others_may_go_on;
     auto work = std::async(std::launch::async, [&] { act(stop.get_token()); });
     while (work.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
       if (!hears) continue;
       const nb::gil_scoped_acquire lock;
-      if (is_interrupted || PyErr_CheckSignals() == 0) continue;
-      is_interrupted = true;
-      stop.request_stop();
+      if (raised) continue;
+      try {
+        if (PyErr_CheckSignals() != 0) throw nb::python_error();
+        tick();
+      } catch (const nb::python_error&) {
+        raised = std::current_exception();
+        stop.request_stop();
+      }
     }
     work.get();
   }
-  if (is_interrupted) throw nb::python_error();
+  if (raised) std::rethrow_exception(raised);
+}
+template <class Do>
+void interruptibly(Do act) {
+  interruptibly(act, [] {});
 }
 
 }  // namespace pendula::python

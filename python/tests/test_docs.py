@@ -10,6 +10,7 @@ from pathlib import Path
 import pendula
 import pendula._derivatives
 import pendula._ensemble
+import pendula._map
 import pendula._runs
 import pendula._simulation
 import pendula._systems
@@ -23,6 +24,7 @@ import pytest
         pendula,
         pendula._derivatives,
         pendula._ensemble,
+        pendula._map,
         pendula._runs,
         pendula._simulation,
         pendula._systems,
@@ -34,10 +36,11 @@ def test_examples_of_docstrings(module):
     assert doctest.testmod(module).failed == 0
 
 
-def test_the_readme_shows_what_happens():
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    [session] = re.findall(r"^```pycon\n(.*?)^```$", readme, re.DOTALL | re.MULTILINE)
-    examples = doctest.DocTestParser().get_doctest(session, {}, "README.md", "README.md", 0)
+@pytest.mark.parametrize("name", ["README.md", "docs/ensembles.md"])
+def test_the_pages_show_what_happens(name):
+    page = (Path(__file__).parents[2] / name).read_text()
+    [session] = re.findall(r"^```pycon\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    examples = doctest.DocTestParser().get_doctest(session, {}, name, name, 0)
     assert doctest.DocTestRunner().run(examples).failed == 0
 
 

@@ -1,4 +1,4 @@
-"""Step by step, and many at once."""
+"""Step by step."""
 
 import copy
 import pickle
@@ -75,93 +75,8 @@ def test_exponents_are_those_of_a_regular_motion():
         pendula.lyapunov(DOUBLE, 10.0, theta="90 deg", count=7)
 
 
-def test_members_are_simulations():
-    starts = np.random.default_rng(3).uniform(-1, 1, (20, 2))
-    ends = pendula.ensemble(DOUBLE, 2.0, {"theta": starts, "theta_dot_1": 0.5}, tolerance=1e-11)
-    assert ends.sizes == {"member": 20} and (ends["run_status"] == "ok").all() and ends["run_trusted"].all()
-    for k in (0, 7, 19):
-        alone = pendula.Simulation(DOUBLE, {"theta": starts[k], "theta_dot": [0.5, 0]}, tolerance=1e-11)
-        alone.advance_to(2.0)
-        found = np.array(
-            [ends[name].values[k] for name in ("theta_1", "theta_2", "theta_dot_1", "theta_dot_2")]
-        )
-        assert np.abs(found - alone.state).max() < 1e-9  # measured 1.2e-11
-    one, two = (pendula.ensemble(DOUBLE, 2.0, {"theta": starts}, threads=n) for n in (1, 2))
-    assert one.equals(two)
-
-
-def test_members_of_space_and_of_models():
-    spatial = pendula.Chain(links=2, space="spatial")
-    ends = pendula.ensemble(
-        spatial, 0.5, {"theta": np.full((4, 2), 0.4), "phi": np.arange(8.0).reshape(4, 2)}
-    )
-    alone = pendula.Simulation(spatial, {"theta": 0.4, "phi": [2, 3]}).advance_to(0.5)
-    names = ["theta_1", "theta_2", "phi_1", "phi_2", "theta_dot_1", "theta_dot_2", "phi_dot_1", "phi_dot_2"]
-    assert np.abs([ends[name].values[1] for name in names] - alone.state).max() < 1e-11  # measured 7.6e-14
-    ends = pendula.ensemble(pendula.Model("cart_chain"), 0.5, {"theta": [0.1, 0.2, 0.3]})
-    assert ends["x"].shape == (3,)
-
-
-@pytest.mark.parametrize(
-    ("start", "message"),
-    [
-        ({"theta": np.zeros((3, 3))}, r"start: expected \(members, 2\) for theta, got shape \(3, 3\)"),
-        ({"theta": np.zeros(3)}, r"start: expected \(members, 2\) for theta, got shape \(3,\)"),
-        ({"theta_1": np.zeros((3, 2))}, r"start: expected a number or \(members,\) for theta_1"),
-        (
-            {"theta": np.zeros((3, 2)), "theta_dot_1": np.zeros(4)},
-            "start: expected as many members of each, got 3, 4",
-        ),
-        ({"theta": np.zeros((3, 2)), "theta_1": 1.0}, "start: theta_1 is given twice"),
-        ({"theta": [[0, float("nan")]]}, "start: expected finite numbers for theta_2, got nan"),
-        ({"alpha": 1.0}, "start: expected some of theta_1, .*, got alpha"),
-        ({"theta": "ninety"}, "start: theta: expected an array of numbers, got one of <U6"),
-    ],
-)
-def test_wrong_starts_are_named(start, message):
-    with pytest.raises(ValueError, match=message):
-        pendula.ensemble(DOUBLE, 1.0, start)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"steps": 3}, "ensemble: expected options among method, .*, got steps"),
-        ({"duration": -1.0}, r"duration: expected a number, not negative, got -1\.0"),
-        ({"duration": float("nan")}, "duration: expected a finite number, got nan"),
-        ({"duration": "1"}, "duration: expected a finite number, got '1'"),
-        ({"threads": -1}, "threads: expected how many"),
-        ({"start": [1, 2]}, "start: expected a mapping by names, got list"),
-        ({"system": "furuta"}, "system: expected a Chain or a Model, got str"),
-    ],
-)
-def test_wrong_ensembles_are_named(given, message):
-    with pytest.raises(pendula.InputError, match=message):
-        pendula.ensemble(**{"system": DOUBLE, "duration": 1.0, "start": {"theta": [[0.1, 0.2]]}, **given})
-
-
-def test_chaos_is_told_of_members():
-    with pytest.warns(pendula.TrustWarning, match="1 of 2 members cannot be trusted; member 1: "):
-        ends = pendula.ensemble(DOUBLE, 60.0, {"theta": [[0.1, 0.1], [2.5, 2.5]]})
-    assert ends["run_trusted"].values.tolist() == [True, False]
-    assert "run_trusted" not in pendula.ensemble(DOUBLE, 1.0, {"theta": [[0.1, 0.1]]}, estimate=False)
-
-
-# Of models whose names interleave, or end as rates do, and of chains in space.
+# Of chains in space.
 def test_every_order_is_that_of_names():
-    @pendula.model
-    def several(model, links):
-        names = ("a_1", "b_1", "a_2", "c_dot")
-        model.lagrangian = 0
-        for k, name in enumerate(names):
-            x = model.coordinate(name, "m")
-            model.lagrangian += model.rate(x) ** 2 / 2 - (k + 1) ** 2 * x**2 / 2
-            model.point(f"p{k}", (x, 0 * x))
-
-    starts = {"a_1": [1.0, 2.0], "b_1": [1.0, 2.0], "a_2": 1.0, "c_dot": 1.0}
-    ends = pendula.ensemble(several(), 1.0, starts)
-    for name, omega in (("a_1", 1), ("b_1", 2), ("a_2", 3), ("c_dot", 4)):
-        assert abs(ends[name].values[0] - np.cos(omega)) < 1e-11, name  # measured 1.7e-14
     spatial = pendula.Chain(masses=[1, 2], space="spatial")
     start = {"theta": [0.4, 0.5], "phi": [1.0, 2.0]}
     run = spatial.simulate(1.0, **start)
@@ -262,10 +177,9 @@ def test_inputs_are_held_all_or_none():
     [
         lambda: DOUBLE.simulate(1e7, theta=1.5, step=1e-3, every=10**9),
         lambda: pendula.Simulation(DOUBLE, {"theta": 1.5}, step=1e-3).advance_to(1e7),
-        lambda: pendula.ensemble(DOUBLE, 1e6, {"theta": np.ones((64, 2))}),
         lambda: pendula.lyapunov(DOUBLE, 1e7, theta=1.5),
     ],
-    ids=["simulate", "simulation", "ensemble", "lyapunov"],
+    ids=["simulate", "simulation", "lyapunov"],
 )
 def test_an_interrupt_ends_work(work):
     pressed = []

@@ -25,8 +25,8 @@ CLI::Validator expect(const std::string& expected, bool (*accept)(const std::str
 }
 
 /// Parses I/N with 1 ≤ I ≤ N; empty for any other text.
-std::optional<Shard> shard_of(const std::string& text) {
-  Shard shard;
+std::optional<io::Shard> shard_of(const std::string& text) {
+  io::Shard shard;
   const char* const end = text.data() + text.size();
   const auto number = std::from_chars(text.data(), end, shard.number);
   if (number.ec != std::errc() || number.ptr == end || *number.ptr != '/') return std::nullopt;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "io/ensemble_output.hpp"
+
 namespace pendula::cli {
 
 /// Exit statuses of the program.
@@ -120,18 +122,13 @@ struct LinearizeOptions {
 /// Prints the linear system beside a scenario's start, or the equilibrium near it. Throws io::InputError.
 ExitStatus linearize(const LinearizeOptions& options);
 
-/// A part of an ensemble that runs by itself.
-struct Shard {
-  int number = 1, of = 1;
-};
-
 struct EnsembleOptions {
   std::string command;                 ///< as typed, for the file
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::string output;                  ///< HDF5 file
   int threads = 0;  ///< of each process; 0 for the number of cores, or one if there are several ranks
-  std::optional<Shard> shard;
+  std::optional<io::Shard> shard;
   bool resume = false;  ///< goes on with the journals beside the output
   bool json = false;
 };

@@ -4,23 +4,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <numeric>
-#include <pendula/numeric/number_text.hpp>
-#include <set>
 #include <utility>
+#include <variant>
 
+#include "io/ensemble_arrays.hpp"
 #include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/link_target.hpp"
 #include "io/output_error.hpp"
-#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {
@@ -89,9 +86,7 @@ class Columns {
   void write_as(const DoneChunk& chunk, std::size_t column, const Stored& place) {
     packed_.resize(static_cast<std::size_t>(chunk.members.size()) * sizeof(Number));
     for (std::size_t k = 0; k < packed_.size() / sizeof(Number); ++k) {
-      const double value = chunk.rows[k * width_ + column];
-      const auto number =
-          std::is_floating_point_v<Number> || !std::isnan(value) ? static_cast<Number>(value) : Number(-1);
+      const auto number = stored<Number>(chunk.rows[k * width_ + column]);
       std::memcpy(packed_.data() + k * sizeof(Number), &number, sizeof(Number));
     }
     bytes_.write(packed_.data(), packed_.size(),
@@ -126,121 +121,36 @@ void for_each_done(const std::string& folder, const EnsembleHead& head, Take tak
 
 Found look_through(const std::string& folder, const EnsembleHead& head) {
   Found found;
-  EnsembleTally& tally = found.tally;
   for_each_done(folder, head, [&](const DoneChunk& chunk) {
-    tally.done += chunk.members.size();
-    for (std::int64_t k = 0; k < chunk.members.size(); ++k) {
-      const double* const row = &chunk.rows[static_cast<std::size_t>(k) * head.width()];
-      ++tally.statuses.at(static_cast<std::size_t>(row[0]));
-      if (std::isnan(row[1])) continue;
-      ++tally.looked_at;
-      if (row[1] != static_cast<double>(Trusted::no)) continue;
-      const std::int64_t member = chunk.members.first + k;
-      if (tally.untrusted++ == 0 || member < tally.first_untrusted) tally.first_untrusted = member;
-    }
+    found.tally.add(chunk, head.width());
     found.messages.insert(found.messages.end(), chunk.messages.begin(), chunk.messages.end());
   });
   std::ranges::sort(found.messages, {}, &DoneChunk::Message::member);
-  if (!found.messages.empty()) found.tally.first_failure = found.messages.front();
   return found;
 }
 
-/// Names of data sets for the names as typed: letters, digits and single underscores; each name occurs once.
-class Words {
- public:
-  std::string of(const std::string& typed) {
-    std::string word;
-    for (const char c : typed) {
-      const bool fits = std::isalnum(static_cast<unsigned char>(c)) != 0;
-      if (fits || (!word.empty() && word.back() != '_')) word += fits ? c : '_';
-    }
-    if (word.ends_with('_')) word.pop_back();
-    std::string other = word;
-    for (int number = 2; !taken_.insert(other).second; ++number) other = word + "_" + std::to_string(number);
-    return other;
-  }
-
- private:
-  std::set<std::string> taken_ = {"status", "trusted", "member", "failed_member", "message"};
-};
-
-void write_origin(const hdf5::Handle& file, const EnsembleHead& head, const EnsembleTally& tally) {
-  const RunOrigin& origin = head.origin;
-  hdf5::write_attribute(file, "Conventions", "CF-1.11");
-  hdf5::write_attribute(file, "title", origin.title);
-  hdf5::write_attribute(file, "history", history_line(origin.command));
-  hdf5::write_attribute(file, "source", "pendula " + origin.version);
-  hdf5::write_attribute(file, "pendula", origin.version);
-  hdf5::write_attribute(file, "kind", "ensemble");
-  hdf5::write_attribute(file, "instruction_set", origin.instruction_set);
-  hdf5::write_attribute(file, "scenario_file", origin.scenario_name);
-  hdf5::write_attribute(file, "scenario", origin.scenario);
-  hdf5::write_attribute(file, "set", nlohmann::json(origin.overrides).dump());
-  hdf5::write_attribute(file, "model", origin.model);
-  hdf5::write_attribute(file, "ensemble", static_cast<std::int64_t>(head.kind().ensemble));
-  hdf5::write_attribute(file, "members", head.plan.count);
-  hdf5::write_attribute(file, "members_done", tally.done);
-  hdf5::write_attribute(file, "complete", std::int64_t{tally.done == head.plan.count});
-}
-
-/// Writes the long name of a data set, and its unit if known.
-void describe(const hdf5::Handle& array, const std::string& meaning, const EnsembleHead& head,
-              const std::string& unit) {
-  hdf5::write_attribute(array, "long_name", meaning);
-  if (!unit.empty()) write_unit(array, head.natural, unit);
-}
-
-/// Makes the scales of the axes, or of the members; numbers of members are written later, since they may not fit into
-/// memory.
-std::vector<hdf5::Handle> write_scales(const hdf5::Handle& file, const EnsembleHead& head, Words& words) {
-  const EnsemblePlan& plan = head.plan;
-  std::vector<hdf5::Handle> scales;
-  for (const EnsembleAxis& axis : plan.axes) {
-    std::vector<double> values(static_cast<std::size_t>(axis.count));
-    for (std::size_t k = 0; k < values.size(); ++k) values[k] = axis.at(static_cast<std::int64_t>(k));
-    const std::string name = words.of(axis.key);
-    scales.push_back(hdf5::create_vector(file, name, values));
-    describe(scales.back(), axis.key, head, unit_of_key(axis.key));
-    hdf5::make_scale(scales.back(), name);
-  }
-  if (!scales.empty()) return scales;
-  scales.push_back(hdf5::create_array(file, "member", plan.shape(), Type::whole));
-  describe(scales.back(), "number of the member", head, "1");
-  hdf5::make_scale(scales.back(), "member");
-  return scales;
-}
-
-/// Makes empty data sets, and notes their positions: flags, columns, and for random members their numbers and keys.
-std::vector<Stored> create_columns(const hdf5::Handle& file, const EnsembleHead& head) {
-  Words words;
-  const std::vector<hdf5::Handle> scales = write_scales(file, head, words);
+/// Makes empty data sets in the shape of the members, and scales. Returns the position of each but those of axes, which
+/// are full.
+std::vector<Stored> create_arrays(const hdf5::Handle& file, const EnsembleHead& head,
+                                  const std::vector<EnsembleArray>& arrays) {
   const std::vector<std::int64_t> shape = head.plan.shape();
+  std::vector<hdf5::Handle> scales;
   std::vector<Stored> places;
-  const auto create = [&](const std::string& name, const std::string& meaning, const std::string& unit, Type type) {
-    hdf5::Handle dataset = hdf5::create_array(file, name, shape, type);
-    describe(dataset, meaning, head, unit);
-    for (unsigned k = 0; k < scales.size(); ++k) hdf5::attach_scale(dataset, scales[k], k);
-    places.push_back({hdf5::offset_of(dataset), type});
-    return dataset;
-  };
-  const hdf5::Handle status = create("status", "how the member ended", "", Type::byte);
-  std::vector<std::string> meanings{"not_run"};
-  meanings.insert(meanings.end(), member_statuses.begin(), member_statuses.end());
-  hdf5::write_flags(status, Type::byte, not_run, meanings);
-  const hdf5::Handle trusted = create("trusted", "whether a second look at the member agrees", "", Type::byte);
-  hdf5::write_flags(trusted, Type::byte, -1, std::array<std::string, 3>{"not_looked_at", "no", "yes"});
-  std::vector<Stored> drawn;
-  for (const EnsembleDraw& draw : head.plan.draws) {
-    create(words.of(draw.key), draw.key, unit_of_key(draw.key), Type::real);
-    drawn.push_back(places.back());
-    places.pop_back();
+  for (const EnsembleArray& array : arrays) {
+    const bool is_axis = array.source == EnsembleArray::Source::axis;
+    hdf5::Handle dataset = is_axis ? hdf5::create_vector(file, array.name, head.plan.axes[array.index].all())
+                                   : hdf5::create_array(file, array.name, shape, array.type);
+    hdf5::write_attribute(dataset, "long_name", array.meaning);
+    if (!array.unit.empty()) write_unit(dataset, head.natural, array.unit);
+    if (!array.flags.empty()) hdf5::write_flags(dataset, array.type, -1, array.flags);
+    places.push_back({is_axis ? 0 : hdf5::offset_of(dataset), array.type});
+    if (array.is_scale()) {
+      hdf5::make_scale(dataset, array.name);
+      scales.push_back(std::move(dataset));
+    } else {
+      for (unsigned k = 0; k < scales.size(); ++k) hdf5::attach_scale(dataset, scales[k], k);
+    }
   }
-  for (const EnsembleColumn& column : head.columns) {
-    create(words.of(column.name), column.meaning.empty() ? column.name : column.meaning, column.unit,
-           column.whole ? Type::whole : Type::real);
-  }
-  if (head.plan.axes.empty()) places.push_back({hdf5::offset_of(scales.front()), Type::whole});
-  places.insert(places.end(), drawn.begin(), drawn.end());
   return places;
 }
 
@@ -257,24 +167,24 @@ void write_failures(const hdf5::Handle& file, const std::vector<DoneChunk::Messa
   hdf5::attach_scale(hdf5::create_texts(file, "message", texts), scale, 0);
 }
 
-/// Writes the numbers of random members, and the values drawn for each.
-void write_draws(const Bytes& bytes, const EnsembleHead& head, std::span<const Stored> places) {
-  if (places.empty()) return;
-  std::vector<std::int64_t> numbers;
-  std::vector<std::vector<double>> keys(places.size() - 1);
+/// Writes the numbers of members, and the values that they have each for themselves.
+void write_draws(const Bytes& bytes, const EnsembleHead& head, const std::vector<EnsembleArray>& arrays,
+                 const std::vector<Stored>& places) {
+  if (head.plan.draws.empty()) return;
   for (std::int64_t k = 0; k < head.chunks(); ++k) {
     const Chunk members = head.members_of(k);
-    const std::uint64_t before = static_cast<std::uint64_t>(members.first) * sizeof(double);
-    numbers.resize(static_cast<std::size_t>(members.size()));
+    const auto count = static_cast<std::size_t>(members.size());
+    std::vector<std::int64_t> numbers(count);
     std::iota(numbers.begin(), numbers.end(), members.first);
-    bytes.write(numbers.data(), numbers.size() * sizeof(std::int64_t), places.front().offset + before);
-    for (auto& column : keys) column.clear();
-    for (const std::int64_t member : numbers) {
-      const std::vector<double> drawn = head.plan.values(member);
-      for (std::size_t j = 0; j < keys.size(); ++j) keys[j].push_back(drawn[j]);
-    }
-    for (std::size_t j = 0; j < keys.size(); ++j) {
-      bytes.write(keys[j].data(), keys[j].size() * sizeof(double), places[j + 1].offset + before);
+    std::vector<std::vector<double>> values;
+    for (const std::int64_t member : numbers) values.push_back(head.plan.values(member));
+    for (std::size_t j = 0; j < arrays.size(); ++j) {
+      const std::uint64_t at = places[j].offset + static_cast<std::uint64_t>(members.first) * sizeof(double);
+      if (arrays[j].source == EnsembleArray::Source::number) bytes.write(numbers.data(), count * sizeof(double), at);
+      if (arrays[j].source != EnsembleArray::Source::draw) continue;
+      std::vector<double> column;
+      for (const std::vector<double>& each : values) column.push_back(each[arrays[j].index]);
+      bytes.write(column.data(), count * sizeof(double), at);
     }
   }
 }
@@ -285,6 +195,22 @@ int member_status(std::string_view name) {
   const auto found = std::ranges::find(member_statuses, name);
   return static_cast<int>((found == member_statuses.end() ? std::ranges::find(member_statuses, "failed") : found) -
                           member_statuses.begin());
+}
+
+void EnsembleTally::add(const DoneChunk& chunk, std::size_t width) {
+  done += chunk.members.size();
+  for (std::int64_t k = 0; k < chunk.members.size(); ++k) {
+    const double* const row = &chunk.rows[static_cast<std::size_t>(k) * width];
+    ++statuses.at(static_cast<std::size_t>(row[0]));
+    if (std::isnan(row[1])) continue;
+    ++looked_at;
+    if (row[1] != static_cast<double>(Trusted::no)) continue;
+    const std::int64_t member = chunk.members.first + k;
+    if (untrusted++ == 0 || member < first_untrusted) first_untrusted = member;
+  }
+  for (const DoneChunk::Message& message : chunk.messages) {
+    if (first_failure.member < 0 || message.member < first_failure.member) first_failure = message;
+  }
 }
 
 Chunk EnsembleHead::members_of(std::int64_t k) const {
@@ -322,21 +248,25 @@ bool is_complete(const std::string& file, const EnsembleHead& head) {
 EnsembleTally write_ensemble(const std::string& file, const EnsembleHead& head, const std::string& folder) {
   const Found found = look_through(folder, head);
   const std::string target = link_target(file), part = folder + "/whole" + std::to_string(getpid()) + ".h5";
+  const std::vector<EnsembleArray> arrays = arrays_of(head);
   std::vector<Stored> places;
   hdf5::begin();
   try {
     hdf5::Handle opened = hdf5::create_file(part);
-    write_origin(opened, head, found.tally);
-    places = create_columns(opened, head);
+    for (const auto& [name, value] : attributes_of(head, found.tally.done)) {
+      std::visit([&, &key = name](const auto& one) { hdf5::write_attribute(opened, key, one); }, value);
+    }
+    places = create_arrays(opened, head, arrays);
     write_failures(opened, found.messages);
     if (!opened.close()) throw hdf5::Error();
     Bytes bytes(part, file);
     Columns columns(bytes, head);
-    const std::size_t kept = head.width();
     for_each_done(folder, head, [&](const DoneChunk& chunk) {
-      for (std::size_t k = 0; k < kept; ++k) columns.write(chunk, k, places[k]);
+      for (std::size_t k = 0; k < arrays.size(); ++k) {
+        if (arrays[k].source == EnsembleArray::Source::row) columns.write(chunk, arrays[k].index, places[k]);
+      }
     });
-    write_draws(bytes, head, std::span(places).subspan(kept));
+    write_draws(bytes, head, arrays, places);
     bytes.close();
   } catch (const hdf5::Error& error) {
     unlink(part.c_str());

@@ -72,6 +72,8 @@ struct EnsembleTally {
   std::int64_t first_untrusted = -1;          ///< number of a member
   DoneChunk::Message first_failure{-1, {}};   ///< of the first member that has one
 
+  /// Adds the rows of members, of `width` numbers each.
+  void add(const DoneChunk& chunk, std::size_t width);
   std::int64_t failed() const { return done - statuses[0] - statuses[1]; }
 };
 

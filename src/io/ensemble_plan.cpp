@@ -3,13 +3,15 @@
 #include <Random123/philox.h>
 
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
 #include <pendula/numeric/number_text.hpp>
+#include <set>
+#include <span>
 #include <string_view>
 
 #include "io/input_error.hpp"
 #include "io/section.hpp"
-#include "io/toml_reader.hpp"
 
 namespace pendula::io {
 namespace {
@@ -24,9 +26,30 @@ std::string read_key(const Section& section) {
   return key;
 }
 
+/// Refuses keys that have no meaning beside others.
+void require_none(const Section& section, std::initializer_list<std::string_view> keys, const std::string& expected) {
+  for (const std::string_view key : keys) {
+    if (const auto entry = section.find(key)) entry->fail(expected);
+  }
+}
+
+std::vector<double> read_values(const Section& section) {
+  const Entry entry = section.require("values");
+  if (entry.size() == 0) entry.fail(std::string(find_key("ensemble.axis.values")->hint));
+  std::vector<double> values(entry.size());
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = entry.element(k).number();
+  return values;
+}
+
 EnsembleAxis read_axis(const Section& section) {
   EnsembleAxis axis;
   axis.key = read_key(section);
+  if (section.find("values")) {
+    require_none(section, {"from", "to", "count"}, "nothing beside values");
+    axis.values = read_values(section);
+    axis.count = static_cast<std::int64_t>(axis.values.size());
+    return axis;
+  }
   axis.from = section.require("from").number();
   axis.to = section.require("to").number();
   axis.count = section.require("count").integer();
@@ -42,20 +65,30 @@ EnsembleDraw read_draw(const Section& section) {
     draw.second = section.require("to").number();
     return draw;
   }
-  for (const std::string_view other : {"from", "to"}) {
-    if (const auto entry = section.find(other)) entry->fail("nothing beside mean and deviation");
-  }
+  require_none(section, {"from", "to"}, "nothing beside mean and deviation");
   draw.first = section.require("mean").number();
   draw.second = section.require("deviation").number();
   return draw;
 }
 
-void require_different(const Section& ensemble, const std::string& name, const std::vector<std::string>& keys) {
-  for (std::size_t k = 0; k < keys.size(); ++k) {
-    for (std::size_t j = 0; j < k; ++j) {
-      if (keys[j] == keys[k]) ensemble.find(name)->element(k).fail("another key than " + keys[j] + ", which has one");
-    }
+EnsembleDraw read_list(const Section& section) {
+  EnsembleDraw list;
+  list.key = read_key(section);
+  list.values = read_values(section);
+  return list;
+}
+
+/// Reads the tables [[ensemble.NAME]], whose keys must differ from those in `taken`.
+template <class Read>
+auto read_each(const Section& ensemble, const std::string& name, std::set<std::string>& taken, Read read) {
+  std::vector<decltype(read(ensemble))> all;
+  for (const Section& table : ensemble.each(name)) {
+    all.push_back(read(table));
+    const std::string& key = all.back().key;
+    if (taken.insert(key).second) continue;
+    ensemble.find(name)->element(all.size() - 1).fail("another key than " + key + ", which has one");
   }
+  return all;
 }
 
 std::int64_t product(const Section& ensemble, const std::vector<EnsembleAxis>& axes) {
@@ -67,12 +100,29 @@ std::int64_t product(const Section& ensemble, const std::vector<EnsembleAxis>& a
   return count;
 }
 
+std::int64_t count_members(const Section& ensemble, const EnsemblePlan& plan, std::span<const EnsembleDraw> lists) {
+  if (plan.axes.empty() && lists.empty()) return ensemble.require("count").integer();
+  if (const auto count = ensemble.find("count")) {
+    count->fail(std::string("a count of each ") + (lists.empty() ? "axis" : "list") + ", and none of the ensemble");
+  }
+  if (lists.empty()) return product(ensemble, plan.axes);
+  const std::size_t count = lists.front().values.size();
+  for (std::size_t k = 1; k < lists.size(); ++k) {
+    if (lists[k].values.size() == count) continue;
+    throw InputError(ensemble.find("list")->element(k).place() + ".values: expected as many values as " +
+                     lists.front().key + " has, " + std::to_string(count) + ", got " +
+                     std::to_string(lists[k].values.size()));
+  }
+  return static_cast<std::int64_t>(count);
+}
+
 /// Uniform in (0, 1), with 53 bits.
 double uniform(std::uint64_t bits) {
   return (static_cast<double>(bits >> 11) + 0.5) * 0x1p-53;
 }
 
 double drawn(const EnsembleDraw& draw, std::uint64_t seed, std::uint64_t key, std::uint64_t member) {
+  if (!draw.values.empty()) return draw.values[member];
   const r123::Philox4x64 generate;
   const r123::Philox4x64::ctr_type words = generate({{member, key, 0, 0}}, {{seed, 0}});
   if (!draw.normal) return std::lerp(draw.first, draw.second, uniform(words[0]));
@@ -84,8 +134,15 @@ double drawn(const EnsembleDraw& draw, std::uint64_t seed, std::uint64_t key, st
 }  // namespace
 
 double EnsembleAxis::at(std::int64_t k) const {
+  if (!values.empty()) return values[static_cast<std::size_t>(k)];
   if (k + 1 == count) return count == 1 ? from : to;
   return std::lerp(from, to, static_cast<double>(k) / static_cast<double>(count - 1));
+}
+
+std::vector<double> EnsembleAxis::all() const {
+  std::vector<double> each(static_cast<std::size_t>(count));
+  for (std::size_t k = 0; k < each.size(); ++k) each[k] = at(static_cast<std::int64_t>(k));
+  return each;
 }
 
 std::vector<std::int64_t> EnsemblePlan::shape() const {
@@ -129,28 +186,26 @@ std::string unit_of_key(std::string_view key) {
   return known == nullptr ? std::string() : std::string(known->unit);
 }
 
-EnsemblePlan parse_ensemble(std::string_view text, const std::string& name, std::span<const std::string> overrides) {
-  const toml::table document = parse_toml(text, name, overrides);
-  const Section root(document);
+EnsemblePlan read_ensemble(const Section& root, const std::string& name) {
   if (!root.find("ensemble")) {
-    throw InputError(name + ": expected [[ensemble.axis]] or [[ensemble.random]], got a scenario without [ensemble]");
+    throw InputError(name +
+                     ": expected [[ensemble.axis]], [[ensemble.random]] or [[ensemble.list]], got a scenario without "
+                     "[ensemble]");
   }
   const Section ensemble(root, "ensemble");
   EnsemblePlan plan;
-  for (const Section& table : ensemble.each("axis")) plan.axes.push_back(read_axis(table));
-  for (const Section& table : ensemble.each("random")) plan.draws.push_back(read_draw(table));
+  std::set<std::string> taken;
+  plan.axes = read_each(ensemble, "axis", taken, read_axis);
+  plan.draws = read_each(ensemble, "random", taken, read_draw);
+  const std::vector<EnsembleDraw> lists = read_each(ensemble, "list", taken, read_list);
+  plan.draws.insert(plan.draws.end(), lists.begin(), lists.end());
   if (plan.axes.empty() == plan.draws.empty()) {
-    throw InputError(ensemble.where(), "ensemble", "either [[ensemble.axis]] or [[ensemble.random]]",
+    throw InputError(ensemble.where(), "ensemble",
+                     "either [[ensemble.axis]], or [[ensemble.random]] and [[ensemble.list]]",
                      plan.axes.empty() ? "neither" : "both");
   }
-  require_different(ensemble, plan.axes.empty() ? "random" : "axis", plan.keys());
-  const std::optional<Entry> count = ensemble.find("count"), keep = ensemble.find("keep");
-  if (plan.axes.empty()) {
-    plan.count = ensemble.require("count").integer();
-  } else {
-    if (count) count->fail("a count of each axis, and none of the ensemble");
-    plan.count = product(ensemble, plan.axes);
-  }
+  plan.count = count_members(ensemble, plan, lists);
+  const std::optional<Entry> keep = ensemble.find("keep");
   plan.seed = static_cast<std::uint64_t>(ensemble.integer("seed"));
   plan.chooses_method = ensemble.choice("method") == 1;
   if (!keep) return plan;

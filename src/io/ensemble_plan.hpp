@@ -1,33 +1,37 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace pendula::io {
 
-/// One axis of a grid of members: a key of the scenario takes evenly spaced values `from` … `to`.
+class Section;
+
+/// One axis of a grid of members: a key of the scenario takes evenly spaced values `from` … `to`, or those of a list.
 struct EnsembleAxis {
   std::string key;
   double from = 0, to = 0;
   std::int64_t count = 1;
+  std::vector<double> values = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 
   double at(std::int64_t k) const;
+  std::vector<double> all() const;
 };
 
-/// A key whose value is drawn at random for every member.
+/// A key whose value every member has for itself: drawn at random, or from a list.
 struct EnsembleDraw {
   std::string key;
-  bool normal = false;           ///< else uniform
-  double first = 0, second = 1;  ///< from and to, or mean and standard deviation
+  bool normal = false;              ///< else uniform
+  double first = 0, second = 1;     ///< from and to, or mean and standard deviation
+  std::vector<double> values = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
 /// The members of an ensemble, and what is kept of each.
 struct EnsemblePlan {
   std::vector<EnsembleAxis> axes;   ///< either these, the first one slowest,
-  std::vector<EnsembleDraw> draws;  ///< or these
+  std::vector<EnsembleDraw> draws;  ///< or these, first those at random
   std::int64_t count = 0;           ///< of members
   std::uint64_t seed = 0;
   bool chooses_method = false;    ///< the fastest one is used, whatever [run] says
@@ -47,7 +51,7 @@ struct EnsemblePlan {
 /// SI unit of a scenario's key; empty if unknown.
 std::string unit_of_key(std::string_view key);
 
-/// Reads the tables [ensemble], [[ensemble.axis]] and [[ensemble.random]] from a scenario's text. Throws InputError.
-EnsemblePlan parse_ensemble(std::string_view text, const std::string& name, std::span<const std::string> overrides);
+/// Reads the table [ensemble] of a scenario, and those within it; `name` stands for the file. Throws InputError.
+EnsemblePlan read_ensemble(const Section& root, const std::string& name);
 
 }  // namespace pendula::io

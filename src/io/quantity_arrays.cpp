@@ -19,9 +19,14 @@ std::string name_in(const hdf5::Handle& where, const Quantity& quantity) {
 }  // namespace
 
 void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& natural, const std::string& unit) {
+  for (const auto& [name, text] : unit_attributes(natural, unit)) hdf5::write_attribute(array, name, text);
+}
+
+std::vector<std::pair<std::string, std::string>> unit_attributes(const std::optional<NaturalUnits>& natural,
+                                                                 const std::string& unit) {
   const std::string own = in_units(natural, unit);
-  hdf5::write_attribute(array, "units", own == unit ? unit : "1");
-  if (own != unit) hdf5::write_attribute(array, "natural_unit", own);
+  if (own == unit) return {{"units", unit}};
+  return {{"units", "1"}, {"natural_unit", own}};
 }
 
 hdf5::Handle create_links(const hdf5::Handle& file, const RunContents& contents) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <pendula/run/quantity.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/hdf5.hpp"
@@ -19,7 +20,10 @@ struct RunContents {
   std::optional<NaturalUnits> natural;
 };
 
-/// Writes the unit of an array as UDUNITS knows it, and beside it the natural unit.
+/// Attributes that tell a unit as UDUNITS knows it, and beside it the natural unit.
+std::vector<std::pair<std::string, std::string>> unit_attributes(const std::optional<NaturalUnits>& natural,
+                                                                 const std::string& unit);
+/// Writes them.
 void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& natural, const std::string& unit);
 
 /// Makes the scale of the axis of links, if any array has that axis.

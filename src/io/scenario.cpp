@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "io/input_file.hpp"
+#include "io/scenario_document.hpp"
 #include "io/section.hpp"
 #include "io/system_reader.hpp"
 #include "io/toml_reader.hpp"
@@ -340,6 +341,8 @@ std::string checked(InputFile file, const std::string& name) {
   return std::move(file.text);
 }
 
+}  // namespace
+
 AnyScenario read_document(const toml::table& document, std::string_view name, const FindSystem& find) {
   if (document.contains("system")) {
     const std::filesystem::path folder = std::filesystem::path(name).parent_path();
@@ -354,28 +357,9 @@ AnyScenario read_document(const toml::table& document, std::string_view name, co
   return read<Spatial>(sections);
 }
 
-}  // namespace
-
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides,
                            const FindSystem& find) {
   return read_document(parse_toml(text, name, overrides), name, find);
-}
-
-struct ScenarioDocument::Document {
-  std::string name;
-  toml::table root;
-};
-
-ScenarioDocument::ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides)
-    : document_(std::make_unique<const Document>(Document{std::string(name), parse_toml(text, name, overrides)})) {}
-
-ScenarioDocument::~ScenarioDocument() = default;
-
-AnyScenario ScenarioDocument::with(std::span<const std::string> keys, std::span<const double> numbers,
-                                   const FindSystem& find) const {
-  toml::table changed = document_->root;
-  for (std::size_t k = 0; k < keys.size(); ++k) set_number(changed, keys[k], numbers[k]);
-  return read_document(changed, document_->name, find);
 }
 
 ScenarioText read_scenario_text(const std::filesystem::path& file) {

@@ -79,24 +79,6 @@ std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
                            const FindSystem& find = built_in_system);
 
-/// A scenario that is parsed once and read many times with other numbers.
-class ScenarioDocument {
- public:
-  /// As parse_scenario.
-  ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides);
-  ~ScenarioDocument();
-  ScenarioDocument(const ScenarioDocument&) = delete;
-  ScenarioDocument& operator=(const ScenarioDocument&) = delete;
-
-  /// The scenario with numbers[k] as the value of keys[k]. Neither it nor the InputError that it throws knows places in
-  /// the file; parse_scenario does.
-  AnyScenario with(std::span<const std::string> keys, std::span<const double> numbers, const FindSystem& find) const;
-
- private:
-  struct Document;
-  std::unique_ptr<const Document> document_;
-};
-
 /// The text of a scenario, and the name of its file in messages.
 struct ScenarioText {
   std::string name, text;

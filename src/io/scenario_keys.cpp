@@ -148,10 +148,11 @@ constexpr std::array<ScenarioKey, 4> event = {
 
 constexpr std::array<std::string_view, 2> member_methods = {"run", "auto"};
 
-constexpr std::array<ScenarioKey, 6> ensemble = {
+constexpr std::array<ScenarioKey, 7> ensemble = {
     another("axis", tables, none, "axes of a grid, either these"),
     another("random", tables, none, "keys that are drawn for every member, or these"),
-    an_integer("count", 1, most_members, InWords{"must be given with random keys"},
+    another("list", tables, none, "keys whose values are listed for every member"),
+    an_integer("count", 1, most_members, InWords{"must be given with random keys, where there are no lists"},
                "how many members, an integer >= 1"),
     an_integer("seed", 0, any_most, std::int64_t{1}, "of what is drawn"),
     one_of("method", member_methods, member_methods[0], "that of [run], or an explicit one where that is over sooner"),
@@ -161,11 +162,19 @@ constexpr std::array<ScenarioKey, 6> ensemble = {
 
 constexpr std::string_view key_of_scenario = "a key of the scenario, such as \"start.theta[1]\"";
 
-constexpr std::array<ScenarioKey, 4> ensemble_axis = {
+constexpr std::string_view list_of_numbers = "an array of finite numbers, one or more";
+
+constexpr std::array<ScenarioKey, 5> ensemble_axis = {
     another("key", text, required, key_of_scenario),
-    a_number("from", "", any_number, required, "a finite number"),
-    a_number("to", "", any_number, required, "a finite number"),
-    an_integer("count", 1, most_members, required, "an integer >= 1"),
+    a_number("from", "", any_number, InWords{"must be given without values"}, "a finite number, or values"),
+    a_number("to", "", any_number, InWords{"must be given with from"}, "a finite number"),
+    an_integer("count", 1, most_members, InWords{"must be given with from"}, "an integer >= 1"),
+    another("values", numbers, none, list_of_numbers),
+};
+
+constexpr std::array<ScenarioKey, 2> ensemble_list = {
+    another("key", text, required, key_of_scenario),
+    another("values", numbers, required, list_of_numbers),
 };
 
 constexpr std::array<ScenarioKey, 5> ensemble_random = {
@@ -180,7 +189,7 @@ constexpr std::array<ScenarioKey, 5> ensemble_random = {
 constexpr std::array<std::string_view, 4> commands = {"simulate", "ensemble", "lyapunov", "linearize"};
 constexpr Names all_commands = commands, of_rows = Names(commands).first(2), of_members = Names(commands).subspan(1, 1);
 
-constexpr std::array<ScenarioTable, 12> tables_of_scenarios = {{
+constexpr std::array<ScenarioTable, 13> tables_of_scenarios = {{
     {"", all_commands, document},
     {"chain", all_commands, chain},
     {"chain.drive", all_commands, chain_drive},
@@ -193,6 +202,7 @@ constexpr std::array<ScenarioTable, 12> tables_of_scenarios = {{
     {"ensemble", of_members, ensemble},
     {"ensemble.axis", of_members, ensemble_axis},
     {"ensemble.random", of_members, ensemble_random},
+    {"ensemble.list", of_members, ensemble_list},
 }};
 
 std::vector<std::string> dotted_names() {

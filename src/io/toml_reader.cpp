@@ -229,6 +229,8 @@ std::string counting_hint(std::string_view key) {
   return key.find("[0]") == std::string_view::npos ? "" : " (elements of arrays count from 1)";
 }
 
+}  // namespace
+
 void apply_override(toml::table& root, const std::string& text) {
   const std::string where = std::string(override_prefix) + printable(text);
   require_shallow(text, where);
@@ -243,8 +245,6 @@ void apply_override(toml::table& root, const std::string& text) {
   toml::table value = parse_value(given, where);
   put(root, key, *value.get("value"), where);
 }
-
-}  // namespace
 
 toml::table parse_toml(std::string_view text, std::string_view name, std::span<const std::string> overrides) {
   toml::table root = parse(text, std::string(name));

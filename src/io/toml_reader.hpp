@@ -11,6 +11,9 @@ namespace pendula::io {
 /// of the override. Throws InputError if the text is not TOML, or an override cannot be applied.
 toml::table parse_toml(std::string_view text, std::string_view name, std::span<const std::string> overrides);
 
+/// Applies one override. Throws InputError.
+void apply_override(toml::table& root, const std::string& text);
+
 /// Sets one key to a number, as an override does. For the many copies of a document, whose nodes do not know their
 /// places.
 void set_number(toml::table& root, std::string_view key, double number);

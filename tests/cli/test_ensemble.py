@@ -494,6 +494,64 @@ def test_an_axis_may_be_a_key_of_a_drive(tmp_path):
     assert len(np.unique(ends[:, 0])) == 31
 
 
+def test_values_of_axes_and_of_members_may_be_listed(tmp_path):
+    values = [0.1, 2.0, -1.5]
+    assert (
+        run(
+            tmp_path, scenario=MAP.replace("from  = -3.0\nto    = 3.0\ncount = 31", f"values = {values}")
+        ).status
+        == 0
+    )
+    with h5py.File(tmp_path / "out.h5") as opened:
+        assert opened["start_theta_1"][...].tolist() == values
+        second = opened["start_theta_2"][...].tolist()
+        grid = opened["theta_1"][...]
+    (tmp_path / "out.h5").unlink()
+    listed = MAP[: MAP.index("[[ensemble.axis]]")]
+    pairs = [(a, b) for a in values for b in second]
+    for k in (0, 1):
+        listed += f'[[ensemble.list]]\nkey = "start.theta[{k + 1}]"\nvalues = {[pair[k] for pair in pairs]}\n'
+    listed += '[[ensemble.random]]\nkey = "chain.gravity"\nmean = 9.81\ndeviation = 0\n'
+    assert run(tmp_path, scenario=listed).status == 0
+    with h5py.File(tmp_path / "out.h5") as opened:
+        assert opened["start_theta_1"][...].tolist() == [a for a, _ in pairs]
+        assert (opened["chain_gravity"][...] == 9.81).all()
+        assert opened["theta_1"][...].tolist() == grid.ravel().tolist()
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ('axis = [{key = "start.theta[1]", values = []}]', "values: expected an array of finite numbers"),
+        (
+            'axis = [{key = "start.theta[1]", values = [1, nan]}]',
+            "values[2]: expected a finite number, got nan",
+        ),
+        (
+            'axis = [{key = "start.theta[1]", values = [1], count = 1}]',
+            "count: expected nothing beside values",
+        ),
+        (
+            'list = [{key = "start.theta[1]", values = [1, 2]}]\ncount = 2',
+            "count: expected a count of each list",
+        ),
+        (
+            'list = [{key = "start.theta[1]", values = [1, 2]}, {key = "start.theta[2]", values = [1]}]',
+            "ensemble.list[2].values: expected as many values as start.theta[1] has, 2, got 1",
+        ),
+        (
+            'list = [{key = "start.theta[1]", values = [1]}]\n'
+            'axis = [{key = "start.theta[2]", values = [1]}]',
+            "expected either [[ensemble.axis]], or [[ensemble.random]] and [[ensemble.list]], got both",
+        ),
+    ],
+)
+def test_wrong_lists_are_told(tmp_path, tables, message):
+    done = run(tmp_path, scenario=MAP[: MAP.index("[[ensemble.axis]]")] + "[ensemble]\n" + tables + "\n")
+    assert done.status == 2
+    assert message in done.err
+
+
 # Chaotic, then at rest: members end after other numbers of whole turns by other tolerances.
 SETTLING = """\
 [chain]

@@ -1,8 +1,7 @@
-#include "cli/members.hpp"
+#include "io/members.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
 #include <limits>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/lyapunov.hpp>
@@ -15,36 +14,31 @@
 #include "io/kernel_cache.hpp"
 #include "io/summary.hpp"
 
-namespace pendula::cli {
+namespace pendula::io {
 
-MemberScenarios::MemberScenarios(const std::string& file, std::vector<std::string> overrides, bool quiet)
-    : text_(io::read_scenario_text(file)),
+MemberScenarios::MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell)
+    : text_(std::move(text)),
       overrides_(std::move(overrides)),
       document_(text_.text, text_.name, overrides_),
-      quiet_(quiet) {}
+      toolchain_(std::move(toolchain)),
+      tell_(std::move(tell)) {}
 
-io::AnyScenario MemberScenarios::of_member(const io::EnsemblePlan& plan, std::int64_t member) {
-  std::vector<std::string> overrides = overrides_;
-  for (std::string& change : plan.overrides(member)) overrides.push_back(std::move(change));
+AnyScenario MemberScenarios::of_member(std::int64_t member) {
   try {
-    return parse(overrides);
-  } catch (const io::InputError& error) {
+    return document_.with(plan().overrides(member), find());
+  } catch (const InputError& error) {
     // The members' numbers are overrides, too; messages must not call them --set.
-    const std::string_view told = error.what(), sign = "--set ";
-    const bool is_of_member = told.starts_with(sign) && std::ranges::any_of(plan.keys(), [&](const std::string& key) {
-                                return told.substr(sign.size()).starts_with(key + '=');
-                              });
-    if (!is_of_member) throw;
-    throw io::InputError(text_.name + ": ensemble: " + std::string(told.substr(sign.size())));
+    const std::string_view told = error.what();
+    const auto is_of = [&](const std::string& key) {
+      return told.substr(override_prefix.size()).starts_with(key + '=');
+    };
+    if (!told.starts_with(override_prefix) || std::ranges::none_of(plan().keys(), is_of)) throw;
+    throw InputError(text_.name + ": ensemble: " + std::string(told.substr(override_prefix.size())));
   }
 }
 
-io::AnyScenario MemberScenarios::quickly_of_member(const io::EnsemblePlan& plan, std::int64_t member) {
-  return document_.with(plan.keys(), plan.values(member), find());
-}
-
-io::AnyScenario MemberScenarios::parse(const std::vector<std::string>& overrides) {
-  return io::parse_scenario(text_.text, text_.name, overrides, find());
+AnyScenario MemberScenarios::quickly_of_member(std::int64_t member) {
+  return document_.with(plan().keys(), plan().values(member), find());
 }
 
 std::shared_ptr<const SystemTable> MemberScenarios::find_system(const std::string& name, std::optional<int> links,
@@ -52,26 +46,21 @@ std::shared_ptr<const SystemTable> MemberScenarios::find_system(const std::strin
   const std::scoped_lock lock(guard_);
   std::shared_ptr<const SystemTable>& found = systems_[{name, links.value_or(0)}];
   if (found) return found;
-  const io::Toolchain toolchain = io::Toolchain::of_this_program();
-  model_ = io::model_source(name, links, folder, toolchain);
-  const auto say = [&](const std::string& what) {
-    if (!quiet_) std::cerr << "pendula: " << what << '\n';
-  };
-  found = io::find_kernel(name, links, folder, toolchain, say).table;
+  model_ = model_source(name, links, folder, toolchain_);
+  found = find_kernel(name, links, folder, toolchain_, tell_).table;
   return found;
 }
 
-MemberRuns::MemberRuns(MemberScenarios& scenarios, const io::EnsemblePlan& plan, const Kept& kept,
-                       const InterruptGuard& guard)
+MemberRuns::MemberRuns(MemberScenarios& scenarios, const Kept& kept, std::function<bool()> stop)
     : scenarios_(scenarios),
-      plan_(plan),
+      plan_(scenarios.plan()),
       kept_(kept),
-      guard_(guard),
-      width_(kept.columns().size() + io::EnsembleHead::flags) {}
+      stop_(std::move(stop)),
+      width_(kept.columns().size() + EnsembleHead::flags) {}
 
 /// A member, its scenario and its report.
 struct MemberRuns::Member {
-  std::optional<io::AnyScenario> scenario;  // empty if it cannot be read
+  std::optional<AnyScenario> scenario;  // empty if it cannot be read
   std::string problem;
   std::optional<RunSetup> setup;  // of a member that is run together with others
   RunReport report;
@@ -79,19 +68,18 @@ struct MemberRuns::Member {
   std::optional<LyapunovSpectrum> exponent;  // if it is kept, and was found in lanes
 };
 
-io::DoneChunk MemberRuns::run(const Chunk& members) const {
+DoneChunk MemberRuns::run(const Chunk& members) const {
   std::vector<Member> all;
   std::vector<RunSetup> waiting;
-  io::SharedExpressions shared;
+  SharedExpressions shared;
   for (std::int64_t number = members.first; number < members.last; ++number) {
     all.push_back(member(number, shared));
     if (all.back().setup) waiting.push_back(*all.back().setup);
   }
-  std::vector<RunReport> reports = run_members(
-      waiting, [&] { return guard_.interrupted(); }, method());
+  std::vector<RunReport> reports = run_members(waiting, stop_, method());
   if (kept_.chaos()) find_exponents(all);
   auto next = reports.begin();
-  io::DoneChunk done;
+  DoneChunk done;
   done.members = members;
   done.rows.reserve(static_cast<std::size_t>(members.size()) * width_);
   for (std::size_t k = 0; k < all.size(); ++k) {
@@ -99,7 +87,7 @@ io::DoneChunk MemberRuns::run(const Chunk& members) const {
     const std::string message = append(all[k], done.rows);
     if (!message.empty()) done.messages.push_back({members.first + static_cast<std::int64_t>(k), message});
   }
-  if (guard_.interrupted()) throw Interrupted();  // an interrupted second look would raise false doubts
+  if (stop_()) throw Interrupted();  // an interrupted second look would raise false doubts
   return done;
 }
 
@@ -113,22 +101,21 @@ bool MemberRuns::is_looked_at(std::int64_t number) const {
 }
 
 // Reads a member, and runs it unless it can run in lanes. A wrong member is read again with places, for the message.
-MemberRuns::Member MemberRuns::member(std::int64_t number, io::SharedExpressions& shared) const {
+MemberRuns::Member MemberRuns::member(std::int64_t number, SharedExpressions& shared) const {
   try {
-    return member_of(scenarios_.quickly_of_member(plan_, number), number, shared);
-  } catch (const io::InputError&) {
+    return member_of(scenarios_.quickly_of_member(number), number, shared);
+  } catch (const InputError&) {
   }
   try {
-    return member_of(scenarios_.of_member(plan_, number), number, shared);
-  } catch (const io::InputError& error) {
+    return member_of(scenarios_.of_member(number), number, shared);
+  } catch (const InputError& error) {
     Member unreadable;
     unreadable.problem = error.what();
     return unreadable;
   }
 }
 
-MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, std::int64_t number,
-                                         io::SharedExpressions& shared) const {
+MemberRuns::Member MemberRuns::member_of(AnyScenario scenario, std::int64_t number, SharedExpressions& shared) const {
   Member member;
   member.scenario = std::move(scenario);
   RunSetup setup = setup_of(*member.scenario, shared);
@@ -143,11 +130,11 @@ MemberRuns::Member MemberRuns::member_of(io::AnyScenario scenario, std::int64_t 
   return member;
 }
 
-RunSetup MemberRuns::setup_of(const io::AnyScenario& scenario, io::SharedExpressions& shared) const {
+RunSetup MemberRuns::setup_of(const AnyScenario& scenario, SharedExpressions& shared) const {
   RunSetup setup = std::visit(
       [&](const auto& read) {
         RunSetup found = member_setup(read);
-        found.events = io::events_of(read.events, found.subject, read.start, shared);
+        found.events = events_of(read.events, found.subject, read.start, shared);
         return found;
       },
       scenario);
@@ -166,16 +153,15 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
     setups.push_back(std::move(setup));
     members.push_back(&member);
   }
-  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(
-      setups, [&] { return guard_.interrupted(); }, method());
+  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(setups, stop_, method());
   if (found.size() < members.size()) throw Interrupted();
   for (std::size_t k = 0; k < members.size(); ++k) members[k]->exponent = std::move(found[k]);
 }
 
 template <class Scenario>
 RunReport MemberRuns::run_alone(const Scenario& scenario, RunSetup setup) const {
-  Run one = io::told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
-  return one.go([&] { return guard_.interrupted(); });
+  Run one = told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
+  return one.go(stop_);
 }
 
 // Appends the row of a member. Returns its message, or an empty one.
@@ -184,28 +170,28 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
   const auto add = [&](const auto& scenario) {
     const RunReport& report = member.report;
     if (report.end == RunEnd::stopped) throw Interrupted();
-    const std::shared_ptr<const Subject> subject = io::subject_of(scenario);
+    const std::shared_ptr<const Subject> subject = subject_of(scenario);
     std::vector<std::string> events;
     events.reserve(scenario.events.size());
-    for (const io::EventPlan& event : scenario.events) events.push_back(event.name);
-    const io::Ending ending = io::ending_of(report, subject->coordinates(), events);
+    for (const EventPlan& event : scenario.events) events.push_back(event.name);
+    const Ending ending = ending_of(report, subject->coordinates(), events);
     LyapunovSpectrum spectrum;
     if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
-    const int status = io::member_status(ending.status);
-    const auto trusted = static_cast<double>(report.warnings.empty() ? io::Trusted::yes : io::Trusted::no);
+    const int status = member_status(ending.status);
+    const auto trusted = static_cast<double>(report.warnings.empty() ? Trusted::yes : Trusted::no);
     rows.push_back(status);
-    rows.push_back(member.is_looked_at && io::is_ok(status) ? trusted : std::nan(""));
+    rows.push_back(member.is_looked_at && is_ok(status) ? trusted : std::nan(""));
     kept_.append(*subject, report, spectrum, rows);
     return ending.message;
   };
   std::string problem = member.problem;
   try {
     if (member.scenario) return std::visit(add, *member.scenario);
-  } catch (const io::InputError& error) {
+  } catch (const InputError& error) {
     problem = error.what();
   }
   rows.resize(begin);
-  rows.push_back(io::member_status("wrong_input"));
+  rows.push_back(member_status("wrong_input"));
   rows.resize(begin + width_, std::nan(""));
   return problem;
 }
@@ -213,14 +199,13 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
 template <class Scenario>
 LyapunovSpectrum MemberRuns::leading_exponent(const Scenario& scenario) const {
   const double step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  LyapunovRun found = io::told_at_keys(scenario, scenarios_.text().name, [&] {
-    const auto integrator = io::subject_of(scenario)->make_integrator(scenario.run);
+  LyapunovRun found = told_at_keys(scenario, scenarios_.text().name, [&] {
+    const auto integrator = subject_of(scenario)->make_integrator(scenario.run);
     return find_lyapunov_spectrum(
-        *integrator, scenario.start, step, scenario.duration, 1, [](const LyapunovProgress&) {},
-        [&] { return guard_.interrupted(); });
+        *integrator, scenario.start, step, scenario.duration, 1, [](const LyapunovProgress&) {}, stop_);
   });
   if (found.result.stopped) throw Interrupted();
   return found;
 }
 
-}  // namespace pendula::cli
+}  // namespace pendula::io

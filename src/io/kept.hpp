@@ -10,15 +10,15 @@
 #include "io/ensemble_plan.hpp"
 #include "io/event_reader.hpp"
 
-namespace pendula::cli {
+namespace pendula::io {
 
 /// What is kept of every member of an ensemble.
 class Kept {
  public:
-  /// Throws io::InputError if the ensemble asks for an unknown quantity.
-  Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events);
+  /// Throws InputError if the ensemble asks for an unknown quantity.
+  Kept(const EnsemblePlan& plan, const Subject& subject, const std::vector<EventPlan>& events);
 
-  std::vector<io::EnsembleColumn> columns() const;
+  std::vector<EnsembleColumn> columns() const;
   /// Whether anything is kept that needs tangents.
   bool chaos() const;
 
@@ -41,16 +41,16 @@ class Kept {
   };
 
   struct Column {
-    io::EnsembleColumn column;
+    EnsembleColumn column;
     Source source;
     std::size_t index = 0;  // of a column of the row, or of an event
   };
 
   void add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
-           const std::vector<io::EventPlan>& events);
+           const std::vector<EventPlan>& events);
   void add_last(const std::vector<Quantity>& quantities, bool points);
 
   std::vector<Column> columns_;
 };
 
-}  // namespace pendula::cli
+}  // namespace pendula::io

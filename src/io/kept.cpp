@@ -1,4 +1,4 @@
-#include "cli/kept.hpp"
+#include "io/kept.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,25 +8,25 @@
 
 #include "io/input_error.hpp"
 
-namespace pendula::cli {
+namespace pendula::io {
 namespace {
 
 constexpr std::string_view event_prefix = "event:";
 
 }  // namespace
 
-Kept::Kept(const io::EnsemblePlan& plan, const Subject& subject, const std::vector<io::EventPlan>& events) {
+Kept::Kept(const EnsemblePlan& plan, const Subject& subject, const std::vector<EventPlan>& events) {
   const std::vector<Quantity> quantities = subject.quantities();
   std::vector<std::string> keep = plan.keep;
   if (keep.empty()) {
     keep = {"final", "energy_error", "steps"};
-    for (const io::EventPlan& event : events) keep.push_back(std::string(event_prefix) + event.name);
+    for (const EventPlan& event : events) keep.push_back(std::string(event_prefix) + event.name);
   }
   for (const std::string& what : keep) add(what, plan.keep_place, quantities, events);
 }
 
 void Kept::add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
-               const std::vector<io::EventPlan>& events) {
+               const std::vector<EventPlan>& events) {
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(columns_, [&](const Column& each) { return each.column.name == name; });
   };
@@ -53,11 +53,11 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
     return;
   }
   const auto event = std::ranges::find_if(
-      events, [&](const io::EventPlan& each) { return what == std::string(event_prefix) + each.name; });
+      events, [&](const EventPlan& each) { return what == std::string(event_prefix) + each.name; });
   if (event == events.end()) {
     std::string known = "final, points, energy, energy_error, steps, lyapunov, ftle, megno";
-    for (const io::EventPlan& each : events) known += ", " + std::string(event_prefix) + each.name;
-    throw io::InputError(place + ": expected some of " + known + ", got \"" + what + '"');
+    for (const EventPlan& each : events) known += ", " + std::string(event_prefix) + each.name;
+    throw InputError(place + ": expected some of " + known + ", got \"" + what + '"');
   }
   const auto index = static_cast<std::size_t>(event - events.begin());
   columns_.push_back({{what, "s"}, Source::event_time, index});
@@ -77,8 +77,8 @@ void Kept::add_last(const std::vector<Quantity>& quantities, bool points) {
   }
 }
 
-std::vector<io::EnsembleColumn> Kept::columns() const {
-  std::vector<io::EnsembleColumn> columns;
+std::vector<EnsembleColumn> Kept::columns() const {
+  std::vector<EnsembleColumn> columns;
   columns.reserve(columns_.size());
   for (const Column& each : columns_) columns.push_back(each.column);
   return columns;
@@ -130,4 +130,4 @@ void Kept::append(const Subject& subject, const RunReport& report, const Lyapuno
   }
 }
 
-}  // namespace pendula::cli
+}  // namespace pendula::io

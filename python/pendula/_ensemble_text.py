@@ -1,0 +1,167 @@
+"""Ensembles as scenarios: which numbers their members have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _toml
+from ._core import InputError
+from ._runs import numbers
+from ._systems import Chain, System
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+DRAWN = {"normal": ("mean", "deviation"), "uniform": ("from", "to")}
+
+
+class Design:
+    """What the members of a system have in common, and what each has for itself."""
+
+    def __init__(self, system: System, names: list[str]) -> None:
+        """``names`` are those of coordinates, then of their rates."""
+        self._system = system
+        self._coordinates = names[: len(names) // 2]
+        self._columns = [*names, *(f"p_{name}" for name in self._coordinates)]
+        self._fixed: dict[str, object] = {}
+        self._axes: dict[str, NDArray[np.float64]] = {}
+        self._lists: dict[str, NDArray[np.float64]] = {}
+        self._random: list[dict[str, object]] = []
+        self._families = dict.fromkeys(system.at_zero())  # of a chain's start: theta, phi, ...
+
+    def add_start(self, start: Mapping[str, object]) -> None:
+        """Tuples are axes of a grid, arrays list the members, numbers and texts are those of all."""
+        for name, given in start.items():
+            for column, one in self._columns_of(name, given):
+                self._add(column, one, is_axis=isinstance(given, tuple))
+        sizes = {one.size for one in self._lists.values()}
+        if len(sizes) > 1:
+            told = ", ".join(map(str, sorted(sizes)))
+            raise InputError(f"start: expected as many members of each, got {told}")
+
+    def add_axes(self, axes: Mapping[str, object]) -> None:
+        for key, given in axes.items():
+            if key in self._axes:
+                raise InputError(f"axes: {key} is given twice")
+            self._axes[key] = _values(f"axes: {key}", given)
+
+    def add_random(self, random: Mapping[str, object]) -> None:
+        for key, given in random.items():
+            expected = f'random: expected ("normal", mean, deviation) or ("uniform", from, to) for {key}'
+            if not isinstance(given, Sequence) or len(given) != 3 or str(given[0]) not in DRAWN:
+                raise InputError(f"{expected}, got {given!r}")
+            self._random.append({"key": key, **dict(zip(DRAWN[given[0]], given[1:], strict=True))})
+
+    def tables(self) -> dict[str, Any]:
+        """Those of a scenario that say what moves, where it starts, and which numbers members have."""
+        of_each = bool(self._lists or self._random)
+        if bool(self._axes) == of_each:
+            raise InputError(
+                "ensemble: expected axes of a grid, or numbers of each member (arrays of starts, random keys), got "
+                + ("both" if of_each else "neither")
+            )
+        tables: dict[str, Any] = {**self._system.tables(), "start": self._start()}
+        keys = [*self._axes, *(str(one["key"]) for one in self._random)]
+        if isinstance(self._system, Chain):
+            for key in keys:
+                self._write_as_array(tables, key)
+        tables["ensemble.axis"] = [{"key": key, "values": values} for key, values in self._axes.items()]
+        tables["ensemble.random"] = self._random
+        tables["ensemble.list"] = [{"key": key, "values": values} for key, values in self._lists.items()]
+        return tables
+
+    def _add(self, column: str, given: object, is_axis: bool) -> None:
+        key = self._key(column)
+        self._families[column.rsplit("_", 1)[0]] = None
+        if column in self._fixed or key in self._axes or key in self._lists:
+            raise InputError(f"start: {column} is given twice")
+        if np.ndim(given) == 0:  # type: ignore[arg-type]
+            self._fixed[column] = given
+            return
+        values = _values(f"start: {column}", given)
+        if is_axis:
+            self._axes[key] = values
+        else:
+            self._lists[key] = values
+
+    def _columns_of(self, name: str, given: object) -> list[tuple[str, object]]:
+        """What each column has: a number, a text, or an array of one axis."""
+        links = [name] if name in self._columns else self._links_of(name)
+        if not links:
+            raise InputError(f"start: expected some of {', '.join(self._columns)}, got {name}")
+        if isinstance(given, tuple) or _has_texts(given):
+            if len(given) != len(links):  # type: ignore[arg-type]
+                raise InputError(f"start: expected {len(links)} of {name}, got {len(given)}")  # type: ignore[arg-type]
+            return list(zip(links, given, strict=True))  # type: ignore[call-overload]
+        if isinstance(given, str):
+            return [(column, given) for column in links]
+        array = numbers(f"start: {name}", given)
+        if array.ndim == 0 or (array.ndim == 1 and len(links) == 1):
+            return [(column, array if array.ndim else float(array)) for column in links]
+        if array.ndim != 2 or array.shape[1] != len(links):
+            members = "(members,)" if name in self._columns else f"(members, {len(links)})"
+            raise InputError(f"start: expected {members} for {name}, got shape {array.shape}")
+        return [(column, array[:, k]) for k, column in enumerate(links)]
+
+    def _links_of(self, name: str) -> list[str]:
+        named = (f"{name}_{k + 1}" for k in range(len(self._columns)))
+        return [column for column in named if column in self._columns]
+
+    def _key(self, column: str) -> str:
+        """A chain's scenario has arrays, one number a link; others have each coordinate by its name."""
+        if not isinstance(self._system, Chain):
+            return f"start.{column}"
+        family, link = column.rsplit("_", 1)
+        return f"start.{family}[{link}]"
+
+    def _start(self) -> dict[str, object]:
+        if not isinstance(self._system, Chain):
+            return self._fixed
+        return {name: [self._fixed.get(one, 0.0) for one in self._links_of(name)] for name in self._families}
+
+    def _write_as_array(self, tables: dict[str, Any], key: str) -> None:
+        """A key of one link needs an array that it is in."""
+        found = re.fullmatch(r"(chain|start)\.(\w+)\[\d+\]", key)
+        if found is None:
+            return
+        table, name = tables[found[1]], found[2]
+        known = name in tables["chain"] if found[1] == "chain" else self._links_of(name)
+        one = table.get(name)
+        if known and np.ndim(one) == 0:  # None, too
+            links = sum(1 for column in self._coordinates if column.startswith("theta_"))
+            table[name] = [0.0 if one is None else one] * links
+
+
+def ensemble_text(
+    tables: Mapping[str, Any], *, method: object, members: object, seed: object, keep: object
+) -> str:
+    """A scenario's text. What is None is left to its defaults."""
+    names = [keep] if isinstance(keep, str) else keep
+    if names is not None and (not isinstance(names, Sequence) or not all(isinstance(x, str) for x in names)):
+        raise InputError(f"keep: expected names of what is kept, got {keep!r}")
+    ensemble = {
+        "count": members,
+        "seed": seed,
+        "method": "auto" if method == "auto" else None,
+        "keep": None if names is None else list(names),
+    }
+    return _toml.document({**tables, "ensemble": ensemble})
+
+
+def _has_texts(given: object) -> bool:
+    return (
+        isinstance(given, Sequence) and not isinstance(given, str) and any(isinstance(x, str) for x in given)
+    )
+
+
+def _values(name: str, given: object) -> NDArray[np.float64]:
+    array = numbers(name, given)
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(f"{name}: expected an array of numbers along one axis, got shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name}: expected finite numbers, got {array[~np.isfinite(array)][0]}")
+    return array

@@ -1,0 +1,114 @@
+"""Maps of ensembles, as ``pendula map`` draws them."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import _core
+from ._core import InputError
+from ._ensemble_data import missing
+from ._runs import places
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+
+def map(
+    data: xarray.Dataset,
+    key: str,
+    *,
+    axes: Axes | None = None,
+    scale: str | None = None,
+    contour: tuple[str, float] | None = None,
+) -> Axes:
+    """Draws a number of every member of an ensemble: over two axes as colours, over one as a curve.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Of :func:`ensemble` or :func:`open_ensemble`, over one axis or two; the first one goes to the right.
+    key : str
+        The name of a data set, or what ``keep`` calls it: "theta_2", "final:theta_2", "event:flip".
+    axes : matplotlib Axes, optional
+        Left out, those of a new figure.
+    scale : {"log", "linear"}, optional
+        Left out, logarithmic where a positive number spans a wide range. Angles are cyclic.
+    contour : (str, float), optional
+        A line where another number has that value.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Examples
+    --------
+    >>> import numpy, pendula
+    >>> grid = numpy.linspace(-1, 1, 5)
+    >>> data = pendula.ensemble(pendula.Chain(masses=[1, 1]), 1.0, {"theta": (grid, grid)})
+    >>> pendula.map(data, "final:theta_2").get_xlabel()
+    '$θ_{1}$ [rad]'
+    """
+    try:
+        drawing = _drawing()
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise missing("pictures", error) from None
+    if data.attrs.get("kind") != "ensemble":
+        raise InputError("data: expected the dataset of an ensemble, got another one")
+    if scale not in (None, "log", "linear"):
+        raise InputError(f'scale: expected "log" or "linear", got {scale!r}')
+    line, level = contour if contour is not None else ("", None)
+    choice = drawing.MapChoice(scale or "", None if level is None else float(level))
+    errors = importlib.import_module("pendula_plot.errors")
+    try:
+        shown = _of(drawing, data, key, line)
+        with drawing.style(), errors.told_of_numbers("data"):
+            if axes is None:
+                axes = plt.figure(layout="constrained").add_subplot()
+            if len(shown.axes) == 1:
+                drawing.draw_curve(axes, shown, choice)
+            else:
+                drawing.draw_map(axes.figure, axes, shown, choice)
+    except errors.PlotError as error:
+        raise InputError(str(error)) from None
+    return axes
+
+
+def _of(drawing: Any, data: xarray.Dataset, key: str, line: str) -> Any:
+    """The numbers that are shown, as the pictures have them of a file."""
+    status = data["status"]
+    if len(status.dims) > 2 or "member" in status.dims:
+        raise InputError(f"data: expected one axis or two, got {', '.join(str(dim) for dim in status.dims)}")
+    kept = {str(name): one for name, one in data.data_vars.items() if one.dims == status.dims}
+    key, line = (drawing.called("data", kept, name) if name else "" for name in (key, line))
+    scales = [data[dim] for dim in status.dims]
+    axes = [(str(one.attrs["long_name"]), drawing.unit_of(one.attrs), one.values) for one in scales]
+    unit = drawing.unit_of(kept[key].attrs)
+    return drawing.Ensemble(
+        "data",
+        key,
+        drawing.counted(kept[key].values),
+        unit,
+        status.values,
+        axes,
+        kept[line].values if line else None,
+        bool(data.attrs["complete"]),
+        drawing.duration_of(data.attrs, [name for name, _, _ in axes], unit),
+    )
+
+
+def _drawing() -> Any:
+    """The module of the pictures that draws maps."""
+    if "pendula_plot" not in sys.modules:
+        folder = Path(_core.plotting_folder(places()[0])) / "pendula_plot"
+        found = importlib.util.spec_from_file_location("pendula_plot", folder / "__init__.py")
+        assert found is not None and found.loader is not None
+        package = importlib.util.module_from_spec(found)
+        sys.modules["pendula_plot"] = package
+        found.loader.exec_module(package)
+    return importlib.import_module("pendula_plot.map")

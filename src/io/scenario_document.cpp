@@ -1,0 +1,28 @@
+#include "io/scenario_document.hpp"
+
+#include <cstddef>
+
+#include "io/section.hpp"
+#include "io/toml_reader.hpp"
+
+namespace pendula::io {
+
+ScenarioDocument::ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides)
+    : name_(name), root_(parse_toml(text, name, overrides)), plan_(read_ensemble(Section(root_), name_)) {
+  root_.erase("ensemble");
+}
+
+AnyScenario ScenarioDocument::with(std::span<const std::string> overrides, const FindSystem& find) const {
+  toml::table changed = root_;
+  for (const std::string& override : overrides) apply_override(changed, override);
+  return read_document(changed, name_, find);
+}
+
+AnyScenario ScenarioDocument::with(std::span<const std::string> keys, std::span<const double> numbers,
+                                   const FindSystem& find) const {
+  toml::table changed = root_;
+  for (std::size_t k = 0; k < keys.size(); ++k) set_number(changed, keys[k], numbers[k]);
+  return read_document(changed, name_, find);
+}
+
+}  // namespace pendula::io
