@@ -19,6 +19,9 @@ from ._systems import System, event_tables
 if TYPE_CHECKING:
     import xarray
 
+# What is kept of tangents, for which methods differ in which those are.
+EXPONENTS = {"lyapunov", "ftle", "megno"}
+
 
 def ensemble(
     system: System,
@@ -71,7 +74,8 @@ def ensemble(
         As for :meth:`Chain.simulate`.
     tolerance, step, accuracy, method, stages, form, solver, iteration, estimate
         As ``[run]`` of a scenario; a tolerance of 1e-9 where nothing says otherwise. ``method="auto"``: an explicit
-        one where that is over sooner.
+        one where that is over sooner, else Gauss steps; it is the default where none of method, step and how Gauss
+        steps are made is given, and no exponents are kept.
     threads : int
         0: as many as there are processors.
     file : path, optional
@@ -124,7 +128,8 @@ def ensemble(
     for name in options:
         if name not in RUN_OPTIONS:
             raise InputError(f"ensemble: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
-    method = options.pop("method", None)
+    keeps_exponents = isinstance(keep, Sequence) and not EXPONENTS.isdisjoint(keep)
+    method = options.pop("method", None if step or options or keeps_exponents else "auto")
     at_zero = system.at_zero() if isinstance(system, System) else {}
     made = Beginning.of(system, at_zero, tolerance=None, step=None, options={}).prepare()
     design = Design(system, [made.columns[k] for k in made.state])
