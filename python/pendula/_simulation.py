@@ -78,7 +78,7 @@ class Simulation:
     Parameters
     ----------
     system : Chain or Model
-        Models without drives; inputs may be held instead.
+        Held inputs replace what is constant of them; drives are added.
     start : mapping, optional
         As for :meth:`Chain.simulate`.
     tolerance, step : float, optional
@@ -168,7 +168,7 @@ class Simulation:
 
     @property
     def inputs(self) -> dict[str, float]:
-        """What is held, by name; drives of a chain are added to it."""
+        """What is held, by name; drives are added to it."""
         with self._alone():
             return dict(zip(self._inputs, self._core.held, strict=True))
 

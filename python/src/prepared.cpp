@@ -25,11 +25,15 @@ Model model_of(const io::Scenario<Space>& scenario) {
 }
 Model model_of(const io::SystemScenario& scenario) {
   const PlainSystem numbers = scenario.system->numbers().plain();
-  if (!numbers.sines.empty()) throw std::invalid_argument("drives: expected none here, inputs may be held instead");
   std::size_t count = 0;
   for (const auto size : scenario.system->info().parameter_sizes) count += static_cast<std::size_t>(size);
-  return Model(pendula_model_of_table(&scenario.system->table(), numbers.parameters, count, numbers.inputs,
-                                      scenario.system->info().inputs.size()));
+  Model model(pendula_model_of_table(&scenario.system->table(), numbers.parameters, count, numbers.inputs,
+                                     scenario.system->info().inputs.size()));
+  for (const InputSine& sine : numbers.sines) {
+    const std::string input(scenario.system->info().inputs[static_cast<std::size_t>(sine.input)]);
+    model = model.driven(input, sine.amplitude, sine.frequency, sine.phase);
+  }
+  return model;
 }
 
 /// Columns of the numbers of a role in the order of a motion: of a chain all theta, then all phi; of another system as

@@ -47,7 +47,7 @@ struct Prepared {
   std::vector<std::string> warnings;
 };
 
-/// The same as a model of the front, which has no drives of systems.
+/// The same as a model of the front.
 Model model_of(const Prepared& made);
 
 /// Columns of the coordinates, then of their rates, in the order of a motion: of a chain all theta, then all phi.

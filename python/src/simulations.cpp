@@ -8,8 +8,11 @@
 #include <pendula/pendula.h>
 
 #include <Eigen/Core>
+#include <limits>
 #include <memory>
 #include <pendula/pendula.hpp>
+#include <pendula/run/lyapunov.hpp>
+#include <pendula/system/outcome.hpp>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -94,11 +97,15 @@ void define_simulations(nb::module_& module) {
   module.def("lyapunov",
              [](const Prepared& made, double duration,
                 int count) -> nb::typed<nb::tuple, Vector, Vector, double, double, double, double> {
-               LyapunovSpectrum found;
+               LyapunovRun found;
                interruptibly([&](const std::stop_token& stop) {
-                 found = lyapunov(model_of(made), made.start,
-                                  {.duration = duration, .count = count, .run = made.options, .stop = stop});
+                 const std::unique_ptr<Integrator> integrator = made.subject->make_integrator(made.run);
+                 const double step = is_adaptive(made.run) ? std::numeric_limits<double>::infinity() : made.run.step;
+                 found = find_lyapunov_spectrum(
+                     *integrator, made.start, step, duration, count, [](const LyapunovProgress&) {},
+                     [&] { return stop.stop_requested(); });
                });
+               if (!found.result.outcome) throw RunFailed(message(found.result.outcome, made.subject->coordinates()));
                return nb::make_tuple(vector_of(found.exponents), vector_of(found.errors), found.sum, found.duration,
                                      found.ftle, found.megno);
              });

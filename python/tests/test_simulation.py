@@ -213,3 +213,14 @@ def test_other_threads_go_on_meanwhile():
     stop.set()
     thread.join()
     assert sum(began < at < ended for at in ticks) > 5  # seen 257
+
+
+def test_a_driven_model_goes_as_its_run_and_has_exponents():
+    drives = [{"input": "push", "amplitude": 3.0, "frequency": 2.0, "phase": 0.3}]
+    cart = pendula.Model("cart_chain", links=1, drives=drives, inputs={"push": 0.5})
+    run = cart.simulate(2.0, theta=0.3, tolerance=1e-11)
+    alone = pendula.Simulation(cart, {"theta": 0.3}, tolerance=1e-11).advance_to(2.0)
+    assert np.abs(alone.state - run.y[:, -1]).max() < 1e-13  # measured 0
+    assert alone.inputs == {"push": 0.5}
+    found = pendula.lyapunov(cart, 20.0, start={"theta": 0.3}, count=1, step=0.01)
+    assert found.exponents.shape == (1,) and np.isfinite(found.exponents).all()

@@ -141,6 +141,21 @@ pendula_model* pendula_model_of_table(const void* table, const double* parameter
   });
 }
 
+pendula_model* pendula_model_driven(const pendula_model* model, size_t input, double amplitude, double frequency,
+                                    double phase) {
+  return made([&] {
+    const auto* system = dynamic_cast<const SystemSubject*>(model->subject.get());
+    if (system == nullptr) throw std::invalid_argument("model: expected one that is no chain, got a chain");
+    if (!std::isfinite(amplitude) || !std::isfinite(frequency) || !std::isfinite(phase)) {
+      throw std::invalid_argument("drive: expected a finite amplitude, frequency and phase, got another number");
+    }
+    SystemNumbers numbers = system->numbers();
+    numbers.sines.push_back({input < model->inputs.size() ? static_cast<int>(input) : -1, amplitude, frequency, phase});
+    const std::shared_ptr<const SystemTable> table(model->subject, &system->table());
+    return new pendula_model(std::make_shared<SystemSubject>(table, std::move(numbers)), model->coordinates);
+  });
+}
+
 void pendula_model_free(pendula_model* model) {
   delete model;
 }

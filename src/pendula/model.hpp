@@ -67,6 +67,13 @@ class Model {
     detail::require_size("v", static_cast<std::size_t>(motion.v.size()), coordinates());
   }
 
+  /// The same model with amplitude sin(frequency t + phase) added to an input. Throws std::invalid_argument for an
+  /// unknown name, and for a chain, which has drives of its own.
+  Model driven(std::string_view input, double amplitude, double frequency, double phase = 0) const {
+    const std::size_t place = detail::place_of("input", input, input_names());
+    return Model(pendula_model_driven(get(), place, amplitude, frequency, phase));
+  }
+
   pendula_model* get() const { return model_.get(); }
 
  private:

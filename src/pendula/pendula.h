@@ -70,6 +70,11 @@ pendula_model* pendula_model_named(const char* name, int links, const double* pa
 pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
                                       const double* inputs, size_t input_count);
 
+/* The same model with amplitude sin(frequency t + phase) added to an input, counted from 0; `model` may be freed. The
+ * drives of a chain are in pendula_chain. */
+pendula_model* pendula_model_driven(const pendula_model* model, size_t input, double amplitude, double frequency,
+                                    double phase);
+
 void pendula_model_free(pendula_model* model);
 
 /* Numbers of coordinates; of inputs, which for a chain are its torques, link by link; and of columns of a row: t,
