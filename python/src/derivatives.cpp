@@ -10,6 +10,7 @@
 #include <pendula/numeric/dual.hpp>
 #include <pendula/pendula.hpp>
 #include <pendula/run/derivatives.hpp>
+#include <pendula/run/state_columns.hpp>
 #include <pendula/system/outcome.hpp>
 #include <stop_token>
 #include <string>

@@ -4,9 +4,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <algorithm>
 #include <filesystem>
-#include <pendula/run/system_subject.hpp>
+#include <pendula/run/state_columns.hpp>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -34,18 +33,6 @@ Model model_of(const io::SystemScenario& scenario) {
     model = model.driven(input, sine.amplitude, sine.frequency, sine.phase);
   }
   return model;
-}
-
-/// Columns of the numbers of a role in the order of a motion: of a chain all theta, then all phi; of another system as
-/// its columns come.
-std::vector<std::size_t> columns_of(const Subject& subject, Role role) {
-  std::vector<std::size_t> columns;
-  for (const Quantity& quantity : subject.quantities()) {
-    if (quantity.role != role) continue;
-    for (std::size_t k = 0; k < quantity.size(); ++k) columns.push_back(quantity.column(k));
-  }
-  if (dynamic_cast<const SystemSubject*>(&subject) != nullptr) std::ranges::sort(columns);
-  return columns;
 }
 
 std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& name,
@@ -94,12 +81,6 @@ io::FindSystem Models::finder() {
 
 Model model_of(const Prepared& made) {
   return std::visit([](const auto& scenario) { return model_of(scenario); }, made.scenario);
-}
-
-std::vector<std::size_t> state_columns(const Subject& subject) {
-  std::vector<std::size_t> columns = columns_of(subject, Role::coordinate);
-  for (const std::size_t column : columns_of(subject, Role::rate)) columns.push_back(column);
-  return columns;
 }
 
 void define_prepared(nb::module_& module) {

@@ -50,7 +50,4 @@ struct Prepared {
 /// The same as a model of the front.
 Model model_of(const Prepared& made);
 
-/// Columns of the coordinates, then of their rates, in the order of a motion: of a chain all theta, then all phi.
-std::vector<std::size_t> state_columns(const Subject& subject);
-
 }  // namespace pendula::python

@@ -10,6 +10,7 @@
 #include <optional>
 #include <pendula/run/observer.hpp>
 #include <pendula/run/run.hpp>
+#include <pendula/run/state_columns.hpp>
 #include <string>
 #include <utility>
 #include <variant>

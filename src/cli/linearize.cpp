@@ -10,6 +10,7 @@
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/inputs.hpp>
 #include <pendula/run/linearize.hpp>
+#include <pendula/run/state_columns.hpp>
 #include <string>
 #include <variant>
 #include <vector>
@@ -30,18 +31,10 @@ struct Linear {
   Directions<> a, b;
 };
 
-/// Names of coordinates, then of rates, in the order of a motion.
 std::vector<std::string> state_names(const Subject& subject) {
-  std::vector<std::string> names;
   const std::vector<std::string> columns = subject.columns();
-  for (const Role role : {Role::coordinate, Role::rate}) {
-    std::vector<std::size_t> places;
-    for (const Quantity& quantity : subject.quantities()) {
-      if (quantity.role != role) continue;
-      for (std::size_t k = 0; k < quantity.size(); ++k) places.push_back(quantity.column(k));
-    }
-    for (const std::size_t place : places) names.push_back(columns[place]);
-  }
+  std::vector<std::string> names;
+  for (const std::size_t place : state_columns(subject)) names.push_back(columns[place]);
   return names;
 }
 
@@ -142,7 +135,8 @@ void print_text(const Linear& linear, const LinearizeOptions& options, const Eig
   const double smallest = 1e-13 * eigenvalues.cwiseAbs().maxCoeff();  // less is rounding
   for (const std::complex<double>& one : eigenvalues) {
     std::cout << std::setw(15) << (std::abs(one.real()) < smallest ? "0" : rounded(one.real(), 6));
-    if (std::abs(one.imag()) >= smallest) std::cout << (one.imag() < 0 ? " - " : " + ") << rounded(std::abs(one.imag()), 6) << " i";
+    if (std::abs(one.imag()) >= smallest)
+      std::cout << (one.imag() < 0 ? " - " : " + ") << rounded(std::abs(one.imag()), 6) << " i";
     std::cout << '\n';
   }
 }

@@ -71,3 +71,21 @@ def test_a_pole_is_refused(pendula, tmp_path):
     run = pendula("linearize", "pole.toml")
     assert run.status == 2
     assert "expected a state where the equations are regular" in run.err
+
+
+def test_rows_and_columns_are_in_the_order_of_names(pendula, tmp_path):
+    """Names that interleave: a_1, b_1, a_2 swing by 1, 2 and 3 rad/s."""
+    (tmp_path / "several.py").write_text(
+        "def define(model, links):\n"
+        "    model.lagrangian = 0\n"
+        "    for k, name in enumerate(('a_1', 'b_1', 'a_2')):\n"
+        "        x = model.coordinate(name, 'm')\n"
+        "        model.lagrangian += model.rate(x)**2 / 2 - (k + 1)**2 * x**2 / 2\n"
+    )
+    (tmp_path / "several.toml").write_text(
+        '[system]\nmodel = "several.py"\n[start]\na_1 = 1.0\n[run]\nduration = 1.0\n'
+    )
+    found = pendula("linearize", "several.toml", "--json").json
+    assert found["names"] == ["a_1", "b_1", "a_2", "a_dot_1", "b_dot_1", "a_dot_2"]
+    assert found["state"] == [1, 0, 0, 0, 0, 0]
+    assert [found["A"][3 + k][k] for k in range(3)] == [-1, -4, -9]
