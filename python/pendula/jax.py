@@ -11,7 +11,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,7 +108,7 @@ def simulate(
     """The states of a motion at times, as a function that JAX differentiates and maps.
 
     Derivatives are those of the discrete motion, whose step sizes are held: forward (``jax.jvp``) and backward
-    (``jax.grad``) by the same matrices, of first order. A mapped call moves one motion after another.
+    (``jax.grad``) by the same matrices, of first order. Motions of a mapped call go on all processors.
 
     Parameters
     ----------
@@ -151,6 +152,20 @@ def simulate(
     return states
 
 
+def _of_each(function: Callable[[Any, Tree], Any], states: NDArray[np.float64], values: Tree) -> Any:
+    """What a function gives of each state of a mapped call, by as many threads as there are processors."""
+    batch = states.shape[:-1]
+    if not batch:
+        return function(states, values)
+
+    def of_one(place: tuple[int, ...]) -> Any:
+        return function(states[place], {name: np.asarray(one)[place] for name, one in values.items()})
+
+    with ThreadPoolExecutor() as threads:
+        found = list(threads.map(of_one, np.ndindex(batch)))
+    return jax.tree.map(lambda *parts: np.stack(parts).reshape(*batch, *parts[0].shape), *found)
+
+
 def _array(shape: tuple[int, ...]) -> Any:
     return jax.ShapeDtypeStruct(shape, jnp.float64)  # type: ignore[no-untyped-call]
 
@@ -159,7 +174,10 @@ def _function(moved: _Moved) -> Any:
     shape = (moved.size, moved.times.size)
 
     def called(function: Any, result: Any, *arguments: Any) -> Any:
-        return jax.pure_callback(function, result, *arguments, vmap_method="sequential")
+        def of_each(state: Any, values: Tree) -> Any:
+            return _of_each(function, np.asarray(state), values)
+
+        return jax.pure_callback(of_each, result, *arguments, vmap_method="broadcast_all")
 
     @jax.custom_jvp
     def states(state: Any, values: Tree) -> Any:
