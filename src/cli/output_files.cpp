@@ -52,7 +52,7 @@ void check_names(const SimulateOptions& options) {
   io::require_format(*options.events, io::FileFormat::csv, "events (a run file, -o run.h5, has them, too)");
 }
 
-std::optional<std::string> output_of(const RunSource& source, const SimulateOptions& options) {
+std::optional<std::string> output_of(const io::RunSource& source, const SimulateOptions& options) {
   const bool without_rows = source.saved && !source.saved->has_rows;
   if (!options.output) return without_rows ? std::nullopt : options.resume;
   if (without_rows && is_run_file(*options.output, options)) {

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "cli/commands.hpp"
-#include "cli/run_source.hpp"
 #include "io/event_file.hpp"
 #include "io/quantity_arrays.hpp"
 #include "io/rows_file.hpp"
 #include "io/run_origin.hpp"
+#include "io/run_source.hpp"
 #include "io/saved_run.hpp"
 #include "view/page.hpp"
 #include "view/scene.hpp"
@@ -28,7 +28,7 @@ void spare_scenario(const std::string& file, const char* what, const SimulateOpt
 void check_names(const SimulateOptions& options);
 
 /// The file for the rows: the one that is resumed, unless it has no rows.
-std::optional<std::string> output_of(const RunSource& source, const SimulateOptions& options);
+std::optional<std::string> output_of(const io::RunSource& source, const SimulateOptions& options);
 
 /// Opens that file, if there is one, and says what it replaces; a resumed run file begins with its old rows.
 std::unique_ptr<io::RowsFile> open_rows(const std::optional<std::string>& file, const SimulateOptions& options,

@@ -8,10 +8,8 @@
 #include <memory>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
-#include <pendula/run/chain_subject.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/run.hpp>
-#include <pendula/version.hpp>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -23,54 +21,24 @@
 #include "cli/interrupt.hpp"
 #include "cli/output_files.hpp"
 #include "cli/progress.hpp"
-#include "cli/run_source.hpp"
 #include "io/event_file.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
-#include "io/natural_units.hpp"
 #include "io/run_file.hpp"
+#include "io/run_source.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
 #include "io/summary.hpp"
 #include "view/page.hpp"
-#include "view/scene.hpp"
+#include "view/scenario_scene.hpp"
 
 namespace pendula::cli {
 namespace {
 
-/// The description of a subject for a page.
-template <class Space>
-view::Scene page_scene(const io::Scenario<Space>& scenario) {
-  return view::scene_of(ChainSubject<Space>(scenario.chain));
-}
-view::Scene page_scene(const io::SystemScenario& scenario) {
-  return view::scene_of(*scenario.system);
-}
-
-std::vector<std::string> event_names(const RunSetup& setup) {
-  std::vector<std::string> names;
-  names.reserve(setup.events.size());
-  for (const Event& event : setup.events) names.push_back(event.name);
-  return names;
-}
-
-/// The contents of a page for a scenario.
-template <class Scenario>
-view::Scene scene_of(const Scenario& scenario, const RunSource& source) {
-  view::Scene scene = page_scene(scenario);
-  scene.title = std::filesystem::path(source.text.name).stem().string();
-  scene.scenario = source.text.text;
-  for (const std::string& change : source.overrides) scene.scenario += "# run with --set " + change + '\n';
-  scene.version = version;
-  scene.time_unit = io::in_units(scenario.natural, "s");
-  scene.length_unit = io::in_units(scenario.natural, "m");
-  return scene;
-}
-
-/// The contents of a run file; with events if `with_events`.
-io::RunContents contents_of(const RunSetup& setup, const io::RunPlan& plan, bool with_events = true) {
-  return {setup.subject->quantities(), setup.subject->constants(),
-          with_events ? event_names(setup) : std::vector<std::string>(), plan.natural};
+/// The source of a run. Throws io::InputError, too, if this program cannot resume the run.
+io::RunSource read_run_source(const SimulateOptions& options) {
+  if (!options.resume) return {io::read_scenario_text(options.scenario), options.overrides, {}};
+  return io::resumed_source(*options.resume, io::read_saved_run(*options.resume), options.overrides);
 }
 
 /// Rows of a film: four for each frame of pendula_plot, so that traces are smooth.
@@ -88,18 +56,18 @@ class LastCheckpoint : public Observer {
 /// Runs a scenario and reports the results.
 class RunSession {
  public:
-  RunSession(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const RunSource& source,
+  RunSession(RunSetup setup, const view::Scene& scene, const io::RunPlan& plan, const io::RunSource& source,
              const std::string& model, const SimulateOptions& options)
       : setup_(std::move(setup)),
         options_(options),
-        from_(checkpoint_of(source, setup_.start.time + setup_.duration)),
+        from_(io::checkpoint_of(source, setup_.start.time + setup_.duration)),
         run_(io::told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
-        origin_(origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
+        origin_(io::origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
-        file_(open_rows(output_, options, origin_, source.saved, contents_of(setup_, plan))),
+        file_(open_rows(output_, options, origin_, source.saved, io::contents_of(setup_, plan))),
         events_(open_events(options, setup_)),
-        film_rows_(open_film_rows(contents_of(setup_, plan, false))),
+        film_rows_(open_film_rows(io::contents_of(setup_, plan, false))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_, page_->times(setup_.duration));
@@ -220,7 +188,7 @@ class RunSession {
     run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));
     const RunReport report = run.go(interrupted);
     page_->end_run(report.energy_error);
-    const io::Ending ending = io::ending_of(report, setup.subject->coordinates(), event_names(setup));
+    const io::Ending ending = io::ending_of(report, setup.subject->coordinates(), io::event_names(setup));
     if (!ending.ok() && report.end != RunEnd::stopped) {
       warn({"copy " + std::to_string(copy) + " ends early: " + ending.message});
     }
@@ -253,7 +221,7 @@ class RunSession {
 
 ExitStatus simulate(const SimulateOptions& options) {
   check_names(options);
-  const RunSource source = read_run_source(options);
+  const io::RunSource source = read_run_source(options);
   if (options.video) {
     spare_scenario(*options.video, "film", options);
     if (check_film(*options.video) != done) return wrong_input;
@@ -262,9 +230,9 @@ ExitStatus simulate(const SimulateOptions& options) {
   const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
                                   const std::filesystem::path& beside) {
     const io::Toolchain toolchain = io::Toolchain::of_this_program();
-    const std::filesystem::path folder = options.resume ? model_folder(*options.resume, name, beside) : beside;
+    const std::filesystem::path folder = options.resume ? io::model_folder(*options.resume, name, beside) : beside;
     model = io::model_source(name, links, folder, toolchain);
-    require_same_model(source, model);
+    io::require_same_model(source, model);
     const io::ModelKernel kernel = io::find_kernel(name, links, folder, toolchain, [&](const std::string& what) {
       if (!options.quiet) std::cerr << "pendula: " << what << '\n';
     });
@@ -276,7 +244,7 @@ ExitStatus simulate(const SimulateOptions& options) {
       [&](const auto& scenario) {
         const RunSetup setup = io::setup_of(scenario);
         check_events(options, setup);
-        RunSession session(setup, scene_of(scenario, source), scenario, source, model, options);
+        RunSession session(setup, view::scene_of(scenario, source), scenario, source, model, options);
         io::Summary summary = session.run();
         summary.kernel_by = kernel_by;
         io::describe(scenario, options.resume ? source.text.name : options.scenario, summary);

@@ -10,9 +10,11 @@
 #include <pendula/system/motion.hpp>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "io/event_reader.hpp"
 #include "io/input_error.hpp"
+#include "io/quantity_arrays.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"
 
@@ -44,6 +46,20 @@ RunSetup setup_of(const ScenarioType& scenario) {
           .events = events_of(scenario.events, subject, scenario.start)};
 }
 
+/// The names of the events that a run looks for.
+inline std::vector<std::string> event_names(const RunSetup& setup) {
+  std::vector<std::string> names;
+  names.reserve(setup.events.size());
+  for (const Event& event : setup.events) names.push_back(event.name);
+  return names;
+}
+
+/// The contents of a run file; with events if `with_events`.
+inline RunContents contents_of(const RunSetup& setup, const RunPlan& plan, bool with_events = true) {
+  return {setup.subject->quantities(), setup.subject->constants(),
+          with_events ? event_names(setup) : std::vector<std::string>(), plan.natural};
+}
+
 /// Calls act(). Errors of the runtime about an option, `key: …`, become InputError with the place of that key.
 template <class Do>
 auto told_at_keys(const RunPlan& plan, const std::string& file, Do act) {
@@ -65,8 +81,7 @@ inline void describe(const RunSetup& setup, Summary& summary) {
   summary.duration = setup.duration;
   summary.every = setup.every;
   summary.at = setup.rows;
-  summary.event_names.clear();
-  for (const Event& event : setup.events) summary.event_names.push_back(event.name);
+  summary.event_names = event_names(setup);
   summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names);
 }
 

@@ -6,23 +6,23 @@
 #include <string>
 #include <vector>
 
-#include "cli/commands.hpp"
 #include "io/run_file.hpp"
 #include "io/scenario.hpp"
 
-namespace pendula::cli {
+namespace pendula::io {
 
 /// The source of a run: a scenario, or a run file to resume.
 struct RunSource {
-  io::ScenarioText text;
+  ScenarioText text;
   std::vector<std::string> overrides;  ///< those of the file and of the command line
-  std::optional<io::SavedRun> saved;   ///< the run to resume
+  std::optional<SavedRun> saved;       ///< the run to resume
 };
 
-/// Reads the source of a run. Throws io::InputError, too, if this program cannot resume the run.
-RunSource read_run_source(const SimulateOptions& options);
+/// The source of a run that goes on, `saved` in `file`, with overrides of keys that may change. Throws InputError, too,
+/// if this program cannot resume the run.
+RunSource resumed_source(const std::string& file, SavedRun saved, const std::vector<std::string>& overrides);
 
-/// Throws io::ModelError if a saved run has another model; `model` is the text of the model's file.
+/// Throws ModelError if a saved run has another model; `model` is the text of the model's file.
 void require_same_model(const RunSource& source, const std::string& model);
 
 /// The folder in which the model file of a resumed run is found: `folder` as named by the scenario, relative to the
@@ -31,10 +31,10 @@ std::filesystem::path model_folder(const std::string& run_file, const std::strin
                                    const std::filesystem::path& folder);
 
 /// The origin of a run, for its file.
-io::RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
-                        const std::string& command, const std::string& title);
+RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
+                    const std::string& command, const std::string& title);
 
-/// The checkpoint to resume from, for a checked scenario. Throws io::InputError if the scenario ends before it.
+/// The checkpoint to resume from, for a checked scenario. Throws InputError if the scenario ends before it.
 std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end);
 
-}  // namespace pendula::cli
+}  // namespace pendula::io

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/version.hpp>
+#include <string>
+
+#include "io/natural_units.hpp"
+#include "io/run_source.hpp"
+#include "io/scenario.hpp"
+#include "view/scene.hpp"
+
+namespace pendula::view {
+
+/// The description of a scenario's subject for a page.
+template <class Space>
+Scene subject_scene(const io::Scenario<Space>& scenario) {
+  return scene_of(ChainSubject<Space>(scenario.chain));
+}
+inline Scene subject_scene(const io::SystemScenario& scenario) {
+  return scene_of(*scenario.system);
+}
+
+/// What a page is told of a run besides its rows.
+template <class Scenario>
+Scene scene_of(const Scenario& scenario, const io::RunSource& source) {
+  Scene scene = subject_scene(scenario);
+  scene.title = std::filesystem::path(source.text.name).stem().string();
+  scene.scenario = source.text.text;
+  for (const std::string& change : source.overrides) scene.scenario += "# run with --set " + change + '\n';
+  scene.version = version;
+  scene.time_unit = io::in_units(scenario.natural, "s");
+  scene.length_unit = io::in_units(scenario.natural, "m");
+  return scene;
+}
+
+}  // namespace pendula::view
