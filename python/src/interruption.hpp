@@ -20,6 +20,12 @@ inline bool hears_signals() {
   return threading.attr("current_thread")().is(threading.attr("main_thread")());
 }
 
+/// Throws what a signal handler of Python raises, if one does: Ctrl-C. To be called without Python's lock.
+inline void heed_signals() {
+  const nb::gil_scoped_acquire lock;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+
 /// Asks Python now and then whether Ctrl-C was pressed; the run holds no lock meanwhile.
 class Interruption {
  public:

@@ -12,6 +12,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "interruption.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario_run.hpp"
 
@@ -66,6 +67,7 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& na
 Models::Models(const std::string& program, std::string python, const Tell& tell)
     : toolchain_(io::Toolchain::of(program)), tell_(tell) {
   toolchain_.python = std::move(python);
+  toolchain_.ask = heed_signals;
 }
 
 io::FindSystem Models::finder() {

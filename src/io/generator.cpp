@@ -60,11 +60,17 @@ fs::path find_model(const std::string& model, const fs::path& folder, const Tool
 std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
   std::vector<std::string> command = toolchain.module(toolchain.codegen, "pendula_codegen");
   command.insert(command.end(), arguments.begin(), arguments.end());
-  const Ended ended = run_process(command);
+  const Ended ended = run_process(command, toolchain.ask);
   if (ended.status == 0) return ended.output;
-  constexpr std::string_view told = "pendula_codegen: error: ";
+  // A model may print, too: what it prints may come later.
+  constexpr std::string_view told = "\npendula_codegen: error: ";
+  const std::string output = '\n' + ended.output;
+  const std::size_t at = output.rfind(told);
+  if (ended.status == 2 && at != std::string::npos) {
+    const std::size_t begin = at + told.size();
+    throw ModelError(output.substr(begin, output.find('\n', begin) - begin));
+  }
   const std::string line = last_line(ended.output);
-  if (ended.status == 2 && line.starts_with(told)) throw ModelError(line.substr(told.size()));
   throw ModelError("models take a Python with the packages of " + (toolchain.codegen / "requirements.txt").string() +
                    ", which " + toolchain.setup().string() + " installs; " + toolchain.python + ": " + line +
                    " (PENDULA_PYTHON names another one)");

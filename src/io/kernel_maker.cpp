@@ -1,6 +1,9 @@
 #include "io/kernel_maker.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <functional>
 #include <future>
 #include <initializer_list>
 #include <iterator>
@@ -48,13 +51,29 @@ void require_compiled(const Ended& ended, const std::string& compiler, const std
   }
 }
 
-/// Runs compiler commands in parallel. Throws ModelError if one fails.
-void run_compilers(const std::vector<std::vector<std::string>>& commands, const std::string& name) {
+/// Runs compiler commands in parallel; only this thread calls ask(). Throws ModelError if one fails.
+void run_compilers(const std::vector<std::vector<std::string>>& commands, const std::string& name,
+                   const std::function<void()>& ask) {
+  struct Stopped {};
+  const auto stop_if = [](const std::atomic<bool>& stops) {
+    if (stops) throw Stopped();
+  };
+  std::atomic<bool> stops = false;
   std::vector<std::future<Ended>> running(commands.size());
-  std::ranges::transform(commands, running.begin(), [](const std::vector<std::string>& command) {
-    return std::async(std::launch::async, [&command] { return run_process(command); });
+  std::ranges::transform(commands, running.begin(), [&](const std::vector<std::string>& command) {
+    return std::async(std::launch::async, [&] { return run_process(command, [&] { stop_if(stops); }); });
   });
-  for (std::future<Ended>& one : running) require_compiled(one.get(), commands.front().front(), name);
+  for (std::future<Ended>& one : running) {
+    try {
+      while (one.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
+        if (ask) ask();
+      }
+    } catch (...) {
+      stops = true;
+      throw;
+    }
+    require_compiled(one.get(), commands.front().front(), name);
+  }
 }
 
 /// Compiles a kernel. Returns the shared object, beside the text.
@@ -83,8 +102,8 @@ fs::path compile(const std::string& name, const fs::path& text, const Toolchain&
     link.push_back(object);
   }
   link.emplace_back("-lm");
-  run_compilers(commands, name);
-  run_compilers({link}, name);
+  run_compilers(commands, name, toolchain.ask);
+  run_compilers({link}, name, toolchain.ask);
   return made;
 }
 

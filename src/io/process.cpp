@@ -1,5 +1,6 @@
 #include "io/process.hpp"
 
+#include <poll.h>
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/time.h>
@@ -8,6 +9,7 @@
 
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <utility>
 
@@ -24,10 +26,17 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return pointers;
 }
 
-std::string read_all(int descriptor) {
+/// How often a program that waits for another asks whether it should, in milliseconds.
+constexpr int patience = 50;
+
+std::string read_all(int descriptor, const std::function<void()>& ask) {
   std::string text;
   std::array<char, 4096> block;
-  for (ssize_t count = 0; (count = read(descriptor, block.data(), block.size())) != 0;) {
+  pollfd waits{descriptor, POLLIN, 0};
+  for (ssize_t count = 0;;) {
+    if (ask) ask();
+    if (poll(&waits, 1, ask ? patience : -1) <= 0) continue;
+    if ((count = read(descriptor, block.data(), block.size())) == 0) break;
     if (count < 0 && errno != EINTR) break;
     if (count > 0) text.append(block.data(), static_cast<std::size_t>(count));
   }
@@ -59,7 +68,7 @@ std::string last_line(const std::string& output) {
                        end - (begin == std::string::npos ? 0 : begin + 1) + 1);
 }
 
-Ended run_process(const std::vector<std::string>& command) {
+Ended run_process(const std::vector<std::string>& command, const std::function<void()>& ask) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) return {127, std::strerror(errno)};
   posix_spawn_file_actions_t actions;
@@ -72,7 +81,14 @@ Ended run_process(const std::vector<std::string>& command) {
   close(ends[1]);
   Ended ended{127, error != 0 ? std::strerror(error) : ""};
   if (error == 0) {
-    ended.output = read_all(ends[0]);
+    try {
+      ended.output = read_all(ends[0], ask);
+    } catch (...) {
+      kill(child, SIGTERM);
+      wait_for(child);
+      close(ends[0]);
+      throw;
+    }
     ended.status = wait_for(child);
   }
   close(ends[0]);

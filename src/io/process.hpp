@@ -15,8 +15,9 @@ struct Ended {
 /// The last line of a program's output; empty if there is none.
 std::string last_line(const std::string& output);
 
-/// Runs a program and waits for it.
-Ended run_process(const std::vector<std::string>& command);
+/// Runs a program and waits for it. Meanwhile it calls ask() many times a second, if there is one; what that throws
+/// ends the program.
+Ended run_process(const std::vector<std::string>& command, const std::function<void()>& ask = {});
 
 /// Runs a program with this program's standard streams. Returns its exit status.
 int run_attached(const std::vector<std::string>& command);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct Toolchain {
   std::filesystem::path plotting;  ///< folder of the Python package pendula_plot
   std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
   std::filesystem::path cache;     ///< folder of kernels; empty if there is none
+  std::function<void()> ask;       ///< called while other programs work, if there is one; what it throws ends them
 
   /// Those that go with a program or Python package in `folder`: of its build, if the file pendula.toolchain is there,
   /// else of its installation. The environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS;
