@@ -9,16 +9,33 @@
 Units are SI, angles radians, unless a system says ``units="natural"``.
 """
 
+from typing import TYPE_CHECKING
+
 from ._core import InputError, instruction_set
 from ._core import version as _version
 from ._derivatives import Derivatives, Gradient, differentiate, linearize
 from ._ensemble import ensemble
 from ._ensemble_data import merge, open_ensemble
-from ._functions import ModelFunction, model
 from ._map import map as map  # not in __all__: `from pendula import *` leaves Python its own
-from ._runs import RunFailed, Solution, TrustWarning
+from ._models import Kernel, Model, models
+from ._runs import RunFailed, TrustWarning
+from ._scenario import Scenario
 from ._simulation import Lyapunov, Simulation, lyapunov
-from ._systems import Chain, Model, Scenario
+from ._solution import Solution, open
+from ._systems import Chain
+
+if TYPE_CHECKING:
+    from ._functions import ModelFunction, model
+
+
+def __getattr__(name: str) -> object:
+    """Imports what reads functions when it is asked for."""
+    if name not in ("ModelFunction", "model"):
+        raise AttributeError(f"module 'pendula' has no attribute {name!r}")
+    from . import _functions
+
+    return getattr(_functions, name)
+
 
 __version__ = _version()
 InputError.__doc__ = (
@@ -30,6 +47,7 @@ __all__ = [
     "Derivatives",
     "Gradient",
     "InputError",
+    "Kernel",
     "Lyapunov",
     "Model",
     "ModelFunction",
@@ -46,5 +64,7 @@ __all__ = [
     "lyapunov",
     "merge",
     "model",
+    "models",
+    "open",
     "open_ensemble",
 ]

@@ -12,9 +12,10 @@ from . import _core
 from ._core import InputError
 from ._ensemble_data import dataset_of, open_ensemble, progress_line
 from ._ensemble_text import Design, ensemble_text
+from ._events import event_tables
 from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
 from ._simulation import RUN_OPTIONS, Beginning
-from ._systems import System, event_tables
+from ._systems import System
 
 if TYPE_CHECKING:
     import xarray

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from ._core import InputError
-from ._systems import Model
+from ._models import Model
 
 
 class _Text:

@@ -1,41 +1,35 @@
-"""What moves: chains, models, scenarios."""
+"""What moves: what all systems have in common, and chains."""
 
 from __future__ import annotations
 
 import copy
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _toml
+from . import _core, _toml
 from ._core import InputError
-from ._runs import Solution, mapping, merged, number, numbers, run_text
+from ._events import events_of
+from ._progress import bar
+from ._runs import mapping, merged, numbers, places, plainly, tell
+from ._solution import Solution, concluded
 
 if TYPE_CHECKING:
-    import xarray
     from numpy.typing import ArrayLike, NDArray
+
+    from ._events import Event
 
 Tables = dict[str, "dict[str, object] | list[dict[str, object]]"]
 
 
-def _drives(given: object) -> list[dict[str, object]]:
+def drives_of(given: object) -> list[dict[str, object]]:
     if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
         raise InputError(f"drives: expected a sequence of mappings, got {type(given).__name__}")
     drives = [mapping(f"drives[{k}]", drive) for k, drive in enumerate(given)]
     return copy.deepcopy(drives)
-
-
-def event_tables(events: object) -> list[dict[str, object]]:
-    """Events as a scenario has them: expressions, or mappings with ``when``, by name."""
-    return [
-        {"name": name, **({"when": event} if isinstance(event, str) else mapping(f"events.{name}", event))}
-        for name, event in mapping("events", events).items()
-    ]
 
 
 class System(ABC):
@@ -59,13 +53,22 @@ class System(ABC):
     ) -> System:
         """The same system with other values of parameters, and of what is constant of inputs."""
 
+    def held(self, inputs: Mapping[str, object]) -> System:
+        """The same with these inputs, in place of its own. Raises InputError."""
+        if inputs:
+            raise InputError(
+                f"inputs: expected none of a chain, which has torque and drives, got {', '.join(inputs)}"
+            )
+        return self
+
     def simulate(
         self,
         duration: float | None = None,
         *,
         t: ArrayLike | None = None,
         start: Mapping[str, object] | None = None,
-        events: Mapping[str, str | Mapping[str, object]] | None = None,
+        inputs: Mapping[str, float] | None = None,
+        events: Mapping[str, Event] | None = None,
         method: str | None = None,
         stages: int | None = None,
         form: str | None = None,
@@ -77,6 +80,7 @@ class System(ABC):
         estimate: bool | None = None,
         every: int | None = None,
         interval: float | None = None,
+        progress: bool | None = None,
         **starts: object,
     ) -> Solution:
         """Moves the system from a start.
@@ -94,10 +98,17 @@ class System(ABC):
         events : mapping, optional
             Expressions of the columns that change their sign where an event happens, by name:
             ``{"flip": "abs(theta_2) - pi"}``, or mappings with ``when``, ``direction`` ("up", "down", "both") and
-            ``stop``.
+            ``stop``. None is missed by the steps. A function of the time and the state, as SciPy has it (with its
+            attributes ``terminal`` and ``direction``), is asked at a fixed number of places in each step: of two
+            changes of sign that lie between two such places, it misses both.
+        inputs : mapping, optional
+            Constant values of a model's inputs, in place of those that it has.
         method, stages, form, solver, iteration, step, tolerance, accuracy, estimate
             As ``[run]`` of a scenario (``pendula help scenario``). Steps are chosen for an accuracy of 1e-9 unless one
             of ``accuracy``, ``tolerance`` and ``step`` says otherwise.
+
+        progress : bool, optional
+            Whether a bar (of tqdm) is shown where a run takes more than a second; left out, where somebody looks.
 
         Returns
         -------
@@ -124,7 +135,7 @@ class System(ABC):
             duration = float(times[-1])
         if step is None and tolerance is None and accuracy is None:
             accuracy = 1e-9
-        tables = self.tables()
+        tables = self.held(mapping("inputs", inputs)).tables()
         tables["start"] = merged("start", start, starts)
         tables["run"] = {
             "duration": duration,
@@ -145,8 +156,13 @@ class System(ABC):
             "interval": interval,
             "times": None if times is None else times.tolist(),
         }
-        tables["event"] = event_tables(events)
-        return run_text(_toml.document(tables))
+        expressions, functions = events_of(events)
+        tables["event"] = expressions
+        names = {f"event[{k + 1}]": f"events.{one['name']}" for k, one in enumerate(expressions)}
+        text = _toml.document(tables)
+        with bar(duration, progress) as told, plainly(names):
+            result = _core.simulate(text, "pendula", [], functions, told, *places(), tell)
+        return concluded(result, names)
 
 
 class Chain(System):
@@ -193,7 +209,7 @@ class Chain(System):
                 "units": units,
             }
         )
-        self._drives = _drives(drives)
+        self._drives = drives_of(drives)
 
     def __repr__(self) -> str:
         given = ", ".join(f"{key}={one!r}" for key, one in self._numbers.items() if one is not None)
@@ -217,118 +233,3 @@ class Chain(System):
 
     def at_zero(self) -> dict[str, object]:
         return {"theta": 0.0, "phi": 0.0} if self._numbers["space"] == "spatial" else {"theta": 0.0}
-
-
-class Model(System):
-    """Any other mechanical system: a built-in model by its name, or a model file.
-
-    Parameters
-    ----------
-    model : str or path
-        ``"furuta"`` (``pendula models`` lists them), or a file that defines ``define(model, links)``.
-    links : int, optional
-        Of models with as many links as asked for.
-    inputs : mapping, optional
-        Constant values of inputs, by name.
-    drives : sequence of mappings, optional
-        Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``.
-    parameters
-        By name; the model has defaults.
-    """
-
-    def __init__(
-        self,
-        model: str | PathLike[str],
-        links: int | None = None,
-        *,
-        inputs: Mapping[str, float] | None = None,
-        drives: Sequence[Mapping[str, object]] = (),
-        **parameters: object,
-    ) -> None:
-        name = str(model)
-        self._name = str(Path(name).resolve()) if name.endswith(".py") else name
-        self._links = links
-        self._parameters = copy.deepcopy(parameters)
-        self._drives = [
-            {"input": key, "constant": number(f"inputs.{key}", one)}
-            for key, one in mapping("inputs", inputs).items()
-        ]
-        self._drives += _drives(drives)
-
-    def __repr__(self) -> str:
-        return f"Model({self._name!r})"
-
-    def model_file(self) -> Path | None:
-        return Path(self._name) if self._name.endswith(".py") else None
-
-    def replaced(
-        self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]
-    ) -> Model:
-        other = copy.copy(self)
-        sizes = {name: float(one[0]) if one.size == 1 else one for name, one in parameters.items()}
-        other._parameters = {**self._parameters, **sizes}
-        others = [
-            {**drive, "constant": 0.0} if drive.get("input") in inputs else drive for drive in self._drives
-        ]
-        other._drives = others + [{"input": name, "constant": float(one[0])} for name, one in inputs.items()]
-        return other
-
-    def tables(self) -> Tables:
-        system: dict[str, object] = {
-            "model": self._name,
-            "links": self._links,
-            "parameters": self._parameters or None,
-        }
-        return {"system": system, "system.drive": list(self._drives)}
-
-
-class Scenario:
-    """A scenario file, as the command line runs it.
-
-    Parameters
-    ----------
-    file : path
-    set : mapping, optional
-        Keys to replace, ``{"run.step": 1e-4}``.
-    """
-
-    def __init__(self, file: str | PathLike[str], set: Mapping[str, object] | None = None) -> None:
-        self.file = Path(file)
-        self._overrides = []
-        for key, one in mapping("set", set).items():
-            if not re.fullmatch(r"[A-Za-z_][\w.\[\]]*", key):
-                raise InputError(f"set: expected a key of a scenario, such as run.step, got {key!r}")
-            self._overrides.append(f"{key}={_toml.value(one, key)}")
-
-    def __repr__(self) -> str:
-        return f"Scenario({str(self.file)!r})"
-
-    def run(self) -> Solution:
-        """Runs it; as :meth:`Chain.simulate`, and to the bit as ``pendula simulate``."""
-        return run_text(self.file.read_text(encoding="utf-8"), str(self.file), self._overrides)
-
-    def ensemble(
-        self,
-        *,
-        threads: int = 0,
-        file: str | PathLike[str] | None = None,
-        shard: tuple[int, int] | None = None,
-        resume: bool = False,
-        client: Any = None,
-        progress: bool = False,
-    ) -> xarray.Dataset:
-        """Moves all members of a scenario with ``[ensemble]``; as :func:`ensemble`, and to the bit as ``pendula
-        ensemble``."""
-        from ._ensemble import move_members
-
-        return move_members(
-            self.file.read_text(encoding="utf-8"),
-            str(self.file),
-            self._overrides,
-            threads=threads,
-            file=file,
-            shard=shard,
-            resume=resume,
-            client=client,
-            progress=progress,
-        )

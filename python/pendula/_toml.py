@@ -9,9 +9,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ._core import InputError
+from ._runs import arrayed
+
 
 def value(given: object, key: str) -> str:
-    """One value in TOML. Raises TypeError, with the key, on what has no form there."""
+    """One value in TOML. Raises InputError, with the key, on what has no form there."""
     if isinstance(given, (bool, np.bool_)):
         return "true" if given else "false"
     if isinstance(given, (int, np.integer)):
@@ -29,14 +32,15 @@ def value(given: object, key: str) -> str:
         inside = (f"{_text(str(name))} = {value(one, f'{key}.{name}')}" for name, one in given.items())
         return "{" + ", ".join(inside) + "}"
     if isinstance(given, np.ma.MaskedArray):
-        raise TypeError(f"{key}: expected an array without a mask, got one with a mask")
-    if isinstance(given, np.ndarray):
-        if given.dtype == np.float64 and given.ndim > 0:
-            return str(given.tolist())  # as TOML has them, and fast
-        return value(given.tolist(), key)
+        raise InputError(f"{key}: expected an array without a mask, got one with a mask")
+    if hasattr(given, "__array__") or hasattr(given, "__dlpack__"):
+        array = np.asarray(arrayed(given))
+        if array.dtype == np.float64 and array.ndim > 0:
+            return str(array.tolist())  # as TOML has them, and fast
+        return value(array.tolist(), key)
     if isinstance(given, Sequence) and not isinstance(given, (bytes, bytearray)):
         return "[" + ", ".join(value(one, key) for one in given) + "]"
-    raise TypeError(f"{key}: expected a number, a string, an array or a mapping, got {type(given).__name__}")
+    raise InputError(f"{key}: expected a number, a string, an array or a mapping, got {type(given).__name__}")
 
 
 def _text(given: str) -> str:

@@ -25,6 +25,8 @@ NB_MODULE(_core, module) {
     }
   });
   python::define_runs(module);
+  python::define_files(module);
+  python::define_models(module);
   python::define_prepared(module);
   python::define_simulations(module);
   python::define_ensembles(module);

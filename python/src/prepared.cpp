@@ -41,7 +41,12 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& na
                                   const std::string& python, const Tell& tell, bool remembers) {
   const nb::gil_scoped_release others_may_go_on;
   Models models(program, python, tell);
-  io::AnyScenario any = io::parse_scenario(text, name, overrides, models.finder());
+  return prepared(io::parse_scenario(text, name, overrides, models.finder()), remembers);
+}
+
+}  // namespace
+
+std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers) {
   return std::visit(
       [&](const auto& scenario) {
         const RunOptions& run = scenario.run;
@@ -61,8 +66,6 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& na
       },
       any);
 }
-
-}  // namespace
 
 Models::Models(const std::string& program, std::string python, const Tell& tell)
     : toolchain_(io::Toolchain::of(program)), tell_(tell) {

@@ -47,6 +47,9 @@ struct Prepared {
   std::vector<std::string> warnings;
 };
 
+/// What a scenario says; with `remembers` a simulation keeps its earlier steps.
+std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers);
+
 /// The same as a model of the front.
 Model model_of(const Prepared& made);
 

@@ -11,8 +11,9 @@ import pendula
 import pendula._derivatives
 import pendula._ensemble
 import pendula._map
-import pendula._runs
+import pendula._models
 import pendula._simulation
+import pendula._solution
 import pendula._systems
 import pendula.jax
 import pytest
@@ -25,7 +26,8 @@ import pytest
         pendula._derivatives,
         pendula._ensemble,
         pendula._map,
-        pendula._runs,
+        pendula._models,
+        pendula._solution,
         pendula._simulation,
         pendula._systems,
         pendula.jax,

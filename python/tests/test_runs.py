@@ -101,7 +101,7 @@ def test_doubts_are_warnings():
         warnings.simplefilter("always")
         pendula.Chain(links=3).simulate(30.0, theta=2.5, step=0.02, stages=2, tolerance=1e-9)
     told = [str(one.message) for one in caught]
-    assert "run.tolerance: has no effect with run.step" in told
+    assert "tolerance: has no effect with step" in told
     assert any("cannot be trusted" in sentence for sentence in told)
     assert all(one.category is pendula.TrustWarning for one in caught)
     assert all(one.filename == __file__ for one in caught)
@@ -113,13 +113,13 @@ REFUSED = [
     ({"theta": float("nan")}, "start.theta: expected a finite number.* got nan"),
     ({"theta": [0.1, float("inf")]}, "start.theta"),
     ({"thet": 1.0}, "unknown key .*did you mean theta"),
-    ({"theta": 1.0, "step": -1.0}, "run.step: expected"),
-    ({"theta": 1.0, "method": "euler"}, 'run.method: expected .* got "euler"'),
-    ({"theta": 1.0, "stages": 99}, "run.stages: expected"),
-    ({"theta": 1.0, "tolerance": -1.0}, "run.tolerance: expected"),
-    ({"theta": 1.0, "events": {"a": "foo + 1"}}, 'event\\[1\\].when: .*unknown name "foo"'),
+    ({"theta": 1.0, "step": -1.0}, "^step: expected"),
+    ({"theta": 1.0, "method": "euler"}, '^method: expected .* got "euler"'),
+    ({"theta": 1.0, "stages": 99}, "^stages: expected"),
+    ({"theta": 1.0, "tolerance": -1.0}, "^tolerance: expected"),
+    ({"theta": 1.0, "events": {"a": "foo + 1"}}, '^events.a.when: .*unknown name "foo"'),
     ({"theta": 1.0, "events": {"a": {"direction": "up"}}}, "when"),
-    ({"theta": 1.0, "every": 0}, "output.every: expected"),
+    ({"theta": 1.0, "every": 0}, "^every: expected"),
     ({}, "start.theta: expected"),
 ]
 
@@ -135,15 +135,18 @@ def test_wrong_arguments_are_named(given, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: pendula.Chain(masses=[1, -1]).simulate(1.0, theta=0), "chain.masses.*: expected"),
-        (lambda: pendula.Chain(masses=[1, 1], lengths=[1, 1, 1]).simulate(1.0, theta=0), "chain.lengths"),
-        (lambda: pendula.Chain(space="plane").simulate(1.0, theta=0), "chain.space: expected"),
-        (lambda: pendula.Chain(drives=[{"link": 3}], links=2).simulate(1.0, theta=0), "chain.drive"),
-        (lambda: pendula.Model("no_such_model").simulate(1.0), "system.model: expected"),
-        (lambda: pendula.Model("no_such_file.py").simulate(1.0), "system.model"),
+        (lambda: pendula.Chain(masses=[1, -1]).simulate(1.0, theta=0), "^masses.*: expected"),
+        (lambda: pendula.Chain(masses=[1, 1], lengths=[1, 1, 1]).simulate(1.0, theta=0), "^lengths"),
+        (lambda: pendula.Chain(space="plane").simulate(1.0, theta=0), "^space: expected"),
+        (
+            lambda: pendula.Chain(drives=[{"link": 3}], links=2).simulate(1.0, theta=0),
+            r"^drives\[0\].link: expected",
+        ),
+        (lambda: pendula.Model("no_such_model").simulate(1.0), "^model: expected"),
+        (lambda: pendula.Model("no_such_file.py").simulate(1.0), "^model: expected"),
         (lambda: pendula.Model("furuta", nothing=1.0).simulate(1.0), "nothing"),
-        (lambda: pendula.Chain(links=1).simulate(-1.0, theta=0), "run.duration: expected"),
-        (lambda: pendula.Chain(links=1).simulate(t=[0, 2, 1], theta=0), "output.times"),
+        (lambda: pendula.Chain(links=1).simulate(-1.0, theta=0), "^duration: expected"),
+        (lambda: pendula.Chain(links=1).simulate(t=[0, 2, 1], theta=0), r"^t\[2\]: expected"),
     ],
 )
 def test_wrong_systems_are_named(make, message):
@@ -198,8 +201,8 @@ def test_failures_can_be_pickled():
     assert str(failed) == "no" and failed.partial is None
 
 
-def test_what_is_no_value_is_a_type_error():
-    with pytest.raises(TypeError, match=r"start\.theta: expected a number, .* got complex"):
+def test_what_is_no_value_is_named():
+    with pytest.raises(pendula.InputError, match=r"start\.theta: expected a number, .* got complex"):
         pendula.Chain(links=1).simulate(1.0, theta=1j)
     with pytest.raises(TypeError, match="duration= or t=, got neither"):
         pendula.Chain(links=1).simulate(theta=1.0)

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <sstream>
 #include <utility>
 
 #include "io/changed_file.hpp"
@@ -13,6 +15,32 @@ namespace {
 constexpr std::array<const char*, 3> told = {"event_number", "event_name", "event_direction"};
 
 }  // namespace
+
+std::vector<std::vector<double>> read_events(const hdf5::Handle& group, const std::vector<Quantity>& quantities,
+                                             std::size_t first, std::size_t count) {
+  const std::vector<double> block = read_block(group, quantities, first, count);
+  std::vector<std::vector<double>> events(count);
+  for (const char* name : told) {
+    const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(group, name), first, count);
+    if (read.size() != count) throw ChangedFile("one whose events are not those of its scenario");
+    for (std::size_t k = 0; k < count; ++k) events[k].push_back(read[k]);
+  }
+  const std::size_t columns = columns_in(quantities);
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto begin = block.begin() + static_cast<std::ptrdiff_t>(k * columns);
+    events[k].insert(events[k].end(), begin, begin + static_cast<std::ptrdiff_t>(columns));
+  }
+  return events;
+}
+
+std::size_t count_events(const hdf5::Handle& group) {
+  return hdf5::extent(hdf5::open_dataset(group, told[0]))[0];
+}
+
+std::vector<std::string> event_names(const hdf5::Handle& group) {
+  std::istringstream words(hdf5::read_attribute(hdf5::open_dataset(group, told[1]), "flag_meanings"));
+  return {std::istream_iterator<std::string>(words), {}};
+}
 
 void EventList::create(const hdf5::Handle& file, const RunContents& contents, const hdf5::Handle& links) {
   if (contents.events.empty() || contents.quantities.empty()) return;
@@ -43,21 +71,10 @@ void EventList::create(const hdf5::Handle& file, const RunContents& contents, co
 void EventList::take_over(const hdf5::Handle& file, std::size_t count) {
   if (!is_there()) return;
   const hdf5::Handle group = hdf5::open_group(file, "events");
-  const std::size_t columns = columns_in(quantities_);
   constexpr std::size_t at_once = 1024;
   for (std::size_t first = 0; first < count; first += at_once) {
-    const std::size_t rows = std::min(at_once, count - first);
-    const std::vector<double> block = read_block(group, quantities_, first, rows);
-    std::vector<std::vector<double>> events(rows);
-    for (const char* name : told) {
-      const std::vector<double> read = hdf5::read_rows(hdf5::open_dataset(group, name), first, rows);
-      if (read.size() != rows) throw ChangedFile("one whose events are not those of its scenario");
-      for (std::size_t k = 0; k < rows; ++k) events[k].push_back(read[k]);
-    }
-    for (std::size_t k = 0; k < rows; ++k) {
-      const auto begin = block.begin() + static_cast<std::ptrdiff_t>(k * columns);
-      events[k].insert(events[k].end(), begin, begin + static_cast<std::ptrdiff_t>(columns));
-      add(std::move(events[k]));
+    for (std::vector<double>& event : read_events(group, quantities_, first, std::min(at_once, count - first))) {
+      add(std::move(event));
     }
     write();
   }

@@ -13,6 +13,14 @@
 
 namespace pendula::io {
 
+/// Reads events of the group `events` of a run file, one after the other: each is its number, which event it is, from 1
+/// on, whether it went up, and the row at that instant. Throws ChangedFile.
+std::vector<std::vector<double>> read_events(const hdf5::Handle& group, const std::vector<Quantity>& quantities,
+                                             std::size_t first, std::size_t count);
+/// How many events that group has, and their names.
+std::size_t count_events(const hdf5::Handle& group);
+std::vector<std::string> event_names(const hdf5::Handle& group);
+
 /// The group `events` of a run file: one row for each event, written in place as it happens.
 class EventList {
  public:

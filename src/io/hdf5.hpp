@@ -130,5 +130,7 @@ void write_rows(const Handle& table, std::size_t first, std::span<const double> 
 Handle create_late_text(const Handle& where, const std::string& name, std::size_t room);
 /// Writes that text; nothing if it is too long.
 void write_late_text(const Handle& dataset, const std::string& text);
+/// Reads it; empty where nothing was written.
+std::string read_late_text(const Handle& where, const std::string& name);
 
 }  // namespace pendula::io::hdf5

@@ -167,4 +167,13 @@ void write_late_text(const Handle& dataset, const std::string& text) {
   require(H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()));
 }
 
+std::string read_late_text(const Handle& where, const std::string& name) {
+  const Handle dataset = open_dataset(where, name);
+  if (extent(dataset)[0] == 0) return {};
+  const Handle type(H5Dget_type(dataset.get()), H5Tclose);
+  std::string text(H5Tget_size(type.get()), '\0');
+  require(H5Dread(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()));
+  return text.substr(0, text.find('\0'));
+}
+
 }  // namespace pendula::io::hdf5

@@ -45,6 +45,11 @@ inline std::string rate_name(std::string_view coordinate) {
   return std::string(stem).append("_dot").append(index);
 }
 
+/// Unit of the rate of a coordinate.
+inline std::string rate_unit(std::string_view unit) {
+  return (unit.empty() ? "1" : std::string(unit)) + "/s";
+}
+
 /// Name of a rate in older files: `theta_1_dot` for `theta_dot_1`, but `x_dot` for `x_dot`.
 inline std::string former_rate_name(std::string_view rate) {
   constexpr std::string_view ending = "_dot";

@@ -164,8 +164,6 @@ class SystemSubject : public Subject {
                                 std::string(info().name) + ", got " + std::to_string(got));
   }
 
-  static std::string rate_unit(std::string_view unit) { return (unit.empty() ? "1" : std::string(unit)) + "/s"; }
-
   // For functions that do not depend on inputs; `time` must outlive the result.
   Conditions conditions(const double& time) const {
     return {table_->context, numbers_.parameters.data(), &time, numbers_.inputs.data()};

@@ -1,0 +1,177 @@
+"""Systems other than chains: built-in models and model files."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import _core
+from ._core import InputError
+from ._runs import mapping, number, places, plainly, tell
+from ._systems import System, Tables, drives_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def _inputs(given: Mapping[str, object]) -> dict[str, float]:
+    for name, one in given.items():
+        if callable(one) or isinstance(one, (tuple, list)):
+            raise InputError(
+                f"inputs.{name}: expected a number, which is held (drives= are sines; Simulation.step holds another "
+                f"one from step to step), got {type(one).__name__}"
+            )
+    return {name: number(f"inputs.{name}", one) for name, one in given.items()}
+
+
+class Kernel(NamedTuple):
+    """How the functions of a model run."""
+
+    by: str  #: "built in", "compiled" or "interpreted"
+    file: Path | None  #: where it is kept; None if it is part of pendula
+
+
+def models() -> list[str]:
+    """Names of the models that come with pendula, for :class:`Model`.
+
+    >>> import pendula
+    >>> "furuta" in pendula.models()
+    True
+    """
+    return _core.built_in_models(places()[0])
+
+
+class Model(System):
+    """Any other mechanical system: a built-in model by its name, or a model file.
+
+    Parameters
+    ----------
+    model : str or path
+        ``"furuta"`` (``pendula models`` lists them), or a file that defines ``define(model, links)``.
+    links : int, optional
+        Of models with as many links as asked for.
+    inputs : mapping, optional
+        Constant values of inputs, by name.
+    drives : sequence of mappings, optional
+        Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``.
+    parameters
+        By name; the model has defaults.
+
+    Examples
+    --------
+    >>> import pendula
+    >>> cart = pendula.Model("cart_chain", links=2, cart_mass=2.0)
+    >>> cart.coordinates, cart.inputs
+    (['x', 'theta_1', 'theta_2'], ['push'])
+    >>> cart.units["theta_dot_1"], cart.parameters["cart_mass"]
+    ('rad/s', 2.0)
+    """
+
+    def __init__(
+        self,
+        model: str | PathLike[str],
+        links: int | None = None,
+        *,
+        inputs: Mapping[str, float] | None = None,
+        drives: Sequence[Mapping[str, object]] = (),
+        **parameters: object,
+    ) -> None:
+        name = str(model)
+        self._name = str(Path(name).resolve()) if name.endswith(".py") else name
+        self._links = links
+        self._parameters = copy.deepcopy(parameters)
+        self._drives = drives_of(drives)
+        self._inputs = _inputs(mapping("inputs", inputs))
+
+    def __repr__(self) -> str:
+        given = {"links": self._links, **self._parameters, "inputs": self._inputs, "drives": self._drives}
+        told = "".join(f", {key}={one!r}" for key, one in given.items() if one not in (None, {}, []))
+        return f"Model({self._name!r}{told})"
+
+    @cached_property
+    def _info(self) -> _core.ModelInfo:
+        with plainly({"model": "model"}):
+            return _core.describe_model(self._name, self._links, *places(), tell)
+
+    @property
+    def links(self) -> int:
+        """How many; 1 of a model without links."""
+        return self._info.links
+
+    @property
+    def coordinates(self) -> list[str]:
+        """Names of the coordinates."""
+        return [name for name, _ in self._info.coordinates]
+
+    @property
+    def rates(self) -> list[str]:
+        """Names of their rates."""
+        return [name for name, _ in self._info.rates]
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the inputs."""
+        return [name for name, _ in self._info.inputs]
+
+    @property
+    def points(self) -> list[str]:
+        """Names of the points: ``run["bob_x"]`` is a component of the point bob."""
+        return self._info.points
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """As they were given, or the model's defaults; NaN where it has none."""
+        defaults = {name: default for name, _, default in self._info.parameters}
+        return {**defaults, **copy.deepcopy(self._parameters)}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of coordinates, rates, inputs and parameters, by name."""
+        info = self._info
+        return dict([*info.coordinates, *info.rates, *info.inputs, *(named[:2] for named in info.parameters)])
+
+    @property
+    def kernel(self) -> Kernel:
+        """How the model's functions run: it is made if need be.
+
+        >>> import pendula
+        >>> pendula.Model("furuta").kernel.by in ("built in", "compiled", "interpreted")
+        True
+        """
+        by = {"build": "built in", "compiler": "compiled", "interpreter": "interpreted"}
+        return Kernel(
+            by[self._info.kernel_by], Path(self._info.kernel_file) if self._info.kernel_file else None
+        )
+
+    def model_file(self) -> Path | None:
+        return Path(self._name) if self._name.endswith(".py") else None
+
+    def replaced(
+        self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]
+    ) -> Model:
+        other = copy.copy(self)
+        sizes = {name: float(one[0]) if one.size == 1 else one for name, one in parameters.items()}
+        other._parameters = {**self._parameters, **sizes}
+        other._drives = [
+            {**drive, "constant": 0.0} if drive.get("input") in inputs else drive for drive in self._drives
+        ]
+        other._inputs = {**self._inputs, **{name: float(one[0]) for name, one in inputs.items()}}
+        return other
+
+    def tables(self) -> Tables:
+        system: dict[str, object] = {
+            "model": self._name,
+            "links": self._links,
+            "parameters": self._parameters or None,
+        }
+        constants = [{"input": key, "constant": one} for key, one in self._inputs.items()]
+        return {"system": system, "system.drive": [*self._drives, *constants]}
+
+    def held(self, inputs: Mapping[str, object]) -> Model:
+        return self.replaced({}, {name: np.array([one]) for name, one in _inputs(inputs).items()})

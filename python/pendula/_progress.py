@@ -1,0 +1,47 @@
+"""A bar for runs that take long."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+def _is_watched() -> bool:
+    """Whether somebody looks: at a terminal, or at a notebook."""
+    return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+
+
+@contextmanager
+def bar(duration: object, wanted: bool | None) -> Iterator[Callable[[float], None] | None]:
+    """What is told the time that a run has come to, in s; None where no bar is wanted.
+
+    Raises ImportError where it is wanted and tqdm is not there.
+    """
+    if wanted is None:
+        wanted = _is_watched() and importlib.util.find_spec("tqdm") is not None
+    if not wanted:
+        yield None
+        return
+    try:
+        from tqdm.auto import tqdm  # type: ignore[import-untyped]
+    except ImportError:
+        raise ImportError("progress: expected tqdm, got none (pip install pendula[progress])") from None
+    total = duration if isinstance(duration, (int, float)) else None
+    shown: list[tqdm] = []
+
+    def told(time: float) -> None:
+        if not shown:
+            shown.append(tqdm(total=total, unit="s", leave=False, bar_format=_BAR if total else _TIME))
+        shown[0].update(time - shown[0].n)
+
+    try:
+        yield told
+    finally:
+        for one in shown:
+            one.close()
+
+
+_BAR = "{l_bar}{bar}| t = {n:.4g} of {total:.4g} [{elapsed}<{remaining}]"
+_TIME = "t = {n:.4g} [{elapsed}]"

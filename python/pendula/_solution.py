@@ -1,0 +1,364 @@
+"""Solutions: what comes of runs."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from math import inf
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+from ._progress import bar
+from ._runs import RunFailed, number, numbers, places, plainly, tell, warn
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike, NDArray
+
+    from ._derivatives import Gradient
+
+
+class Solution:
+    """Rows of a run, with SciPy's names.
+
+    Attributes
+    ----------
+    t : (rows,) array
+        Times, in s.
+    y : (coordinates + rates, rows) array
+        Coordinates, then their rates, in the order of ``names``: of a chain all theta, then all phi.
+    names : list of str
+        What the rows of ``y`` are; the order of :attr:`Simulation.state` and of :func:`linearize`, too.
+    t_events, y_events : dict of arrays
+        Times (events,) and states (events, coordinates + rates) of each event, by its name.
+    status : int
+        0: came to its end; 1: an event ended it; -1: it failed.
+    message : str
+    success : bool
+    summary : dict
+        As ``pendula simulate --json``: method, steps, energy error, warnings and more.
+    columns, units : list of str
+        Of all numbers that a row has: ``run["theta_1"]``; ``run["theta"]`` of all links is (links, rows).
+
+    Notes
+    -----
+    Arrays are read-only. An event at the very start or end of the run is none.
+    """
+
+    def __init__(self, result: _core.Result, summary: dict[str, Any] | None = None) -> None:
+        self._result = result
+        self.columns: list[str] = result.columns
+        self.units: list[str] = result.units
+        self.summary: dict[str, Any] = summary or json.loads(result.summary or "{}")
+        self._rows: NDArray[np.float64] = result.rows
+        self._state = np.array(result.state)
+        self.names = [self.columns[k] for k in self._state]
+        self.t: NDArray[np.float64] = self._rows[:, 0]
+        self.y: NDArray[np.float64] = self._rows[:, self._state].T
+        self.y.flags.writeable = False
+        happened = np.array(result.events, dtype=object)
+        events = result.event_rows
+        self.t_events = {name: events[happened == name, 0] for name in result.event_names}
+        self.y_events = {name: events[happened == name][:, self._state] for name in result.event_names}
+        outcome = self.summary.get("outcome", {"status": "unfinished", "message": "The run was cut off."})
+        status = outcome["status"]
+        self.status = 0 if status == "ok" else 1 if status == "stopped_by_event" else -1
+        by_event = f"Event {outcome.get('event')} ended the run."
+        usual = by_event if self.status == 1 else "The run came to its end."
+        self.message: str = outcome.get("message") or usual
+        self.success = self.status >= 0
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """A column by its name; without an index, of all links, (links, rows)."""
+        found = self._columns(name)
+        return self._rows[:, found[0]] if name in self.columns else self._rows[:, found].T
+
+    def _columns(self, name: str) -> list[int]:
+        if name in self.columns:
+            return [self.columns.index(name)]
+        links = [
+            k for k, column in enumerate(self.columns) if re.fullmatch(re.escape(name) + r"_\d+", column)
+        ]
+        if not links:
+            raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
+        return links
+
+    def sol(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The motion at any times of the run, in any order, at the full order of the method.
+
+        The run is made again for it, by the same steps.
+
+        Parameters
+        ----------
+        t : float or (m,) array_like
+            In s.
+
+        Returns
+        -------
+        (coordinates + rates,) or (coordinates + rates, m) array
+            In the order of ``names``.
+        """
+        when = numbers("t", t)
+        if when.ndim > 1 or self.t.size == 0 or not np.all((when >= self.t[0]) & (when <= self.t[-1])):
+            there = f"times from {self.t[0]} to {self.t[-1]} s" if self.t.size else "a solution with rows"
+            raise _core.InputError(f"t: expected {there}, got {t!r}")
+        times, order = np.unique(when, return_inverse=True)
+        return self._rows_at(times)[:, self._state].T[:, order.reshape(when.shape)]
+
+    def _rows_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows of the same run, made again, at ascending times."""
+        with plainly():
+            return _core.rows_at(self._result, (times - self.t[0]).tolist(), *places(), tell)
+
+    def go_on(self, duration: float, *, progress: bool | None = None) -> Solution:
+        """The same run to a later end, as if it had never stopped, to the bit.
+
+        Parameters
+        ----------
+        duration : float
+            Of the whole run, in s.
+        progress : bool, optional
+            As for :meth:`Chain.simulate`.
+
+        Returns
+        -------
+        Solution
+            With the rows of this one, too.
+
+        Raises
+        ------
+        InputError
+            The run is further already; or it was made by another version of pendula, or on another instruction set.
+
+        Examples
+        --------
+        >>> import pendula
+        >>> double = pendula.Chain(links=2)
+        >>> run = double.simulate(1.0, theta=1.0, step=0.01).go_on(2.0)
+        >>> bool((run.y == double.simulate(2.0, theta=1.0, step=0.01).y).all())
+        True
+        """
+        end = number("duration", duration)
+        with bar(end, progress) as told, plainly():
+            result = _core.go_on(self._result, [f"run.duration={end!r}"], told, *places(), tell)
+        return concluded(result)
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the rows: CSV, or a run file (HDF5) that ends in .h5, .hdf5 or .nc.
+
+        A run file has names and units, the scenario, events, and the place from which the run can go on:
+        :func:`pendula.open`, ``pendula plot``, ``pendula simulate --resume``, xarray and netCDF read it.
+
+        Raises
+        ------
+        InputError
+            It cannot be opened; OSError where it cannot be written.
+        """
+        with plainly():
+            _core.save(self._result, fspath(file))
+
+    def to_netcdf(self, file: str | PathLike[str]) -> None:
+        """Writes a run file, as :meth:`save`: it is a netCDF file."""
+        if not fspath(file).endswith((".nc", ".h5", ".hdf5")):
+            raise _core.InputError(
+                f"file: expected a name that ends in .nc, .h5 or .hdf5, got {fspath(file)}"
+            )
+        self.save(file)
+
+    def to_html(self, file: str | PathLike[str]) -> None:
+        """Writes the page that ``pendula simulate --view`` writes: one file that moves, and needs nothing else.
+
+        The run is made again for it, by the same steps.
+        """
+        with plainly():
+            _core.write_page(self._result, fspath(file), *places(), tell)
+
+    def _repr_html_(self) -> str | None:
+        """The page in a notebook, if the run is not one of more than a few seconds; :meth:`to_html` writes that."""
+        if not self.summary.get("wall_seconds", inf) < 5 or self.t.size == 0:
+            return None
+        from tempfile import TemporaryDirectory
+
+        from ._pictures import iframe
+
+        with TemporaryDirectory() as folder:
+            page = Path(folder) / "page.html"
+            self.to_html(page)
+            return iframe(page.read_text(encoding="utf-8"))
+
+    def __getstate__(self) -> dict[str, Any]:
+        from tempfile import TemporaryDirectory
+
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "run.h5"
+            self.save(file)
+            return {"file": file.read_bytes(), "summary": self.summary}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        from tempfile import TemporaryDirectory
+
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "run.h5"
+            file.write_bytes(state["file"])
+            Solution.__init__(self, opened(file), state["summary"])
+
+    def gradient(self, by_end: ArrayLike) -> Gradient:
+        """What a number that depends on where the run ends changes by.
+
+        The run is made again for it, forth and back, by steps of the same sizes.
+
+        Parameters
+        ----------
+        by_end : (coordinates + rates,) or (coordinates + rates, rows) array_like
+            The number's gradient by the last state, or by those of all rows, in the order of ``names``.
+
+        Returns
+        -------
+        Gradient
+            By the start, by parameters and by inputs.
+
+        Raises
+        ------
+        InputError
+            An argument is wrong, or the method's steps have no derivative.
+
+        Examples
+        --------
+        >>> import pendula
+        >>> run = pendula.Chain(links=1).simulate(1.0, theta=0.5, step=0.01)
+        >>> by_length = run.gradient([1, 0]).parameters["lengths"]  # of theta at the end
+        """
+        from ._derivatives import gradient
+
+        given = numbers("by_end", by_end)
+        if given.shape not in ((len(self.names),), self.y.shape):
+            raise _core.InputError(
+                f"by_end: expected shape ({len(self.names)},) or {self.y.shape}, got {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            raise _core.InputError("by_end: expected finite numbers, got others")
+        with plainly():
+            made = _core.prepare_again(self._result, *places(), tell)
+        last = given.ndim == 1
+        return gradient(made, self.t[-1:] if last else self.t, given[:, None] if last else given)
+
+    @property
+    def nfev(self) -> int:
+        """Iterations on the stages of implicit steps, which evaluate the equations at all of them."""
+        return int(self._told("newton_iterations") or 0)
+
+    @property
+    def energy(self) -> NDArray[np.float64]:
+        """T + U of each row, in J."""
+        return self["energy"]
+
+    @property
+    def nsteps(self) -> int:
+        """Steps that were taken."""
+        return int(self._told("steps"))
+
+    def _told(self, key: str) -> Any:
+        if key not in self.summary:
+            raise RuntimeError(f"{key}: expected a run that came to an end, got one that was cut off")
+        return self.summary[key]
+
+    def __repr__(self) -> str:
+        rows = f"{self.t.size} rows to t = {self.t[-1]:.6g} s" if self.t.size else "no rows"
+        s = self.summary
+        how = f", {s['steps']} steps of {s['method']}, energy error {s['energy_error_max']:.2g}" if s else ""
+        return f"<Solution: {rows}{how}: {self.message}>"
+
+    def plot(self, *names: str, axes: Axes | None = None) -> Axes:
+        """Draws columns over time with matplotlib; without names, the coordinates.
+
+        >>> import pendula
+        >>> axes = pendula.Chain(links=2).simulate(1.0, theta=1.0).plot("theta", "x_2")
+        >>> [line.get_label() for line in axes.lines]
+        ['theta_1 [rad]', 'theta_2 [rad]', 'x_2 [m]']
+        """
+        from ._pictures import plot
+
+        if not names:
+            names = tuple(self.names[: len(self.names) // 2])
+        columns = [column for name in names for column in self._columns(name)]
+        return plot(self._rows, columns, self.columns, self.units, axes)
+
+    def animate(self, *, seconds: float | None = None, fps: int = 30) -> FuncAnimation:
+        """A matplotlib animation of the points, in the plane or in space, in a figure of its own.
+
+        The run is made again for it, by the same steps.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            How long it takes to look at; left out, as long as the motion.
+        fps : int
+            Frames a second.
+
+        Examples
+        --------
+        >>> import pendula
+        >>> run = pendula.Chain(links=2).simulate(1.0, theta=1.0)
+        >>> run.animate(fps=10).save("double.gif")  # doctest: +SKIP
+        """
+        from ._pictures import animation, frames
+
+        times = frames(self.t, seconds, fps)
+        return animation(times, self._rows_at(times), self._result.points, self.units, 1000 / fps)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """All columns by name over ``t``, with their units."""
+        import xarray
+
+        data = {
+            name: ("t", self._rows[:, k], {"units": self.units[k]})
+            for k, name in enumerate(self.columns)
+            if name != "t"
+        }
+        return xarray.Dataset(data, coords={"t": ("t", self.t, {"units": self.units[0]})})
+
+
+def concluded(
+    result: _core.Result, names: Mapping[str, str] | None = None, in_file: bool = False
+) -> Solution:
+    """The solution of a run that the caller's caller has just made, with its warnings. Raises RunFailed."""
+    solution = Solution(result)
+    warn(solution.summary["warnings"], 4, names, in_file)
+    if solution.status < 0:
+        raise RunFailed(solution.message, solution)
+    return solution
+
+
+def opened(file: str | PathLike[str]) -> _core.Result:
+    with plainly():
+        return _core.open(fspath(file), *places(), tell)
+
+
+def open(file: str | PathLike[str]) -> Solution:
+    """The solution in a run file, of :meth:`Solution.save` or of ``pendula simulate -o run.h5``.
+
+    A run that was cut off, or is still going on, has the rows up to there, ``status`` -1 and an empty ``summary``.
+
+    Raises
+    ------
+    InputError
+        It is no run file, or it is damaged.
+
+    Examples
+    --------
+    >>> import pathlib, pendula, tempfile
+    >>> run = pendula.Chain(links=2).simulate(1.0, theta=1.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run.save(pathlib.Path(folder) / "run.h5")
+    ...     again = pendula.open(pathlib.Path(folder) / "run.h5")
+    >>> bool((again.y == run.y).all()), again.success
+    (True, True)
+    """
+    return Solution(opened(file))

@@ -1,0 +1,95 @@
+// What models have: names, units, defaults, and how their kernels run.
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstddef>
+#include <optional>
+#include <pendula/run/quantity.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "bindings.hpp"
+#include "interruption.hpp"
+#include "io/generator.hpp"
+#include "io/kernel_cache.hpp"
+#include "prepared.hpp"
+
+namespace pendula::python {
+namespace {
+
+using Named = std::vector<std::pair<std::string, std::string>>;  // names and units
+
+/// A model as it is described.
+struct ModelInfo {
+  int links = 1;
+  Named coordinates, rates, inputs;
+  std::vector<std::tuple<std::string, std::string, double>> parameters;  // with defaults, NaN where there is none
+  std::vector<std::string> points;
+  std::string kernel_by, kernel_file;
+};
+
+Named named(std::span<const std::string_view> names, std::span<const std::string_view> units) {
+  Named named;
+  for (std::size_t k = 0; k < names.size(); ++k) named.emplace_back(names[k], units[k]);
+  return named;
+}
+
+io::Toolchain toolchain_of(const std::string& program, const std::string& python) {
+  io::Toolchain toolchain = io::Toolchain::of(program);
+  toolchain.python = python;
+  toolchain.ask = heed_signals;
+  return toolchain;
+}
+
+ModelInfo describe_model(const std::string& model, std::optional<int> links, const std::string& program,
+                         const std::string& python, const Tell& tell) {
+  const nb::gil_scoped_release others_may_go_on;
+  const io::ModelKernel kernel =
+      io::find_kernel(model, links, "", toolchain_of(program, python), [&](const std::string& what) {
+        const nb::gil_scoped_acquire lock;
+        tell(what);
+      });
+  const SystemInfo& info = kernel.table->info;
+  ModelInfo told{.links = info.links,
+                 .coordinates = named(info.coordinates, info.coordinate_units),
+                 .rates = {},
+                 .inputs = named(info.inputs, info.input_units),
+                 .parameters = {},
+                 .points = {info.points.begin(), info.points.end()},
+                 .kernel_by = std::string(kernel.by()),
+                 .kernel_file = kernel.file.string()};
+  for (const auto& [name, unit] : told.coordinates) told.rates.emplace_back(rate_name(name), rate_unit(unit));
+  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+    told.parameters.emplace_back(info.parameters[k], info.parameter_units[k], info.parameter_defaults[k]);
+  }
+  return told;
+}
+
+}  // namespace
+
+void define_models(nb::module_& module) {
+  nb::class_<ModelInfo>(module, "ModelInfo")
+      .def_ro("links", &ModelInfo::links)
+      .def_ro("coordinates", &ModelInfo::coordinates)
+      .def_ro("rates", &ModelInfo::rates)
+      .def_ro("inputs", &ModelInfo::inputs)
+      .def_ro("parameters", &ModelInfo::parameters)
+      .def_ro("points", &ModelInfo::points)
+      .def_ro("kernel_by", &ModelInfo::kernel_by)
+      .def_ro("kernel_file", &ModelInfo::kernel_file);
+  module.def("describe_model", &describe_model, nb::arg("model"), nb::arg("links").none(), nb::arg("program"),
+             nb::arg("python"), nb::arg("tell"));
+  module.def(
+      "built_in_models", [](const std::string& program) { return io::built_in_models(io::Toolchain::of(program)); },
+      nb::arg("program"));
+}
+
+}  // namespace pendula::python
