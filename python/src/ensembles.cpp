@@ -116,22 +116,18 @@ class Ensemble {
       return true;
     }
     const std::vector<std::int64_t> missing = output.find_missing();
-    const auto write_all = [&] {
-      const nb::gil_scoped_release others_may_go_on;
-      return output.write();
-    };
     {
       io::Journal journal(output.folder(), head().kind());
       try {
         run(missing, threads, output.already(), shown, [&](const io::DoneChunk& chunk) { journal.add(chunk); });
       } catch (const nb::python_error&) {
         journal.sync();
-        write_all();  // what there is
+        output.write();  // what there is
         throw;
       }
       journal.sync();
     }
-    const std::optional<io::EnsembleTally> found = write_all();
+    const std::optional<io::EnsembleTally> found = output.write();  // Python's lock is held: HDF5 knows no threads
     if (!found) return true;
     tally_ = *found;
     return tally_.done == head().plan.count;

@@ -106,8 +106,9 @@ bool comes_to_an_end(const std::function<void()>& action) {
   if (child > 0) return wait_for(child) == 0;
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
-  constexpr itimerval half_a_second{{0, 0}, {0, 500'000}};
+  constexpr itimerval half_a_second{{0, 0}, {0, 500'000}}, half_a_minute{{0, 0}, {30, 0}};
   setitimer(ITIMER_PROF, &half_a_second, nullptr);
+  setitimer(ITIMER_REAL, &half_a_minute, nullptr);  // a lock that a thread held which is not here
   try {
     action();
   } catch (...) {  // the caller will meet the same exception

@@ -23,7 +23,8 @@ Ended run_process(const std::vector<std::string>& command, const std::function<v
 int run_attached(const std::vector<std::string>& command);
 
 /// Whether `action` ends in a child process within half a second of processor time, in whatever way. Guards against
-/// libraries that loop forever on damaged files. No other thread may run.
+/// libraries that loop forever on damaged files. Other threads do not run there: a lock that one holds ends it, after
+/// half a minute.
 bool comes_to_an_end(const std::function<void()>& action);
 
 }  // namespace pendula::io
