@@ -104,5 +104,5 @@ def test_ctrl_c_while_a_kernel_is_made(by, tmp_path):
         child.send_signal(signal.SIGINT)
         begun = time.monotonic()
         assert child.stdout.readline() == "interrupted\n"
-        assert time.monotonic() - begun < 0.2  # measured 0.05 s
+        assert time.monotonic() - begun < 3.0  # measured 0.05 s
         child.kill()
