@@ -184,6 +184,7 @@ def move_members(
         raise InputError("client: expected no file beside it, got one; the dataset has .to_netcdf")
     with plainly():
         made = _core.Ensemble(text, name, overrides, "pendula.ensemble", *places(), tell)
+    is_complete = True
     with progress_line(bool(progress), made.members) as shown:
         if client is not None:
             from . import _cluster
@@ -195,7 +196,7 @@ def move_members(
         else:
             with plainly():
                 is_complete = made.write(fspath(file), part, bool(resume), how_many, shown)
-        if shown and (file is None or is_complete):
+        if shown and is_complete:
             shown(made.members)
     data = dataset_of(made) if file is None else open_ensemble(file)
     if data.attrs["complete"]:

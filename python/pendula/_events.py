@@ -10,11 +10,7 @@ from ._core import InputError
 from ._runs import mapping, number
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    EventFunction = Callable[[float, NDArray[np.float64]], float]
-    Event = str | EventFunction | Mapping[str, object]
+    Event = str | Callable[..., float] | Mapping[str, object]  # a function is one of (t, y)
 
 
 def events_of(events: object) -> tuple[list[dict[str, object]], list[tuple[str, Any, int, bool]]]:

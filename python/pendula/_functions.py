@@ -69,7 +69,7 @@ class _Text:
         elif _is_plain(what):
             self.parts.append(f"{name} = {_literal(what)}")
         elif hasattr(what, "__module__") and hasattr(what, "__name__") and _comes_from(what, "sympy"):
-            self.imports.add(f"from {what.__module__} import {what.__name__} as {name}")
+            self.imports.add(f"from {what.__module__} import {getattr(what, '__name__')} as {name}")  # noqa: B009
         elif _comes_from(type(what), "sympy"):
             import sympy  # type: ignore[import-untyped]
 
@@ -233,7 +233,7 @@ class ModelFunction:
             )
         given = list(arguments.values())[1].default
         self._links = given if isinstance(given, int) else None
-        self.file = kept_model(name, _Text(function).text())
+        self.file: Path = kept_model(name, _Text(function).text())
         functools.update_wrapper(self, function)
 
     def __call__(

@@ -29,7 +29,7 @@ class Scenario:
     """
 
     def __init__(self, file: str | PathLike[str], set: Mapping[str, object] | None = None) -> None:
-        self.file = Path(file)
+        self.file: Path = Path(file)
         self._overrides = []
         for key, one in mapping("set", set).items():
             if not re.fullmatch(r"[A-Za-z_][\w.\[\]]*", key):

@@ -59,21 +59,25 @@ class Solution:
         self.summary: dict[str, Any] = summary or json.loads(result.summary or "{}")
         self._rows: NDArray[np.float64] = result.rows
         self._state = np.array(result.state)
-        self.names = [self.columns[k] for k in self._state]
+        self.names: list[str] = [self.columns[k] for k in self._state]
         self.t: NDArray[np.float64] = self._rows[:, 0]
         self.y: NDArray[np.float64] = self._rows[:, self._state].T
         self.y.flags.writeable = False
         happened = np.array(result.events, dtype=object)
         events = result.event_rows
-        self.t_events = {name: events[happened == name, 0] for name in result.event_names}
-        self.y_events = {name: events[happened == name][:, self._state] for name in result.event_names}
+        self.t_events: dict[str, NDArray[np.float64]] = {
+            name: events[happened == name, 0] for name in result.event_names
+        }
+        self.y_events: dict[str, NDArray[np.float64]] = {
+            name: events[happened == name][:, self._state] for name in result.event_names
+        }
         outcome = self.summary.get("outcome", {"status": "unfinished", "message": "The run was cut off."})
         status = outcome["status"]
-        self.status = 0 if status == "ok" else 1 if status == "stopped_by_event" else -1
+        self.status: int = 0 if status == "ok" else 1 if status == "stopped_by_event" else -1
         by_event = f"Event {outcome.get('event')} ended the run."
         usual = by_event if self.status == 1 else "The run came to its end."
         self.message: str = outcome.get("message") or usual
-        self.success = self.status >= 0
+        self.success: bool = self.status >= 0
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """A column by its name; without an index, of all links, (links, rows)."""

@@ -27,8 +27,8 @@ from ._systems import System
 try:
     import jax
     import jax.numpy as jnp
-except ImportError as error:
-    raise ImportError("pendula.jax: expected JAX, got none; pip install 'pendula[jax]'") from error
+except ImportError as _error:
+    raise ImportError("pendula.jax: expected JAX, got none; pip install 'pendula[jax]'") from _error
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

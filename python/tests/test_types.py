@@ -1,10 +1,12 @@
 """The package is typed, strictly."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pendula
+import pytest
 
 
 def test_mypy_finds_nothing():
@@ -21,3 +23,12 @@ def test_mypy_finds_nothing():
 
 def test_the_package_says_that_it_is_typed():
     assert (Path(pendula.__file__).parent / "py.typed").exists()
+
+
+@pytest.mark.parametrize("arguments", [["pendula"], ["--verifytypes", "pendula", "--ignoreexternal"]])
+def test_pyright_finds_nothing_and_knows_all_public_types(arguments):
+    folder = Path(pendula.__file__).parents[1]
+    found = {**os.environ, "PYTHONPATH": str(folder), "PYRIGHT_PYTHON_IGNORE_WARNINGS": "1"}
+    command = [sys.executable, "-m", "pyright", "--pythonpath", sys.executable, *arguments]
+    checked = subprocess.run(command, cwd=folder, env=found, capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stdout
