@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class Derivatives(NamedTuple):
     """A motion, and its derivatives: exactly those of its steps, whose sizes are held.
 
-    What ends at an event ends at another time from another start: the last row is differentiated along with that time.
+    What ends at an event ends at another time from another start: the last row is differentiated along with that time,
+    which depends on the start as the field tells there, to the accuracy of the steps.
     """
 
     t: NDArray[np.float64]  #: (rows,) times, in s
@@ -43,9 +44,11 @@ class Gradient(NamedTuple):
 
 
 class Varied:
-    """Names of parameters and inputs, and their places among all numbers."""
+    """Names of parameters and inputs, and their places among all numbers. Raises InputError for natural units."""
 
     def __init__(self, made: _core.Prepared) -> None:
+        if made.is_natural:
+            raise InputError('units: expected "SI" for derivatives, got "natural"')
         self.parameters: dict[str, slice] = {}
         self.inputs: dict[str, slice] = {}
         self.count = 0
@@ -77,9 +80,10 @@ def differentiate(
     t : array_like, optional
         Times of the rows, in s, from 0 on, at which steps end; if left out, the duration alone.
     start : mapping, optional
-        As for :meth:`Chain.simulate`.
+        As for :meth:`Chain.simulate`. Coordinates and rates are what is held where parameters vary, also where momenta
+        are given.
     until : str, optional
-        An expression of ``t``, coordinates and rates. The last row is where it first crosses zero.
+        An expression of ``t``, coordinates and rates that does not jump. The last row is where it first crosses zero.
     direction : {"both", "up", "down"}
         How it crosses zero.
     tolerance, step : float, optional
@@ -94,7 +98,9 @@ def differentiate(
     Raises
     ------
     InputError
-        An argument is wrong, or a chain has more links than this build has kernels for (with ``until`` alone).
+        An argument is wrong, or rows are at a pole of (theta, phi).
+    RuntimeError
+        With ``until``, for a chain of more links than this build has kernels for.
     RunFailed
         The computation failed.
 
@@ -110,25 +116,31 @@ def differentiate(
     """
     times = _times(duration, t)
     given = mapping("start", start)
+    for name in options:
+        if name not in RUN_OPTIONS:
+            raise InputError(f"differentiate: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
+    if direction not in ("both", "up", "down"):
+        raise InputError(f'direction: expected "both", "up" or "down", got {direction!r}')
     made = Beginning.of(system, given, tolerance=tolerance, step=step, options=options).prepare()
+    varied = Varied(made)
     warn(made.warnings, stacklevel=3)
     if until is not None:
-        run = {name: one for name, one in options.items() if name in RUN_OPTIONS}
+        _slopes(made, until, made.time, made.start)
+        event = {"when": until, "direction": direction, "stop": True}
         found = system.simulate(
             float(times[-1]),
             start=given,
-            events={"until": {"when": until, "direction": direction, "stop": True}},
+            events={"until": event},
             tolerance=1e-9 if tolerance is None and step is None else tolerance,
             step=step,
             estimate=False,
-            **run,  # type: ignore[arg-type]
+            **options,  # type: ignore[arg-type]
         )
         if found.status != 1:
             raise InputError(
                 f"until: expected {until} to cross zero within {times[-1]:.6g} s, got no crossing"
             )
         times = np.append(times[times < found.t[-1]], found.t[-1])
-    varied = Varied(made)
     size = made.start.size
     seeds = np.eye(size + varied.count)
     with plainly():
@@ -196,6 +208,8 @@ def linearize(
         raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
     start = {**system.at_zero(), **mapping("at", at)}
     if step is None:
+        if tolerance is not None:
+            raise InputError("tolerance: expected none without step, got one")
         return Simulation(system, start).linearize()
     if number("step", step) <= 0:
         raise InputError(f"step: expected a positive number, got {step!r}")
@@ -207,6 +221,8 @@ def linearize(
 def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:
     if t is None and duration is None:
         raise TypeError("differentiate: expected duration= or t=, got neither")
+    if duration is not None and number("duration", duration) < 0:
+        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
     times = numbers("t", t) if t is not None else np.array([number("duration", duration)])
     if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
         raise InputError(f"t: expected a vector of finite times, got {t!r}")
@@ -217,6 +233,18 @@ def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:
     return times
 
 
+def _slopes(
+    made: _core.Prepared, until: object, time: float, state: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The gradient of an expression, by the time and by the state. Raises InputError."""
+    if not isinstance(until, str):
+        raise InputError(f"until: expected an expression, got {type(until).__name__}")
+    try:
+        return _core.gradient(made, until, time, state)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"until: {error}") from None
+
+
 def _at_event(
     made: _core.Prepared, until: str, time: float, state: NDArray[np.float64], by_all: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -224,8 +252,8 @@ def _at_event(
 
     With g the expression, f the field and Phi the derivative at that time: dt = -(g_x Phi) / (g_x f + g_t).
     """
+    slopes = _slopes(made, until, time, state)
     with plainly():
-        slopes = _core.gradient(made, until, time, state)
         field = _core.field(made, time, state)
     speed = slopes[0] + slopes[1:] @ field
     if speed == 0:

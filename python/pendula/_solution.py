@@ -216,12 +216,13 @@ class Solution:
     def gradient(self, by_end: ArrayLike) -> Gradient:
         """What a number that depends on where the run ends changes by.
 
-        The run is made again for it, forth and back, by steps of the same sizes.
+        The run is made again for it, forth and back, by steps that end at the rows that are asked for. Their times
+        are held, also that of an event that ended the run.
 
         Parameters
         ----------
         by_end : (coordinates + rates,) or (coordinates + rates, rows) array_like
-            The number's gradient by the last state, or by those of all rows, in the order of ``names``.
+            The number's gradient by the state of the last row, or by those of all, in the order of ``names``.
 
         Returns
         -------

@@ -21,7 +21,7 @@ from . import _core
 from ._core import InputError
 from ._derivatives import Varied
 from ._runs import mapping, numbers, plainly
-from ._simulation import Beginning
+from ._simulation import RUN_OPTIONS, Beginning
 from ._systems import System
 
 try:
@@ -40,10 +40,18 @@ class _Moved:
     """A system at times, whose start, parameters and inputs vary."""
 
     def __init__(self, system: System, times: NDArray[np.float64], options: Mapping[str, object]) -> None:
+        for name in options:
+            if name not in ("tolerance", "step", *RUN_OPTIONS):
+                known = ", ".join(("tolerance", "step", *RUN_OPTIONS))
+                raise InputError(f"simulate: expected options among {known}, got {name}")
         self.system, self.times, self.options = system, times, options
         self.made = self._prepared(system)
         self.varied = Varied(self.made)
         self.size = int(self.made.start.size)
+        # What has no derivatives is told now, and not while JAX runs it.
+        none = np.zeros((self.size, 0)), np.zeros((self.varied.count, 0))
+        with plainly():
+            _core.forward(self.made, self.made.time, self.made.start, np.zeros(0), *none)
 
     def _prepared(self, system: System) -> _core.Prepared:
         rest = dict(self.options)
@@ -128,18 +136,31 @@ def simulate(
 
     Raises
     ------
-    InputError, RunFailed
-        As :func:`pendula.differentiate`; and InputError where JAX computes with 32 bits.
+    InputError
+        An argument is wrong, or JAX computes with 32 bits.
+    jax.errors.JaxRuntimeError
+        What goes wrong while JAX runs the motion, as RunFailed and values of parameters: its text has the message.
     """
     if jnp.zeros(0).dtype != jnp.float64:
         raise InputError(
             'simulate: expected JAX with 64 bits, jax.config.update("jax_enable_x64", True), got 32'
         )
+    if isinstance(t, jax.core.Tracer):
+        raise InputError("t: expected times that are known, got traced ones: they are not differentiated")
     times = numbers("t", t)
-    if times.ndim != 1 or times.size == 0 or np.any(times < 0) or np.any(np.diff(times) < 0):
+    if (
+        times.ndim != 1
+        or times.size == 0
+        or not np.all(times >= 0)
+        or not np.all(np.isfinite(times))
+        or np.any(np.diff(times) < 0)
+    ):
         raise InputError(f"t: expected a vector of times from 0 on, ascending, got {t!r}")
     moved = _Moved(system, times, options)
-    start = jnp.asarray(state, float)
+    given = jnp.asarray(state)
+    if jnp.iscomplexobj(given):
+        raise InputError(f"state: expected real numbers, got {given.dtype}")
+    start = given.astype(float)
     if start.shape != (moved.size,):
         raise InputError(f"state: expected shape ({moved.size},), got {start.shape}")
     values = {name: jnp.asarray(one, float) for name, one in mapping("parameters", parameters).items()}
@@ -180,13 +201,23 @@ def _function(moved: _Moved) -> Any:
         return jax.pure_callback(of_each, result, *arguments, vmap_method="broadcast_all")
 
     @jax.custom_jvp
+    def derivatives(state: Any, values: Tree) -> Any:
+        matrices = jax.tree.map(lambda one: _array((*shape, one.size)), (state, values))
+        return called(moved.derivatives, matrices, state, values)
+
+    @derivatives.defjvp
+    def _(primals: Any, tangents: Any) -> Any:
+        raise NotImplementedError(
+            "pendula.jax.simulate: expected derivatives of first order, got one of second"
+        )
+
+    @jax.custom_jvp
     def states(state: Any, values: Tree) -> Any:
         return called(moved.states, _array(shape), state, values)
 
     @states.defjvp
     def _(primals: Any, tangents: Any) -> Any:
-        matrices = jax.tree.map(lambda one: _array((*shape, one.size)), primals)
-        found = called(moved.derivatives, matrices, *primals)
+        found = derivatives(*primals)
         parts = jax.tree.map(lambda matrix, dot: matrix @ jnp.ravel(dot), found, tangents)
         return states(*primals), sum(jax.tree.leaves(parts))
 

@@ -97,6 +97,7 @@ Vector gradient(const Prepared& made, const std::string& text, double time, cons
   const std::vector<std::string> names = made.subject->columns();
   const std::vector<std::size_t> columns_of_state = state_columns(*made.subject);
   io::Expression expression(text, names);
+  if (expression.may_jump()) throw std::invalid_argument("expected an expression that does not jump, got " + text);
   std::vector<double> numbers, slopes(columns_of_state.size() + 1);
   made.subject->append_row(motion_of(made, time, state), {}, numbers);
   std::vector<Dual<double>> given;

@@ -95,6 +95,11 @@ void define_prepared(nb::module_& module) {
       .def_prop_ro("inputs", [](const Prepared& made) { return model_of(made).input_names(); })
       .def_prop_ro(
           "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
+      .def_prop_ro("is_natural",
+                   [](const Prepared& made) {
+                     return std::visit([](const auto& scenario) { return scenario.natural.has_value(); },
+                                       made.scenario);
+                   })
       .def_prop_ro("time", [](const Prepared& made) { return made.start.time; })
       .def_ro("warnings", &Prepared::warnings);
   module.def("prepare", &prepare, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),

@@ -73,12 +73,23 @@ def test_a_model_has_parameters_and_inputs() -> None:
     assert float(found["cart_mass"]) == plain.by_parameters["cart_mass"][0, 0, 0]
 
 
+def test_derivatives_are_of_first_order() -> None:
+    with pytest.raises(NotImplementedError, match="expected derivatives of first order"):
+        jax.hessian(lambda state: moved(state).sum())(STATE)
+    with pytest.raises(pendula.InputError, match="t: expected times that are known"):
+        jax.jit(lambda t: pendula.jax.simulate(CHAIN, t, STATE))(jnp.array(TIMES))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"t": [1.0, 0.5]}, "t: expected a vector of times from 0 on, ascending"),
         ({"state": np.zeros(3)}, r"state: expected shape \(4,\), got \(3,\)"),
         ({"parameters": {"length": 1.0}}, "parameters: expected some of masses, lengths, .*, got length"),
+        ({"t": [np.inf]}, "t: expected a vector of times from 0 on, ascending"),
+        ({"state": 1j * STATE}, "state: expected real numbers, got complex128"),
+        ({"method": "rk4", "step": 0.01}, "expected method = gauss or radau in momentum form"),
+        ({"duration": 1.0}, "simulate: expected options among tolerance, step, .*, got duration"),
         ({"parameters": {"lengths": np.ones(3)}}, "parameters.lengths: expected 2 numbers, got 3"),
     ],
 )

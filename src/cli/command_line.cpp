@@ -214,8 +214,8 @@ void CommandLine::add_linearize() {
   linearize = app.add_subcommand("linearize", "Print the linear system beside a scenario's start");
   add_scenario(linearize, options.scenario);
   linearize->get_option("SCENARIO")->required();
-  takes_words(linearize->add_option("--at", options.at, "Beside the start, or the equilibrium that is nearest to it"),
-              "PLACE", {"start", "equilibrium"});
+  takes_words(linearize->add_option("--at", options.at, "Beside the start, or an equilibrium near it"), "PLACE",
+              {"start", "equilibrium"});
   linearize->add_option("--step", options.step, "The discrete system, over so many seconds, while inputs are held")
       ->type_name("SECONDS")
       ->check(expect("a positive number", [](const std::string& text) {

@@ -119,7 +119,7 @@ struct LinearizeOptions {
   bool json = false;
 };
 
-/// Prints the linear system beside a scenario's start, or the equilibrium near it. Throws io::InputError.
+/// Prints the linear system beside a scenario's start, or an equilibrium near it. Throws io::InputError.
 ExitStatus linearize(const LinearizeOptions& options);
 
 struct EnsembleOptions {

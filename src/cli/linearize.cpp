@@ -71,13 +71,15 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
   const Eigen::Index n = 2 * linear.at.q.size();
   linear.a.resize(n, n);
   linear.b.resize(n, static_cast<Eigen::Index>(linear.inputs.size()));
-  linearize(*subject, linear.at, linear.a.data(), linear.b.data());
+  if (options.step) {
+    make_discrete(*subject, scenario.run, *options.step, guard, linear);
+  } else {
+    linearize(*subject, linear.at, linear.a.data(), linear.b.data());
+  }
   if (!linear.a.allFinite() || !linear.b.allFinite()) {
     throw io::InputError(options.scenario +
-                         ": expected a state where the equations are regular, got one where they are "
-                         "not (in space phi has no meaning where sin(theta) is 0)");
+                         ": expected a state where the equations are regular, got one where they are not");
   }
-  if (options.step) make_discrete(*subject, scenario.run, *options.step, guard, linear);
   return linear;
 }
 

@@ -1,5 +1,8 @@
 #include "io/expression.hpp"
 
+#include <algorithm>
+#include <array>
+
 #include "io/expression_operations.hpp"
 #include "io/expression_reader.hpp"
 
@@ -19,6 +22,15 @@ Number Expression::of(std::span<const Number> numbers, std::vector<Number>& valu
                     : detail::applied(node.operation, values[node.a], values[node.b], values[node.c]);
   }
   return values.back();
+}
+
+bool Expression::may_jump() const {
+  using enum Operation;
+  constexpr std::array jumping = {less, greater, at_most, at_least, equal, unequal,
+                                  both, either,  choose,  sign,     rint,  floor};
+  return std::ranges::any_of(program_.nodes, [&](const ExpressionProgram::Node& node) {
+    return std::ranges::find(jumping, node.operation) != jumping.end();
+  });
 }
 
 double Expression::operator()(std::span<const double> numbers) {

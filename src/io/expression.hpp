@@ -32,6 +32,9 @@ class Expression {
   /// Whether it oscillates about as fast as its columns: it is a linear combination of columns and of their sines.
   bool is_plain() const { return program_.is_plain; }
 
+  /// Whether it may jump where its columns change smoothly: by a comparison, ?:, sign, rint or floor.
+  bool may_jump() const;
+
   /// Its value for the numbers of `columns`; NaN where it has none.
   double operator()(std::span<const double> numbers);
   /// Bounds of its value over a time, from bounds of the numbers.

@@ -25,6 +25,12 @@ inline Dual<double> atan2(const Dual<double>& y, const Dual<double>& x) {
 inline Dual<double> fmod(const Dual<double>& a, const Dual<double>& b) {
   return {std::fmod(a.value, b.value), a.slope - std::trunc(a.value / b.value) * b.slope};
 }
+inline Dual<double> pow(const Dual<double>& x, const Dual<double>& exponent) {
+  const double power = std::pow(x.value, exponent.value);
+  double slope = x.slope == 0 ? 0 : exponent.value * std::pow(x.value, exponent.value - 1) * x.slope;
+  if (exponent.slope != 0) slope += std::log(x.value) * power * exponent.slope;
+  return {power, slope};
+}
 inline Dual<double> log2(const Dual<double>& x) {
   return {std::log2(x.value), x.slope / (x.value * std::numbers::ln2)};
 }

@@ -63,6 +63,20 @@ def test_what_has_none_is_refused(arguments, status, said, pendula, double):
     assert said in run.err
 
 
+def test_where_there_is_no_equilibrium_none_is_told(pendula, tmp_path):
+    pushed = CART + '[[system.drive]]\ninput = "push"\nconstant = 5.0\n'
+    (tmp_path / "pushed.toml").write_text(pushed)
+    run = pendula("linearize", "pushed.toml", "--at", "equilibrium")
+    assert run.status == 2
+    assert "expected a start near an equilibrium" in run.err
+
+
+def test_a_constant_torque_moves_the_equilibrium(pendula, double):
+    run = pendula("linearize", double, "--set", "chain.torque=[0, 2.0]", "--at", "equilibrium", "--json")
+    assert run.status == 0, run.err
+    assert run.json["state"][1] == pytest.approx(math.asin(2 / 9.81), rel=1e-14)  # measured 0
+
+
 def test_a_pole_is_refused(pendula, tmp_path):
     (tmp_path / "pole.toml").write_text(
         '[chain]\nspace = "spatial"\nmasses = [1.0]\nlengths = 1.0\n'

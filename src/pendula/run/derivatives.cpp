@@ -50,6 +50,7 @@ class Differentiated {
   Eigen::Index varied() { return integrator_->parameters(); }
 
   TangentMap map_at(const Motion& motion) {
+    require_regular(task_.subject, motion);
     const Eigen::Index state = 2 * motion.q.size(), varied = this->varied();
     return as_its_kind(task_.subject, [&](const auto& kind) {
       return is_dense() ? TangentMap(LagrangianVariation(system_model_of(kind), motion), state, rows_, varied)
@@ -194,6 +195,16 @@ Backward move_gradients(const MotionTask& task, const Directions<>& gradients) {
   backward.of_start = first.in.transpose() * pulled.col(0);
   backward.of_parameters = of_parameters.col(0) + first.in_by.transpose() * pulled.col(0);
   return backward;
+}
+
+void require_regular(const Subject& subject, const Motion& motion) {
+  if (dynamic_cast<const ChainSubject<Spatial>*>(&subject) == nullptr) return;
+  const Eigen::Index links = motion.q.size() / 2;
+  constexpr double smallest = 1e-9;  // of sin(theta); derivatives have the digits that this leaves
+  if ((motion.q.head(links).array().sin().abs() >= smallest).all()) return;
+  throw std::invalid_argument(
+      "derivatives: expected a state where the equations are regular, got one at a pole (in space phi has no meaning "
+      "where sin(theta) is 0)");
 }
 
 Eigen::VectorXd field_at(const Subject& subject, const Motion& motion) {

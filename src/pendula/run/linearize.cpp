@@ -68,6 +68,7 @@ void find_b(const SystemModel& model, const Motion& motion, double* b) {
 }  // namespace
 
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
+  require_regular(subject, motion);
   const SystemModel model = as_its_kind(subject, [](const auto& kind) { return system_model_of(kind); });
   if (a != nullptr) {
     SystemAt<8> here(model);
@@ -95,6 +96,9 @@ Motion equilibrium(const Subject& subject, const Motion& near) {
     if (size > largest * scale) change *= largest * scale / size;
     at.q += change;
     if (size > smallest * scale) continue;
+    // Where accelerations cannot vanish, a smallest sum of their squares is found.
+    const double swing = a.bottomLeftCorner(n, n).cwiseAbs().maxCoeff();
+    if (acceleration.cwiseAbs().maxCoeff() > 1e-9 * swing * scale) break;
     at.q = (at.q.array().abs() < smallest * scale).select(0, at.q);
     return at;
   }

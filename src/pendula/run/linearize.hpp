@@ -10,9 +10,9 @@ namespace pendula {
 /// std::invalid_argument where the mass matrix is singular.
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b);
 
-/// The motion at rest nearest to where one is, by Newton's method on the accelerations: of coordinates that these do
-/// not depend on, none changes. Throws NoKernel as linearize, std::invalid_argument where a system changes with time,
-/// or where none is found.
+/// A motion at rest that stays where it is, by Newton's method on the accelerations from where one is: of coordinates
+/// that these do not depend on, none changes. Throws NoKernel as linearize, std::invalid_argument where a system
+/// changes with time, or where none is found.
 Motion equilibrium(const Subject& subject, const Motion& near);
 
 }  // namespace pendula
