@@ -177,12 +177,14 @@ void write_draws(const Bytes& bytes, const EnsembleHead& head, const std::vector
     std::vector<std::int64_t> numbers(count);
     std::iota(numbers.begin(), numbers.end(), members.first);
     std::vector<std::vector<double>> values;
+    values.reserve(count);
     for (const std::int64_t member : numbers) values.push_back(head.plan.values(member));
     for (std::size_t j = 0; j < arrays.size(); ++j) {
       const std::uint64_t at = places[j].offset + static_cast<std::uint64_t>(members.first) * sizeof(double);
       if (arrays[j].source == EnsembleArray::Source::number) bytes.write(numbers.data(), count * sizeof(double), at);
       if (arrays[j].source != EnsembleArray::Source::draw) continue;
       std::vector<double> column;
+      column.reserve(count);
       for (const std::vector<double>& each : values) column.push_back(each[arrays[j].index]);
       bytes.write(column.data(), count * sizeof(double), at);
     }

@@ -18,7 +18,7 @@ struct TangentMap {
   Directions<> out, out_by;  ///< (2 coordinates x rows), (2 coordinates x varied)
 
   template <class Variation>
-  TangentMap(Variation variation, Eigen::Index state, Eigen::Index rows, Eigen::Index varied) {
+  TangentMap(Variation&& variation, Eigen::Index state, Eigen::Index rows, Eigen::Index varied) {
     const Directions<> parameters = Directions<>::Identity(varied, varied);
     variation.tangents(Directions<>::Identity(state, state), in);
     variation.tangents(Directions<>::Zero(state, varied), in_by, parameters);
@@ -146,7 +146,7 @@ Forward move_variations(const MotionTask& task, const Directions<>& of_start, co
       forward, [] {}, [&](double) { moved.integrator().push(tangents, of_parameters); },
       [&](const Motion& motion) {
         const TangentMap here = moved.map_at(motion);
-        forward.variations.push_back(here.out * tangents + here.out_by * of_parameters);
+        forward.variations.emplace_back(here.out * tangents + here.out_by * of_parameters);
       });
   return forward;
 }
