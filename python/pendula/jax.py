@@ -26,6 +26,7 @@ from ._systems import System
 
 try:
     import jax
+    import jax.core
     import jax.numpy as jnp
 except ImportError as _error:
     raise ImportError("pendula.jax: expected JAX, got none; pip install 'pendula[jax]'") from _error

@@ -91,9 +91,7 @@ def test_every_order_is_that_of_names():
 
 
 def test_a_pole_has_no_linearization():
-    with pytest.raises(
-        pendula.InputError, match="expected a state where the equations are regular"
-    ):
+    with pytest.raises(pendula.InputError, match="expected a state where the equations are regular"):
         pendula.linearize(pendula.Chain(links=1, space="spatial"))
 
 
