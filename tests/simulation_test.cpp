@@ -403,14 +403,18 @@ TEST(Simulation, WritesTheInputsThatAreHeld) {
   EXPECT_EQ(pushes, (std::vector{0.0, push(0), push(1), push(2)}));  // of the steps that led there
 }
 
-TEST(Model, IsAKernelWithItsNumbers) {
-  using Kernel = kernels::Planar2;
-  Kernel::Parameters<double> parameters;
+/// Two equal links, as their kernel has them.
+Model model_of_kernel() {
+  kernels::Planar2::Parameters<double> parameters;
   parameters.masses.setOnes();
   parameters.lengths.setOnes();
   parameters.damping.setZero();
   parameters.gravity = 9.81;
-  Simulation own(model<Kernel>(parameters), let_go(), {.stages = 4, .step = 0.01});
+  return model<kernels::Planar2>(parameters);
+}
+
+TEST(Model, IsAKernelWithItsNumbers) {
+  Simulation own(model_of_kernel(), let_go(), {.stages = 4, .step = 0.01});
   Simulation built_in(equal_chain<Planar>(2), let_go(), {.stages = 4, .solver = Solver::dense, .step = 0.01});
   own.advance_to(1);
   built_in.advance_to(1);
@@ -420,13 +424,7 @@ TEST(Model, IsAKernelWithItsNumbers) {
 }
 
 TEST(Model, IsDrivenBySinesThatAddUp) {
-  using Kernel = kernels::Planar2;
-  Kernel::Parameters<double> parameters;
-  parameters.masses.setOnes();
-  parameters.lengths.setOnes();
-  parameters.damping.setZero();
-  parameters.gravity = 9.81;
-  const Model plain = model<Kernel>(parameters);
+  const Model plain = model_of_kernel();
   Simulation twice(plain.driven("torque_1", 1.5, 2.0, 0.3).driven("torque_1", -0.5, 2.0, 0.3), let_go());
   ChainParameters<Planar> of_chain{.masses = Eigen::Vector2d(1, 1), .lengths = Eigen::Vector2d(1, 1)};
   of_chain.drives.push_back({0, Eigen::Matrix<double, 1, 1>(1.0), 2.0, 0.3});

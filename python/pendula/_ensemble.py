@@ -10,9 +10,10 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._ensemble_data import dataset_of, open_ensemble, progress_line
+from ._ensemble_data import dataset_of, open_ensemble
 from ._ensemble_text import Design, ensemble_text
 from ._events import event_tables
+from ._progress import progress_line
 from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
 from ._simulation import RUN_OPTIONS, Beginning
 from ._systems import System
@@ -33,7 +34,7 @@ def ensemble(
     random: Mapping[str, object] | None = None,
     members: int | None = None,
     seed: int | None = None,
-    keep: Sequence[str] | None = None,
+    keep: str | Sequence[str] | None = None,
     events: Mapping[str, str | Mapping[str, object]] | None = None,
     tolerance: float | None = None,
     step: float | None = None,
@@ -68,7 +69,7 @@ def ensemble(
         to)``. Not beside axes.
     members, seed : int, optional
         Of what is drawn.
-    keep : sequence of str, optional
+    keep : str or sequence of str, optional
         As in a scenario: "final", "points", "energy", "energy_error", "steps", "lyapunov", "ftle", "megno",
         "event:NAME". Left out: final, energy_error, steps and all events.
     events : mapping, optional
@@ -129,8 +130,9 @@ def ensemble(
     for name in options:
         if name not in RUN_OPTIONS:
             raise InputError(f"ensemble: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
-    keeps_exponents = isinstance(keep, Sequence) and not EXPONENTS.isdisjoint(keep)
-    method = options.pop("method", None if step or options or keeps_exponents else "auto")
+    kept = [keep] if isinstance(keep, str) else keep
+    keeps_exponents = isinstance(kept, Sequence) and not EXPONENTS.isdisjoint(kept)
+    method = options.pop("method", None if step is not None or options or keeps_exponents else "auto")
     at_zero = system.at_zero() if isinstance(system, System) else {}
     made = Beginning.of(system, at_zero, tolerance=None, step=None, options={}).prepare()
     design = Design(system, [made.columns[k] for k in made.state])
@@ -149,7 +151,7 @@ def ensemble(
         **options,
     }
     tables = {**design.tables(), "run": run, "event": event_tables(events)}
-    text = ensemble_text(tables, method=method, members=members, seed=seed, keep=keep)
+    text = ensemble_text(tables, method=method, members=members, seed=seed, keep=kept)
     return move_members(
         text,
         "pendula",

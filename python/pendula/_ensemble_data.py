@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
@@ -154,31 +150,3 @@ def _joined(whole: xarray.Dataset, part: xarray.Dataset) -> xarray.Dataset:
         scales["failed_member"] = ("failed_member", np.array(sorted(told)))
         data["message"] = ("failed_member", np.array([told[one] for one in sorted(told)], dtype=object))
     return _dataset(data, scales, whole.attrs)
-
-
-@contextmanager
-def progress_line(wanted: bool, members: int) -> Iterator[Callable[[int], None] | None]:
-    """Something to tell how many members are done: a bar of tqdm, else a line on standard error."""
-    if not wanted:
-        yield None
-        return
-    try:
-        tqdm = importlib.import_module("tqdm.auto").tqdm
-    except ImportError:
-        began = time.monotonic()
-
-        def show(done: int) -> None:
-            rate = done / max(time.monotonic() - began, 1e-3)
-            print(f"\r{done} of {members} members, {rate:.0f} a second", end="", file=sys.stderr, flush=True)
-
-        try:
-            yield show
-        finally:
-            print(file=sys.stderr)
-        return
-    with tqdm(total=members, unit=" members") as bar:
-
-        def draw(done: int) -> None:
-            bar.update(done - bar.n)
-
-        yield draw

@@ -140,14 +140,13 @@ def ensemble_text(
     tables: Mapping[str, Any], *, method: object, members: object, seed: object, keep: object
 ) -> str:
     """A scenario's text. What is None is left to its defaults."""
-    names = [keep] if isinstance(keep, str) else keep
-    if names is not None and (not isinstance(names, Sequence) or not all(isinstance(x, str) for x in names)):
+    if keep is not None and (not isinstance(keep, Sequence) or not all(isinstance(x, str) for x in keep)):
         raise InputError(f"keep: expected names of what is kept, got {keep!r}")
     ensemble = {
         "count": members,
         "seed": seed,
         "method": "auto" if method == "auto" else None,
-        "keep": None if names is None else list(names),
+        "keep": None if keep is None else list(keep),
     }
     return _toml.document({**tables, "ensemble": ensemble})
 

@@ -7,9 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ._core import InputError
-from ._runs import mapping, number
+from ._runs import Raised, mapping, number
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     Event = str | Callable[..., float] | Mapping[str, object]  # a function is one of (t, y)
 
 
@@ -53,4 +56,11 @@ def _function(name: str, given: Mapping[str, Any]) -> tuple[str, Any, int, bool]
             raise InputError(f"events.{name}.direction: expected up, down or both, got {direction!r}")
         direction = named[direction]
     sign = number(f"events.{name}.direction", direction)
-    return name, function, (sign > 0) - (sign < 0), bool(terminal)
+
+    def asked(t: float, y: NDArray[np.float64]) -> Any:
+        try:
+            return function(t, y)
+        except Exception as error:
+            raise Raised(error) from None
+
+    return name, asked, (sign > 0) - (sign < 0), bool(terminal)

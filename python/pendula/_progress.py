@@ -1,9 +1,10 @@
-"""A bar for runs that take long."""
+"""How far runs and ensembles that take long are."""
 
 from __future__ import annotations
 
 import importlib.util
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -45,3 +46,31 @@ def bar(duration: object, wanted: bool | None) -> Iterator[Callable[[float], Non
 
 _BAR = "{l_bar}{bar}| t = {n:.4g} of {total:.4g} [{elapsed}<{remaining}]"
 _TIME = "t = {n:.4g} [{elapsed}]"
+
+
+@contextmanager
+def progress_line(wanted: bool, members: int) -> Iterator[Callable[[int], None] | None]:
+    """Something to tell how many members are done: a bar of tqdm, else a line on standard error."""
+    if not wanted:
+        yield None
+        return
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        began = time.monotonic()
+
+        def show(done: int) -> None:
+            rate = done / max(time.monotonic() - began, 1e-3)
+            print(f"\r{done} of {members} members, {rate:.0f} a second", end="", file=sys.stderr, flush=True)
+
+        try:
+            yield show
+        finally:
+            print(file=sys.stderr)
+        return
+    with tqdm(total=members, unit=" members") as one:
+
+        def draw(done: int) -> None:
+            one.update(done - one.n)
+
+        yield draw

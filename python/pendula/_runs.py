@@ -36,6 +36,10 @@ class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
         return RunFailed, (str(self), self.partial)
 
 
+class Raised(Exception):  # noqa: N818  (nobody sees it)
+    """What a function of the user has raised, on its way through C++: its first argument."""
+
+
 @contextmanager
 def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
     """Errors about arguments name those, not lines and keys of a text that nobody wrote.
@@ -44,6 +48,8 @@ def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
     """
     try:
         yield
+    except Raised as raised:
+        raise raised.args[0] from None
     except _core.StepFailed as error:
         raise RunFailed(str(error)) from None
     except ValueError as error:

@@ -98,9 +98,9 @@ class System(ABC):
         events : mapping, optional
             Expressions of the columns that change their sign where an event happens, by name:
             ``{"flip": "abs(theta_2) - pi"}``, or mappings with ``when``, ``direction`` ("up", "down", "both") and
-            ``stop``. None is missed by the steps. A function of the time and the state, as SciPy has it (with its
-            attributes ``terminal`` and ``direction``), is asked at a fixed number of places in each step: of two
-            changes of sign that lie between two such places, it misses both.
+            ``stop``. They are located on the motion within each step. A function of the time and the state, as SciPy
+            has it (with its attributes ``terminal`` and ``direction``), is only called at a fixed number of times in
+            each step: if its sign changes twice between two of them, both changes are missed.
         inputs : mapping, optional
             Constant values of a model's inputs, in place of those that it has.
         method, stages, form, solver, iteration, step, tolerance, accuracy, estimate

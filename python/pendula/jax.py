@@ -117,7 +117,7 @@ def simulate(
     """The states of a motion at times, as a function that JAX differentiates and maps.
 
     Derivatives are those of the discrete motion, whose step sizes are held: forward (``jax.jvp``) and backward
-    (``jax.grad``) by the same matrices, of first order. Motions of a mapped call go on all processors.
+    (``jax.grad``) by the same matrices, of first order. Motions of a mapped call run on all processors.
 
     Parameters
     ----------

@@ -116,6 +116,7 @@ class Ensemble {
       return true;
     }
     const std::vector<std::int64_t> missing = output.find_missing();
+    if (output.replaces()) tell_("replacing " + file);
     {
       io::Journal journal(output.folder(), head().kind());
       try {

@@ -2,7 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,3 +31,39 @@ def command_line() -> Callable[..., dict]:
         return json.loads(done.stdout)
 
     return run
+
+
+def interrupted(work: Callable[[], object]) -> float:
+    """Seconds from Ctrl-C, half a second after work began, to KeyboardInterrupt."""
+    pressed = []
+
+    def press() -> None:
+        pressed.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.5, press)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    timer.join()
+    return time.monotonic() - pressed[0]
+
+
+def ticks_during(work: Callable[[], object]) -> int:
+    """How often another thread of Python, which sleeps a millisecond each time, goes on while this one works."""
+    ticks = []
+    stop = threading.Event()
+
+    def tick() -> None:
+        while not stop.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    began = time.monotonic()
+    work()
+    ended = time.monotonic()
+    stop.set()
+    thread.join()
+    return sum(began < at < ended for at in ticks)

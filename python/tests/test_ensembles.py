@@ -4,11 +4,8 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-import time
 import tomllib
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +13,7 @@ import pandas
 import pendula
 import pytest
 import xarray
+from conftest import interrupted, ticks_during
 from pendula import _core
 from pendula._cluster import Work
 from pendula._runs import places, tell
@@ -178,6 +176,13 @@ def test_members_are_simulations():
             DOUBLE, 2.0, {"theta": given, "theta_dot_1": 0.5}, tolerance=1e-11, threads=2
         )
         assert_same(other, data)
+
+
+def test_one_name_is_kept_as_a_list_of_one():
+    start = {"theta": np.ones((3, 2))}
+    one, several = (pendula.ensemble(DOUBLE, 2.0, start, keep=keep) for keep in ("lyapunov", ["lyapunov"]))
+    assert one.attrs["scenario"] == several.attrs["scenario"] and "auto" not in one.attrs["scenario"]
+    assert one["lyapunov"].identical(several["lyapunov"])
 
 
 def test_members_of_space_and_of_models():
@@ -363,20 +368,10 @@ def test_files_that_are_none_are_named(tmp_path):
         pendula.merge([])
 
 
-def interrupted(work: Callable[[], object]) -> float:
-    """Seconds from Ctrl-C to KeyboardInterrupt."""
-    pressed = []
-
-    def press() -> None:
-        pressed.append(time.monotonic())
-        os.kill(os.getpid(), signal.SIGINT)
-
-    timer = threading.Timer(0.5, press)
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    timer.join()
-    return time.monotonic() - pressed[0]
+def test_a_file_that_is_replaced_is_told(tmp_path, capsys):
+    for told in ("", f"pendula: replacing {tmp_path / 'x.h5'}\n"):
+        pendula.ensemble(DOUBLE, 1.0, {"theta": np.ones((4, 2))}, file=tmp_path / "x.h5")
+        assert capsys.readouterr().err == told
 
 
 def test_an_interrupt_ends_it():
@@ -411,23 +406,10 @@ def test_an_interrupt_loses_nothing(tmp_path):
 
 
 def test_other_threads_go_on_meanwhile():
-    ticks = []
-    stop = threading.Event()
+    def work():
+        pendula.ensemble(DOUBLE, 20.0, {"theta": np.full((4000, 2), 0.5)}, estimate=False)
 
-    def tick() -> None:
-        while not stop.is_set():
-            ticks.append(time.monotonic())
-            time.sleep(0.001)
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    began = time.monotonic()
-    pendula.ensemble(DOUBLE, 20.0, {"theta": np.full((4000, 2), 0.5)}, estimate=False)
-    ended = time.monotonic()
-    stop.set()
-    thread.join()
-    found = sum(began < at < ended for at in ticks)
-    assert found > 5  # measured 300 and more
+    assert ticks_during(work) > 5  # measured 300 and more
 
 
 def test_progress_is_shown(capsys, monkeypatch):

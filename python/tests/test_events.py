@@ -47,6 +47,14 @@ def test_an_exception_comes_out_as_itself():
     for more in ({"step": 0.01}, {"accuracy": 1e-9}):
         with pytest.raises(MineError, match="at last"):
             DOUBLE.simulate(5.0, theta=1.0, events={"fail": fail}, **more)
+    for error in (ValueError("of the user"), pendula.InputError("of the user"), KeyError("y")):
+
+        def wrong(t, y, error=error):
+            raise error
+
+        with pytest.raises(type(error)) as raised:
+            DOUBLE.simulate(1.0, theta=1.0, events={"wrong": wrong})
+        assert raised.value is error
     with pytest.raises(TypeError):
         DOUBLE.simulate(5.0, theta=1.0, events={"text": lambda t, y: "no number"})
     assert DOUBLE.simulate(0.5, theta=1.0, events={"fail": fail}).success

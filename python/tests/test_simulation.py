@@ -3,15 +3,14 @@
 import copy
 import pickle
 import resource
-import signal
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pendula
 import pytest
+from conftest import interrupted, ticks_during
 
 DOUBLE = pendula.Chain(masses=[1, 1])
 
@@ -180,37 +179,14 @@ def test_inputs_are_held_all_or_none():
     ids=["simulate", "simulation", "lyapunov"],
 )
 def test_an_interrupt_ends_work(work):
-    pressed = []
-
-    def press() -> None:
-        pressed.append(time.monotonic())
-        signal.raise_signal(signal.SIGINT)
-
-    timer = threading.Timer(0.3, press)
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert time.monotonic() - pressed[0] < 1.0
-    timer.join()
+    assert interrupted(work) < 1.0
 
 
 def test_other_threads_go_on_meanwhile():
-    ticks = []
-    stop = threading.Event()
+    def work():
+        DOUBLE.simulate(500.0, theta=1.5, step=1e-3, every=10**9, estimate=False)
 
-    def tick() -> None:
-        while not stop.is_set():
-            ticks.append(time.monotonic())
-            time.sleep(0.001)
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    began = time.monotonic()
-    DOUBLE.simulate(500.0, theta=1.5, step=1e-3, every=10**9, estimate=False)
-    ended = time.monotonic()
-    stop.set()
-    thread.join()
-    assert sum(began < at < ended for at in ticks) > 5  # seen 257
+    assert ticks_during(work) > 5  # seen 257
 
 
 def test_a_driven_model_goes_as_its_run_and_has_exponents():
