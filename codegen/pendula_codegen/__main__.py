@@ -11,9 +11,10 @@ from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
+from pendula_codegen.feedback import close_loops
 from pendula_codegen.kernel_program import render_bytecode, render_c
 from pendula_codegen.links import LINKS
-from pendula_codegen.model import read_model
+from pendula_codegen.model import Model, read_model
 from pendula_codegen.models import find_model
 from pendula_codegen.render import (
     Header,
@@ -71,6 +72,7 @@ def _parser() -> argparse.ArgumentParser:
     program = commands.add_parser("program", help="the kernel of a model as the program loads it")
     program.add_argument("--model", required=True, help="as of the command model")
     program.add_argument("--links", type=int, help="as of the command model")
+    _add_feedback(program)
     program.add_argument(
         "--as", dest="language", choices=("c", "bytecode"), default="c", help="bytecode is interpreted"
     )
@@ -88,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
         ("v", "rates of the start"),
     ):
         written.add_argument(f"--{name}", required=True, type=_numbers, help=f"{words}, with commas")
+    _add_feedback(written)
     written.add_argument("--time", required=True, type=float, help="of the start")
     written.add_argument("--seed", required=True, type=int, help="of the points")
     written.set_defaults(run=_run_written)
@@ -119,6 +122,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_feedback(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--feedback",
+        action="append",
+        default=[],
+        help="INPUT=WORDS, what is added to an input: see feedback.py",
+    )
+
+
 def _write(output: Path, name: str, header: Header) -> None:
     write_atomically(output if output.suffix == ".hpp" else output / name, header.text)
 
@@ -138,7 +150,7 @@ def _run_model(options: argparse.Namespace) -> None:
 
 
 def _run_program(options: argparse.Namespace) -> None:
-    model = read_model(find_model(options.model), options.links)
+    model = _fed_model(options)
     if options.language == "bytecode":
         text = render_bytecode(model)
     else:
@@ -146,8 +158,16 @@ def _run_program(options: argparse.Namespace) -> None:
     write_atomically(options.output, text)
 
 
-def _run_written(options: argparse.Namespace) -> None:
+def _fed_model(options: argparse.Namespace) -> Model:
     model = read_model(find_model(options.model), options.links)
+    if options.feedback:
+        close_loops(model, options.feedback)
+        model.system  # noqa: B018  the checks of the whole
+    return model
+
+
+def _run_written(options: argparse.Namespace) -> None:
+    model = _fed_model(options)
     start = Start(options.parameters, options.time, options.q, options.v)
     print(comparison(model, start, options.seed))
 

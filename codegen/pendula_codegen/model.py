@@ -212,6 +212,14 @@ class Model:
 
     # --- what the generator asks
 
+    def feed(self, to: Symbol, value: Expr) -> None:
+        """Adds a value to an input wherever forces hold it."""
+        fed = to + self._expression(value, "feedback")
+        self._forces[:] = [
+            (along, _Said(said.value.xreplace({to: fed}), said.where)) for along, said in self._forces
+        ]
+        vars(self).pop("system", None)  # it was derived without
+
     @property
     def ordered_parameters(self) -> list[Parameter]:
         """Parameters in the order of the kernel: those of links first."""

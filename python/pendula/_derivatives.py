@@ -263,15 +263,20 @@ def _at_event(
     return of_time
 
 
-def gradient(made: _core.Prepared, times: NDArray[np.float64], by_states: NDArray[np.float64]) -> Gradient:
+def gradient(
+    made: _core.Prepared,
+    start: NDArray[np.float64],
+    times: NDArray[np.float64],
+    by_states: NDArray[np.float64],
+) -> Gradient:
     """Backward: from a number's gradient by the states at the times, (coordinates + rates, times)."""
     varied = Varied(made)
     with plainly():
-        _, start, all_varied = _core.backward(
-            made, made.time, made.start, np.ascontiguousarray(times), np.ascontiguousarray(by_states)
+        _, by_start, all_varied = _core.backward(
+            made, made.time, start, np.ascontiguousarray(times), np.ascontiguousarray(by_states)
         )
     return Gradient(
-        start,
+        by_start,
         {name: all_varied[place] for name, place in varied.parameters.items()},
         {name: all_varied[place] for name, place in varied.inputs.items()},
     )

@@ -242,10 +242,11 @@ class ModelFunction:
         *,
         inputs: Mapping[str, float] | None = None,
         drives: Sequence[Mapping[str, object]] = (),
+        feedback: Sequence[Mapping[str, object]] = (),
         **parameters: object,
     ) -> Model:
         how_many = self._links if links is None else links
-        return Model(self.file, how_many, inputs=inputs, drives=drives, **parameters)
+        return Model(self.file, how_many, inputs=inputs, drives=drives, feedback=feedback, **parameters)
 
     def __repr__(self) -> str:
         return f"<model {self.__name__}: {self.file}>"  # type: ignore[attr-defined]

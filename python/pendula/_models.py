@@ -14,7 +14,7 @@ import numpy as np
 from . import _core
 from ._core import InputError
 from ._runs import mapping, number, places, plainly, tell
-from ._systems import System, Tables, drives_of
+from ._systems import System, Tables, tables_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,6 +60,9 @@ class Model(System):
         Constant values of inputs, by name.
     drives : sequence of mappings, optional
         Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``.
+    feedback : sequence of mappings, optional
+        What is added to inputs as a function of the motion: ``input``, ``value`` (an expression of the columns:
+        ``"-12*x - 9*x_dot"``), and for a controller that samples ``sample`` (s) and ``limit``.
     parameters
         By name; the model has defaults.
 
@@ -80,17 +83,25 @@ class Model(System):
         *,
         inputs: Mapping[str, float] | None = None,
         drives: Sequence[Mapping[str, object]] = (),
+        feedback: Sequence[Mapping[str, object]] = (),
         **parameters: object,
     ) -> None:
         name = str(model)
         self._name = str(Path(name).resolve()) if name.endswith(".py") else name
         self._links = links
         self._parameters = copy.deepcopy(parameters)
-        self._drives = drives_of(drives)
+        self._drives = tables_of("drives", drives)
+        self._feedback = tables_of("feedback", feedback)
         self._inputs = _inputs(mapping("inputs", inputs))
 
     def __repr__(self) -> str:
-        given = {"links": self._links, **self._parameters, "inputs": self._inputs, "drives": self._drives}
+        given = {
+            "links": self._links,
+            **self._parameters,
+            "inputs": self._inputs,
+            "drives": self._drives,
+            "feedback": self._feedback,
+        }
         told = "".join(f", {key}={one!r}" for key, one in given.items() if one not in (None, {}, []))
         return f"Model({self._name!r}{told})"
 
@@ -171,7 +182,11 @@ class Model(System):
             "parameters": self._parameters or None,
         }
         constants = [{"input": key, "constant": one} for key, one in self._inputs.items()]
-        return {"system": system, "system.drive": [*self._drives, *constants]}
+        return {
+            "system": system,
+            "system.drive": [*self._drives, *constants],
+            "system.feedback": list(self._feedback),
+        }
 
     def held(self, inputs: Mapping[str, object]) -> Model:
         return self.replaced({}, {name: np.array([one]) for name, one in _inputs(inputs).items()})

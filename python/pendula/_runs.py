@@ -62,10 +62,11 @@ def in_arguments(sentence: str, names: Mapping[str, str] | None = None) -> str:
     """A sentence about a scenario that was made of arguments."""
 
     def numbered(table: re.Match[str]) -> str:
-        return (names or {}).get(table[1], f"{table[2]}s[{int(table[3]) - 1}]")
+        plural = {"feedback": "feedback"}.get(table[2], f"{table[2]}s")
+        return (names or {}).get(table[1], f"{plural}[{int(table[3]) - 1}]")
 
     sentence = re.sub(r"^pendula(:\d+)?: ", "", sentence)
-    sentence = re.sub(r"\b(?:chain\.|system\.)?((drive|event)\[(\d+)\])", numbered, sentence)
+    sentence = re.sub(r"\b(?:chain\.|system\.)?((drive|event|feedback)\[(\d+)\])", numbered, sentence)
     sentence = re.sub(r"\boutput\.times\b", "t", sentence)
     return re.sub(r"\b(?:run|output|chain|system)\.(?=[a-z])(?:parameters\.)?", "", sentence)
 

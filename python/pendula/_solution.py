@@ -252,7 +252,7 @@ class Solution:
         with plainly():
             made = _core.prepare_again(self._result, *places(), tell)
         last = given.ndim == 1
-        return gradient(made, self.t[-1:] if last else self.t, given[:, None] if last else given)
+        return gradient(made, made.start, self.t[-1:] if last else self.t, given[:, None] if last else given)
 
     @property
     def nfev(self) -> int:

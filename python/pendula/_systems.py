@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 Tables = dict[str, "dict[str, object] | list[dict[str, object]]"]
 
 
-def drives_of(given: object) -> list[dict[str, object]]:
+def tables_of(name: str, given: object) -> list[dict[str, object]]:
+    """A sequence of mappings, as ``drives`` and ``feedback`` are."""
     if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
-        raise InputError(f"drives: expected a sequence of mappings, got {type(given).__name__}")
-    drives = [mapping(f"drives[{k}]", drive) for k, drive in enumerate(given)]
-    return copy.deepcopy(drives)
+        raise InputError(f"{name}: expected a sequence of mappings, got {type(given).__name__}")
+    return copy.deepcopy([mapping(f"{name}[{k}]", one) for k, one in enumerate(given)])
 
 
 class System(ABC):
@@ -181,6 +181,9 @@ class Chain(System):
         Of each link, in N m s and N m.
     drives : sequence of mappings, optional
         Torques that depend on time: ``link``, ``amplitude``, ``frequency``, ``phase``.
+    feedback : sequence of mappings, optional
+        Torques that follow from the motion: ``input`` ("torque_1"), ``value`` (an expression of the columns),
+        ``sample`` (s), ``limit``. They are held from sample to sample.
     units : {"SI", "natural"}
     """
 
@@ -195,6 +198,7 @@ class Chain(System):
         damping: ArrayLike | None = None,
         torque: ArrayLike | None = None,
         drives: Sequence[Mapping[str, object]] = (),
+        feedback: Sequence[Mapping[str, object]] = (),
         units: str | None = None,
     ) -> None:
         self._numbers: dict[str, object] = copy.deepcopy(
@@ -209,14 +213,19 @@ class Chain(System):
                 "units": units,
             }
         )
-        self._drives = drives_of(drives)
+        self._drives = tables_of("drives", drives)
+        self._feedback = tables_of("feedback", feedback)
 
     def __repr__(self) -> str:
         given = ", ".join(f"{key}={one!r}" for key, one in self._numbers.items() if one is not None)
         return f"Chain({given})"
 
     def tables(self) -> Tables:
-        return {"chain": dict(self._numbers), "chain.drive": list(self._drives)}
+        return {
+            "chain": dict(self._numbers),
+            "chain.drive": list(self._drives),
+            "chain.feedback": list(self._feedback),
+        }
 
     def replaced(
         self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]

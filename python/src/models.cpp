@@ -53,7 +53,7 @@ ModelInfo describe_model(const std::string& model, std::optional<int> links, con
                          const std::string& python, const Tell& tell) {
   const nb::gil_scoped_release others_may_go_on;
   const io::ModelKernel kernel =
-      io::find_kernel(model, links, "", toolchain_of(program, python), [&](const std::string& what) {
+      io::find_kernel({model, links}, toolchain_of(program, python), [&](const std::string& what) {
         const nb::gil_scoped_acquire lock;
         tell(what);
       });

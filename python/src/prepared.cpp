@@ -4,7 +4,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <filesystem>
 #include <pendula/run/state_columns.hpp>
 #include <stdexcept>
 #include <utility>
@@ -44,12 +43,22 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& na
   return prepared(io::parse_scenario(text, name, overrides, models.finder()), remembers);
 }
 
+void require_continuous(const io::RunPlan& plan) {
+  for (const io::FeedbackPlan& feedback : plan.feedback) {
+    if (feedback.sample == 0) continue;
+    throw io::InputError(
+        "feedback: expected a continuous one, got one with sample, which simulate and ensemble alone have: here a "
+        "program holds inputs itself, from step to step");
+  }
+}
+
 }  // namespace
 
 std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers) {
   return std::visit(
       [&](const auto& scenario) {
         const RunOptions& run = scenario.run;
+        require_continuous(scenario);
         const SimulationOptions options{.method = run.method,
                                         .stages = scenario.places.contains("stages") ? run.stages : 0,
                                         .form = run.form,
@@ -74,8 +83,8 @@ Models::Models(const std::string& program, std::string python, const Tell& tell)
 }
 
 io::FindSystem Models::finder() {
-  return [this](const std::string& model, std::optional<int> links, const std::filesystem::path& folder) {
-    const io::ModelKernel kernel = io::find_kernel(model, links, folder, toolchain_, [&](const std::string& what) {
+  return [this](const io::ModelName& name) {
+    const io::ModelKernel kernel = io::find_kernel(name, toolchain_, [&](const std::string& what) {
       const nb::gil_scoped_acquire lock;
       tell_(what);
     });

@@ -272,13 +272,15 @@ RunModel::RunModel(const std::string& program, const std::string& python, const 
 }
 
 io::FindSystem RunModel::finder() {
-  return [this, find = models_.finder()](const std::string& model, std::optional<int> links, const fs::path& folder) {
+  return [this, find = models_.finder()](io::ModelName name) {
     if (text_.empty()) {
-      text_ = io::model_source(model, links, folder, toolchain_);
-      return find(model, links, folder);
+      text_ = io::model_source(name, toolchain_);
+      return find(name);
     }
-    const ModelFile file(model, text_);
-    return find(file.name(), links, "");
+    const ModelFile file(name.model, text_);
+    name.model = file.name();
+    name.folder.clear();
+    return find(name);
   };
 }
 

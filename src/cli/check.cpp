@@ -127,9 +127,7 @@ void check_space(const CheckOptions& options, Tally& tally) {
 
 /// A model, its system, and a start.
 struct ModelToCheck {
-  std::string model;  ///< as find_kernel takes it
-  std::optional<int> links;
-  std::filesystem::path folder;
+  io::ModelName name;
   std::shared_ptr<const SystemSubject> system;
   Motion start;
 };
@@ -137,8 +135,8 @@ struct ModelToCheck {
 /// Compares the kernel with its model; moves it only if they agree.
 void check_system(const ModelToCheck& checked, const io::Toolchain& toolchain, Tally& tally) {
   const SystemInfo& info = checked.system->info();
-  const std::vector<double> said = io::written_values(checked.model, checked.links, checked.folder, toolchain,
-                                                      checked.system->numbers().parameters, checked.start, seed);
+  const std::vector<double> said =
+      io::written_values(checked.name, toolchain, checked.system->numbers().parameters, checked.start, seed);
   const KernelComparison comparison(checked.system->table(), said);
   add(comparison.check(), info.name, tally);
   if (tally.failures > 0) return;
@@ -172,15 +170,12 @@ Motion usual_start(const SystemSubject& system) {
 void check_model(const CheckOptions& options, Tally& tally) {
   const auto tell = [](const std::string& what) { std::cerr << "pendula: " << what << '\n'; };
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
-  ModelToCheck checked{*options.model, options.links, {}, {}, {}};
+  ModelToCheck checked{{*options.model, options.links}, {}, {}};
   try {
     if (options.model->ends_with(".toml")) {
-      const io::FindSystem find = [&](const std::string& model, std::optional<int> links,
-                                      const std::filesystem::path& folder) {
-        checked.model = model;
-        checked.links = links;
-        checked.folder = folder;
-        return io::find_kernel(model, links, folder, toolchain, tell).table;
+      const io::FindSystem find = [&](const io::ModelName& name) {
+        checked.name = name;
+        return io::find_kernel(name, toolchain, tell).table;
       };
       const io::AnyScenario any = io::read_scenario(*options.model, {}, find);
       const auto* scenario = std::get_if<io::SystemScenario>(&any);
@@ -188,7 +183,7 @@ void check_model(const CheckOptions& options, Tally& tally) {
       checked.system = scenario->system;
       checked.start = scenario->start;
     } else {
-      const auto kernel = io::find_kernel(*options.model, options.links, "", toolchain, tell).table;
+      const auto kernel = io::find_kernel(checked.name, toolchain, tell).table;
       checked.system = std::make_shared<const SystemSubject>(kernel, usual_numbers(kernel->info));
       checked.start = usual_start(*checked.system);
     }

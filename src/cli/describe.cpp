@@ -99,8 +99,9 @@ void print_model(const Json& model) {
 }  // namespace
 
 ExitStatus describe(const DescribeOptions& options) {
-  const Json model = answer(
-      "describe", [&] { return io::describe_model(options.model, options.links, io::Toolchain::of_this_program()); });
+  const Json model = answer("describe", [&] {
+    return io::describe_model({options.model, options.links}, io::Toolchain::of_this_program());
+  });
   if (options.json) {
     std::cout << model.dump() << '\n';
   } else {

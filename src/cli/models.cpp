@@ -72,7 +72,7 @@ bool is_name(const std::string& name) {
 ExitStatus build(const BuildOptions& options) {
   try {
     const io::ModelKernel kernel =
-        io::find_kernel(options.model, options.links, "", io::Toolchain::of_this_program(),
+        io::find_kernel({options.model, options.links}, io::Toolchain::of_this_program(),
                         [](const std::string& what) { std::cerr << "pendula: " << what << '\n'; });
     const SystemInfo& info = kernel.table->info;
     std::cout << info.name << ": coordinates";

@@ -1,20 +1,17 @@
 #include "cli/read_scenario.hpp"
 
-#include <filesystem>
 #include <iostream>
-#include <optional>
 
 #include "io/kernel_cache.hpp"
 
 namespace pendula::cli {
 
 io::AnyScenario read_scenario(const std::string& file, const std::vector<std::string>& overrides, bool quiet) {
-  const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
-                                  const std::filesystem::path& folder) {
+  const io::FindSystem find = [&](const io::ModelName& name) {
     const auto tell = [&](const std::string& what) {
       if (!quiet) std::cerr << "pendula: " << what << '\n';
     };
-    return io::find_kernel(name, links, folder, io::Toolchain::of_this_program(), tell).table;
+    return io::find_kernel(name, io::Toolchain::of_this_program(), tell).table;
   };
   const io::ScenarioText text = io::read_scenario_text(file);
   return io::parse_scenario(text.text, text.name, overrides, find);

@@ -227,13 +227,12 @@ ExitStatus simulate(const SimulateOptions& options) {
     if (check_film(*options.video) != done) return wrong_input;
   }
   std::string model, kernel_by = "build";
-  const io::FindSystem find = [&](const std::string& name, std::optional<int> links,
-                                  const std::filesystem::path& beside) {
+  const io::FindSystem find = [&](io::ModelName name) {
     const io::Toolchain toolchain = io::Toolchain::of_this_program();
-    const std::filesystem::path folder = options.resume ? io::model_folder(*options.resume, name, beside) : beside;
-    model = io::model_source(name, links, folder, toolchain);
+    if (options.resume) name.folder = io::model_folder(*options.resume, name.model, name.folder);
+    model = io::model_source(name, toolchain);
     io::require_same_model(source, model);
-    const io::ModelKernel kernel = io::find_kernel(name, links, folder, toolchain, [&](const std::string& what) {
+    const io::ModelKernel kernel = io::find_kernel(name, toolchain, [&](const std::string& what) {
       if (!options.quiet) std::cerr << "pendula: " << what << '\n';
     });
     kernel_by = kernel.by();

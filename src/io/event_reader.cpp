@@ -8,6 +8,7 @@
 
 #include "io/expression.hpp"
 #include "io/input_error.hpp"
+#include "io/row_function.hpp"
 
 namespace pendula::io {
 namespace {
@@ -32,67 +33,13 @@ EventPlan read_event(const Section& table) {
   return plan;
 }
 
-/// A function of the motion: an expression in the columns of its row.
-class RowFunction : public Formula {
- public:
-  RowFunction(std::shared_ptr<const Subject> subject, std::shared_ptr<Expression> expression, const Motion& start)
-      : subject_(std::move(subject)), expression_(std::move(expression)), numbers_(columns().size()) {
-    subject_->append_row(start, {}, row_);
-    const std::size_t of_motion = row_.size() - 1;  // columns other than points and energy
-    const auto is_observed = [&](std::size_t column) { return column >= of_motion; };
-    observes_ = std::ranges::any_of(columns(), is_observed);
-    has_time_ = std::ranges::find(columns(), time_column) != columns().end();
-    reaches_.resize(columns().size());
+/// Inputs with feedback may change faster than the motion, and jump: no event is found on them.
+void require_unfed(const Expression& expression, const Subject& subject, const std::vector<std::string>& names) {
+  for (const std::size_t column : subject.fed_columns()) {
+    if (std::ranges::find(expression.columns(), column) == expression.columns().end()) continue;
+    throw ExpressionError("an expression without inputs that have feedback (write what is fed back)", names[column]);
   }
-
-  double operator()(const Motion& motion) {
-    take_row(motion);
-    for (std::size_t k = 0; k < numbers_.size(); ++k) numbers_[k] = row_[columns()[k]];
-    return (*expression_)(numbers_);
-  }
-
-  std::size_t size() const override { return columns().size() - (has_time_ ? 1 : 0); }
-
-  void read(const Motion& motion, std::span<double> numbers) override {
-    take_row(motion);
-    auto number = numbers.begin();
-    for (const std::size_t column : columns()) {
-      if (column != time_column) *number++ = row_[column];
-    }
-  }
-
-  double value(double time, std::span<const double> numbers) override {
-    return (*expression_)(with_time(time, numbers, numbers_));
-  }
-  Reach reach(const Reach& time, std::span<const Reach> numbers) override {
-    return (*expression_)(with_time(time, numbers, reaches_));
-  }
-
- private:
-  static constexpr std::size_t time_column = 0;
-
-  const std::vector<std::size_t>& columns() const { return expression_->columns(); }
-
-  void take_row(const Motion& motion) {
-    row_.clear();
-    subject_->append_row(motion, observes_ ? subject_->observe(motion) : Observation(), row_);
-  }
-
-  /// In the order of columns.
-  template <class Number>
-  std::span<const Number> with_time(const Number& time, std::span<const Number> others, std::vector<Number>& all) {
-    auto other = others.begin();
-    for (std::size_t k = 0; k < all.size(); ++k) all[k] = columns()[k] == time_column ? time : *other++;
-    return all;
-  }
-
-  std::shared_ptr<const Subject> subject_;
-  std::shared_ptr<Expression> expression_;
-  std::vector<double> row_, numbers_;  // all columns of a row; the columns of the expression
-  std::vector<Reach> reaches_;
-  bool observes_ = false;  // whether the expression needs energy or points, which cost more
-  bool has_time_ = false;
-};
+}
 
 }  // namespace
 
@@ -122,6 +69,7 @@ std::vector<Event> events_of(const std::vector<EventPlan>& plans, const std::sha
     try {
       std::shared_ptr<Expression>& expression = shared[{plan.when, names}];
       if (!expression) expression = std::make_shared<Expression>(plan.when, names);
+      require_unfed(*expression, *subject, names);
       const auto function = std::make_shared<RowFunction>(subject, expression, start);
       const double value = (*function)(start);
       if (!std::isfinite(value)) {

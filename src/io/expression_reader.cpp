@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <initializer_list>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <pendula/run/quantity.hpp>
@@ -62,8 +63,10 @@ std::string quoted(const std::string& text) {
   return '"' + shown + '"';
 }
 
-/// The names for a message; a long list is cut in the middle.
-std::string listed(std::span<const std::string> names) {
+/// The names for a message; a long list is cut in the middle. Columns that must not be used have none.
+std::string listed(std::span<const std::string> all) {
+  std::vector<std::string> names;
+  std::ranges::copy_if(all, std::back_inserter(names), [](const std::string& name) { return !name.empty(); });
   std::string text;
   for (std::size_t k = 0; k < names.size(); ++k) {
     if (names.size() > most_listed && k == most_listed / 2) {

@@ -46,12 +46,13 @@ std::string read_model(const fs::path& file) {
   throw ModelError("expected a model file that can be read, got " + file.string() + ": " + read.problem);
 }
 
-fs::path find_model(const std::string& model, const fs::path& folder, const Toolchain& toolchain) {
-  if (model.ends_with(".py")) return fs::path(model).is_absolute() ? fs::path(model) : folder / model;
+fs::path find_model(const ModelName& name, const Toolchain& toolchain) {
+  const std::string& model = name.model;
+  if (model.ends_with(".py")) return fs::path(model).is_absolute() ? fs::path(model) : name.folder / model;
   const std::vector<std::string> names = built_in_models(toolchain);
   if (std::ranges::find(names, model) != names.end()) return models_folder(toolchain) / (model + ".py");
   std::string text;
-  for (const std::string& name : names) text += ", " + name;
+  for (const std::string& known : names) text += ", " + known;
   throw ModelError("expected a model file ending in .py, or a built-in model" +
                    (names.empty() ? " (none are installed)" : ": " + text.substr(2)) + "; got " + model +
                    did_you_mean(nearest_name(model, std::vector<std::string_view>(names.begin(), names.end()))));
@@ -76,9 +77,10 @@ std::string run_generator(const std::vector<std::string>& arguments, const Toolc
                    " (PENDULA_PYTHON names another one)");
 }
 
-std::vector<std::string> about(const char* command, const fs::path& model, std::optional<int> links) {
-  std::vector<std::string> arguments{command, "--model", model.string()};
-  if (links) arguments.insert(arguments.end(), {"--links", std::to_string(*links)});
+std::vector<std::string> about(const char* command, const ModelName& name, const Toolchain& toolchain) {
+  std::vector<std::string> arguments{command, "--model", find_model(name, toolchain).string()};
+  if (name.links) arguments.insert(arguments.end(), {"--links", std::to_string(*name.links)});
+  for (const InputLaw& law : name.laws) arguments.push_back("--feedback=" + law.input + "=" + law.value);
   return arguments;
 }
 
@@ -92,21 +94,19 @@ std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   return names;
 }
 
-std::string describe_model(const std::string& model, std::optional<int> links, const Toolchain& toolchain) {
-  const fs::path file = find_model(model, "", toolchain);
-  read_model(file);
-  return last_line(run_generator(about("describe", file, links), toolchain));
+std::string describe_model(const ModelName& name, const Toolchain& toolchain) {
+  read_model(find_model(name, toolchain));
+  return last_line(run_generator(about("describe", name, toolchain), toolchain));
 }
 
 std::string describe_models(const Toolchain& toolchain) {
   return last_line(run_generator({"models"}, toolchain));
 }
 
-std::vector<double> written_values(const std::string& model, std::optional<int> links, const fs::path& folder,
-                                   const Toolchain& toolchain, std::span<const double> parameters, const Motion& start,
-                                   unsigned seed) {
-  std::vector<std::string> arguments = about("written", find_model(model, folder, toolchain), links);
-  const auto add = [&](const char* name, const std::string& value) { arguments.push_back(name + ('=' + value)); };
+std::vector<double> written_values(const ModelName& name, const Toolchain& toolchain,
+                                   std::span<const double> parameters, const Motion& start, unsigned seed) {
+  std::vector<std::string> arguments = about("written", name, toolchain);
+  const auto add = [&](const char* key, const std::string& value) { arguments.push_back(key + ('=' + value)); };
   add("--parameters", numbers_text(parameters));
   add("--time", shortest(start.time));
   add("--q", numbers_text(start.q));

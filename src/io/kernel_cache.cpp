@@ -79,25 +79,19 @@ class Workshop {
   fs::path folder_;
 };
 
-std::string kernel_name(const std::string& model, std::optional<int> links) {
-  const std::string stem = fs::path(model).stem().string();
-  return links ? stem + "_" + std::to_string(*links) : stem;
-}
-
 /// The kernel of a built-in model, if this build has it; else null.
-const SystemTable* built_in_table(const std::string& model, std::optional<int> links) {
-  if (model.ends_with(".py")) return nullptr;
+const SystemTable* built_in_table(const ModelName& name) {
+  if (name.model.ends_with(".py")) return nullptr;
   for (const SystemTable* table : library().systems) {
-    if (table->info.name == kernel_name(model, links)) return table;
+    if (table->info.name == kernel_name(name)) return table;
   }
   return nullptr;
 }
 
 }  // namespace
 
-std::string model_source(const std::string& model, std::optional<int> links, const fs::path& folder,
-                         const Toolchain& toolchain) {
-  return built_in_table(model, links) ? "" : read_model(find_model(model, folder, toolchain));
+std::string model_source(const ModelName& name, const Toolchain& toolchain) {
+  return built_in_table(name) ? "" : read_model(find_model(name, toolchain));
 }
 
 std::string_view ModelKernel::by() const {
@@ -105,13 +99,15 @@ std::string_view ModelKernel::by() const {
   return file.extension() == compiled_kernel ? "compiler" : "interpreter";
 }
 
-ModelKernel find_kernel(const std::string& model, std::optional<int> links, const fs::path& folder,
-                        const Toolchain& toolchain, const std::function<void(const std::string&)>& tell) {
-  if (const SystemTable* table = built_in_table(model, links)) return {{}, {table, [](const SystemTable*) {}}};
-  const std::string name = kernel_name(model, links);
-  const fs::path file = find_model(model, folder, toolchain);
+ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
+                        const std::function<void(const std::string&)>& tell) {
+  const SystemTable* const own = model.laws.empty() ? built_in_table(model) : nullptr;
+  if (own != nullptr) return {{}, {own, [](const SystemTable*) {}}};
+  const std::string name = kernel_name(model);
+  const std::vector<std::string> arguments = about("program", model, toolchain);
   Key key;
-  key.add(read_model(file)).add(name).add(version).add(library().instruction_set);
+  key.add(read_model(find_model(model, toolchain))).add(name).add(version).add(library().instruction_set);
+  for (const InputLaw& law : model.laws) key.add(law.input).add(law.value);
   key.add(toolchain.python).add(toolchain.compiler).add_file(this_program());
   for (const std::string& flag : toolchain.flags) key.add(flag);
   std::error_code none;
@@ -127,8 +123,9 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
     fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // marks it as used
   } else {
     const Workshop workshop(cache);
-    tell("deriving the kernel of " + name + ", once; " + how_made(kind, toolchain));
-    const fs::path made = make_kernel(kind, name, about("program", file, links), workshop.folder(), toolchain);
+    tell("deriving the kernel of " + name + (model.laws.empty() ? "" : " with feedback") + ", once; " +
+         how_made(kind, toolchain));
+    const fs::path made = make_kernel(kind, name, arguments, workshop.folder(), toolchain);
     seal_kernel(made);
     fs::rename(made, kept);
     table = load_kernel(kept, problem);

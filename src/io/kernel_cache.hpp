@@ -3,12 +3,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <pendula/system/system_table.hpp>
 #include <string>
 #include <string_view>
 
 #include "io/input_error.hpp"
+#include "io/model_name.hpp"
 #include "io/toolchain.hpp"
 
 namespace pendula::io {
@@ -23,14 +23,12 @@ struct ModelKernel {
   std::string_view by() const;
 };
 
-/// Finds the kernel of a model in this build or in the cache, or makes it. `model` is a file ending in .py, relative to
-/// `folder`, or the name of a built-in model. tell(what) is called before anything takes long. Throws ModelError if the
-/// model is wrong, or something is missing to make it.
-ModelKernel find_kernel(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
-                        const Toolchain& toolchain, const std::function<void(const std::string&)>& tell);
+/// Finds the kernel of a model in this build or in the cache, or makes it. tell(what) is called before anything takes
+/// long. Throws ModelError if the model is wrong, or something is missing to make it.
+ModelKernel find_kernel(const ModelName& name, const Toolchain& toolchain,
+                        const std::function<void(const std::string&)>& tell);
 
 /// The text of a model's file; empty if its kernel is part of this program. Throws as find_kernel.
-std::string model_source(const std::string& model, std::optional<int> links, const std::filesystem::path& folder,
-                         const Toolchain& toolchain);
+std::string model_source(const ModelName& name, const Toolchain& toolchain);
 
 }  // namespace pendula::io

@@ -41,13 +41,12 @@ AnyScenario MemberScenarios::quickly_of_member(std::int64_t member) {
   return document_.with(plan().keys(), plan().values(member), find());
 }
 
-std::shared_ptr<const SystemTable> MemberScenarios::find_system(const std::string& name, std::optional<int> links,
-                                                                const std::filesystem::path& folder) {
+std::shared_ptr<const SystemTable> MemberScenarios::find_system(const ModelName& name) {
   const std::scoped_lock lock(guard_);
-  std::shared_ptr<const SystemTable>& found = systems_[{name, links.value_or(0)}];
+  std::shared_ptr<const SystemTable>& found = systems_[name];
   if (found) return found;
-  model_ = model_source(name, links, folder, toolchain_);
-  found = find_kernel(name, links, folder, toolchain_, tell_).table;
+  model_ = model_source(name, toolchain_);
+  found = find_kernel(name, toolchain_, tell_).table;
   return found;
 }
 

@@ -65,13 +65,10 @@ class MemberScenarios {
   AnyScenario quickly_of_member(std::int64_t member);
 
  private:
-  std::shared_ptr<const SystemTable> find_system(const std::string& name, std::optional<int> links,
-                                                 const std::filesystem::path& folder);
+  std::shared_ptr<const SystemTable> find_system(const ModelName& name);
 
   FindSystem find() {
-    return [this](const std::string& name, std::optional<int> links, const std::filesystem::path& folder) {
-      return find_system(name, links, folder);
-    };
+    return [this](const ModelName& name) { return find_system(name); };
   }
 
   ScenarioText text_;
@@ -80,7 +77,7 @@ class MemberScenarios {
   Toolchain toolchain_;
   Tell tell_;
   std::mutex guard_;
-  std::map<std::pair<std::string, int>, std::shared_ptr<const SystemTable>> systems_;
+  std::map<ModelName, std::shared_ptr<const SystemTable>> systems_;
   std::string model_;
 };
 

@@ -308,6 +308,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.rows = read_row_times(sections.output, plan.duration);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
   plan.events = read_events(sections.root);
+  if (!plan.feedback.empty()) plan.places["feedback"] = plan.feedback.front().place;
   plan.checkpoint = sections.output.number("checkpoint");
   for (const ScenarioKey& key : table_named("run").keys) {
     if (const auto entry = sections.run.find(key.name)) plan.places[std::string(key.name)] = entry->place();
@@ -322,6 +323,7 @@ Scenario<Space> read(const Sections& sections) {
   const std::optional<NaturalUnits> natural = make_natural(sections.chain, parameters);
   const Chain<Space> chain = build_chain(sections.chain, std::move(parameters));
   Scenario<Space> scenario(chain, read_start(sections.start, count, chain, natural ? natural->time : 1));
+  scenario.feedback = read_feedback(sections.chain);
   read_plan(sections, scenario);
   scenario.natural = natural;
   for (std::string& warning : degree_warnings(sections.start)) scenario.warnings.push_back(std::move(warning));

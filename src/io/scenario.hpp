@@ -22,7 +22,9 @@
 #include <vector>
 
 #include "io/event_reader.hpp"
+#include "io/feedback_reader.hpp"
 #include "io/input_error.hpp"
+#include "io/model_name.hpp"
 #include "io/natural_units.hpp"
 
 namespace pendula::io {
@@ -38,6 +40,7 @@ struct RunPlan {
   double duration = 0;
   std::int64_t every = 1;  ///< steps from row to row
   std::vector<EventPlan> events;
+  std::vector<FeedbackPlan> feedback;
   RowTimes rows;                        ///< if there are any, in place of `every`
   double checkpoint = 0;                ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
@@ -64,14 +67,11 @@ struct SystemScenario : RunPlan {
 
 using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>, SystemScenario>;
 
-/// Finds the kernel of the model that a scenario names: a file, relative to the scenario's folder, or a built-in model.
-/// `links` is empty if the scenario does not say. Throws ModelError.
-using FindSystem = std::function<std::shared_ptr<const SystemTable>(const std::string& model, std::optional<int> links,
-                                                                    const std::filesystem::path& folder)>;
+/// Finds the kernel of the model that a scenario names, whose folder is the scenario's. Throws ModelError.
+using FindSystem = std::function<std::shared_ptr<const SystemTable>(const ModelName& name)>;
 
 /// Finds kernels of this build only.
-std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std::optional<int> links,
-                                                   const std::filesystem::path& folder);
+std::shared_ptr<const SystemTable> built_in_system(const ModelName& name);
 
 /// Reads a scenario from TOML text; `name` stands for the file in messages. Each override is `key.path=value`, the
 /// value in TOML, or a bare word for a string; it replaces what the text says. Keys and defaults: docs/scenario.md.

@@ -60,7 +60,7 @@ constexpr std::array<ScenarioKey, 7> document = {
 constexpr std::array<std::string_view, 2> spaces = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
 
-constexpr std::array<ScenarioKey, 9> chain = {
+constexpr std::array<ScenarioKey, 10> chain = {
     one_of("space", spaces, required, "planar (y up) or spatial (z up)"),
     an_integer("links", 1, max_links, InWords{"the length of the first array"},
                "the number of links, where no array tells it"),
@@ -71,6 +71,7 @@ constexpr std::array<ScenarioKey, 9> chain = {
     {.name = "torque", .type = torque, .unit = "N m", .otherwise = 0.0, .hint = "constant torque on each link"},
     one_of("units", unit_systems, unit_systems[0], "of all other tables and of all output"),
     another("drive", tables, none, "torques amplitude sin(frequency t + phase), each on one link"),
+    another("feedback", tables, none, "torques that follow from the motion"),
 };
 
 constexpr std::array<ScenarioKey, 4> chain_drive = {
@@ -80,11 +81,12 @@ constexpr std::array<ScenarioKey, 4> chain_drive = {
     a_number("phase", "rad", any_number, 0.0, "phase at t = 0"),
 };
 
-constexpr std::array<ScenarioKey, 4> system = {
+constexpr std::array<ScenarioKey, 5> system = {
     another("model", text, required, "a model file, or the name of a built-in model"),
     an_integer("links", 1, 64, InWords{"1, for the model to say"}, "number of links, where the model has some"),
     another("parameters", names, InWords{"those of the model"}, "a table by name"),
     another("drive", tables, none, "constant + amplitude sin(frequency t + phase), added to an input"),
+    another("feedback", tables, none, "what follows from the motion, added to an input"),
 };
 
 constexpr std::array<ScenarioKey, 5> system_drive = {
@@ -93,6 +95,20 @@ constexpr std::array<ScenarioKey, 5> system_drive = {
     a_number("amplitude", "", any_number, 0.0, "in the unit of the input"),
     a_number("frequency", "rad/s", any_number, InWords{"must be given with an amplitude"}, "an angular frequency"),
     a_number("phase", "rad", any_number, 0.0, "phase at t = 0"),
+};
+
+constexpr std::array<ScenarioKey, 4> system_feedback = {
+    another("input", text, required, "the name of an input of the model"),
+    another("value", text, required, "an expression in the columns of the motion, as \"-12*x - 9*x_dot\""),
+    a_number("sample", "s", positive, InWords{"continuous"}, "time from sample to sample, in between it is held"),
+    a_number("limit", "", positive, none, "the largest size of the value, of sampled feedback"),
+};
+
+constexpr std::array<ScenarioKey, 4> chain_feedback = {
+    another("input", text, required, "a torque: \"torque_1\", in space \"torque_x_1\""),
+    another("value", text, required, "an expression in the columns of the motion, as \"-2*theta_dot_1\""),
+    a_number("sample", "s", positive, required, "time from sample to sample, in between it is held"),
+    a_number("limit", "N m", positive, none, "the largest size of the value"),
 };
 
 constexpr std::array<ScenarioKey, 6> start = {
@@ -189,12 +205,14 @@ constexpr std::array<ScenarioKey, 5> ensemble_random = {
 constexpr std::array<std::string_view, 4> commands = {"simulate", "ensemble", "lyapunov", "linearize"};
 constexpr Names all_commands = commands, of_rows = Names(commands).first(2), of_members = Names(commands).subspan(1, 1);
 
-constexpr std::array<ScenarioTable, 13> tables_of_scenarios = {{
+constexpr std::array<ScenarioTable, 15> tables_of_scenarios = {{
     {"", all_commands, document},
     {"chain", all_commands, chain},
     {"chain.drive", all_commands, chain_drive},
+    {"chain.feedback", of_rows, chain_feedback},
     {"system", all_commands, system},
     {"system.drive", all_commands, system_drive},
+    {"system.feedback", all_commands, system_feedback},
     {"start", all_commands, start},
     {"run", all_commands, run},
     {"output", of_rows, output},

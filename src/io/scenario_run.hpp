@@ -24,10 +24,10 @@ namespace pendula::io {
 /// The subject of a scenario.
 template <class Space>
 std::shared_ptr<const Subject> subject_of(const Scenario<Space>& scenario) {
-  return std::make_shared<ChainSubject<Space>>(scenario.chain);
+  return with_sampled(scenario.feedback, std::make_shared<ChainSubject<Space>>(scenario.chain));
 }
 inline std::shared_ptr<const Subject> subject_of(const SystemScenario& scenario) {
-  return scenario.system;
+  return with_sampled(scenario.feedback, scenario.system);
 }
 
 /// The run that a scenario asks for. Throws InputError if its events cannot be read.
@@ -85,14 +85,25 @@ inline void describe(const RunSetup& setup, Summary& summary) {
   summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names);
 }
 
+/// Adds which inputs have feedback.
+inline void describe_feedback(const RunPlan& plan, ModelSummary& model) {
+  for (const FeedbackPlan& feedback : plan.feedback) {
+    if (std::ranges::find(model.feedback, feedback.input) == model.feedback.end())
+      model.feedback.push_back(feedback.input);
+  }
+  model.loaded = model.loaded || !model.feedback.empty();
+}
+
 /// Adds what moved, by a scenario in `file`, and its last state.
 template <class Space>
 void describe(const Scenario<Space>& scenario, const std::string& file, Summary& summary) {
   summary.model = model_summary(file, scenario.chain, scenario.natural);
+  describe_feedback(scenario, summary.model);
   summary.final = snapshot(scenario.chain, summary.last);
 }
 inline void describe(const SystemScenario& scenario, const std::string& file, Summary& summary) {
   summary.model = model_summary(file, *scenario.system);
+  describe_feedback(scenario, summary.model);
   summary.system = snapshot(*scenario.system, summary.last);
 }
 

@@ -78,6 +78,9 @@ std::string settings(const Summary& summary) {
   const ModelSummary& model = summary.model;
   const UnitNames unit = unit_names(model.natural);
   std::string text = what_was_moved(model);
+  std::string fed;
+  for (const std::string& input : model.feedback) fed += (fed.empty() ? "" : ", ") + input;
+  if (!fed.empty()) text += line("feedback", fed);
   std::string method(name_of(summary.options.method));
   if (has_stages(summary)) {
     method += ", " + plural(summary.options.stages, "stage") + " (order " +

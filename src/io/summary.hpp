@@ -31,7 +31,8 @@ struct ModelSummary {
   double mass = 0;    ///< Σ m_i
   double length = 0;  ///< Σ l_i
   double gravity = 0;
-  bool loaded = false;                  ///< damping, torque or a drive
+  bool loaded = false;                  ///< damping, torque, a drive or feedback
+  std::vector<std::string> feedback;    ///< inputs that have some
   std::optional<NaturalUnits> natural;  ///< units of all numbers; SI if empty
 };
 

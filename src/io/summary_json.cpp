@@ -139,7 +139,7 @@ constexpr std::string_view events_schema = R"({"type": "array", "items": {
   "properties": {"name": {"type": "string"}, "count": {"type": "integer"},
                  "first": {"type": ["number", "null"]}, "last": {"type": ["number", "null"]}},
   "additionalProperties": false}})";
-constexpr std::string_view warnings_schema = R"({"type": "array", "items": {"type": "string"}})";
+constexpr std::string_view texts_schema = R"({"type": "array", "items": {"type": "string"}})";
 constexpr std::string_view final_schema = R"({"type": "object", "required": ["t", "q", "v", "points"],
   "properties": {
     "t": {"type": "number"},
@@ -156,7 +156,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
                                           unit_systems = {"SI", "natural"};
 constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
 
-constexpr std::array<JsonRow, 39> rows = {{
+constexpr std::array<JsonRow, 40> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
@@ -169,6 +169,7 @@ constexpr std::array<JsonRow, 39> rows = {{
      [](const Summary& s) { return to_json(s.model.natural); }},
     {{"parameters", parameters_schema, "of the model, by name", "", systems},
      [](const Summary& s) { return named(s.model.parameters); }},
+    {{"feedback", texts_schema, "inputs that have some"}, [](const Summary& s) { return Json(s.model.feedback); }},
     {{"method", "string", "as in the scenario", "", anything, names_of<Method>},
      [](const Summary& s) { return Json(name_of(s.options.method)); }},
     {{"stages", "integer null", "of gauss and radau"},
@@ -218,7 +219,7 @@ constexpr std::array<JsonRow, 39> rows = {{
      [](const Summary& s) { return Json(s.stepping_seconds); }},
     {{"outcome", outcome_schema, "status, and what failed"}, [](const Summary& s) { return to_json(s.ending); }},
     {{"events", events_schema, "name, count, first and last time of each [[event]]"}, events_json},
-    {{"warnings", warnings_schema, "sentences, the same as on standard error"},
+    {{"warnings", texts_schema, "sentences, the same as on standard error"},
      [](const Summary& s) { return Json(s.warnings); }},
     {{"final", final_schema, "the last state: t, q, v, points; of chains arrays besides, one element a link"},
      [](const Summary& s) { return s.model.space.empty() ? to_json(s.system) : to_json(s.final); }},

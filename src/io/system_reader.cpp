@@ -228,9 +228,16 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   std::optional<int> links;
   if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer());
   SystemScenario scenario;
+  scenario.feedback = read_feedback(table);
   try {
-    const auto kernel = find(model.text(), links, folder);
-    scenario.system = std::make_shared<SystemSubject>(kernel, read_numbers(table, kernel->info));
+    ModelName name{model.text(), links, folder};
+    const auto kernel = find(name);
+    const SystemNumbers numbers = read_numbers(table, kernel->info);
+    const auto system = std::make_shared<SystemSubject>(kernel, numbers);
+    name.laws = continuous_laws(scenario.feedback, *system);
+    scenario.system = name.laws.empty() ? system
+                                        : std::make_shared<SystemSubject>(
+                                              find(name), numbers, continuous_functions(scenario.feedback, system));
   } catch (const ModelError& error) {
     throw InputError(model.place() + ": " + error.what());
   }
@@ -239,10 +246,9 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   return scenario;
 }
 
-std::shared_ptr<const SystemTable> built_in_system(const std::string& model, std::optional<int> links,
-                                                   const std::filesystem::path&) {
-  const std::string stem = std::filesystem::path(model).stem().string();
-  const std::string name = links ? stem + "_" + std::to_string(*links) : stem;
+std::shared_ptr<const SystemTable> built_in_system(const ModelName& model) {
+  const std::string name = kernel_name(model);
+  if (!model.laws.empty()) throw ModelError("no kernel with feedback is in this build, which cannot make one here");
   std::vector<std::string_view> names;
   for (const SystemTable* table : library().systems) {
     if (table->info.name == name) return {table, [](const SystemTable*) {}};

@@ -41,8 +41,8 @@ std::shared_ptr<const Subject> with(const SystemSubject& system, const std::shar
                                     std::span<const double> inputs) {
   SystemNumbers numbers = system.numbers();
   numbers.inputs.assign(inputs.begin(), inputs.end());
-  return std::make_shared<SystemSubject>(std::shared_ptr<const SystemTable>(owner, &system.table()),
-                                         std::move(numbers));
+  return std::make_shared<SystemSubject>(std::shared_ptr<const SystemTable>(owner, &system.table()), std::move(numbers),
+                                         system.feedback());
 }
 
 template <class Space>

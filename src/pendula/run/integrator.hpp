@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_numbers.hpp>
@@ -15,6 +16,7 @@
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_integrator.hpp>
 #include <pendula/system/stop_sign.hpp>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -54,6 +56,7 @@ class Integrator {
   Motion state() const {
     Motion motion(time(), Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
     integrator_->read_state(motion.q.data(), motion.v.data());
+    hold(motion);
     return motion;
   }
 
@@ -66,6 +69,7 @@ class Integrator {
   Motion glance(double time) {
     Motion motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
     integrator_->glance(time, motion.q.data(), motion.v.data());
+    hold(motion);
     return motion;
   }
 
@@ -79,6 +83,7 @@ class Integrator {
   /// Also sets `work` to the work of loads until then  [J].
   Outcome look(double time, Motion& motion, double& work) {
     motion = Motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
+    hold(motion);
     return integrator_->look(time, motion.q.data(), motion.v.data(), work);
   }
 
@@ -149,6 +154,11 @@ class Integrator {
   }
 
  private:
+  void hold(Motion& motion) const {
+    const std::span<const double> held = integrator_->held(motion.time);
+    if (!held.empty()) motion.held = Eigen::Map<const Eigen::VectorXd>(held.data(), std::ssize(held));
+  }
+
   void require_size(const char* what, Eigen::Index got) const {
     if (got == coordinates_) return;
     throw std::invalid_argument(std::string("state: ") + what + ": expected " + std::to_string(coordinates_) +

@@ -53,6 +53,9 @@ class Subject {
   virtual std::vector<Quantity> quantities() const = 0;
   virtual void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
 
+  /// The columns of inputs that feedback adds to.
+  virtual std::vector<std::size_t> fed_columns() const { return {}; }
+
   /// Masses, lengths and other parameters, in SI units.
   virtual std::vector<Constant> constants() const = 0;
 

@@ -15,13 +15,20 @@
 
 namespace pendula {
 
+/// Continuous feedback, which a kernel has among its forces: what rows add to an input for it.
+struct InputFunction {
+  std::size_t input;
+  std::function<double(const Motion&)> value;
+};
+
 /// A system other than a chain as the subject of a run.
 class SystemSubject : public Subject {
  public:
   /// Shares ownership of `table` and of what it was loaded from. Throws std::invalid_argument for a wrong number of
-  /// parameters or inputs, and for sines on inputs that do not exist.
-  SystemSubject(std::shared_ptr<const SystemTable> table, SystemNumbers numbers)
-      : table_(std::move(table)), numbers_(std::move(numbers)) {
+  /// parameters or inputs, and for sines on inputs that do not exist. `feedback` is what the kernel adds to its inputs.
+  SystemSubject(std::shared_ptr<const SystemTable> table, SystemNumbers numbers,
+                std::vector<InputFunction> feedback = {})
+      : table_(std::move(table)), numbers_(std::move(numbers)), feedback_(std::move(feedback)) {
     const auto& sizes = info().parameter_sizes;
     require_size("parameters", numbers_.parameters.size(),
                  static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0)));
@@ -36,6 +43,7 @@ class SystemSubject : public Subject {
   const SystemTable& table() const { return *table_; }
   const SystemInfo& info() const { return table_->info; }
   const SystemNumbers& numbers() const { return numbers_; }
+  const std::vector<InputFunction>& feedback() const { return feedback_; }
 
   std::unique_ptr<Integrator> make_integrator(const RunOptions& options) const override {
     if (options.solver == Solver::chain) {
@@ -65,7 +73,7 @@ class SystemSubject : public Subject {
   }
 
   std::optional<double> energy_scale() const override { return std::nullopt; }
-  bool loaded() const override { return SystemModel(*table_, numbers_.plain()).loaded(); }
+  bool loaded() const override { return !feedback_.empty() || SystemModel(*table_, numbers_.plain()).loaded(); }
   bool damped() const override { return loaded(); }
   /// Forces that depend on time may exchange energy many times within one step of the motion.
   bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
@@ -108,9 +116,15 @@ class SystemSubject : public Subject {
     row.push_back(motion.time);
     row.insert(row.end(), motion.q.begin(), motion.q.end());
     row.insert(row.end(), motion.v.begin(), motion.v.end());
-    append_inputs(motion.time, row);
+    append_inputs(motion, row);
     row.insert(row.end(), seen.points.begin(), seen.points.end());
     row.push_back(seen.energy);
+  }
+
+  std::vector<std::size_t> fed_columns() const override {
+    std::vector<std::size_t> columns;
+    for (const InputFunction& one : feedback_) columns.push_back(1 + 2 * info().coordinates.size() + one.input);
+    return columns;
   }
 
   /// The parameters of the model.
@@ -169,13 +183,14 @@ class SystemSubject : public Subject {
     return {table_->context, numbers_.parameters.data(), &time, numbers_.inputs.data()};
   }
 
-  void append_inputs(double time, std::vector<double>& row) const {
+  void append_inputs(const Motion& motion, std::vector<double>& row) const {
     const std::size_t first = row.size();
     row.insert(row.end(), numbers_.inputs.begin(), numbers_.inputs.end());
     for (const InputSine& sine : numbers_.sines) {
       row[first + static_cast<std::size_t>(sine.input)] +=
-          sine.amplitude * std::sin(sine.frequency * time + sine.phase);
+          sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
     }
+    for (const InputFunction& one : feedback_) row[first + one.input] += one.value(motion);
   }
 
   int point_components() const { return std::accumulate(info().point_sizes.begin(), info().point_sizes.end(), 0); }
@@ -191,6 +206,7 @@ class SystemSubject : public Subject {
 
   std::shared_ptr<const SystemTable> table_;
   SystemNumbers numbers_;
+  std::vector<InputFunction> feedback_;
 };
 
 }  // namespace pendula

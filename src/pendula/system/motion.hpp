@@ -10,6 +10,8 @@ struct Motion {
   double time = 0;    ///< s
   Eigen::VectorXd q;  ///< coordinates
   Eigen::VectorXd v;  ///< their rates
+  /// What sampled feedback holds of inputs at this time (run/feedback.hpp); empty where there is none, or at a start.
+  Eigen::VectorXd held;
 
   Motion() = default;
   Motion(double at, Eigen::VectorXd coordinates, Eigen::VectorXd rates)

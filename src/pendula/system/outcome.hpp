@@ -148,6 +148,22 @@ struct Statistics {
     if (unseen > trusted) unseen_from = std::min(unseen_from, time);
   }
 
+  /// Adds what another part of the run counted.
+  Statistics& operator+=(const Statistics& other) {
+    steps += other.steps;
+    rejected_steps += other.rejected_steps;
+    newton_iterations += other.newton_iterations;
+    load_work += other.load_work;
+    largest_defect = std::max(largest_defect, other.largest_defect);
+    if (other.smallest_step > 0) {
+      smallest_step = smallest_step == 0 ? other.smallest_step : std::min(smallest_step, other.smallest_step);
+    }
+    largest_step = std::max(largest_step, other.largest_step);
+    unseen += other.unseen;
+    unseen_from = std::min(unseen_from, other.unseen_from);
+    return *this;
+  }
+
   /// Whether a step chosen by tolerance must be retried shorter because of what it misses. The shortest steps are left
   /// to their error estimate.
   bool has_to_see(double impulse, double h, double tolerance) const {

@@ -3,6 +3,7 @@
 #include <pendula/system/member.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/stop_sign.hpp>
+#include <span>
 #include <string_view>
 
 namespace pendula {
@@ -24,6 +25,8 @@ class PlainIntegrator {
   virtual Outcome step(double h) = 0;
   virtual double time() const = 0;
   virtual void read_state(double* q, double* v) const = 0;
+  /// What is held of inputs at a time in the last step; empty but for sampled feedback.
+  virtual std::span<const double> held(double /*time*/) const { return {}; }
 
   /// Whether to remember steps from now on, so that glance and look can go back into the last one; this costs a copy of
   /// the state per step.

@@ -1,0 +1,74 @@
+"""Continuous feedback: what a scenario adds to an input of a model, as a function of the motion.
+
+It stands in the forces of the kernel, which is as exact with it as without, derivatives included.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterable
+
+import sympy
+from sympy import Expr
+
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.exact import MOST_DENOMINATOR
+from pendula_codegen.model import Model, rate_name
+
+_SIGNS: dict[str, Callable[[Expr, Expr], Expr]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": lambda base, exponent: base ** _exponent(exponent),
+}
+_FUNCTIONS = frozenset(
+    ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt"]
+)
+
+
+def close_loops(model: Model, laws: Iterable[str]) -> None:
+    """Adds to inputs what laws say: each INPUT=WORDS, operands before what is done with them: `x 9 * ~` is −(x · 9).
+
+    Words are numbers, names of columns of the motion, signs (~ is minus of one), and functions as `sin()`.
+    """
+    names = _columns(model)
+    for law in laws:
+        name, _, words = law.partition("=")
+        inputs = {each.symbol.name: each.symbol for each in model.inputs}
+        if name not in inputs:
+            raise GenerationError(f"feedback: expected an input of the model, got {name}")
+        model.feed(inputs[name], _value(words, names))
+
+
+def _exponent(value: Expr) -> Expr:
+    """Roots stay exact."""
+    return sympy.Float(value) if value.is_Rational and value.q > MOST_DENOMINATOR else value
+
+
+def _columns(model: Model) -> dict[str, Expr]:
+    names: dict[str, Expr] = {"t": model.time}
+    for coordinate in model.coordinates:
+        names[coordinate.symbol.name] = coordinate.symbol
+        names[rate_name(coordinate.symbol.name)] = model.rate(coordinate.symbol)
+    for point in model.points:
+        names |= {f"{point.name}_{axis}": value for axis, value in zip("xyz", point.components, strict=False)}
+    return names
+
+
+def _value(words: str, names: dict[str, Expr]) -> Expr:
+    stack: list[Expr] = []
+    for word in words.split():
+        if word in _SIGNS:
+            right = stack.pop()
+            stack.append(_SIGNS[word](stack.pop(), right))
+        elif word == "~":
+            stack.append(-stack.pop())
+        elif word.endswith("()") and word[:-2] in _FUNCTIONS:
+            stack.append(getattr(sympy, word[:-2])(stack.pop()))
+        elif word in names:
+            stack.append(names[word])
+        else:
+            stack.append(sympy.Rational(*float(word).as_integer_ratio()))
+    (value,) = stack
+    return value

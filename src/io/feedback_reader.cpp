@@ -1,0 +1,206 @@
+#include "io/feedback_reader.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <mutex>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/feedback.hpp>
+#include <pendula/run/inputs.hpp>
+#include <string_view>
+#include <utility>
+
+#include "io/expression.hpp"
+#include "io/expression_reader.hpp"
+#include "io/nearest_name.hpp"
+#include "io/row_function.hpp"
+
+namespace pendula::io {
+namespace {
+
+/// A column that no feedback may hold has this name, which no expression can have.
+constexpr const char* nameless = "";
+
+/// Names of the columns that an expression may hold: all but inputs, and with `without_energy` but the energy.
+std::vector<std::string> names_for(const Subject& subject, bool without_energy) {
+  std::vector<std::string> names = subject.columns();
+  for (const Quantity& quantity : subject.quantities()) {
+    if (quantity.role != Role::input && !(without_energy && quantity.role == Role::energy)) continue;
+    for (std::size_t k = 0; k < quantity.size(); ++k) names[quantity.column(k)] = nameless;
+  }
+  return names;
+}
+
+template <class Read>
+auto told_at(const FeedbackPlan& plan, Read read) {
+  try {
+    return read();
+  } catch (const ExpressionError& error) {
+    throw InputError(plan.place + ": expected " + error.expected + ", got " + error.got);
+  }
+}
+
+std::size_t input_of(const FeedbackPlan& plan, const Subject& subject) {
+  const std::vector<std::string> names = input_names(subject);
+  const auto found = std::ranges::find(names, plan.input);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  constexpr std::size_t few = 12;
+  std::string known;
+  for (std::size_t k = 0; k < std::min(few, names.size()); ++k) known += (known.empty() ? "" : ", ") + names[k];
+  if (names.size() > few) known += ", ...";
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  throw InputError(plan.input_place + ": expected an input: " + (known.empty() ? "there is none" : known) + "; got \"" +
+                   plan.input + '"' + did_you_mean(nearest_name(plan.input, views)));
+}
+
+/// A function of the motion that several threads may call.
+std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
+                                                 const std::shared_ptr<const Subject>& subject) {
+  struct Guarded {
+    Guarded(const std::shared_ptr<const Subject>& subject, std::shared_ptr<Expression> expression, const Motion& any)
+        : function(subject, std::move(expression), any) {}
+    RowFunction function;
+    std::mutex guard;
+  };
+  const std::vector<std::string> names = names_for(*subject, plan.sample == 0);
+  auto expression = told_at(plan, [&] { return std::make_shared<Expression>(plan.value, names); });
+  std::size_t coordinates = 0;
+  for (const Quantity& quantity : subject->quantities()) {
+    if (quantity.role == Role::coordinate) coordinates += quantity.size();
+  }
+  const auto size = static_cast<Eigen::Index>(coordinates);
+  const Motion any(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size));
+  const auto shared = std::make_shared<Guarded>(subject, std::move(expression), any);
+  return [shared](const Motion& motion) {
+    const std::scoped_lock lock(shared->guard);
+    return shared->function(motion);
+  };
+}
+
+/// The name of a smooth function; empty for what is none.
+std::string_view smooth_name(Operation operation) {
+  switch (operation) {
+    case Operation::sine:
+      return "sin";
+    case Operation::cosine:
+      return "cos";
+    case Operation::tangent:
+      return "tan";
+    case Operation::arcsine:
+      return "asin";
+    case Operation::arccosine:
+      return "acos";
+    case Operation::arctangent:
+      return "atan";
+    case Operation::hyperbolic_sine:
+      return "sinh";
+    case Operation::hyperbolic_cosine:
+      return "cosh";
+    case Operation::hyperbolic_tangent:
+      return "tanh";
+    case Operation::exponential:
+      return "exp";
+    case Operation::logarithm:
+      return "log";
+    case Operation::root:
+      return "sqrt";
+    default:
+      return "";
+  }
+}
+
+std::string_view sign_of(Operation operation) {
+  switch (operation) {
+    case Operation::sum:
+      return "+";
+    case Operation::difference:
+      return "-";
+    case Operation::product:
+      return "*";
+    case Operation::ratio:
+      return "/";
+    case Operation::power:
+      return "^";
+    case Operation::negative:
+      return "~";
+    default:
+      return "";
+  }
+}
+
+/// A program as the generator reads it: words, operands before what is done with them. `x 9 * ~` is -(x * 9).
+std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names) {
+  std::vector<std::string> words;
+  for (const ExpressionProgram::Node& node : program.nodes) {
+    const std::string_view function = smooth_name(node.operation), sign = sign_of(node.operation);
+    if (node.operation == Operation::constant) {
+      words.push_back(shortest(node.number));
+    } else if (node.operation == Operation::column) {
+      words.push_back(names[program.columns[node.a]]);
+    } else if (!function.empty()) {
+      words.push_back(std::string(function) + "()");
+    } else if (!sign.empty()) {
+      words.emplace_back(sign);
+    } else {
+      throw ExpressionError(
+          "smooth functions in continuous feedback (+ - * / ^, sqrt, exp, log, trigonometric and hyperbolic ones)",
+          "another one; sample = ... beside it allows all");
+    }
+  }
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+}  // namespace
+
+std::vector<FeedbackPlan> read_feedback(const Section& system) {
+  std::vector<FeedbackPlan> plans;
+  for (const Section& table : system.each("feedback")) {
+    FeedbackPlan plan;
+    const Entry input = table.require("input"), value = table.require("value");
+    plan.input = input.text();
+    plan.input_place = input.place();
+    plan.value = value.text();
+    plan.place = value.place();
+    if (const auto sample = table.find("sample")) plan.sample = sample->number();
+    if (const auto limit = table.find("limit")) {
+      if (plan.sample == 0) limit->fail("sample beside it: a limit is not smooth");
+      plan.limit = limit->number();
+    }
+    plans.push_back(std::move(plan));
+  }
+  return plans;
+}
+
+std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system) {
+  std::vector<InputLaw> laws;
+  const std::vector<std::string> names = names_for(system, true);
+  for (const FeedbackPlan& plan : plans) {
+    input_of(plan, system);
+    if (plan.sample > 0) continue;
+    laws.push_back(
+        {plan.input, told_at(plan, [&] { return postfix_text(read_expression(plan.value, names), names); })});
+  }
+  return laws;
+}
+
+std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
+                                                const std::shared_ptr<const SystemSubject>& system) {
+  std::vector<InputFunction> functions;
+  for (const FeedbackPlan& plan : plans) {
+    if (plan.sample == 0) functions.push_back({input_of(plan, *system), function_of(plan, system)});
+  }
+  return functions;
+}
+
+std::shared_ptr<const Subject> with_sampled(const std::vector<FeedbackPlan>& plans,
+                                            const std::shared_ptr<const Subject>& subject) {
+  std::vector<SampledLaw> laws;
+  for (const FeedbackPlan& plan : plans) {
+    if (plan.sample == 0) continue;
+    laws.push_back({input_of(plan, *subject), function_of(plan, subject), plan.sample, plan.limit});
+  }
+  return with_feedback(subject, std::move(laws));
+}
+
+}  // namespace pendula::io

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <pendula/run/subject.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <string>
+#include <vector>
+
+#include "io/model_name.hpp"
+#include "io/section.hpp"
+
+namespace pendula::io {
+
+/// Feedback as a scenario describes it. Its expression is read once the columns of the rows are known.
+struct FeedbackPlan {
+  std::string input, value;
+  double sample = 0;  ///< 0: continuous  [s]
+  double limit = std::numeric_limits<double>::infinity();
+  std::string place, input_place;  ///< `where: key` of `value` and of `input`
+};
+
+/// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Throws InputError.
+std::vector<FeedbackPlan> read_feedback(const Section& system);
+
+/// The continuous ones, as the generator reads them. Throws InputError if an expression cannot be read, names something
+/// unknown, or is not smooth.
+std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system);
+
+/// The same as functions. `system` is without feedback.
+std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
+                                                const std::shared_ptr<const SystemSubject>& system);
+
+/// The subject with those that are sampled. Throws InputError as continuous_laws.
+std::shared_ptr<const Subject> with_sampled(const std::vector<FeedbackPlan>& plans,
+                                            const std::shared_ptr<const Subject>& subject);
+
+}  // namespace pendula::io

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <vector>
+
+namespace pendula {
+
+/// What a controller adds to an input: a function of the motion, computed at multiples of the sample time and held in
+/// between (a zero-order hold).
+struct SampledLaw {
+  std::size_t input = 0;  ///< index among the subject's inputs (inputs.hpp)
+  std::function<double(const Motion&)> value;
+  double sample = 0;                                       ///< > 0  [s]
+  double limit = std::numeric_limits<double>::infinity();  ///< the largest size of what is added
+};
+
+/// The subject with sampled feedback: steps end where samples are. Rows have the inputs as they are held from their
+/// time on. There are no derivatives of its motion, which jumps. Throws std::invalid_argument for an input that the
+/// subject does not have.
+std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subject, std::vector<SampledLaw> laws);
+
+}  // namespace pendula
