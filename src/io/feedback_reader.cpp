@@ -24,8 +24,8 @@ constexpr const char* nameless = "";
 std::vector<std::string> names_for(const Subject& subject, bool without_energy) {
   std::vector<std::string> names = subject.columns();
   for (const Quantity& quantity : subject.quantities()) {
-    if (quantity.role != Role::input && !(without_energy && quantity.role == Role::energy)) continue;
-    for (std::size_t k = 0; k < quantity.size(); ++k) names[quantity.column(k)] = nameless;
+    const bool is_left_out = quantity.role == Role::input || (without_energy && quantity.role == Role::energy);
+    for (std::size_t k = 0; is_left_out && k < quantity.size(); ++k) names[quantity.column(k)] = nameless;
   }
   return names;
 }

@@ -123,6 +123,7 @@ class SystemSubject : public Subject {
 
   std::vector<std::size_t> fed_columns() const override {
     std::vector<std::size_t> columns;
+    columns.reserve(feedback_.size());
     for (const InputFunction& one : feedback_) columns.push_back(1 + 2 * info().coordinates.size() + one.input);
     return columns;
   }
