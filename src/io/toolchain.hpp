@@ -2,8 +2,11 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "io/process.hpp"
 
 namespace pendula::io {
 
@@ -18,6 +21,9 @@ struct Toolchain {
   std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
   std::filesystem::path cache;     ///< folder of kernels; empty if there is none
   std::function<void()> ask;       ///< called while other programs work, if there is one; what it throws ends them
+
+  /// Runs the generator in this process, if there is one; returns nothing where `python` has to.
+  std::function<std::optional<Ended>(const std::vector<std::string>& arguments)> generate;
 
   /// Those that go with a program or Python package in `folder`: of its build, if the file pendula.toolchain is there,
   /// else of its installation. The environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS;
