@@ -5,7 +5,12 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cstdint>
+#include <filesystem>
 #include <optional>
+#include <pendula/system/c_kernel.hpp>
+#include <stdexcept>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -25,6 +30,31 @@ std::optional<io::Ended> generate(const std::string& codegen, const std::string&
   return io::Ended{ended->first, std::move(ended->second)};
 }
 
+nb::object jit(const char* function) {
+  return nb::module_::import_("pendula._jit").attr(function);
+}
+
+const CKernel* load(std::string_view object) {
+  const nb::gil_scoped_acquire lock;
+  const nb::object found = jit("load")(nb::bytes(object.data(), object.size()));
+  if (nb::isinstance<nb::str>(found)) throw std::invalid_argument(nb::cast<std::string>(found));
+  return reinterpret_cast<const CKernel*>(nb::cast<std::uintptr_t>(found));  // NOLINT(performance-no-int-to-ptr)
+}
+
+io::Llvm llvm() {
+  return {.is_there =
+              [] {
+                const nb::gil_scoped_acquire lock;
+                return nb::cast<bool>(jit("is_there")());
+              },
+          .compile =
+              [](const std::filesystem::path& text, const std::filesystem::path& object) {
+                const nb::gil_scoped_acquire lock;
+                return nb::cast<std::string>(jit("compile_text")(text.string(), object.string()));
+              },
+          .load = load};
+}
+
 }  // namespace
 
 io::Toolchain toolchain_of(const std::string& program, const std::string& python) {
@@ -34,6 +64,7 @@ io::Toolchain toolchain_of(const std::string& program, const std::string& python
   toolchain.generate = [codegen = toolchain.codegen.string(), python](const std::vector<std::string>& arguments) {
     return generate(codegen, python, arguments);
   };
+  toolchain.llvm = llvm();
   return toolchain;
 }
 

@@ -102,6 +102,7 @@ std::string model_source(const std::string& model, std::optional<int> links, con
 
 std::string_view ModelKernel::by() const {
   if (file.empty()) return "build";
+  if (file.extension() == llvm_kernel) return "llvm";
   return file.extension() == compiled_kernel ? "compiler" : "interpreter";
 }
 
@@ -121,7 +122,7 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
   const char* const kind = kind_of_kernels(toolchain);
   const fs::path cache = require_cache(toolchain.cache), kept = cache / (name + "-" + key.text() + kind);
   std::string problem;
-  std::shared_ptr<const SystemTable> table = load_kernel(kept, problem);
+  std::shared_ptr<const SystemTable> table = load_kernel(kept, toolchain, problem);
   const bool was_there = table != nullptr;
   if (was_there) {
     fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // marks it as used
@@ -131,7 +132,7 @@ ModelKernel find_kernel(const std::string& model, std::optional<int> links, cons
     const fs::path made = make_kernel(kind, name, about("program", file, links), workshop.folder(), toolchain);
     seal_kernel(made);
     fs::rename(made, kept);
-    table = load_kernel(kept, problem);
+    table = load_kernel(kept, toolchain, problem);
     if (!table) throw ModelError("the kernel cannot be loaded: " + problem);
   }
   remove_unused_kernels(cache);
