@@ -61,6 +61,7 @@ def test_kernels_do_not_take_each_others_place(tmp_path):
 
 
 def test_what_needs_no_sympy_does_not_import_it():
+    assert pendula.Model("furuta").kernel  # it is there by now
     code = (
         "import pendula, sys\n"
         "pendula.Model('furuta').coordinates\n"
