@@ -78,7 +78,8 @@ def _import_package(folder: Path) -> bool:
 def _run(main: Callable[[list[str]], int], arguments: list[str]) -> tuple[int, str]:
     import mpmath  # type: ignore[import-untyped]
 
-    printed = io.StringIO()
+    memory = io.BytesIO()
+    printed = io.TextIOWrapper(memory, encoding="utf-8", errors="backslashreplace", write_through=True)
     with _printing_to(printed), mpmath.workprec(53):
         try:
             status = main(arguments)
@@ -87,7 +88,7 @@ def _run(main: Callable[[list[str]], int], arguments: list[str]) -> tuple[int, s
         except Exception:
             traceback.print_exc()
             status = 1
-    return status, printed.getvalue().encode(errors="backslashreplace").decode()
+    return status, memory.getvalue().decode(errors="replace")
 
 
 def _status_of(end: SystemExit) -> int:
@@ -97,31 +98,22 @@ def _status_of(end: SystemExit) -> int:
     return 1
 
 
-class _Printer(io.TextIOBase):
-    """Standard output or error, where one thread prints elsewhere."""
+class _Printer:
+    """Standard output or error: one file for this thread, another for all others."""
 
-    def __init__(self, usual: TextIO, other: io.StringIO) -> None:
-        self._usual, self._other = usual, other
+    def __init__(self, ours: TextIO, theirs: TextIO) -> None:
+        self._ours, self._theirs = ours, theirs
         self._thread = threading.get_ident()
 
-    def _stream(self) -> TextIO:
-        return self._other if threading.get_ident() == self._thread else self._usual
-
-    def write(self, text: str) -> int:
-        return self._stream().write(text)
-
-    def flush(self) -> None:
-        self._stream().flush()
-
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._usual, name)
+        return getattr(self._ours if threading.get_ident() == self._thread else self._theirs, name)
 
 
 @contextmanager
-def _printing_to(printed: io.StringIO) -> Iterator[None]:
+def _printing_to(printed: TextIO) -> Iterator[None]:
     """This thread prints there; others print as they did."""
     usual = {name: getattr(sys, name) for name in ("stdout", "stderr")}
-    ours = {name: _Printer(stream, printed) for name, stream in usual.items()}
+    ours = {name: _Printer(printed, stream or io.StringIO()) for name, stream in usual.items()}
     for name, stream in ours.items():
         setattr(sys, name, stream)
     try:

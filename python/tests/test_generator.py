@@ -109,8 +109,9 @@ def test_what_a_model_prints_is_not_seen_and_what_others_print_is(tmp_path, caps
     """A model waits until another thread has printed."""
     file, begun, told = tmp_path / "own.py", tmp_path / "begun", tmp_path / "told"
     file.write_text(
-        f"from pathlib import Path\nprint('of the model')\nPath({str(begun)!r}).touch()\n"
-        f"import time\nwhile not Path({str(told)!r}).exists():\n    time.sleep(0.01)\n{MODEL}"
+        "import sys, time\nfrom pathlib import Path\n"
+        "print('of the model')\nsys.stdout.buffer.write(b'\\xff')\n"
+        f"Path({str(begun)!r}).touch()\nwhile not Path({str(told)!r}).exists():\n    time.sleep(0.01)\n{MODEL}"
     )
 
     def other() -> None:

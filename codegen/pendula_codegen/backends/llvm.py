@@ -34,7 +34,7 @@ def print_kernel(table: KernelTable, size: int, description: Sequence[str], inst
     most, features = INSTRUCTION_SETS[instruction_set]
     used = table.operations()
     of_many, plain = ([_written_out(one) for one in functions] for functions in (table.of_many, table.plain))
-    parts = [*library_declarations()]
+    parts = library_declarations()
     for width in sorted({min(most, states) for states in WIDTHS}):
         parts += functions_of(width, used)
         if size > UNROLLED:
@@ -177,8 +177,7 @@ class _Steps:
             case "inverse":
                 names[step.first] = f.do("fdiv", f.number(1.0), given[0])
             case "sincos":
-                kind = f"{{ {f.numbers}, {f.numbers} }}"
-                pair = f.let(f"call fastcc {kind} @sincos.{f.width}({f.numbers} {given[0]})")
+                pair = f.let(f"call fastcc {f.pairs} @sincos.{f.width}({f.numbers} {given[0]})")
                 names |= zip(step.results, f.of_pair(pair), strict=True)
             case "factor" | "solve":
                 self._system(step, given)

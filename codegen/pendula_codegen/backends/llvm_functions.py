@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pendula_codegen.backends.c import CALLS
-from pendula_codegen.backends.llvm_text import LlvmFunction
+from pendula_codegen.backends.llvm_text import LlvmFunction, literal
 
 ROUND = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, and leaves its low bits in the mantissa
 LARGE = 1e5  # angles from which the standard library takes over
@@ -24,12 +24,8 @@ def call_of(function: LlvmFunction, operation: str, x: str, exponent: float) -> 
     if operation == "sqrt":
         return function.intrinsic("sqrt", x)
     if operation == "pow":
-        return function.let(f"call fastcc {kind} @pow.{width}({kind} {x}, double {_one(exponent)})")
+        return function.let(f"call fastcc {kind} @pow.{width}({kind} {x}, double {literal(exponent)})")
     return function.let(f"call fastcc {kind} @{operation}.{width}({kind} {x})")
-
-
-def _one(number: float) -> str:
-    return LlvmFunction("", 1).number(number)
 
 
 def functions_of(width: int, used: set[str]) -> list[str]:
@@ -71,7 +67,7 @@ def _sincos(width: int) -> list[str]:
         _by_library(large, "sin", "%x", is_large, "%sine"),
         _by_library(large, "cos", "%x", is_large, "%cosine"),
     ]
-    large.line(f"ret {{ {large.numbers}, {large.numbers} }} {large.pair(*found)}")
+    large.line(f"ret {large.pairs} {large.pair(*found)}")
 
     f = _begin("sincos", width, "V %x", "{ V, V }", "noinline ")
     x, one = "%x", f.number(1.0)
@@ -114,14 +110,13 @@ def _sincos(width: int) -> list[str]:
     cosine = f.as_numbers(f.integral("xor", f.integral("xor", c_bits, difference), other_sign))
 
     are_small = f.all(f.compare("olt", f.intrinsic("fabs", x), f.number(LARGE)))
-    kind = f"{{ {f.numbers}, {f.numbers} }}"
     _otherwise(
         f,
         are_small,
-        kind,
+        f.pairs,
         f.pair(sine, cosine),
         lambda: f.let(
-            f"call fastcc {kind} @sincos_of_large.{width}({f.numbers} {x}, {f.numbers} {sine}, {f.numbers} {cosine})"
+            f"call fastcc {f.pairs} @sincos_of_large.{width}({f.numbers} {x}, {f.numbers} {sine}, {f.numbers} {cosine})"
         ),
     )
     return [large.text(), f.text()]

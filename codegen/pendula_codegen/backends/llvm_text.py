@@ -20,6 +20,8 @@ class LlvmFunction:
 
     numbers    the type of such a register
     integers   of one with as many integers
+    bits       of one with as many bits
+    pairs      of two registers of numbers
     """
 
     def __init__(self, head: str, width: int, attributes: str = "#0"):
@@ -27,6 +29,7 @@ class LlvmFunction:
         self.numbers = self._of("double")
         self.integers = self._of("i64")
         self.bits = self._of("i1")
+        self.pairs = f"{{ {self.numbers}, {self.numbers} }}"
         self._head = f"define {head} {attributes} {{"
         self._slots: list[str] = []
         self._lines: list[str] = []
@@ -104,12 +107,11 @@ class LlvmFunction:
     def pair(self, x: str, y: str, type_: str = "") -> str:
         """Two at once, of registers if nothing else is said."""
         of = type_ or self.numbers
-        first = self.let(f"insertvalue {{ {of}, {of} }} undef, {of} {x}, 0")
+        first = self.let(f"insertvalue {{ {of}, {of} }} poison, {of} {x}, 0")
         return self.let(f"insertvalue {{ {of}, {of} }} {first}, {of} {y}, 1")
 
     def of_pair(self, pair: str) -> Pair:
-        kind = f"{{ {self.numbers}, {self.numbers} }}"
-        first, second = (self.let(f"extractvalue {kind} {pair}, {k}") for k in range(2))
+        first, second = (self.let(f"extractvalue {self.pairs} {pair}, {k}") for k in range(2))
         return first, second
 
     def lanes(self, x: str) -> list[str]:
@@ -121,7 +123,7 @@ class LlvmFunction:
     def together(self, lanes: Sequence[str]) -> str:
         if self.width == 1:
             return lanes[0]
-        found = "undef"
+        found = "poison"
         for k, lane in enumerate(lanes):
             found = self.let(f"insertelement {self.numbers} {found}, double {lane}, i64 {k}")
         return found
@@ -130,9 +132,9 @@ class LlvmFunction:
         """A register of one number."""
         if self.width == 1:
             return lane
-        first = self.let(f"insertelement {self.numbers} undef, double {lane}, i64 0")
+        first = self.let(f"insertelement {self.numbers} poison, double {lane}, i64 0")
         return self.let(
-            f"shufflevector {self.numbers} {first}, {self.numbers} undef, <{self.width} x i32> zeroinitializer"
+            f"shufflevector {self.numbers} {first}, {self.numbers} poison, <{self.width} x i32> zeroinitializer"
         )
 
     # --- memory
