@@ -242,7 +242,7 @@ def test_every_function_of_models_with_any_instructions(compiler, march, tmp_pat
 def test_linear_systems_too_large_to_be_written_out(compiler, tmp_path):
     model = own(MANY, "many", tmp_path, links=12)
     loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
-    assert max(error(loaded, truth, width, width) for width in (1, 4)) < 1e-14  # measured 1.2e-15
+    assert max(error(loaded, truth, width, width) for width in (1, 4)) < 1e-14  # measured 1.6e-15
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -252,7 +252,11 @@ def test_names_of_models_meet_no_others(compiler, tmp_path):
     assert error(loaded, truth, 2, 1) < 1e-14  # measured 1.4e-16
 
 
-@pytest.fixture(scope="module", params=[(name, march) for name in COMPILERS for march in INSTRUCTIONS[-2:]])
+@pytest.fixture(
+    scope="module",
+    params=[(name, march) for name in COMPILERS for march in INSTRUCTIONS[-2:]],
+    ids="-".join,
+)
 def everything(request, tmp_path_factory) -> tuple[LoadedKernel, Truth]:
     folder = tmp_path_factory.mktemp("everything")
     model = own(EVERYTHING, "everything", folder)
