@@ -38,7 +38,7 @@ const CKernel* load(std::string_view object) {
   const nb::gil_scoped_acquire lock;
   const nb::object found = jit("load")(nb::bytes(object.data(), object.size()));
   if (nb::isinstance<nb::str>(found)) throw std::invalid_argument(nb::cast<std::string>(found));
-  return reinterpret_cast<const CKernel*>(nb::cast<std::uintptr_t>(found));  // NOLINT(performance-no-int-to-ptr)
+  return reinterpret_cast<const CKernel*>(nb::cast<std::uintptr_t>(found));
 }
 
 io::Llvm llvm() {
