@@ -7,12 +7,13 @@ import json
 import sys
 from pathlib import Path
 
+from pendula_codegen.backends.llvm import INSTRUCTION_SETS
 from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import close_loops
-from pendula_codegen.kernel_program import render_bytecode, render_c
+from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
 from pendula_codegen.links import LINKS
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.models import find_model
@@ -74,7 +75,18 @@ def _parser() -> argparse.ArgumentParser:
     program.add_argument("--links", type=int, help="as of the command model")
     _add_feedback(program)
     program.add_argument(
-        "--as", dest="language", choices=("c", "bytecode"), default="c", help="bytecode is interpreted"
+        "--as",
+        dest="language",
+        choices=("c", "bytecode", "llvm"),
+        default="c",
+        help="bytecode is interpreted",
+    )
+    program.add_argument(
+        "--for",
+        dest="instruction_set",
+        choices=[*INSTRUCTION_SETS],
+        default="baseline",
+        help="of what LLVM compiles",
     )
     program.add_argument("--output", required=True, type=Path, help="a file")
     program.set_defaults(run=_run_program)
@@ -153,6 +165,8 @@ def _run_program(options: argparse.Namespace) -> None:
     model = _fed_model(options)
     if options.language == "bytecode":
         text = render_bytecode(model)
+    elif options.language == "llvm":
+        text = render_llvm(model, options.instruction_set)
     else:
         text = render_c(model, Path(options.model).name, options.output.name)
     write_atomically(options.output, text)

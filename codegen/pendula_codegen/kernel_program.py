@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pendula_codegen.backends.bytecode import function_lines
 from pendula_codegen.backends.c import CALLS, INTERFACE, print_functions, print_plain, quoted
+from pendula_codegen.backends.llvm import print_kernel
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
@@ -52,3 +53,9 @@ def render_bytecode(model: Model) -> str:
         "end",
     ]
     return "\n".join(lines) + "\n"
+
+
+def render_llvm(model: Model, instruction_set: str) -> str:
+    """The kernel of a model as LLVM's text, for an instruction set of the library."""
+    kernel = ModelKernel(model)
+    return print_kernel(kernel_table(kernel), len(model.coordinates), info_lines(kernel), instruction_set)

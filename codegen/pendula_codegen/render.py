@@ -54,6 +54,7 @@ class Header:
 KINDS = {
     "backends/bytecode.py": {"program"},
     "backends/c.py": {"program"},
+    **{f"backends/{name}.py": {"program"} for name in ("llvm", "llvm_functions", "llvm_loops", "llvm_text")},
     "blocks.py": {"kernel"},
     "chain.py": {"kernel"},
     "chain_kernel.py": {"kernel"},

@@ -5,14 +5,22 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
+from importlib.util import find_spec
 from pathlib import Path
+from platform import machine
+from typing import Any
 
-from pendula_codegen.kernel_program import render_c
+from pendula_codegen.kernel_program import render_c, render_llvm
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.table import OF_MANY, PLAIN, KernelTable, TableFunction, kernel_table
 
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+LLVM = "llvm"
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] + [LLVM] * bool(find_spec("llvmlite"))
+# What LLVM's text calls them; the widest that this processor has.
+FEATURES = Path("/proc/cpuinfo").read_text() if machine() == "x86_64" else ""
+WIDEST = "avx512" if " avx512dq " in FEATURES else "avx2" if " avx2 " in FEATURES else "baseline"
+INSTRUCTION_SETS = {"native": WIDEST, "haswell": "avx2", "x86-64": "sse2"}
 WIDTHS = (1, 2, 4, 8)
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=fast", "-fno-math-errno", "-Wall", "-Wextra", "-Werror")
 
@@ -60,21 +68,43 @@ def flat(rows: Rows) -> Numbers:
     return Numbers([number for row in rows for number in row])
 
 
+def jit(text: str) -> Any:
+    """The engine that has a kernel of LLVM's text; what is wrong with that is an error."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    module = llvm.parse_assembly(text)
+    module.verify()
+    machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    engine = llvm.create_mcjit_compiler(module, machine)
+    engine.finalize_object()
+    return engine
+
+
 class LoadedKernel:
-    """The kernel of a model, by a compiler, with instructions that `march` names."""
+    """The kernel of a model, by a compiler, with instructions that `march` names; or by LLVM from its own text."""
 
     def __init__(self, model: Model, folder: Path, compiler: str, march: str = "native"):
         self.table: KernelTable = kernel_table(ModelKernel(model))
+        if compiler == LLVM:
+            self._library = jit(render_llvm(model, INSTRUCTION_SETS[march]))
+            self._kernel = _Kernel.from_address(self._library.get_global_value_address("pendula_kernel"))
+        else:
+            self._library = self._compiled(model, folder, compiler, march)
+            self._kernel = _Kernel.in_dll(self._library, "pendula_kernel")
+        self.interface = self._kernel.interface
+        self.description = self._kernel.description.decode()
+
+    @staticmethod
+    def _compiled(model: Model, folder: Path, compiler: str, march: str) -> ctypes.CDLL:
         source = folder / f"{model.name}.c"
         source.write_text(render_c(model, Path(model.file).name, source.name), encoding="utf-8")
         shared = folder / f"{model.name}-{compiler}-{march}.so"
         command = [compiler, *FLAGS, f"-march={march}", str(source), "-o", str(shared), "-lm"]
         ended = subprocess.run(command, capture_output=True, text=True)
         assert ended.returncode == 0 and ended.stderr == "", f"{' '.join(command)}:\n{ended.stderr}"
-        self._library = ctypes.CDLL(str(shared))
-        self._kernel = _Kernel.in_dll(self._library, "pendula_kernel")
-        self.interface = self._kernel.interface
-        self.description = self._kernel.description.decode()
+        return ctypes.CDLL(str(shared))
 
     def call(self, name: str, width: int, given: dict[str, Rows]) -> dict[str, Rows]:
         """What a function gives; `given` has rows of all that functions take."""

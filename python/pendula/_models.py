@@ -33,7 +33,7 @@ def _inputs(given: Mapping[str, object]) -> dict[str, float]:
 class Kernel(NamedTuple):
     """How the functions of a model run."""
 
-    by: str  #: "built in", "compiled" or "interpreted"
+    by: str  #: "built in", "compiled", "jit" (by LLVM in this process) or "interpreted"
     file: Path | None  #: where it is kept; None if it is part of pendula
 
 
@@ -152,10 +152,10 @@ class Model(System):
         """How the model's functions run: it is made if need be.
 
         >>> import pendula
-        >>> pendula.Model("furuta").kernel.by in ("built in", "compiled", "interpreted")
+        >>> pendula.Model("furuta").kernel.by in ("built in", "compiled", "jit", "interpreted")
         True
         """
-        by = {"build": "built in", "compiler": "compiled", "interpreter": "interpreted"}
+        by = {"build": "built in", "compiler": "compiled", "llvm": "jit", "interpreter": "interpreted"}
         return Kernel(
             by[self._info.kernel_by], Path(self._info.kernel_file) if self._info.kernel_file else None
         )

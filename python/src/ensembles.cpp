@@ -33,6 +33,7 @@
 #include "io/journal.hpp"
 #include "io/quantity_arrays.hpp"
 #include "prepared.hpp"
+#include "toolchain.hpp"
 
 namespace pendula::python {
 namespace {
@@ -62,8 +63,7 @@ class Ensemble {
            const std::string& command, const std::string& program, const std::string& python, Tell tell)
       : tell_(std::move(tell)) {
     const nb::gil_scoped_release others_may_go_on;
-    io::EnsembleSource source{{name, text}, overrides, command, io::Toolchain::of(program)};
-    source.toolchain.python = python;
+    const io::EnsembleSource source{{name, text}, overrides, command, toolchain_of(program, python)};
     const auto say = [this](const std::string& what) {
       const nb::gil_scoped_acquire lock;
       tell_(what);

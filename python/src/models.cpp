@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "interruption.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_cache.hpp"
 #include "prepared.hpp"
+#include "toolchain.hpp"
 
 namespace pendula::python {
 namespace {
@@ -40,13 +40,6 @@ Named named(std::span<const std::string_view> names, std::span<const std::string
   Named named;
   for (std::size_t k = 0; k < names.size(); ++k) named.emplace_back(names[k], units[k]);
   return named;
-}
-
-io::Toolchain toolchain_of(const std::string& program, const std::string& python) {
-  io::Toolchain toolchain = io::Toolchain::of(program);
-  toolchain.python = python;
-  toolchain.ask = heed_signals;
-  return toolchain;
 }
 
 ModelInfo describe_model(const std::string& model, std::optional<int> links, const std::string& program,

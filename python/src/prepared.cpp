@@ -11,9 +11,9 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "interruption.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario_run.hpp"
+#include "toolchain.hpp"
 
 namespace pendula::python {
 namespace {
@@ -76,11 +76,8 @@ std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers) {
       any);
 }
 
-Models::Models(const std::string& program, std::string python, const Tell& tell)
-    : toolchain_(io::Toolchain::of(program)), tell_(tell) {
-  toolchain_.python = std::move(python);
-  toolchain_.ask = heed_signals;
-}
+Models::Models(const std::string& program, const std::string& python, const Tell& tell)
+    : toolchain_(toolchain_of(program, python)), tell_(tell) {}
 
 io::FindSystem Models::finder() {
   return [this](const io::ModelName& name) {

@@ -26,7 +26,7 @@ using Tell = nb::typed<nb::callable, void(const std::string&)>;
 /// `program` is where the program is in the Python package: it tells where the generator is. `python` runs that.
 class Models {
  public:
-  Models(const std::string& program, std::string python, const Tell& tell);
+  Models(const std::string& program, const std::string& python, const Tell& tell);
 
   io::FindSystem finder();
   const std::string& by() const { return by_; }

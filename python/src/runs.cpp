@@ -31,6 +31,7 @@
 #include "io/scenario_run.hpp"
 #include "io/summary.hpp"
 #include "run_result.hpp"
+#include "toolchain.hpp"
 #include "view/page.hpp"
 #include "view/scenario_scene.hpp"
 
@@ -267,9 +268,7 @@ void describe(const Subject& subject, io::RunContents contents, const view::Scen
 }
 
 RunModel::RunModel(const std::string& program, const std::string& python, const Tell& tell, std::string began_with)
-    : toolchain_(io::Toolchain::of(program)), models_(program, python, tell), text_(std::move(began_with)) {
-  toolchain_.python = python;
-}
+    : toolchain_(toolchain_of(program, python)), models_(program, python, tell), text_(std::move(began_with)) {}
 
 io::FindSystem RunModel::finder() {
   return [this, find = models_.finder()](io::ModelName name) {

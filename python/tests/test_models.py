@@ -43,7 +43,7 @@ def test_kernels_are_told(tmp_path, monkeypatch):
     file.write_text(MODEL)
     own = pendula.Model(file)
     assert math.isnan(own.parameters["length"]) and own.units["length"] == "m"
-    assert own.kernel.by in ("compiled", "interpreted") and own.kernel.file.exists()
+    assert own.kernel.by in ("compiled", "jit", "interpreted") and own.kernel.file.exists()
     monkeypatch.setenv("PENDULA_KERNELS_BY", "interpreter")
     assert pendula.Model(file).kernel.by == "interpreted"
 
@@ -61,6 +61,7 @@ def test_kernels_do_not_take_each_others_place(tmp_path):
 
 
 def test_what_needs_no_sympy_does_not_import_it():
+    assert pendula.Model("furuta").kernel  # it is there by now
     code = (
         "import pendula, sys\n"
         "pendula.Model('furuta').coordinates\n"

@@ -35,6 +35,15 @@ std::string numbers_text(const Numbers& numbers) {
   return text;
 }
 
+Ended ended_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
+  if (toolchain.generate) {
+    if (std::optional<Ended> here = toolchain.generate(arguments)) return *std::move(here);
+  }
+  std::vector<std::string> command = toolchain.module(toolchain.codegen, "pendula_codegen");
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return run_process(command, toolchain.ask);
+}
+
 }  // namespace
 
 std::string read_model(const fs::path& file) {
@@ -59,9 +68,7 @@ fs::path find_model(const ModelName& name, const Toolchain& toolchain) {
 }
 
 std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
-  std::vector<std::string> command = toolchain.module(toolchain.codegen, "pendula_codegen");
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  const Ended ended = run_process(command, toolchain.ask);
+  const Ended ended = ended_generator(arguments, toolchain);
   if (ended.status == 0) return ended.output;
   // A model may print, too: what it prints may come later.
   constexpr std::string_view told = "\npendula_codegen: error: ";

@@ -96,6 +96,7 @@ std::string model_source(const ModelName& name, const Toolchain& toolchain) {
 
 std::string_view ModelKernel::by() const {
   if (file.empty()) return "build";
+  if (file.extension() == llvm_kernel) return "llvm";
   return file.extension() == compiled_kernel ? "compiler" : "interpreter";
 }
 
@@ -117,7 +118,7 @@ ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
   const char* const kind = kind_of_kernels(toolchain);
   const fs::path cache = require_cache(toolchain.cache), kept = cache / (name + "-" + key.text() + kind);
   std::string problem;
-  std::shared_ptr<const SystemTable> table = load_kernel(kept, problem);
+  std::shared_ptr<const SystemTable> table = load_kernel(kept, toolchain, problem);
   const bool was_there = table != nullptr;
   if (was_there) {
     fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // marks it as used
@@ -128,7 +129,7 @@ ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
     const fs::path made = make_kernel(kind, name, arguments, workshop.folder(), toolchain);
     seal_kernel(made);
     fs::rename(made, kept);
-    table = load_kernel(kept, problem);
+    table = load_kernel(kept, toolchain, problem);
     if (!table) throw ModelError("the kernel cannot be loaded: " + problem);
   }
   remove_unused_kernels(cache);

@@ -19,7 +19,7 @@ struct ModelKernel {
   std::shared_ptr<const SystemTable> table;
   bool was_there = true;  ///< false if it was made just now
 
-  /// How its functions run: "build" if it is part of this program, else "compiler" or "interpreter".
+  /// How its functions run: "build" if it is part of this program, else "compiler", "llvm" or "interpreter".
   std::string_view by() const;
 };
 

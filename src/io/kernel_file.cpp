@@ -93,7 +93,7 @@ void seal_kernel(const fs::path& file) {
   }
 }
 
-std::shared_ptr<const SystemTable> load_kernel(const fs::path& kept, std::string& problem) {
+std::shared_ptr<const SystemTable> load_kernel(const fs::path& kept, const Toolchain& toolchain, std::string& problem) {
   Descriptor opened(open(kept.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   struct stat status {};
   const auto none = [&](const std::string& why) -> std::shared_ptr<const SystemTable> {
@@ -108,6 +108,7 @@ std::shared_ptr<const SystemTable> load_kernel(const fs::path& kept, std::string
   try {
     if (kept.extension() == compiled_kernel) return table_of_object(std::move(opened));
     file.text.resize(file.text.size() - seal_of({}).size());
+    if (kept.extension() == llvm_kernel) return table_of(*toolchain.llvm.load(file.text), nullptr);
     return table_of(std::move(file.text), *library().interpreter);
   } catch (const std::invalid_argument& error) {
     return none(error.what());
@@ -120,8 +121,8 @@ void remove_unused_kernels(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder, none)) {
     const fs::file_time_type used = entry.last_write_time(none);
     const fs::path kind = entry.path().extension();
-    if (!none && (kind == compiled_kernel || kind == interpreted_kernel) && used < oldest)
-      fs::remove(entry.path(), none);
+    const bool is_kernel = kind == compiled_kernel || kind == llvm_kernel || kind == interpreted_kernel;
+    if (!none && is_kernel && used < oldest) fs::remove(entry.path(), none);
   }
 }
 

@@ -5,18 +5,21 @@
 #include <pendula/system/system_table.hpp>
 #include <string>
 
+#include "io/toolchain.hpp"
+
 /// Files of kernels. They end in a hash, so that a damaged kernel is not run.
 namespace pendula::io {
 
-/// Extensions of their names: a shared object, or a program for the interpreter.
-inline constexpr const char *compiled_kernel = ".so", *interpreted_kernel = ".program";
+/// Extensions of their names: a shared object, an object file by LLVM, or a program for the interpreter.
+inline constexpr const char *compiled_kernel = ".so", *llvm_kernel = ".o", *interpreted_kernel = ".program";
 
 /// Appends the hash. Throws ModelError if the file cannot be written.
 void seal_kernel(const std::filesystem::path& file);
 
 /// Loads a kernel. Returns null, and says why in `problem`, unless the file is complete, the user's own, and of this
 /// version.
-std::shared_ptr<const SystemTable> load_kernel(const std::filesystem::path& kept, std::string& problem);
+std::shared_ptr<const SystemTable> load_kernel(const std::filesystem::path& kept, const Toolchain& toolchain,
+                                               std::string& problem);
 
 /// Removes kernels that were not used for 90 days: each version of a model and of pendula has its own.
 void remove_unused_kernels(const std::filesystem::path& folder);

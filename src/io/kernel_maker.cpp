@@ -107,30 +107,48 @@ fs::path compile(const std::string& name, const fs::path& text, const Toolchain&
   return made;
 }
 
+fs::path compile_by_llvm(const std::string& name, const fs::path& text, const Toolchain& toolchain) {
+  const fs::path made = fs::path(text).replace_extension(llvm_kernel);
+  const std::string problem = toolchain.llvm.compile(text, made);
+  if (!problem.empty()) {
+    throw ModelError("LLVM refuses the kernel of " + name + ": " + problem +
+                     " (PENDULA_KERNELS_BY=interpreter does without)");
+  }
+  return made;
+}
+
 }  // namespace
 
 const char* kind_of_kernels(const Toolchain& toolchain) {
   const std::string& by = toolchain.kernels_by;
-  if (by == "interpreter" || (by == "auto" && toolchain.compiler.empty())) return interpreted_kernel;
-  if (by != "compiler" && by != "auto") {
-    throw ModelError("PENDULA_KERNELS_BY: expected compiler, interpreter or auto, got " + by);
+  const bool is_open = by == "auto";
+  if (by == "compiler" && toolchain.compiler.empty()) {
+    throw ModelError("models take a C compiler, got no cc, gcc or clang (CC names one)");
   }
-  if (toolchain.compiler.empty()) throw ModelError("models take a C compiler, got no cc, gcc or clang (CC names one)");
-  return compiled_kernel;
+  if (by == "compiler" || (is_open && !toolchain.compiler.empty())) return compiled_kernel;
+  if (by == "llvm" && !toolchain.has_llvm()) {
+    throw ModelError("PENDULA_KERNELS_BY: llvm is for Python with llvmlite (pip install 'pendula[jit]')");
+  }
+  if (by == "llvm" || (is_open && toolchain.has_llvm())) return llvm_kernel;
+  if (by == "interpreter" || is_open) return interpreted_kernel;
+  throw ModelError("PENDULA_KERNELS_BY: expected compiler, llvm, interpreter or auto, got " + by);
 }
 
 std::string how_made(std::string_view kind, const Toolchain& toolchain) {
   if (kind == compiled_kernel) return "compiled by " + toolchain.compiler;
-  return toolchain.kernels_by == "auto" ? "interpreted: no C compiler was found (CC names one)" : "interpreted";
+  const std::string how = kind == llvm_kernel ? "compiled by LLVM" : "interpreted";
+  return toolchain.kernels_by == "auto" ? how + ": no C compiler was found (CC names one)" : how;
 }
 
 fs::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
                      const fs::path& folder, const Toolchain& toolchain) {
-  const bool compiles = kind == compiled_kernel;
-  const fs::path text = folder / (compiles ? "kernel.c" : "kernel.program");
-  arguments.insert(arguments.end(), {"--as", compiles ? "c" : "bytecode", "--output", text.string()});
+  const bool is_c = kind == compiled_kernel, is_llvm = kind == llvm_kernel;
+  const fs::path text = folder / (is_c ? "kernel.c" : is_llvm ? "kernel.ll" : "kernel.program");
+  arguments.insert(arguments.end(), {"--as", is_c ? "c" : is_llvm ? "llvm" : "bytecode", "--output", text.string()});
+  if (is_llvm) arguments.insert(arguments.end(), {"--for", std::string(library().instruction_set)});
   run_generator(arguments, toolchain);
-  return compiles ? compile(name, text, toolchain) : text;
+  if (is_c) return compile(name, text, toolchain);
+  return is_llvm ? compile_by_llvm(name, text, toolchain) : text;
 }
 
 }  // namespace pendula::io

@@ -7,7 +7,7 @@
 
 #include "io/toolchain.hpp"
 
-/// Makes kernels of models: the generator derives them, and a compiler compiles them, unless they are interpreted.
+/// Makes kernels of models: the generator derives them, and a compiler or LLVM compiles them, or they are interpreted.
 /// Failures throw ModelError.
 namespace pendula::io {
 

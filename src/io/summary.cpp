@@ -92,6 +92,7 @@ std::string settings(const Summary& summary) {
   std::string solver = description.solver.empty() ? "" : description.solver + ", " + description.iteration;
   if (!description.kernel.empty()) solver += (solver.empty() ? "kernel " : ", kernel ") + description.kernel;
   if (!description.kernel.empty() && summary.kernel_by == "interpreter") solver += ", interpreted";
+  if (!description.kernel.empty() && summary.kernel_by == "llvm") solver += ", by LLVM";
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
   if (summary.aimed) text += line("accuracy", shortest(summary.accuracy));

@@ -180,7 +180,7 @@ constexpr std::array<JsonRow, 40> rows = {{
      [](const Summary& s) { return or_null(s.description.solver); }},
     {{"iteration", "string null", "how it did"}, [](const Summary& s) { return or_null(s.description.iteration); }},
     {{"kernel", "string null", "the kernel in use"}, [](const Summary& s) { return or_null(s.description.kernel); }},
-    {{"kernel_by", "string null", "how the kernel came: build, compiler or interpreter"},
+    {{"kernel_by", "string null", "how the kernel came: build, compiler, llvm or interpreter"},
      [](const Summary& s) { return where(!s.description.kernel.empty(), s.kernel_by); }},
     {{"step", "number null", "constant steps, in place of a tolerance", "s"},
      [](const Summary& s) { return where(!chooses_steps(s), s.options.step); }},

@@ -2,22 +2,45 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "io/process.hpp"
+
+namespace pendula {
+struct CKernel;
+}
+
 namespace pendula::io {
+
+/// LLVM in this process, where Python has it (python/pendula/_jit.py).
+struct Llvm {
+  std::function<bool()> is_there;
+  /// Compiles a kernel's text to an object file. Returns what is wrong, if anything is.
+  std::function<std::string(const std::filesystem::path& text, const std::filesystem::path& object)> compile;
+  /// The kernel of an object file, which stays; throws std::invalid_argument if there is none.
+  std::function<const CKernel*(std::string_view object)> load;
+};
 
 /// The programs and folders that pendula uses: Python, the C compiler, the Python packages, the cache of kernels.
 struct Toolchain {
   std::string python;              ///< a Python with the packages of the generator
   std::string compiler;            ///< C compiler; empty if there is none
-  std::string kernels_by;          ///< "compiler", "interpreter", or "auto": the compiler if there is one
+  std::string kernels_by;          ///< "compiler", "llvm", "interpreter", or "auto": the first that is there
   std::vector<std::string> flags;  ///< further compiler flags of the user
   std::filesystem::path codegen;   ///< folder of the Python package pendula_codegen
   std::filesystem::path plotting;  ///< folder of the Python package pendula_plot
   std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
   std::filesystem::path cache;     ///< folder of kernels; empty if there is none
   std::function<void()> ask;       ///< called while other programs work, if there is one; what it throws ends them
+
+  /// Runs the generator in this process, if there is one; returns nothing where `python` has to.
+  std::function<std::optional<Ended>(const std::vector<std::string>& arguments)> generate;
+  Llvm llvm;  ///< functions of the Python package; others have none
+
+  bool has_llvm() const { return llvm.is_there && llvm.is_there(); }
 
   /// Those that go with a program or Python package in `folder`: of its build, if the file pendula.toolchain is there,
   /// else of its installation. The environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS;

@@ -165,7 +165,14 @@ def test_a_program_that_is_not_what_was_written_is_made_anew(damage, pendula, tm
     assert program.read_bytes() == whole
 
 
+def test_llvm_is_for_python_alone(pendula):
+    ended = pendula("build", "spring_pendulum", PENDULA_KERNELS_BY="llvm")
+    assert ended.returncode == 2
+    told = "pendula: PENDULA_KERNELS_BY: llvm is for Python with llvmlite (pip install 'pendula[jit]')\n"
+    assert ended.stderr == told
+
+
 def test_what_nobody_runs_kernels_by_is_refused(pendula):
     ended = pendula("build", "spring_pendulum", PENDULA_KERNELS_BY="magic")
     assert ended.returncode == 2
-    assert ended.stderr == "pendula: PENDULA_KERNELS_BY: expected compiler, interpreter or auto, got magic\n"
+    assert ended.stderr == "pendula: PENDULA_KERNELS_BY: expected compiler, llvm, interpreter or auto, got magic\n"

@@ -1,0 +1,197 @@
+"""Kernels as LLVM's text: the steps of tapes for 1, 2, 4 and 8 states, in registers as wide as a processor has them.
+
+What stands in the table of a kernel is as in C (templates/kernel.c.j2), and so is the order of operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import accumulate
+
+from pendula_codegen.backends.c import INTERFACE, SELDOM
+from pendula_codegen.backends.llvm_functions import call_of, functions_of, library_declarations
+from pendula_codegen.backends.llvm_loops import factorization, iteration, rows_of_eight, solution
+from pendula_codegen.backends.llvm_text import LlvmFunction
+from pendula_codegen.linear_solve import UNROLLED
+from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
+from pendula_codegen.tape import Row, Step, Tape, Value
+
+WIDTHS = (1, 2, 4, 8)
+_AVX2 = "+avx2,+fma"
+# Of the instruction sets of the library: the numbers that a register has, and what LLVM calls the instructions.
+INSTRUCTION_SETS = {
+    "baseline": (2, ""),
+    "sse2": (2, "-sse3"),
+    "avx2": (4, _AVX2),
+    "avx512": (8, f"{_AVX2},+avx512f,+avx512cd,+avx512dq,+avx512bw,+avx512vl"),
+}
+_ARITHMETIC = {"add": "fadd", "subtract": "fsub", "multiply": "fmul"}
+
+
+def print_kernel(table: KernelTable, size: int, description: Sequence[str], instruction_set: str) -> str:
+    """The kernel of a model with so many coordinates, whose description is in lines."""
+    most, features = INSTRUCTION_SETS[instruction_set]
+    used = table.operations()
+    of_many, plain = ([_written_out(one) for one in functions] for functions in (table.of_many, table.plain))
+    parts = library_declarations()
+    for width in sorted({min(most, states) for states in WIDTHS}):
+        parts += functions_of(width, used)
+        if size > UNROLLED:
+            parts += [factorization(width, size), solution(width, size)]
+    for states in WIDTHS:
+        width = min(most, states)
+        parts += rows_of_eight(states) if states < 8 else []
+        for function in filter(None, of_many):
+            seldom = states in SELDOM.get(function.name, ())
+            parts.append(_by_eight(table, function, states) if seldom else _function(function, states, width))
+        parts.append(_iteration(of_many[0], states, width, size))
+    parts += [_function(function, 1, 1) for function in filter(None, plain)]
+    target = f' "target-cpu"="x86-64" "target-features"="{features}"' if features else ""
+    parts += [*_tables(table, description), f"attributes #0 = {{ nounwind{target} }}"]
+    parts.append("attributes #1 = { nounwind willreturn memory(none) }")
+    return "\n\n".join(parts) + "\n"
+
+
+def _written_out(function: TableFunction | None) -> TableFunction | None:
+    """The same with small linear systems in products and sums."""
+    return function and replace(function, tape=function.tape.written_out(UNROLLED))
+
+
+def _tables(table: KernelTable, description: Sequence[str]) -> list[str]:
+    def list_of(
+        name: str, functions: Sequence[TableFunction | None], states: int, more: Sequence[str]
+    ) -> str:
+        entries = [f"ptr @{function.name}_{states}" if function else "ptr null" for function in functions]
+        return (
+            f"@{name} = internal constant [{len(entries) + len(more)} x ptr] [{', '.join([*entries, *more])}]"
+        )
+
+    text = "".join(f"{line}\n" for line in description).encode() + b"\0"
+    written = "".join(chr(c) if 32 <= c < 127 and c not in b'"\\' else f"\\{c:02X}" for c in text)
+    functions = ", ".join(f"ptr @functions_{states}" for states in WIDTHS)
+    kinds = f"{{ i32, ptr, [{len(WIDTHS)} x ptr], ptr }}"
+    return [
+        *(list_of(f"functions_{n}", table.of_many, n, [f"ptr @iterate_{n}"]) for n in WIDTHS),
+        list_of("plain_functions", table.plain, 1, []),
+        f'@description = internal constant [{len(text)} x i8] c"{written}"',
+        f"@pendula_kernel = constant {kinds} {{ i32 {INTERFACE}, ptr @description, "
+        f"[{len(WIDTHS)} x ptr] [{functions}], ptr @plain_functions }}",
+    ]
+
+
+def _head(function: TableFunction, states: int) -> str:
+    arrays = [f"ptr noalias readonly %{name}" for name in function.takes]
+    arrays += [f"ptr noalias %{name}" for name in function.gives]
+    return f"internal void @{function.name}_{states}(ptr readonly %at, {', '.join(arrays)})"
+
+
+def _by_eight(table: KernelTable, function: TableFunction, states: int) -> str:
+    """A function of few states by that of eight, some of them more than once."""
+    f = LlvmFunction(_head(function, states), 1)
+    taken = [table.rows[array] for array in (*CONDITIONS, *function.takes)]
+    given = [[name for name, _ in function.tape.outputs].count(array) for array in function.gives]
+    *starts, rows = accumulate((*taken, *given), initial=0)
+    wide, there = f.slot("double", 8 * rows), f.slot("ptr", 1 + len(CONDITIONS))
+    places = [f.place(wide, 8 * start) for start in starts]
+    arrays = [f.pointer("%at", 1 + k) for k in range(len(CONDITIONS))] + [
+        f"%{name}" for name in function.takes
+    ]
+    f.line(f"store ptr {f.pointer('%at', 0)}, ptr {there}")
+    for k, place in enumerate(places[: len(CONDITIONS)]):
+        f.line(f"store ptr {place}, ptr {f.let(f'getelementptr inbounds ptr, ptr {there}, i64 {1 + k}')}")
+    for array, count, place in zip(arrays, taken, places, strict=False):
+        f.line(f"call fastcc void @widen_{states}(ptr {array}, i64 {count}, ptr {place})")
+    passed = ", ".join(f"ptr {place}" for place in (there, *places[len(CONDITIONS) :]))
+    f.line(f"call void @{function.name}_8({passed})")
+    for array, count, place in zip(function.gives, given, places[len(taken) :], strict=True):
+        f.line(f"call fastcc void @narrow_{states}(ptr {place}, i64 {count}, ptr %{array})")
+    f.line("ret void")
+    return f.text()
+
+
+def _function(function: TableFunction, states: int, width: int) -> str:
+    f = LlvmFunction(_head(function, states), width)
+    with f.each_register(states) as lane:
+        steps = _Steps(f, states, lane)
+        steps.carry_out(function.tape)
+        for row, value in function.tape.outputs.items():
+            f.write(steps.place(row), steps.names[value])
+    f.line("ret void")
+    return f.text()
+
+
+def _iteration(hamiltonian_form: TableFunction, states: int, width: int, size: int) -> str:
+    def form(f: LlvmFunction, lane: int | str, reached: list[str]) -> list[str]:
+        given = {
+            (array, k): reached[first + k] for array, first in (("q", 0), ("p", size)) for k in range(size)
+        }
+        steps = _Steps(f, states, lane, given)
+        steps.carry_out(hamiltonian_form.tape)
+        outputs = hamiltonian_form.tape.outputs
+        return [steps.names[outputs[array, k]] for array in ("v", "f") for k in range(size)]
+
+    head = f"internal {{ double, double }} @iterate_{states}(ptr readonly %at, ptr readonly %on)"
+    return iteration(LlvmFunction(head, width), states, size, form)
+
+
+class _Steps:
+    """The steps of a tape, of the register that begins at the state `lane`, of so many.
+
+    names   what values are called
+    given   rows that need not be read
+    """
+
+    def __init__(self, f: LlvmFunction, states: int, lane: int | str, given: Mapping[Row, str] | None = None):
+        self.names: dict[Value, str] = {}
+        self._f = f
+        self._states = states
+        self._lane = lane
+        self._given = given or {}
+        self._arrays: dict[Value, str] = {}  # of a linear system, by its first result
+        self._places: dict[str, str] = {}
+
+    def carry_out(self, tape: Tape) -> None:
+        for step in tape.steps:
+            self._step(step)
+
+    def place(self, row: Row) -> str:
+        f, (array, k) = self._f, row
+        if array not in self._places:
+            base = f.pointer("%at", 1 + CONDITIONS.index(array)) if array in CONDITIONS else f"%{array}"
+            self._places[array] = f.place(base, self._lane)
+        return f.place(self._places[array], k * self._states)
+
+    def _step(self, step: Step) -> None:
+        f, names = self._f, self.names
+        given = [names[value] for value in step.operands]
+        match step.operation:
+            case "number":
+                names[step.first] = f.number(step.number)
+            case "read":
+                names[step.first] = self._given.get(step.row) or f.read(self.place(step.row))
+            case "add" | "subtract" | "multiply":
+                names[step.first] = f.do(_ARITHMETIC[step.operation], *given)
+            case "negative":
+                names[step.first] = f.let(f"fneg contract {f.numbers} {given[0]}")
+            case "inverse":
+                names[step.first] = f.do("fdiv", f.number(1.0), given[0])
+            case "sincos":
+                pair = f.let(f"call fastcc {f.pairs} @sincos.{f.width}({f.numbers} {given[0]})")
+                names |= zip(step.results, f.of_pair(pair), strict=True)
+            case "factor" | "solve":
+                self._system(step, given)
+            case _:
+                names[step.first] = call_of(f, step.operation, given[0], step.number)
+
+    def _system(self, step: Step, given: list[str]) -> None:
+        """A linear system that is too large to be written out: it is an array."""
+        f = self._f
+        array = self._arrays[step.first] = f.slot(f.numbers, step.count)
+        places = [f.place(array, k * f.width) for k in range(step.count)]
+        for place, name in zip(places, given[-step.count :], strict=True):
+            f.write(place, name)
+        factors = [] if step.operation == "factor" else [self._arrays[step.operands[0]]]
+        passed = ", ".join(f"ptr {one}" for one in (*factors, array))
+        f.line(f"call fastcc void @{step.operation}.{f.width}({passed})")
+        self.names |= {value: f.read(place) for value, place in zip(step.results, places, strict=True)}
