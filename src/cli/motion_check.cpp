@@ -28,8 +28,8 @@ std::string label(const std::string& what, int stages, Form form) {
 }  // namespace
 
 // Doubles the time from a picosecond up to thirty thousand years until eight steps no longer follow the motion; longer
-// times might step over what acts for a moment only. Checks run over half that time, or less if that is not short
-// enough.
+// times might step over what acts for a moment only. The first times may be too short: where forces nearly balance at
+// the start, what moves is rounding. Checks run over half that time, or less if that is not short enough.
 MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
                          double energy_rounding)
     : kernel_(kernel),
@@ -37,7 +37,10 @@ MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion
       start_(std::move(start)),
       units_(std::move(units)),
       energy_rounding_(energy_rounding) {
-  for (double time = std::ldexp(1.0, -40); time < std::ldexp(1.0, 40) && follows(time); time *= 2) time_ = time;
+  const double longest = std::ldexp(1.0, 40);
+  double time = std::ldexp(1.0, -40);
+  while (time < longest && !follows(time)) time *= 2;
+  for (; time < longest && follows(time); time *= 2) time_ = time;
   constexpr int most_spans = 8;
   for (int k = 1; k <= most_spans && time_ > 0; ++k) {
     if (std::optional<Span> found = span(std::ldexp(time_, -k))) spans_.push_back(std::move(*found));
@@ -331,7 +334,8 @@ CheckLine MotionCheck::event(const Span& span) const {
   return at_most(what, moved / (32 * epsilon * span.growth));
 }
 
-/// How far the derivative of a step, in coordinates and momenta, is from symplectic, relative to what cancels.
+/// How far the derivative of a step, in coordinates and momenta, is from symplectic, relative to its size, in units in
+/// which a momentum moves its coordinate by as much as itself.
 CheckLine MotionCheck::tangents(const Span& span) const {
   const std::string what = "tangents: D'JD = J, 4 stages";
   const auto integrator = subject_.make_integrator(options(4, Form::momentum));
@@ -343,11 +347,13 @@ CheckLine MotionCheck::tangents(const Span& span) const {
   Eigen::MatrixXd form = Eigen::MatrixXd::Zero(rows, rows);
   form.topRightCorner(half, half).setIdentity();
   form.bottomLeftCorner(half, half) = -form.topRightCorner(half, half);
-  const Eigen::MatrixXd D = derivative;
+  Eigen::VectorXd unit(rows);
+  unit.head(half) = derivative.topRightCorner(half, half).diagonal().cwiseAbs().cwiseSqrt();
+  unit.tail(half) = unit.head(half).cwiseInverse();
+  const Eigen::MatrixXd D = unit.asDiagonal().inverse() * derivative * unit.asDiagonal();
   if (!D.allFinite()) return at_most(what, none);
-  const Eigen::ArrayXXd size = (D.cwiseAbs().transpose() * form.cwiseAbs() * D.cwiseAbs()).array();
-  const Eigen::ArrayXXd defect = (D.transpose() * form * D - form).cwiseAbs().array();
-  return at_most(what, (defect / (epsilon * size + std::numeric_limits<double>::min())).maxCoeff());
+  const double defect = (D.transpose() * form * D - form).cwiseAbs().maxCoeff();
+  return at_most(what, defect / (epsilon * D.squaredNorm()));
 }
 
 }  // namespace pendula::cli
