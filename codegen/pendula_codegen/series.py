@@ -1,0 +1,193 @@
+"""Taylor series of a system's motion: which sums they take, in the form that takes fewest.
+
+The motion about a time t is Σ c_k τ^k, where t + unit·τ is the time in question. In the momentum form
+
+    dq/dt = v,  ∂L/∂v (q, v, t) = p,  dp/dt = f(q, v, t, u)
+
+the coefficients v_k are solved for at every order; in the form of second order, with residual E = M(q) a + …,
+
+    dq/dt = v,  dv/dt = a,  E(q, v, a, t, u) = 0
+
+it is a_k. Both systems are linear with the matrix M at order 0, so that it is factored once a step, and no series of its
+elimination is needed: what stands on the left is evaluated without the unknown coefficients, and what is missing on the
+right is M₀ times them.
+
+Inputs u are given with their coefficients. Time is the series (t, unit, 0, …).
+
+series_tape.py makes two functions of this, kernels have them: see there for what they take and give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from sympy import Symbol
+
+from pendula_codegen.entry_points import SystemKernel
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.places import Place
+from pendula_codegen.polynomial import Number
+from pendula_codegen.program import Assignment, Problem, Program, pose
+from pendula_codegen.series_graph import ONE, ZERO, Operand, SeriesGraph, Value, rational
+from pendula_codegen.straight_line import UNIT, Term
+from pendula_codegen.vocabulary import ORDERS, Atom, Vocabulary
+
+# Sums of squares have half as many products; what is computed beside sums counts little.
+SQUARE, OTHER = 0.6, 0.02
+
+
+@dataclass(frozen=True)
+class Series:
+    """The series of a system in one form.
+
+    has_momenta   whether the state is q, p; else q, v
+    size          coordinates
+    solved        values that are p, or E: linear in the unknown v or a
+    forces        values that are f; none in the form of second order
+    order         the nodes that are needed, each after its parts
+    sums          of products of coefficients, by their operands
+    operands      all that stand in sums
+    """
+
+    graph: SeriesGraph
+    has_momenta: bool
+    size: int
+    solved: tuple[Value, ...]
+    forces: tuple[Value, ...]
+    order: tuple[int, ...]
+    sums: tuple[tuple[Operand, Operand], ...]
+    operands: tuple[Operand, ...]
+
+    @property
+    def form(self) -> str:
+        return "momentum" if self.has_momenta else "second order"
+
+    @property
+    def cost(self) -> float:
+        return sum(SQUARE if a == b else 1.0 for a, b in self.sums) + OTHER * len(self.order)
+
+    @property
+    def places(self) -> list[tuple[int, int]]:
+        """The sums by the places of their operands."""
+        return [(self.operands.index(a), self.operands.index(b)) for a, b in self.sums]
+
+    def sums_of(self, node: int) -> list[int]:
+        """Which sums a node needs."""
+        return [self.sums.index(pair) for pair in self.graph.sums_of(node)]
+
+
+def series_of(kernel: SystemKernel) -> Series:
+    """The series with the fewest sums, of those the one with the fewest operands; of equals the second order."""
+    forms = (series_in(kernel, momenta) for momenta in (False, True))
+    return min(forms, key=lambda series: (len(series.sums), len(series.operands)))
+
+
+def series_in(kernel: SystemKernel, has_momenta: bool) -> Series:
+    """The cheapest series in one form.
+
+    As with other functions, all vocabularies are tried in the first order, and the best one in the others.
+    """
+    assignments = _assignments(kernel, has_momenta)
+    problems = [pose(assignments, vocabulary) for vocabulary in kernel.shared_vocabularies]
+
+    def best_of(tries: Sequence[tuple[Problem, Program]]) -> tuple[Series, Problem]:
+        made = [
+            (_Reader(kernel, problem, program, has_momenta, unknown_first).series(), problem)
+            for (problem, program), unknown_first in product(tries, (False, True))
+        ]
+        return min(made, key=lambda pair: pair[0].cost)
+
+    found, problem = best_of([(problem, problem.solve(ORDERS[0])) for problem in problems])
+    other, _ = best_of([(problem, problem.solve(order)) for order in ORDERS[1:]])
+    return min(found, other, key=lambda series: series.cost)
+
+
+def _assignments(kernel: SystemKernel, has_momenta: bool) -> list[Assignment]:
+    if not has_momenta:
+        return [(Place("E", index=(k,)), value) for k, value in enumerate(kernel.residual)]
+    forces = [slope + force for slope, force in zip(kernel.L_q, kernel.system.forces, strict=True)]
+    return [
+        *((Place("p", index=(k,)), value) for k, value in enumerate(kernel.L_v)),
+        *((Place("f", index=(k,)), value) for k, value in enumerate(forces)),
+    ]
+
+
+class _Reader:
+    """Reads a program as series."""
+
+    def __init__(
+        self, kernel: SystemKernel, problem: Problem, program: Program, has_momenta: bool, unknown_first: bool
+    ):
+        self._program = program
+        self._has_momenta = has_momenta
+        self._size = len(kernel.system.coordinates)
+        self._graph = SeriesGraph(unknown_first)
+        self._values: dict[int, Value] = {}
+        leaves = kernel.leaves()
+        self._symbols = {leaf.place: leaf.symbol for leaf in leaves}
+        self._inputs = [leaf.place for leaf in leaves if leaf.kind == "input"]
+        self._places = {angle.symbol: angle.place for angle in kernel.angles()}
+
+    def series(self) -> Series:
+        program, graph = self._program, self._graph
+        for node in program.order:
+            self._values[node] = self._made(node)
+        outputs = [self._term(term) for term in program.outputs]
+        roots = [node for _, node in outputs if node is not None]
+        graph.fuse(roots)
+        order = graph.order(roots)
+        sums = dict.fromkeys(pair for node in order for pair in graph.sums_of(node))
+        operands = dict.fromkeys(operand for pair in sums for operand in pair)
+        n = self._size
+        return Series(
+            graph,
+            self._has_momenta,
+            n,
+            (*outputs[:n],),
+            (*outputs[n:],),
+            (*order,),
+            (*sums,),
+            (*operands,),
+        )
+
+    def _term(self, term: Term) -> Value:
+        coefficient, node = term
+        if not coefficient or node == UNIT:
+            return rational(coefficient), None
+        return self._scaled(coefficient, node)
+
+    def _scaled(self, coefficient: Number, node: int) -> Value:
+        constant, place = self._values[node]
+        return rational(coefficient) * constant, place
+
+    def _made(self, node: int) -> Value:
+        program = self._program.graph
+        if node in program.products:
+            return self._graph.product([self._values[factor] for factor in program.products[node]])
+        if node in program.sums:
+            return self._graph.sum([self._term(term) for term in program.sums[node]])
+        atom = self._program.atoms[node]
+        if atom.difference is not None:
+            return self._of_difference(*atom.difference)
+        if node in program.definitions:
+            return self._graph.call(atom.function, self._term(program.definitions[node]))
+        return self._graph.call(atom.function, self._leaf(atom.place))
+
+    def _of_difference(self, function: str, first: Symbol, second: Symbol) -> Value:
+        x, y = (self._leaf(self._places[angle]) for angle in (first, second))
+        return self._graph.call(function, self._graph.sum([x, (-y[0], y[1])]))
+
+    def _leaf(self, place: Place) -> Value:
+        graph = self._graph
+        if place.argument == "q":
+            return ONE, graph.node("q", index=place.index[0])
+        if place.argument in ("v", "a"):
+            is_unknown = (place.argument == "v") == self._has_momenta
+            return ONE, graph.node("unknown" if is_unknown else "rate", index=place.index[0])
+        if place.field == "time":
+            return ONE, graph.node("time")
+        if place in self._inputs:
+            return ONE, graph.node("input", index=self._inputs.index(place))
+        return self._symbols[place], None
