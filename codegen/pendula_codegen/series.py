@@ -8,9 +8,9 @@ the coefficients v_k are solved for at every order; in the form of second order,
 
     dq/dt = v,  dv/dt = a,  E(q, v, a, t, u) = 0
 
-it is a_k. Both systems are linear with the matrix M at order 0, so that it is factored once a step, and no series of its
-elimination is needed: what stands on the left is evaluated without the unknown coefficients, and what is missing on the
-right is M₀ times them.
+it is a_k. Both systems are linear with the matrix M at order 0, so that it is factored once a step, and no series of
+its elimination is needed: what stands on the left is evaluated without the unknown coefficients, and what is missing on
+the right is M₀ times them.
 
 Inputs u are given with their coefficients. Time is the series (t, unit, 0, …).
 
@@ -21,18 +21,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
-from sympy import Symbol
+from sympy import Add, Integer, Symbol, expand
 
 from pendula_codegen.entry_points import SystemKernel
-from pendula_codegen.errors import GenerationError
 from pendula_codegen.places import Place
 from pendula_codegen.polynomial import Number
 from pendula_codegen.program import Assignment, Problem, Program, pose
-from pendula_codegen.series_graph import ONE, ZERO, Operand, SeriesGraph, Value, rational
+from pendula_codegen.series_graph import ONE, Operand, SeriesGraph, Value, rational
 from pendula_codegen.straight_line import UNIT, Term
-from pendula_codegen.vocabulary import ORDERS, Atom, Vocabulary
+from pendula_codegen.vocabulary import ORDERS, Order
 
 # Sums of squares have half as many products; what is computed beside sums counts little.
 SQUARE, OTHER = 0.6, 0.02
@@ -73,6 +71,11 @@ class Series:
         """The sums by the places of their operands."""
         return [(self.operands.index(a), self.operands.index(b)) for a, b in self.sums]
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether what is solved for stands in linear terms alone."""
+        return all(node is None or self.graph.is_linear(node) for _, node in self.solved)
+
     def sums_of(self, node: int) -> list[int]:
         """Which sums a node needs."""
         return [self.sums.index(pair) for pair in self.graph.sums_of(node)]
@@ -85,41 +88,68 @@ def series_of(kernel: SystemKernel) -> Series:
 
 
 def series_in(kernel: SystemKernel, has_momenta: bool) -> Series:
-    """The cheapest series in one form.
+    """The cheapest series in one form."""
+    found = _cheapest(kernel, _assignments(kernel, has_momenta), has_momenta)
+    return found or _cheapest(kernel, _linear_assignments(kernel, has_momenta), has_momenta)
 
-    As with other functions, all vocabularies are tried in the first order, and the best one in the others.
+
+def _cheapest(kernel: SystemKernel, assignments: Sequence[Assignment], has_momenta: bool) -> Series | None:
+    """As with other functions, all vocabularies are tried in the first order, and the best one in the others.
+
+    None where the unknowns stand in terms that are not linear and cancel.
     """
-    assignments = _assignments(kernel, has_momenta)
     problems = [pose(assignments, vocabulary) for vocabulary in kernel.shared_vocabularies]
+    best: tuple[float, Series, Problem] | None = None
 
-    def best_of(tries: Sequence[tuple[Problem, Program]]) -> tuple[Series, Problem]:
-        made = [
-            (_Reader(kernel, problem, program, has_momenta, unknown_first).series(), problem)
-            for (problem, program), unknown_first in product(tries, (False, True))
-        ]
-        return min(made, key=lambda pair: pair[0].cost)
+    def take(problem: Problem, order: Order) -> None:
+        nonlocal best
+        program = problem.solve(order)
+        for unknown_first in (False, True):
+            series = _Reader(kernel, program, has_momenta, unknown_first).series()
+            if series.is_linear and (best is None or series.cost < best[0]):
+                best = series.cost, series, problem
 
-    found, problem = best_of([(problem, problem.solve(ORDERS[0])) for problem in problems])
-    other, _ = best_of([(problem, problem.solve(order)) for order in ORDERS[1:]])
-    return min(found, other, key=lambda series: series.cost)
+    for problem in problems:
+        take(problem, ORDERS[0])
+    if best is None:
+        return None
+    chosen = best[2]
+    for order in ORDERS[1:]:
+        take(chosen, order)
+    return best[1]
 
 
 def _assignments(kernel: SystemKernel, has_momenta: bool) -> list[Assignment]:
     if not has_momenta:
         return [(Place("E", index=(k,)), value) for k, value in enumerate(kernel.residual)]
-    forces = [slope + force for slope, force in zip(kernel.L_q, kernel.system.forces, strict=True)]
-    return [
-        *((Place("p", index=(k,)), value) for k, value in enumerate(kernel.L_v)),
-        *((Place("f", index=(k,)), value) for k, value in enumerate(forces)),
+    return [(Place("p", index=(k,)), value) for k, value in enumerate(kernel.L_v)] + _forces(kernel)
+
+
+def _linear_assignments(kernel: SystemKernel, has_momenta: bool) -> list[Assignment]:
+    """The same with entries of the mass matrix multiplied out."""
+    system = kernel.system
+    unknowns = system.velocities if has_momenta else kernel.accelerations
+    still = {unknown: Integer(0) for unknown in unknowns}
+    solved = [
+        Add(
+            value.xreplace(still),
+            *(expand(entry) * unknown for entry, unknown in zip(kernel.mass.row(k), unknowns, strict=True)),
+        )
+        for k, value in enumerate(kernel.L_v if has_momenta else kernel.residual)
     ]
+    found = [(Place("p", index=(k,)), value) for k, value in enumerate(solved)]
+    return found + _forces(kernel) if has_momenta else found
+
+
+def _forces(kernel: SystemKernel) -> list[Assignment]:
+    forces = [slope + force for slope, force in zip(kernel.L_q, kernel.system.forces, strict=True)]
+    return [(Place("f", index=(k,)), value) for k, value in enumerate(forces)]
 
 
 class _Reader:
     """Reads a program as series."""
 
-    def __init__(
-        self, kernel: SystemKernel, problem: Problem, program: Program, has_momenta: bool, unknown_first: bool
-    ):
+    def __init__(self, kernel: SystemKernel, program: Program, has_momenta: bool, unknown_first: bool):
         self._program = program
         self._has_momenta = has_momenta
         self._size = len(kernel.system.coordinates)

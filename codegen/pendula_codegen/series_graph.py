@@ -77,6 +77,20 @@ class SeriesGraph:
         """On what is solved for."""
         return self._depends[node]
 
+    def is_linear(self, place: int) -> bool:
+        """In what is solved for, as it stands: no terms cancel."""
+        node = self.nodes[place]
+        if not self._depends[place] or node.kind == "unknown":
+            return True
+        if not all(map(self.is_linear, node.parts)):
+            return False
+        moving = [self._depends[part] for part in node.parts]
+        return (
+            node.kind == "sum"
+            or (node.kind == "product" and sum(moving) == 1)
+            or (node.kind == "quotient" and not moving[1])
+        )
+
     # --- algebra
 
     def sum(self, values: Iterable[Value]) -> Value:
@@ -183,7 +197,7 @@ class SeriesGraph:
         return divisor if function == "atan" else self.node("sqrt", divisor)
 
     def companion(self, place: int) -> int | None:
-        """What the coefficients of a node need of orders before: of a sine its cosine, of tan and tanh 1 ± their square."""
+        """What a node needs of orders before: a sine its cosine, tan and tanh 1 ± their square."""
         node = self.nodes[place]
         if node.kind in TWINS:
             return self.node(TWINS[node.kind], *node.parts)
@@ -291,4 +305,3 @@ def _of_constant(function: Call, constant: Constant) -> Constant:
         return 1 / constant
     known: dict[str, type[Function] | Callable[[Expr], Expr]] = {"sqrt": sqrt, "cbrt": cbrt}
     return (known.get(function) or getattr(sympy_functions, function))(constant)
-

@@ -30,7 +30,9 @@ from pendula_codegen.series import Series, series_of
 from pendula_codegen.series_graph import Value as Scaled
 from pendula_codegen.tape import Elimination, Row, Tape, Value
 
-EXPLICIT = 3  # unknowns up to which the inverse of the mass matrix is kept, not its factors: fewer steps in a row
+EXPLICIT = (
+    3  # unknowns up to which the inverse of the mass matrix is kept, not its factors: fewer steps in a row
+)
 
 
 @dataclass(frozen=True)
@@ -286,7 +288,9 @@ class _Start:
         if node.kind == "unknown":
             return self.tape.number(1.0) if node.index == unknown else None
         if node.kind == "sum":
-            slopes = [(c, self._slope(x, unknown)) for c, x in zip(node.coefficients, node.parts, strict=True)]
+            slopes = [
+                (c, self._slope(x, unknown)) for c, x in zip(node.coefficients, node.parts, strict=True)
+            ]
             return self._sums.linear([(c, slope) for c, slope in slopes if slope is not None])
         x, y = node.parts
         if node.kind == "quotient":
@@ -502,4 +506,3 @@ class _Next:
         if rest is None:
             return known
         return tape.add(known, tape.multiply(self._kept(self._start.at(other)), rest))
-

@@ -15,13 +15,20 @@ from math import isqrt
 
 import mpmath
 from mpmath import mpf
-from sympy import Add, Expr, Symbol
+from sympy import Add, Expr, Rational, Symbol
 
 from pendula_codegen.polynomial import Call
 from pendula_codegen.tape import Tape, triangle
 
 # Sines and cosines of angles that are told apart by nothing else.
 CIRCLE = [(3, 4, 5), (5, 12, 13), (8, 15, 17), (7, 24, 25), (20, 21, 29), (12, 35, 37), (9, 40, 41)]
+
+
+def meant(number: float | int | Fraction) -> Fraction:
+    """The simple fraction that a double is next to; else what it is."""
+    exact = Fraction(number)
+    simple = exact.limit_denominator(10**6)
+    return simple if float(simple) == float(exact) else exact
 
 
 class Rationals:
@@ -32,10 +39,7 @@ class Rationals:
         self._angles: dict[Fraction, tuple[Fraction, Fraction]] = {}
 
     def of(self, number: float | int | Fraction) -> Fraction:
-        """A double that is next to a simple fraction means it."""
-        exact = Fraction(number)
-        simple = exact.limit_denominator(10**6)
-        return simple if float(simple) == float(exact) else exact
+        return meant(number)
 
     def call(self, function: Call, x: Fraction) -> Fraction:
         if function in ("sin", "cos"):
@@ -97,10 +101,8 @@ class Decimals:
     """Numbers with as many digits as mpmath is told."""
 
     def of(self, number: float | int | Fraction) -> mpf:
-        exact = Fraction(number)
-        simple = exact.limit_denominator(10**6)
-        meant = simple if float(simple) == float(exact) else exact
-        return mpf(meant.numerator) / meant.denominator
+        exact = meant(number)
+        return mpf(exact.numerator) / exact.denominator
 
     def call(self, function: Call, x: mpf) -> mpf:
         return mpmath.cbrt(x) if function == "cbrt" else getattr(mpmath, str(function))(x)
@@ -180,9 +182,7 @@ class _Evaluator:
             number = self._numbers.of(Fraction(str(expression.evalf(60))))
             return [number] + [zero] * self._order
         if expression.is_Add:
-            return [
-                sum(terms, zero) for terms in zip(*(self(term) for term in expression.args), strict=True)
-            ]
+            return [sum(terms, zero) for terms in zip(*(self(term) for term in expression.args), strict=True)]
         if expression.is_Mul:
             found = self(expression.args[0])
             for factor in expression.args[1:]:
@@ -201,8 +201,8 @@ class _Evaluator:
             for _ in range(int(exponent) - 1):
                 found = self._product(found, base)
             return found
-        power = Fraction(str(exponent)) if exponent.is_Float else Fraction(int(exponent.p), int(exponent.q))
-        return self._composed(self._numbers.power(base[0], power, self._order), base)
+        power = Fraction(*map(int, Rational(exponent).as_numer_denom()))
+        return self._composed(self._numbers.power(base[0], meant(power), self._order), base)
 
     def _product(self, x: Coefficients, y: Coefficients) -> Coefficients:
         zero = self._numbers.of(0)
@@ -281,7 +281,7 @@ def carry_out(tape: Tape, given: Mapping[str, Sequence], numbers: Numbers) -> di
             case "sincos":
                 found = [*numbers.sine_and_cosine(x[0])]
             case "pow":
-                found = [numbers.power(x[0], Fraction(step.number).limit_denominator(10**6), 0)[0]]
+                found = [numbers.power(x[0], meant(step.number), 0)[0]]
             case "factor" | "solve":
                 entries = triangle(step.count) if step.operation == "solve" else step.count
                 whole = Tape()
