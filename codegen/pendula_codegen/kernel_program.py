@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pendula_codegen.backends.bytecode import function_lines
 from pendula_codegen.backends.c import CALLS, INTERFACE, print_functions, print_plain, quoted
+from pendula_codegen.backends.c_series import print_series
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
@@ -35,6 +36,8 @@ def render_c(model: Model, source: str, file: str) -> str:
         description=[quoted(line) for line in info_lines(kernel)],
         functions=print_functions(table),
         plain=print_plain(table),
+        series=print_series(table.series, table.names),
+        inputs=len(model.inputs),
         used=used,
         calls=sorted(used & CALLS),
     )

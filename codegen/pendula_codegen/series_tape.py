@@ -44,6 +44,11 @@ class SeriesTapes:
     next: Tape
     kept: int
 
+    @property
+    def operations(self) -> int:
+        """Of an order, beside its sums."""
+        return sum(1 for step in self.next.steps if step.operation not in ("read", "number"))
+
 
 def series_tapes(
     kernel: SystemKernel, row: Callable[[Place], Row], series: Series | None = None
@@ -99,7 +104,7 @@ class _Sums:
         self.constant = constant
 
     def scaled(self, size: Expr, value: Value) -> Value:
-        return value if size == 1 else self.tape.multiply(self.constant(size), value)
+        return value if size == 1 else self.product(self.constant(size), value)
 
     def linear(self, terms: Iterable[tuple[Expr, Value]], start: Value | None = None) -> Value | None:
         """Σ c x, one term after the other; None where there are none."""
@@ -114,7 +119,9 @@ class _Sums:
         return found
 
     def product(self, x: Value | None, y: Value) -> Value | None:
-        return None if x is None else self.tape.multiply(x, y)
+        if x is None or self.tape.number_of(y) == 1:
+            return x
+        return y if self.tape.number_of(x) == 1 else self.tape.multiply(x, y)
 
     def plus(self, x: Value | None, y: Value | None) -> Value | None:
         if x is None or y is None:

@@ -166,11 +166,11 @@ class Tape:
 
 
 class Elimination:
-    """Linear systems in products and sums, but for those with what is known to be 0."""
+    """Linear systems in products and sums, but for those with what is known to be 0 or 1."""
 
     def __init__(self, tape: Tape):
         self._tape = tape
-        self._zero = tape.number(0.0)
+        self._zero, self._one = tape.number(0.0), tape.number(1.0)
 
     def factor(self, lower: Sequence[Value]) -> list[Value]:
         """L and 1/D."""
@@ -197,7 +197,11 @@ class Elimination:
         return x
 
     def _product(self, x: Value, y: Value) -> Value:
-        return self._zero if self._zero in (x, y) else self._tape.multiply(x, y)
+        if self._zero in (x, y):
+            return self._zero
+        if self._one in (x, y):
+            return y if x == self._one else x
+        return self._tape.multiply(x, y)
 
     def _less(self, x: Value, factor: Value, y: Value) -> Value:
         """x − factor y."""
