@@ -22,6 +22,7 @@ class CSeries:
 
     padded_state   numbers of a row of one motion's state
     padded_sums    lanes of one motion's sums
+    before, after  what an order reads of the state: before the first one, and by each for the next
     """
 
     form: str
@@ -32,38 +33,43 @@ class CSeries:
     padded_sums: int
     adds_newest: bool
     start: list[str]
-    next: list[str]
+    before: list[str]
+    before_of_one: list[str]
     sums_of_one: list[str]
     sums_of_many: list[str]
+    next: list[str]
     rows_of_one: list[str]
     rows_of_many: list[str]
+    after: list[str]
 
 
 def print_series(tapes: SeriesTapes, names: Mapping[Row, str]) -> CSeries:
     series = tapes.series
-    order = {("order", k): f"order_{k}" for k in range(4)}
-    sums = {("sums", k): f"sum_{k}" for k in range(len(series.sums))}
-    start = tapes.start.written_out(UNROLLED)
-    following = Printer({}, {**order, **sums}, conditions=())
-    steps = following.steps(tapes.next)
-    written = {row: following.pack(value) for row, value in tapes.next.outputs.items()}
+    state = [step.row for step in tapes.next.steps if step.operation == "read" and step.row[0] == "state"]
+    variables = {("order", k): f"order_{k}" for k in range(4)} | {row: f"state_{row[1]}" for row in state}
+    variables |= {("sums", k): f"sum_{k}" for k in range(len(series.sums))}
+    printer = Printer({}, variables, conditions=())
+    steps = printer.steps(tapes.next)
+    written = {row: printer.pack(value) for row, value in tapes.next.outputs.items()}
     operands = [written["operands", k] for k in range(len(series.operands))]
-    lanes = lanes_of(len(series.sums))
-    adds_newest = len(series.sums) <= NEWEST_ADDED
+    one = _One(series.places, operands)
     return CSeries(
         form=series.form.capitalize(),
         sums=len(series.sums),
         operands=len(operands),
         operations=tapes.operations,
         padded_state=padded_state(series.size),
-        padded_sums=lanes,
-        adds_newest=adds_newest,
-        start=Printer(names).lines(start),
-        next=[*steps, *(f"WRITE(next, {k}) = {written['next', k]};" for k in range(2 * series.size))],
-        sums_of_one=_sums_of_one(series.places, adds_newest, lanes),
+        padded_sums=one.lanes,
+        adds_newest=one.adds_newest,
+        start=Printer(names).lines(tapes.start.written_out(UNROLLED)),
+        before=[f"V state_{k} = READ(state, {k});" for _, k in state],
+        before_of_one=one.before(),
+        sums_of_one=one.sums(),
         sums_of_many=_sums_of_many(series.places),
-        rows_of_one=_rows_of_one(series.places, operands, adds_newest, lanes),
+        next=[*steps, *(f"WRITE(next, {k}) = {written['next', k]};" for k in range(2 * series.size))],
+        rows_of_one=one.rows(),
         rows_of_many=[f"WRITE(row, {k}) = {value};" for k, value in enumerate(operands)],
+        after=[f"state_{k} = {written['next', k]};" for _, k in state],
     )
 
 
@@ -74,20 +80,6 @@ def padded_state(size: int) -> int:
 
 def lanes_of(count: int) -> int:
     return (count + 7) // 8 * 8
-
-
-def _sums_of_one(places: list[tuple[int, int]], adds_newest: bool, lanes: int) -> list[str]:
-    names = [f"sum_{k} = sums[{k}]" for k in range(len(places))]
-    lines = [f"double {', '.join(names)};"]
-    if not adds_newest:
-        return lines
-    early = "operands + OPERAND_ROW"
-    lines += [f"const double *const early = {early}, *const late = row - OPERAND_ROW;", "if (k > 1) {"]
-    lines += [f"  sum_{k} += early[{k}] * late[{lanes + k}];" for k in range(len(places))]
-    lines += ["}", "if (k > 2) {"]
-    # An operand with itself has the same product again.
-    lines += [f"  sum_{k} += late[{k}] * early[{lanes + k}];" for k in range(len(places))]
-    return [*lines, "}"]
 
 
 def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
@@ -114,18 +106,46 @@ def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
     return [*lines, "}"]
 
 
-def _rows_of_one(
-    places: list[tuple[int, int]], operands: list[str], adds_newest: bool, lanes: int
-) -> list[str]:
-    lines = []
-    for half in range(2):
-        values = [operands[pair[half]] for pair in places]
-        if adds_newest:
-            lines += [f"row[{half * lanes + k}] = {value};" for k, value in enumerate(values)]
-        else:
-            values += ["0.0"] * (lanes - len(values))
-            lines += [
-                f"WRITE_EIGHT(row + {half * lanes + k}, {', '.join(values[k : k + 8])});"
-                for k in range(0, lanes, 8)
-            ]
-    return lines
+class _One:
+    """Of one motion: rows have the first operands of all sums, then the second ones."""
+
+    def __init__(self, places: list[tuple[int, int]], operands: list[str]):
+        self._places = places
+        self._operands = operands
+        self.lanes = lanes_of(len(places))
+        self.adds_newest = len(places) <= NEWEST_ADDED
+
+    def before(self) -> list[str]:
+        """The operands of the order before the first one."""
+        where = {
+            pair[half]: half * self.lanes + k for k, pair in enumerate(self._places) for half in range(2)
+        }
+        return [
+            f"double last_{operand} = first > 1 ? before[{k}] : 0.0;" for operand, k in sorted(where.items())
+        ]
+
+    def sums(self) -> list[str]:
+        lines = [f"double {', '.join(f'sum_{k} = sums[{k}]' for k in range(len(self._places)))};"]
+        if not self.adds_newest:
+            return lines
+        lines += ["const double *const early = operands + OPERAND_ROW;", "if (k > 1) {"]
+        lines += [f"  sum_{k} += early[{k}] * last_{b};" for k, (_, b) in enumerate(self._places)]
+        lines += ["}", "if (k > 2) {"]
+        lines += [f"  sum_{k} += early[{self.lanes + k}] * last_{a};" for k, (a, _) in enumerate(self._places)]
+        return [*lines, "}"]
+
+    def rows(self) -> list[str]:
+        lines = []
+        for half in range(2):
+            values = [self._operands[pair[half]] for pair in self._places]
+            if self.adds_newest:
+                lines += [f"row[{half * self.lanes + k}] = {value};" for k, value in enumerate(values)]
+            else:
+                values += ["0.0"] * (self.lanes - len(values))
+                lines += [
+                    f"WRITE_EIGHT(row + {half * self.lanes + k}, {', '.join(values[k : k + 8])});"
+                    for k in range(0, self.lanes, 8)
+                ]
+        if self.adds_newest:
+            lines += [f"last_{operand} = {value};" for operand, value in enumerate(self._operands)]
+        return lines
