@@ -18,6 +18,7 @@ from mpmath import mpf
 from sympy import Add, Expr, Rational, Symbol
 
 from pendula_codegen.polynomial import Call
+from pendula_codegen.series_tape import SeriesTapes
 from pendula_codegen.tape import Tape, triangle
 
 # Sines and cosines of angles that are told apart by nothing else.
@@ -301,3 +302,37 @@ def carry_out(tape: Tape, given: Mapping[str, Sequence], numbers: Numbers) -> di
     for (array, k), v in tape.outputs.items():
         given_back.setdefault(array, {})[k] = value[v]
     return given_back
+
+
+def by_tapes(
+    tapes: SeriesTapes,
+    numbers: Numbers,
+    given: Mapping[str, Sequence],
+    inputs: Sequence[Sequence],
+    order: int,
+) -> list[list]:
+    """The state's coefficients, order by order, as the tapes give them.
+
+    given    parameters, times, unit, and the state at order 0
+    inputs   their coefficients, order by order
+    """
+    size, unit = 2 * tapes.series.size, given["unit"][0]
+    begun = carry_out(tapes.start, {**given, "inputs": inputs[0]}, numbers)
+    kept = [begun["kept"][k] for k in range(tapes.kept)]
+    rows, operands = [[*given["state"]], [begun["next"][k] for k in range(size)]], [[]]
+    for k in range(1, order):
+        sums = [
+            sum((operands[j][a] * operands[k - j][b] for j in range(1, k)), numbers.of(0))
+            for a, b in tapes.series.places
+        ]
+        here = {
+            "state": rows[k],
+            "inputs": inputs[k],
+            "kept": kept,
+            "sums": sums,
+            "order": [numbers.of(k), numbers.of(1) / k, unit / (k + 1), unit if k == 1 else numbers.of(0)],
+        }
+        made = carry_out(tapes.next, here, numbers)
+        rows.append([made["next"][j] for j in range(size)])
+        operands.append([made["operands"][j] for j in range(len(tapes.series.operands))])
+    return rows

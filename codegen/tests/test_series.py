@@ -14,7 +14,7 @@ from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.models import model_names
 from pendula_codegen.series import series_in
 from pendula_codegen.series_tape import SeriesTapes, series_tapes
-from series_truth import Decimals, Equations, Numbers, Rationals, carry_out, equations, motion
+from series_truth import Decimals, Equations, Numbers, Rationals, by_tapes, equations, motion
 from test_c_kernels import EVERYTHING, MANY, own
 from test_model_kernels import LINKED, read
 
@@ -59,37 +59,18 @@ class Case:
 
     def found(self, tapes: SeriesTapes, numbers: Numbers, momenta: list, order: int) -> list[list]:
         """The coefficients of the state, order by order, as the tapes give them, and back from UNIT to seconds."""
-        of, n, unit = numbers.of, len(self.q), numbers.of(UNIT)
+        of, unit = numbers.of, numbers.of(UNIT)
         inputs = [
             [of(series[k]) * unit**k if k < 3 else of(0) for series in self.given_inputs]
             for k in range(order + 1)
         ]
-        start = [*map(of, self.q), *(momenta if tapes.series.has_momenta else map(of, self.v))]
         given = {
             "parameters": [*map(of, self.numbers)],
             "times": [of(TIME)],
-            "inputs": inputs[0],
-            "state": start,
+            "state": [*map(of, self.q), *(momenta if tapes.series.has_momenta else map(of, self.v))],
             "unit": [unit],
         }
-        begun = carry_out(tapes.start, given, numbers)
-        kept = [begun["kept"][k] for k in range(tapes.kept)] if tapes.kept else []
-        rows, operands = [start, [begun["next"][k] for k in range(2 * n)]], [[]]
-        for k in range(1, order):
-            sums = [
-                sum((operands[j][a] * operands[k - j][b] for j in range(1, k)), of(0))
-                for a, b in tapes.series.places
-            ]
-            here = {
-                "state": rows[k],
-                "inputs": inputs[k],
-                "kept": kept,
-                "sums": sums,
-                "order": [of(k), of(1) / k, unit / (k + 1), unit if k == 1 else of(0)],
-            }
-            made = carry_out(tapes.next, here, numbers)
-            rows.append([made["next"][j] for j in range(2 * n)])
-            operands.append([made.get("operands", {}).get(j) for j in range(len(tapes.series.operands))])
+        rows = by_tapes(tapes, numbers, given, inputs, order)
         return [[value / unit**k for value in row] for k, row in enumerate(rows)]
 
     def differences(self, numbers: Numbers, order: int = ORDER) -> list:

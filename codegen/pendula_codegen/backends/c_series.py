@@ -100,9 +100,7 @@ def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
         lines.append("}")
     lines += [f"sum_{k} += sum_{k};" for k, (a, b) in enumerate(places) if a == b]
     lines += ["if (k % 2 == 0) {", "  const double *const middle = operands + k / 2 * OPERAND_ROW;"]
-    lines += [
-        f"  sum_{k} += READ(middle, {a}) * READ(middle, {b});" for k, (a, b) in enumerate(places)
-    ]
+    lines += [f"  sum_{k} += READ(middle, {a}) * READ(middle, {b});" for k, (a, b) in enumerate(places)]
     return [*lines, "}"]
 
 
@@ -131,7 +129,9 @@ class _One:
         lines += ["const double *const early = operands + OPERAND_ROW;", "if (k > 1) {"]
         lines += [f"  sum_{k} += early[{k}] * last_{b};" for k, (_, b) in enumerate(self._places)]
         lines += ["}", "if (k > 2) {"]
-        lines += [f"  sum_{k} += early[{self.lanes + k}] * last_{a};" for k, (a, _) in enumerate(self._places)]
+        lines += [
+            f"  sum_{k} += early[{self.lanes + k}] * last_{a};" for k, (a, _) in enumerate(self._places)
+        ]
         return [*lines, "}"]
 
     def rows(self) -> list[str]:

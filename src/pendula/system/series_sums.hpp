@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/system/series_info.hpp>
+#include <span>
+#include <utility>
+
+namespace pendula::detail {
+
+/// The sums of one motion, side by side: `operands` has rows of `lanes` first operands and as many second ones. From the
+/// middle of each sum outward to j = least, so that rows that were just written come last.
+template <std::size_t least = 1>
+[[gnu::always_inline]] inline void sums_in_lanes(const double* operands, std::size_t lanes, std::size_t k, double* sums) {
+  using Lanes = Pack<8, RegisterFor<8>>;
+  for (std::size_t at = 0; at < lanes; at += 8) {
+    const auto first = [&](std::size_t j) { return Lanes::load(operands + 2 * lanes * j + at); };
+    const auto second = [&](std::size_t j) { return Lanes::load(operands + (2 * j + 1) * lanes + at); };
+    Lanes even = k % 2 == 0 && k / 2 >= least ? first(k / 2) * second(k / 2) : Lanes(0.0), odd(0.0);
+    for (std::size_t j = (k - 1) / 2; j >= least; --j) {
+      even = fma(first(j), second(k - j), even);
+      odd = fma(first(k - j), second(j), odd);
+    }
+    (even + odd).store(sums + at);
+  }
+}
+
+/// The sums of W motions: `operands` has rows of W numbers of each operand.
+template <int W>
+void sums_of_many(const double* operands, std::span<const SeriesSum> pairs, std::size_t row, std::size_t k,
+                  double* sums) {
+  using Lanes = Pack<W, RegisterFor<W>>;
+  const auto at = [&](std::size_t j, std::size_t operand) {
+    return Lanes::load(operands + row * j + operand * static_cast<std::size_t>(W));
+  };
+  for (const auto& [first, second] : pairs) {
+    Lanes even(0.0), odd(0.0);
+    for (std::size_t j = (k - 1) / 2; j > 0; --j) {
+      even = fma(at(j, first), at(k - j, second), even);
+      if (first != second) odd = fma(at(k - j, first), at(j, second), odd);
+    }
+    even = first == second ? even + even : even + odd;
+    if (k % 2 == 0) even = fma(at(k / 2, first), at(k / 2, second), even);
+    even.store(sums);
+    sums += W;
+  }
+}
+
+/// The same where the sums are known: some together, whose operands are loaded once.
+template <int W, const auto& pairs>
+[[gnu::always_inline]] inline void known_sums_of_many(const double* operands, std::size_t row, std::size_t k,
+                                                      Pack<W, RegisterFor<W>>* sums) {
+  using Lanes = Pack<W, RegisterFor<W>>;
+  constexpr std::size_t count = pairs.size(), together = 10, groups = (count + together - 1) / together;
+  const auto some = [&]<std::size_t from, std::size_t... i>(std::index_sequence<i...>) PENDULA_WRITTEN_OUT {
+    const auto at = [&](std::size_t j, std::size_t operand) PENDULA_WRITTEN_OUT {
+      return Lanes::load(operands + row * j + operand * static_cast<std::size_t>(W));
+    };
+    std::array<Lanes, sizeof...(i)> found{(static_cast<void>(i), Lanes(0.0))...};
+    const auto add = [&]<std::size_t m>(std::size_t j, std::size_t l) PENDULA_WRITTEN_OUT {
+      constexpr std::size_t first = pairs[from + m][0], second = pairs[from + m][1];
+      found[m] = fma(at(j, first), at(l, second), found[m]);
+    };
+    const auto twice = [&]<std::size_t m>(std::size_t j, std::size_t l) PENDULA_WRITTEN_OUT {
+      add.template operator()<m>(j, l);
+      if constexpr (pairs[from + m][0] != pairs[from + m][1]) add.template operator()<m>(l, j);
+    };
+    for (std::size_t j = (k - 1) / 2; j > 0; --j) (twice.template operator()<i>(j, k - j), ...);
+    const auto end = [&]<std::size_t m>() PENDULA_WRITTEN_OUT {
+      if constexpr (pairs[from + m][0] == pairs[from + m][1]) found[m] = found[m] + found[m];
+      if (k % 2 == 0) add.template operator()<m>(k / 2, k / 2);
+      sums[from + m] = found[m];
+    };
+    (end.template operator()<i>(), ...);
+  };
+  [&]<std::size_t... g>(std::index_sequence<g...>) PENDULA_WRITTEN_OUT {
+    (some.template operator()<g * count / groups>(
+         std::make_index_sequence<(g + 1) * count / groups - g * count / groups>()),
+     ...);
+  }(std::make_index_sequence<groups>());
+}
+
+}  // namespace pendula::detail
