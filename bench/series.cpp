@@ -3,22 +3,19 @@
 #include <dlfcn.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
 #include <contestant.hpp>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <memory>
-#include <numbers>
+#include <peers/pendula.hpp>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/state.hpp>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/schedule.hpp>
 #include <pendula/system/c_kernel.hpp>
-#include <peers/pendula.hpp>
 #include <references.hpp>
 #include <stdexcept>
 #include <string>
@@ -28,33 +25,11 @@
 namespace bench {
 namespace {
 
-struct SeriesRows {
-  const double* unit;
-  double *state, *kept, *operands;
-};
-
-using SeriesStart = void (*)(const pendula::Conditions&, const SeriesRows&);
-using SeriesNext = void (*)(const pendula::Conditions&, const SeriesRows&, int first, int last);
-
-/// A kernel in C, of which the series are the last two functions; what it says of them, its text has in a comment.
-struct Kernel {
-  std::shared_ptr<const pendula::SystemTable> table;
-  SeriesStart start;
-  SeriesNext next;
-  bool has_momenta;
-};
-
-constexpr std::size_t functions_before = sizeof(pendula::SystemFunctions) / sizeof(void (*)());
-
-Kernel load(const std::string& file, bool has_momenta) {
+/// The table of a kernel in C, that a shared object has.
+std::shared_ptr<const pendula::SystemTable> load(const std::string& file) {
   void* const object = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (object == nullptr) throw std::invalid_argument(dlerror());
-  const auto& kernel = *static_cast<const pendula::CKernel*>(dlsym(object, "pendula_kernel"));
-  // The functions stand one after the other.
-  std::array<void (*)(), functions_before + 2> functions;
-  std::memcpy(functions.data(), kernel.functions[0], sizeof functions);
-  return {pendula::table_of(kernel, nullptr), reinterpret_cast<SeriesStart>(functions[functions_before]),
-          reinterpret_cast<SeriesNext>(functions[functions_before + 1]), has_momenta};
+  return pendula::table_of(*static_cast<const pendula::CKernel*>(dlsym(object, "pendula_kernel")), nullptr);
 }
 
 /// log2 x and 2^x to 1e-4: for step sizes.
@@ -68,12 +43,12 @@ double log2_near(double x) {
 /// Steps by the series of one motion.
 class SeriesRun : public Run {
  public:
-  SeriesRun(const Kernel& kernel, const pendula::SystemNumbers& numbers, const std::vector<double>& q,
+  SeriesRun(const pendula::SystemTable& kernel, const pendula::SystemNumbers& numbers, const std::vector<double>& q,
             const std::vector<double>& v, double duration, double tolerance)
       : kernel_(kernel), parameters_(numbers.parameters), n_(q.size()), q_(q), v_(v), duration_(duration) {
     order_ = std::clamp(static_cast<int>(std::lround(4 - 1.25 * std::log10(tolerance))), 6, most_order);
     log_reach_ = std::log2(tolerance) / order_;
-    row_ = 2 * n_ <= 4 ? 4 : (2 * n_ + 7) / 8 * 8;
+    row_ = pendula::series_state_row(n_, 1);
   }
 
   void operator()() override {
@@ -82,13 +57,13 @@ class SeriesRun : public Run {
     std::fill(std::begin(low_), std::end(low_), 0.0);
     std::copy(q_.begin(), q_.end(), state_);
     std::copy(v_.begin(), v_.end(), state_ + n_);
-    if (kernel_.has_momenta) kernel_.table->of_1.momentum_from_velocity(at_, q_.data(), v_.data(), state_ + n_);
+    if (kernel_.info.series.has_momenta) kernel_.of_1.momentum_from_velocity(at_, q_.data(), v_.data(), state_ + n_);
     time_ = late_ = 0;
     steps_ = 0;
-    const SeriesRows rows{&unit_, state_, kept_, operands_};
+    const pendula::SeriesRows rows{&unit_, state_, kept_, operands_};
     while (time_ < duration_) {
-      kernel_.start(at_, rows);
-      kernel_.next(at_, rows, 1, order_ - 1);
+      kernel_.of_1.series_start(at_, rows);
+      kernel_.of_1.series_next(at_, rows, 1, order_ - 1);
       double h = step_size();
       const bool last = time_ + h >= duration_;
       if (last) h = (duration_ - time_) - late_;
@@ -102,8 +77,8 @@ class SeriesRun : public Run {
 
   EndState end() override {
     std::vector<double> v(n_);
-    if (kernel_.has_momenta) {
-      kernel_.table->of_1.velocity_from_momentum(at_, state_, state_ + n_, v.data());
+    if (kernel_.info.series.has_momenta) {
+      kernel_.of_1.velocity_from_momentum(at_, state_, state_ + n_, v.data());
     } else {
       std::copy(state_ + n_, state_ + 2 * n_, v.begin());
     }
@@ -121,14 +96,14 @@ class SeriesRun : public Run {
     double size = 0;
     const double* const row = state_ + static_cast<std::size_t>(k) * row_;
     for (std::size_t i = 0; i < n_; ++i) {
-      const double rate = kernel_.has_momenta ? (k + 1) * row[row_ + i] : row[n_ + i];
+      const double rate = kernel_.info.series.has_momenta ? (k + 1) * row[row_ + i] : row[n_ + i];
       size = std::max(size, std::max(std::abs(row[i]), std::abs(rate)));
     }
     return size;
   }
 
   double step_size() const {
-    const int last = order_ - (kernel_.has_momenta ? 1 : 0);
+    const int last = order_ - (kernel_.info.series.has_momenta ? 1 : 0);
     const double base = log2_near(size_of(0));
     double log_radius = 1e3;
     for (int k = last - 3; k <= last; ++k) {
@@ -161,7 +136,7 @@ class SeriesRun : public Run {
     }
   }
 
-  Kernel kernel_;
+  const pendula::SystemTable& kernel_;
   std::vector<double> parameters_, inputs_ = std::vector<double>(64, 0.0);
   std::size_t n_, row_;
   std::vector<double> q_, v_;
@@ -202,14 +177,13 @@ pendula::RunOptions options_of(pendula::Method method, double tolerance) {
   return {.method = method, .stages = pendula::stages_for(method, tolerance), .step = 0, .tolerance = tolerance};
 }
 
-std::unique_ptr<Run> kernel_run(const Problem& problem, const Kernel& kernel, const SystemStart& start,
-                                double tolerance) {
+std::unique_ptr<Run> kernel_run(const Problem& problem, const std::shared_ptr<const pendula::SystemTable>& kernel,
+                                const SystemStart& start, double tolerance) {
   const auto vector = [](const std::vector<double>& values) {
     return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   };
-  const pendula::SystemSubject subject(kernel.table, numbers_of(start, kernel.table->info));
-  return std::make_unique<LibraryRun>(problem,
-                                      subject.make_integrator(options_of(pendula::Method::gauss, tolerance)),
+  const pendula::SystemSubject subject(kernel, numbers_of(start, kernel->info));
+  return std::make_unique<LibraryRun>(problem, subject.make_integrator(options_of(pendula::Method::gauss, tolerance)),
                                       pendula::Motion{0, vector(start.q), vector(start.v)});
 }
 
@@ -264,36 +238,35 @@ void race(const char* who, const Reference& reference, Make make, bool all) {
 }  // namespace
 }  // namespace bench
 
-/// Arguments: for each problem its name, the shared object of its kernel, and momentum or second.
+/// Arguments: for each problem its name and the shared object of its kernel; --all first for all tolerances.
 int main(int count, char** arguments) {
   using namespace bench;
-  bool all = false;
-  for (int k = 1; k < count; k += 3) {
-    if (std::string(arguments[k]) == "--all") {
-      all = true;
-      k -= 2;
-      continue;
-    }
-    if (k + 2 >= count) return 2;
+  const bool all = count > 1 && std::string(arguments[1]) == "--all";
+  for (int k = all ? 2 : 1; k + 1 < count; k += 2) {
     const std::string name = arguments[k];
-    const auto& problem = *std::find_if(kernel_problems.begin(), kernel_problems.end(),
-                                        [&](const Problem& each) { return each.name == name; });
-    const Kernel kernel = load(arguments[k + 1], std::string(arguments[k + 2]) == "momentum");
+    const auto* const found = std::find_if(kernel_problems.begin(), kernel_problems.end(),
+                                           [&](const Problem& each) { return each.name == name; });
+    if (found == kernel_problems.end()) throw std::invalid_argument("no problem " + name);
+    const Problem& problem = *found;
+    const auto kernel = load(arguments[k + 1]);
     static const SystemStart chain{"double_pendulum", {}, {}, {problem.angle, problem.angle}, {0, 0}};
     const SystemStart& start = problem.kernel.empty() ? chain : system_start(problem);
-    const pendula::SystemNumbers numbers = numbers_of(start, kernel.table->info);
+    const pendula::SystemNumbers numbers = numbers_of(start, kernel->info);
     const Reference& reference = reference_of(problem, references);
-    std::printf("%s, %s\n", name.c_str(), kernel.has_momenta ? "momentum form" : "second order");
-    race("series", reference,
-         [&](double tolerance) {
-           return std::make_unique<SeriesRun>(kernel, numbers, start.q, start.v, problem.duration, tolerance);
-         },
-         all);
-    race("gauss", reference, [&](double tolerance) { return kernel_run(problem, kernel, start, tolerance); }, all);
+    std::printf("%s, %s\n", name.c_str(), kernel->info.series.has_momenta ? "momentum form" : "second order");
+    race(
+        "series", reference,
+        [&](double tolerance) {
+          return std::make_unique<SeriesRun>(*kernel, numbers, start.q, start.v, problem.duration, tolerance);
+        },
+        all);
+    race(
+        "gauss", reference, [&](double tolerance) { return kernel_run(problem, kernel, start, tolerance); }, all);
     if (!problem.kernel.empty()) continue;
-    for (const auto& [who, method] : {std::pair{"gauss of rods", pendula::Method::gauss},
-                                      std::pair{"taylor of rods", pendula::Method::taylor}}) {
-      race(who, reference, [&](double tolerance) { return rods_run(problem, method, tolerance); }, all);
+    for (const auto& [who, method] :
+         {std::pair{"gauss of rods", pendula::Method::gauss}, std::pair{"taylor of rods", pendula::Method::taylor}}) {
+      race(
+          who, reference, [&](double tolerance) { return rods_run(problem, method, tolerance); }, all);
     }
   }
 }

@@ -19,7 +19,7 @@ namespace pendula::test {
 namespace {
 
 // A mass m on a spring k with a force u, as the generator writes it, with bars in place of tabs.
-constexpr std::string_view spring = R"(program|10
+constexpr std::string_view spring = R"(program|11
 name|spring
 model|spring
 links|1
@@ -30,6 +30,7 @@ parameter|m|kg|1|1.0|1|0
 parameter|k|N/m|1|1.0|0|0
 input|u|N
 point|bob|2
+series|0|0|0|2
 function|hamiltonian_form|6
 read|0|parameters|0
 read|1|p|0
@@ -167,6 +168,39 @@ read|0|v|0
 number|1|0.0
 write|0|r_dot|0
 write|1|r_dot|1
+function|series_start|6
+read|0|parameters|0
+read|1|parameters|1
+read|2|inputs|0
+read|3|state|0
+read|4|state|1
+read|5|unit|0
+negative|2|2
+inverse|0|0
+multiply|4|4|5
+multiply_add|2|1|3|2
+negative|2|2
+multiply|2|2|0
+multiply|2|2|5
+write|4|next|0
+write|2|next|1
+write|1|kept|0
+write|0|kept|1
+function|series_next|6
+read|0|inputs|0
+read|1|state|0
+read|2|kept|0
+read|3|kept|1
+read|4|state|1
+read|5|order|2
+negative|0|0
+multiply|4|4|5
+multiply_add|0|1|2|0
+negative|0|0
+multiply|0|0|3
+multiply|0|0|5
+write|4|next|0
+write|0|next|1
 end
 )";
 
@@ -305,7 +339,7 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
     return "nothing";
   };
   EXPECT_EQ(told(""), "line 0: expected a program, got ");
-  EXPECT_EQ(told(changed("program|10", "program|9")), "line 1: expected a whole number from 10 to 10, got 9");
+  EXPECT_EQ(told(changed("program|11", "program|9")), "line 1: expected a whole number from 11 to 11, got 9");
   EXPECT_EQ(told(changed("links|1", "links|one")), "line 4: expected a whole number from 1 to 1000000, got one");
   EXPECT_EQ(told(changed("kg|1|1.0|1|0", "kg|1|1.0|1")), "line 8: expected another word, got the end of the line");
   EXPECT_EQ(told(changed("bob|2", "bob|2|3")), "line 11: expected the end of the line, got 3");

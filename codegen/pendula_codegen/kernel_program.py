@@ -12,7 +12,7 @@ from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.render import ENVIRONMENT, banner, links_argument
 from pendula_codegen.system_info import info_lines
-from pendula_codegen.table import kernel_table
+from pendula_codegen.table import kernel_table, series_functions
 
 
 def render_c(model: Model, source: str, file: str) -> str:
@@ -33,7 +33,7 @@ def render_c(model: Model, source: str, file: str) -> str:
         widths=(1, 2, 4, 8),
         unrolled=UNROLLED,
         size=len(model.coordinates),
-        description=[quoted(line) for line in info_lines(kernel)],
+        description=[quoted(line) for line in info_lines(kernel, table.series)],
         functions=print_functions(table),
         plain=print_plain(table),
         series=print_series(table.series, table.names),
@@ -47,10 +47,13 @@ def render_bytecode(model: Model) -> str:
     """The kernel of a model for the interpreter: a line of words with tabs between them for each thing it says."""
     kernel = ModelKernel(model)
     table = kernel_table(kernel)
-    functions = [function for function in (*table.of_many, *table.plain) if function]
+    functions = [
+        function for function in (*table.of_many, *table.plain, *series_functions(table)) if function
+    ]
     lines = [
         f"program\t{INTERFACE}",
-        *info_lines(kernel),
+        *info_lines(kernel, table.series),
+        *(f"sum\t{first}\t{second}" for first, second in table.series.series.places),
         *(line for function in functions for line in function_lines(function)),
         "end",
     ]

@@ -12,9 +12,36 @@ it is a_k. Both systems are linear with the matrix M at order 0, so that it is f
 its elimination is needed: what stands on the left is evaluated without the unknown coefficients, and what is missing on
 the right is M₀ times them.
 
-Inputs u are given with their coefficients. Time is the series (t, unit, 0, …).
+Inputs u are given with their coefficients: sines, polynomials and tables are the affair of who moves the system. Time
+is the series (t, unit, 0, …).
 
-series_tape.py makes two functions of this, kernels have them: see there for what they take and give.
+What kernels have of this
+-------------------------
+
+Two functions of W motions, W = 1, 2, 4, 8, beside those of SystemFunctions (pendula/system/system_table.hpp):
+
+    series_start(at, rows)               order 0: reads row 0 of the state, gives row 1 and `kept`
+    series_next(at, rows, first, last)   orders first … last, first ≥ 1: give rows first + 1 … last + 1 of the state
+
+    at     Conditions: parameters, times t at order 0; inputs, (last + 1, inputs, W), are coefficients of τ^k, order by
+           order, so that row 0 is what other functions take
+    rows   SeriesRows: unit, (W), s; and memory of three kinds, all of it the caller's, aligned to 64 bytes:
+           state     rows of coefficients, order + 1 of them: of q, then of p, or of v in the form of second order
+           kept      (SeriesInfo.kept, W): series_start writes it, series_next reads it
+           operands  a row for each order up to last, row 0 unused: series_next writes and reads it
+
+series_next(1, order − 1) after series_start has rows 0 … order of the state; it may be asked in parts, each of which
+needs what was before. How long rows are, src/pendula/system/series_info.hpp says. For many motions a row of the state is
+2n x W numbers, one of the operands has W of each. One motion is laid out for its sums, which have a lane each: a row of
+operands has the first operands of all sums, padded to a multiple of 8, then the second ones; a row of the state is padded
+to 4 or a multiple of 8 numbers, so that registers can sum many coordinates at once. What pads is never written.
+
+Rates follow from q: v_k = (k + 1) q_(k+1) / unit. A coefficient that is not finite says that there is no series: a
+mass matrix that is singular, or a function at a point where it has none. Coefficients grow as unit^k: who sees them
+overflow takes a smaller unit. Where nothing moves, all coefficients but those of order 0 are zero.
+
+SeriesInfo tells the form and how many sums, operands and kept numbers there are. Kernels in C++ of more than ten
+coordinates have no series: their functions are null there.
 """
 
 from __future__ import annotations
@@ -164,7 +191,7 @@ class _Reader:
         program, graph = self._program, self._graph
         for node in program.order:
             self._values[node] = self._made(node)
-        outputs = [self._term(term) for term in program.outputs]
+        outputs = [graph.multiplied_out(self._term(term)) for term in program.outputs]
         roots = [node for _, node in outputs if node is not None]
         graph.fuse(roots)
         order = graph.order(roots)

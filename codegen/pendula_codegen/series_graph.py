@@ -111,6 +111,15 @@ class SeriesGraph:
             return first, self.node("sum", *held, coefficients=(ONE,) * len(held))
         return ONE, self.node("sum", *held, coefficients=(*held.values(),), offset=offset)
 
+    def multiplied_out(self, value: Value) -> Value:
+        """A constant times a sum as a sum."""
+        constant, node = value
+        if node is None or constant == 1 or self.nodes[node].kind != "sum":
+            return value
+        held = self.nodes[node]
+        scaled = tuple(constant * c for c in held.coefficients)
+        return ONE, self.node("sum", *held.parts, coefficients=scaled, offset=constant * held.offset)
+
     def product(self, factors: Sequence[Value]) -> Value:
         """Equal factors first, by squares; then one after the other, what is solved for last or first."""
         constant = ONE

@@ -173,3 +173,13 @@ class _Tables:
 
 def _taken(function: Function) -> tuple[str, ...]:
     return tuple(argument.name for argument in function.inputs if argument.type == "vector")
+
+
+def series_functions(table: KernelTable) -> tuple[TableFunction, TableFunction]:
+    """The tapes of a kernel's series as functions; what they take besides the conditions is said there."""
+    return (
+        TableFunction("series_start", ("unit", "state"), ("next", "kept"), table.series.start),
+        TableFunction(
+            "series_next", ("order", "state", "kept", "sums"), ("next", "operands"), table.series.next
+        ),
+    )

@@ -400,6 +400,7 @@ def test_what_a_kernel_says_of_itself(everything):
         "point\tp\t2",
         "point\tr\t3",
         *(line for line in lines if line.startswith("argument\t")),
+        f"series\t1\t61\t77\t{loaded.table.series.kept}",
     ]
 
 

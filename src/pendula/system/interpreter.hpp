@@ -28,8 +28,8 @@ class Interpreter : NumbersOfStates<W> {
 
  public:
   static constexpr SystemFunctions functions() {
-    return {&call<0>, &call<1>, &call<2>, &call<3>,  &call<4>,  &call<5>,  &call<6>,
-            &call<7>, &call<8>, &call<9>, &call<10>, &call<11>, &call<12>, &iterate, &series_start, &series_next};
+    return {&call<0>, &call<1>, &call<2>,  &call<3>,  &call<4>,  &call<5>, &call<6>,      &call<7>,
+            &call<8>, &call<9>, &call<10>, &call<11>, &call<12>, &iterate, &series_start, &series_next};
   }
   static constexpr PlainFunctions plain_functions() {
     constexpr std::size_t first = Program::many;
@@ -253,8 +253,9 @@ class Interpreter : NumbersOfStates<W> {
     const std::size_t state_row = series_state_row(program.coordinates, width);
     const std::size_t operand_row = series_operand_row(info, width);
     static thread_local PackRows<width> sums, found;
+    const auto operands = static_cast<std::size_t>(info.operands);
     if (sums.rows() < series_lanes(info)) sums = PackRows<width>(series_lanes(info));
-    if (found.rows() < static_cast<std::size_t>(info.operands)) found = PackRows<width>(info.operands);
+    if (found.rows() < operands) found = PackRows<width>(operands);
     alignas(pack_alignment) double order[4 * width];
     const L unit = load(rows.unit);
     for (auto k = static_cast<std::size_t>(first); k <= static_cast<std::size_t>(last); ++k) {

@@ -10,7 +10,8 @@
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/numbers_of_states.hpp>
 #include <pendula/numeric/stage_product.hpp>
-#include <pendula/system/series_sums.hpp>
+#include <pendula/system/kernel_numbers.hpp>
+#include <pendula/system/kernel_series.hpp>
 #include <pendula/system/system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
@@ -21,17 +22,15 @@ namespace detail {
 
 /// The functions of the generated kernel S for W states at once.
 template <System S, int W>
-class KernelFunctions : NumbersOfStates<W> {
-  using typename NumbersOfStates<W>::L;
-  using NumbersOfStates<W>::load, NumbersOfStates<W>::store;
-  static constexpr auto width = static_cast<std::size_t>(W);
-  static constexpr auto count_of_coordinates = static_cast<std::size_t>(S::coordinates);
+class KernelFunctions : KernelNumbers<S, W> {
+  using Crossing = KernelNumbers<S, W>;
+  using Crossing::inputs, Crossing::parameters, Crossing::vector, Crossing::write, Crossing::write_columns;
+  using Crossing::load, Crossing::store, Crossing::width;
+  using typename Crossing::L, typename Crossing::Rows, typename Crossing::VariedRows;
   template <class Number>
   using Vector = typename S::template Vector<Number>;
   template <class Number>
   using Matrix = typename S::template Matrix<Number>;
-  template <class Number>
-  using Parameters = typename S::template Parameters<Number>;
   template <class Number>
   using Inputs = typename S::template Inputs<Number>;
 
@@ -51,8 +50,8 @@ class KernelFunctions : NumbersOfStates<W> {
             &momentum_form_along,
             tells_arguments<S> ? &call_arguments : nullptr,
             &iterate,
-            has_series<S> ? &series_start : nullptr,
-            has_series<S> ? &series_next : nullptr};
+            has_series<S> ? &KernelSeries<S, W>::start : nullptr,
+            has_series<S> ? &KernelSeries<S, W>::next : nullptr};
   }
 
   static void residual(const Conditions& at, const double* q, const double* v, const double* a, double* E) {
@@ -83,49 +82,6 @@ class KernelFunctions : NumbersOfStates<W> {
   }
 
  private:
-  // --- Numbers as they cross ---
-
-  // Rows of W numbers, without and with their derivatives.
-  struct Rows {
-    const double* from;
-    L operator[](std::size_t k) const { return load(from + k * W); }
-  };
-  struct VariedRows {
-    const double *from, *slopes;
-    Dual<L> operator[](std::size_t k) const { return {load(from + k * W), load(slopes + k * W)}; }
-  };
-
-  // Inlined, so that compilers see which numbers a function uses, and read no others.
-  template <class Number, class From>
-  [[gnu::always_inline]] static Parameters<Number> read_parameters(const From& from, const Conditions& at) {
-    Parameters<Number> parameters;
-    S::template read_parameters<Number>(from, parameters);
-    if constexpr (holds_time<S>) parameters.time = Number(load(at.times));
-    return parameters;
-  }
-  [[gnu::always_inline]] static Parameters<L> parameters(const Conditions& at) {
-    return read_parameters<L>(Rows{at.parameters}, at);
-  }
-  template <class Matrix, class From>
-  [[gnu::always_inline]] static Matrix read(const From& from) {
-    Matrix numbers;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(Matrix::SizeAtCompileTime); ++k) numbers.data()[k] = from[k];
-    return numbers;
-  }
-  [[gnu::always_inline]] static Inputs<L> inputs(const Conditions& at) { return read<Inputs<L>>(Rows{at.inputs}); }
-  [[gnu::always_inline]] static Vector<L> vector(const double* from) { return read<Vector<L>>(Rows{from}); }
-
-  template <class Matrix>
-  [[gnu::always_inline]] static void write(const Matrix& numbers, double* to) {
-    for (Eigen::Index i = 0; i < numbers.rows(); ++i) {
-      for (Eigen::Index j = 0; j < numbers.cols(); ++j, to += W) store(numbers(i, j), to);
-    }
-  }
-  template <class Matrix>
-  [[gnu::always_inline]] static void write_columns(const Matrix& numbers, double* to) {
-    for (Eigen::Index k = 0; k < numbers.size(); ++k) store(numbers.data()[k], to + k * W);
-  }
-
   // --- The functions ---
 
   static void hamiltonian_form(const Conditions& at, const double* q, const double* p, double* v, double* f) {
@@ -210,10 +166,10 @@ class KernelFunctions : NumbersOfStates<W> {
     const Inputs<L> given = inputs(at);
     Inputs<Dual<L>> fixed;
     for (Eigen::Index k = 0; k < given.size(); ++k) fixed.data()[k] = Dual<L>(given.data()[k]);
-    const Parameters<Dual<L>> parameters = read_parameters<Dual<L>>(Rows{at.parameters}, at);
+    const auto parameters = Crossing::template read_parameters<Dual<L>>(Rows{at.parameters}, at);
     Vector<Dual<L>> found;
-    S::acceleration(parameters, read<Vector<Dual<L>>>(VariedRows{q, dq}), read<Vector<Dual<L>>>(VariedRows{v, dv}),
-                    fixed, found);
+    S::acceleration(parameters, Crossing::template read<Vector<Dual<L>>>(VariedRows{q, dq}),
+                    Crossing::template read<Vector<Dual<L>>>(VariedRows{v, dv}), fixed, found);
     for (Eigen::Index k = 0; k < found.size(); ++k) {
       store(found[k].value, a + k * W);
       store(found[k].slope, da + k * W);
@@ -227,8 +183,9 @@ class KernelFunctions : NumbersOfStates<W> {
       fixed_q[k] = Dual<L>(places[k]);
       fixed_v[k] = Dual<L>(rates[k]);
     }
-    S::momentum_form(read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at), fixed_q, fixed_v,
-                     read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}), momenta, forces);
+    S::momentum_form(Crossing::template read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at),
+                     fixed_q, fixed_v, Crossing::template read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}),
+                     momenta, forces);
     for (Eigen::Index k = 0; k < momenta.size(); ++k) {
       store(momenta[k].slope, dp + k * W);
       store(forces[k].slope, df + k * W);
@@ -291,93 +248,6 @@ class KernelFunctions : NumbersOfStates<W> {
     double total = each[0];
     for (int k = 1; k < W; ++k) total += each[k];
     return total;
-  }
-
-  // --- Taylor series ---
-
-  static void series_start(const Conditions& at, const SeriesRows& rows) {
-    if constexpr (has_series<S>) {
-      constexpr std::size_t numbers = 2 * count_of_coordinates, row = series_state_row(count_of_coordinates, width);
-      std::array<L, numbers> state, next;
-      std::array<L, static_cast<std::size_t>(S::series_kept) + 1> kept;
-      for (std::size_t i = 0; i < numbers; ++i) state[i] = load(rows.state + i * width);
-      S::template series_start<L>(parameters(at), inputs(at), load(rows.unit), state.data(), next.data(), kept.data());
-      for (std::size_t i = 0; i < numbers; ++i) store(next[i], rows.state + row + i * width);
-      for (std::size_t i = 0; i + 1 < kept.size(); ++i) store(kept[i], rows.kept + i * width);
-    }
-  }
-
-  PENDULA_IN_REGISTERS static void series_next(const Conditions& at, const SeriesRows& rows, int first, int last) {
-    if constexpr (has_series<S>) {
-      constexpr SeriesInfo info = pendula::series_of<S>();
-      constexpr std::size_t numbers = 2 * count_of_coordinates, given = S::input_names.size();
-      constexpr std::size_t state_row = series_state_row(count_of_coordinates, width);
-      constexpr std::size_t operand_row = series_operand_row(info, width);
-      const Rows kept{rows.kept};
-      const L unit = load(rows.unit);
-      std::array<L, numbers> state, next;
-      std::array<L, given + 1> inputs;
-      std::array<L, static_cast<std::size_t>(info.operands) + 1> found;
-      std::array<L, S::series_sums.size() + 1> sums;
-      const auto begin = static_cast<std::size_t>(first), end = static_cast<std::size_t>(last) + 1;
-      for (std::size_t i = 0; i < numbers; ++i) state[i] = load(rows.state + begin * state_row + i * width);
-      if constexpr (W == 1) found_before(rows.operands, begin, found);
-      double share = 1.0 / static_cast<double>(begin);
-      for (std::size_t k = begin; k < end; ++k) {
-        const double following = 1.0 / static_cast<double>(k + 1);
-        const std::array<L, 4> order{L(static_cast<double>(k)), L(share), unit * L(following),
-                                     k == 1 ? unit : L(0.0)};
-        share = following;
-        for (std::size_t i = 0; i < given; ++i) inputs[i] = load(at.inputs + (k * given + i) * width);
-        if constexpr (W == 1) {
-          sums_of_one(rows.operands, k, found, sums);
-        } else {
-          known_sums_of_many<W, S::series_sums>(rows.operands, operand_row, k, sums.data());
-        }
-        S::template series_next<L>(kept, inputs.data(), order.data(), state.data(), sums.data(), next.data(),
-                                   found.data());
-        double *const to = rows.state + (k + 1) * state_row, *const row = rows.operands + k * operand_row;
-        for (std::size_t i = 0; i < numbers; ++i) store(state[i] = next[i], to + i * width);
-        if constexpr (W == 1) {
-          for (std::size_t m = 0; m < S::series_sums.size(); ++m) {
-            row[m] = found[S::series_sums[m][0]];
-            row[series_lanes(info) + m] = found[S::series_sums[m][1]];
-          }
-        } else {
-          for (std::size_t i = 0; i + 1 < found.size(); ++i) store(found[i], row + i * width);
-        }
-      }
-    }
-  }
-
-  /// Sums of one motion. The terms of orders 1 and k − 1 are added one by one: registers cannot be read yet where their
-  /// numbers were just written so. `last` are the operands of the order before.
-  template <class Last, class Sums>
-  [[gnu::always_inline]] static void sums_of_one(const double* operands, std::size_t k, const Last& last, Sums& sums) {
-    constexpr SeriesInfo info = pendula::series_of<S>();
-    constexpr std::size_t lanes = series_lanes(info), count = S::series_sums.size();
-    alignas(pack_alignment) double found[lanes + 8];
-    sums_in_lanes<2>(operands, lanes, k, found);
-    const double* const early = operands + series_operand_row(info, 1);
-    for (std::size_t m = 0; m < count; ++m) sums[m] = found[m];
-    if (k > 1) {
-      for (std::size_t m = 0; m < count; ++m) sums[m] = fused(early[m], last[S::series_sums[m][1]], sums[m]);
-    }
-    if (k > 2) {
-      for (std::size_t m = 0; m < count; ++m) sums[m] = fused(early[lanes + m], last[S::series_sums[m][0]], sums[m]);
-    }
-  }
-
-  /// The operands of the order before the first one.
-  template <class Last>
-  static void found_before(const double* operands, std::size_t first, Last& last) {
-    constexpr SeriesInfo info = pendula::series_of<S>();
-    if (first == 1) return;
-    const double* const row = operands + (first - 1) * series_operand_row(info, 1);
-    for (std::size_t m = 0; m < S::series_sums.size(); ++m) {
-      last[S::series_sums[m][0]] = row[m];
-      last[S::series_sums[m][1]] = row[series_lanes(info) + m];
-    }
   }
 
   // --- Functions of chains only ---

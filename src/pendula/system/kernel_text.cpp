@@ -17,7 +17,7 @@ std::string_view cut(std::string_view& text, char end) {
   return before;
 }
 
-constexpr int many = 1'000'000;  // upper bound of counts
+constexpr int many = 1'000'000;       // upper bound of counts
 constexpr int most_operands = 65535;  // of series: SeriesSum has numbers of them
 
 }  // namespace

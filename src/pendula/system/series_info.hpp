@@ -20,7 +20,9 @@ struct SeriesSum {
 
 namespace detail {
 
-constexpr std::size_t to_multiple_of_8(std::size_t count) { return (count + 7) / 8 * 8; }
+constexpr std::size_t to_multiple_of_8(std::size_t count) {
+  return (count + 7) / 8 * 8;
+}
 
 }  // namespace detail
 

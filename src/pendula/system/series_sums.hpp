@@ -3,16 +3,18 @@
 #include <array>
 #include <cstddef>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/written_out.hpp>
 #include <pendula/system/series_info.hpp>
 #include <span>
 #include <utility>
 
 namespace pendula::detail {
 
-/// The sums of one motion, side by side: `operands` has rows of `lanes` first operands and as many second ones. From the
-/// middle of each sum outward to j = least, so that rows that were just written come last.
+/// The sums of one motion, side by side: `operands` has rows of `lanes` first operands and as many second ones. From
+/// the middle of each sum outward to j = least, so that rows that were just written come last.
 template <std::size_t least = 1>
-[[gnu::always_inline]] inline void sums_in_lanes(const double* operands, std::size_t lanes, std::size_t k, double* sums) {
+[[gnu::always_inline]] inline void sums_in_lanes(const double* operands, std::size_t lanes, std::size_t k,
+                                                 double* sums) {
   using Lanes = Pack<8, RegisterFor<8>>;
   for (std::size_t at = 0; at < lanes; at += 8) {
     const auto first = [&](std::size_t j) { return Lanes::load(operands + 2 * lanes * j + at); };
@@ -78,7 +80,8 @@ template <int W, const auto& pairs>
     (some.template operator()<g * count / groups>(
          std::make_index_sequence<(g + 1) * count / groups - g * count / groups>()),
      ...);
-  }(std::make_index_sequence<groups>());
+  }
+  (std::make_index_sequence<groups>());
 }
 
 }  // namespace pendula::detail
