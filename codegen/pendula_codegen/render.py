@@ -67,6 +67,8 @@ KINDS = {
     "mechanics.py": {"kernel", "model", "program"},
     "series.py": {"kernel", "model", "program"},
     "series_graph.py": {"kernel", "model", "program"},
+    "series_next.py": {"kernel", "model", "program"},
+    "series_start.py": {"kernel", "model", "program"},
     "series_tape.py": {"kernel", "model", "program"},
     "simplify.py": {"kernel", "model", "program"},
     "system_info.py": {"kernel", "model", "program"},

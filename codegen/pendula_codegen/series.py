@@ -31,10 +31,10 @@ Two functions of W motions, W = 1, 2, 4, 8, beside those of SystemFunctions (pen
            operands  a row for each order up to last, row 0 unused: series_next writes and reads it
 
 series_next(1, order − 1) after series_start has rows 0 … order of the state; it may be asked in parts, each of which
-needs what was before. How long rows are, src/pendula/system/series_info.hpp says. For many motions a row of the state is
-2n x W numbers, one of the operands has W of each. One motion is laid out for its sums, which have a lane each: a row of
-operands has the first operands of all sums, padded to a multiple of 8, then the second ones; a row of the state is padded
-to 4 or a multiple of 8 numbers, so that registers can sum many coordinates at once. What pads is never written.
+needs what was before. How long rows are, src/pendula/system/series_info.hpp says. For many motions a row of the state
+is 2n x W numbers, one of the operands has W of each. One motion is laid out for its sums, which have a lane each: a row
+of operands has the first operands of all sums, padded to a multiple of 8, then the second ones; a row of the state is
+padded to 4 or a multiple of 8 numbers, so that registers can sum many coordinates at once. What pads is never written.
 
 Rates follow from q: v_k = (k + 1) q_(k+1) / unit. A coefficient that is not finite says that there is no series: a
 mass matrix that is singular, or a function at a point where it has none. Coefficients grow as unit^k: who sees them
