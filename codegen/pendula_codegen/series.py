@@ -52,6 +52,7 @@ from dataclasses import dataclass
 from sympy import Add, Integer, Symbol, expand
 
 from pendula_codegen.entry_points import SystemKernel
+from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.places import Place
 from pendula_codegen.polynomial import Number
 from pendula_codegen.program import Assignment, Problem, Program, pose
@@ -140,9 +141,10 @@ def _cheapest(kernel: SystemKernel, assignments: Sequence[Assignment], has_momen
         take(problem, ORDERS[0])
     if best is None:
         return None
-    chosen = best[2]
-    for order in ORDERS[1:]:
-        take(chosen, order)
+    if len(kernel.system.coordinates) <= UNROLLED:  # of more, each try takes seconds
+        chosen = best[2]
+        for order in ORDERS[1:]:
+            take(chosen, order)
     return best[1]
 
 

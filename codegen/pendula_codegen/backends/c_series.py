@@ -13,7 +13,7 @@ from pendula_codegen.tape import Row
 # Of one motion, up to how many sums the newest coefficients are added one by one; beyond, their rows are made in
 # registers.
 NEWEST_ADDED = 16
-AT_A_TIME = 10  # sums of many motions that are made together: as many as registers hold
+AT_A_TIME = 30  # registers that sums of many motions take together, which are made in one loop
 
 
 @dataclass(frozen=True)
@@ -83,25 +83,51 @@ def lanes_of(count: int) -> int:
 
 
 def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
-    groups = -(-len(places) // AT_A_TIME)
+    """Some together, whose operands are read once."""
     lines = [f"V {', '.join(f'sum_{k} = SPLAT(0.0)' for k in range(len(places)))};"]
-    for group in range(groups):
-        held = range(group * len(places) // groups, (group + 1) * len(places) // groups)
+    for group in _groups(places):
+        operands = sorted({operand for k in group for operand in places[k]})
         lines += [
             "for (int j = (k - 1) / 2; j > 0; --j) {",
             "  const double *const early = operands + j * OPERAND_ROW;",
             "  const double *const late = operands + (k - j) * OPERAND_ROW;",
         ]
-        for k in held:
+        for operand in operands:
+            names = (f"early_{operand}", f"late_{operand}")
+            lines.append(f"  V {names[0]} = READ(early, {operand}), {names[1]} = READ(late, {operand});")
+            lines.append(f"  IN_REGISTER({names[0]}); IN_REGISTER({names[1]});")
+        for k in group:
             a, b = places[k]
-            lines.append(f"  sum_{k} += READ(early, {a}) * READ(late, {b});")
+            lines.append(f"  sum_{k} += early_{a} * late_{b};")
+        for k in group:
+            a, b = places[k]
             if a != b:
-                lines.append(f"  sum_{k} += READ(late, {a}) * READ(early, {b});")
+                lines.append(f"  sum_{k} += late_{a} * early_{b};")
         lines.append("}")
     lines += [f"sum_{k} += sum_{k};" for k, (a, b) in enumerate(places) if a == b]
     lines += ["if (k % 2 == 0) {", "  const double *const middle = operands + k / 2 * OPERAND_ROW;"]
     lines += [f"  sum_{k} += READ(middle, {a}) * READ(middle, {b});" for k, (a, b) in enumerate(places)]
     return [*lines, "}"]
+
+
+def _groups(places: list[tuple[int, int]]) -> list[list[int]]:
+    """Sums that share operands, as many as registers hold with them."""
+    waiting, groups = [*range(len(places))], []
+    while waiting:
+        group, held = [], set()
+
+        def more(k: int, held: set[int]) -> int:
+            return len({*places[k]} - held)
+
+        while waiting:
+            best = min(waiting, key=lambda k: (more(k, held), k))
+            if group and len(group) + 1 + 2 * (len(held) + more(best, held)) > AT_A_TIME:
+                break
+            waiting.remove(best)
+            group.append(best)
+            held |= {*places[best]}
+        groups.append(group)
+    return groups
 
 
 class _One:
