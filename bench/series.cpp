@@ -238,35 +238,44 @@ void race(const char* who, const Reference& reference, Make make, bool all) {
 }  // namespace
 }  // namespace bench
 
-/// Arguments: for each problem its name and the shared object of its kernel; --all first for all tolerances.
-int main(int count, char** arguments) {
+/// Runs a problem by the kernel that stands in `file`; `all` prints every tolerance.
+void race_on(const std::string& name, const std::string& file, bool all) {
   using namespace bench;
-  const bool all = count > 1 && std::string(arguments[1]) == "--all";
-  for (int k = all ? 2 : 1; k + 1 < count; k += 2) {
-    const std::string name = arguments[k];
-    const auto* const found = std::find_if(kernel_problems.begin(), kernel_problems.end(),
-                                           [&](const Problem& each) { return each.name == name; });
-    if (found == kernel_problems.end()) throw std::invalid_argument("no problem " + name);
-    const Problem& problem = *found;
-    const auto kernel = load(arguments[k + 1]);
-    static const SystemStart chain{"double_pendulum", {}, {}, {problem.angle, problem.angle}, {0, 0}};
-    const SystemStart& start = problem.kernel.empty() ? chain : system_start(problem);
-    const pendula::SystemNumbers numbers = numbers_of(start, kernel->info);
-    const Reference& reference = reference_of(problem, references);
-    std::printf("%s, %s\n", name.c_str(), kernel->info.series.has_momenta ? "momentum form" : "second order");
+  const auto* const found = std::find_if(kernel_problems.begin(), kernel_problems.end(),
+                                         [&](const Problem& each) { return each.name == name; });
+  if (found == kernel_problems.end()) throw std::invalid_argument("no problem " + name);
+  const Problem& problem = *found;
+  const auto kernel = load(file);
+  const SystemStart chain{"double_pendulum", {}, {}, {Problem::angle, Problem::angle}, {0, 0}};
+  const SystemStart& start = problem.kernel.empty() ? chain : system_start(problem);
+  const pendula::SystemNumbers numbers = numbers_of(start, kernel->info);
+  const Reference& reference = reference_of(problem, references);
+  std::printf("%s, %s\n", name.c_str(), kernel->info.series.has_momenta ? "momentum form" : "second order");
+  race(
+      "series", reference,
+      [&](double tolerance) {
+        return std::make_unique<SeriesRun>(*kernel, numbers, start.q, start.v, problem.duration, tolerance);
+      },
+      all);
+  race(
+      "gauss", reference, [&](double tolerance) { return kernel_run(problem, kernel, start, tolerance); }, all);
+  if (!problem.kernel.empty()) return;
+  for (const auto& [who, method] :
+       {std::pair{"gauss of rods", pendula::Method::gauss}, std::pair{"taylor of rods", pendula::Method::taylor}}) {
     race(
-        "series", reference,
-        [&](double tolerance) {
-          return std::make_unique<SeriesRun>(*kernel, numbers, start.q, start.v, problem.duration, tolerance);
-        },
-        all);
-    race(
-        "gauss", reference, [&](double tolerance) { return kernel_run(problem, kernel, start, tolerance); }, all);
-    if (!problem.kernel.empty()) continue;
-    for (const auto& [who, method] :
-         {std::pair{"gauss of rods", pendula::Method::gauss}, std::pair{"taylor of rods", pendula::Method::taylor}}) {
-      race(
-          who, reference, [&](double tolerance) { return rods_run(problem, method, tolerance); }, all);
-    }
+        who, reference, [&](double tolerance) { return rods_run(problem, method, tolerance); }, all);
   }
+}
+
+/// Arguments: problems and files of their kernels in turn, those of the build if there are none; --all first for every
+/// tolerance.
+int main(int count, char** arguments) {
+  const bool all = count > 1 && std::string(arguments[1]) == "--all";
+  const std::vector<std::string> given(arguments + (all ? 2 : 1), arguments + count);
+  for (std::size_t k = 0; k + 1 < given.size(); k += 2) race_on(given[k], given[k + 1], all);
+  if (!given.empty()) return 0;
+  const std::string folder = SERIES_KERNELS;
+  race_on("D", folder + "/series_double_pendulum.so", all);
+  race_on("spring pendulum", folder + "/series_spring_pendulum.so", all);
+  race_on("swinging atwood", folder + "/series_swinging_atwood.so", all);
 }
