@@ -10,22 +10,44 @@
 
 namespace pendula::detail {
 
-/// The sums of one motion, side by side: `operands` has rows of `lanes` first operands and as many second ones. From
-/// the middle of each sum outward to j = least, so that rows that were just written come last.
+/// Sums of one motion, side by side: `operands` has rows of `lanes` first operands and as many second ones. Those of
+/// lanes at … at + 8 groups, from the middle of each sum outward to j = least, so that rows that were just written come
+/// last.
+template <std::size_t groups, std::size_t least>
+[[gnu::always_inline]] inline void sums_in_groups(const double* operands, std::size_t lanes, std::size_t at,
+                                                  std::size_t k, double* sums) {
+  using Lanes = Pack<8, RegisterFor<8>>;
+  std::array<Lanes, groups> even, odd;
+  const auto each = [](auto visit) PENDULA_WRITTEN_OUT {
+    [&]<std::size_t... g>(std::index_sequence<g...>) PENDULA_WRITTEN_OUT {
+      (visit(std::integral_constant<std::size_t, g>()), ...);
+    }
+    (std::make_index_sequence<groups>());
+  };
+  const auto first = [&](std::size_t j, std::size_t g)
+                         PENDULA_WRITTEN_OUT { return Lanes::load(operands + 2 * lanes * j + at + 8 * g); };
+  const auto second = [&](std::size_t j, std::size_t g)
+                          PENDULA_WRITTEN_OUT { return Lanes::load(operands + (2 * j + 1) * lanes + at + 8 * g); };
+  each([&](auto g) PENDULA_WRITTEN_OUT { even[g] = odd[g] = Lanes(0.0); });
+  if (k % 2 == 0 && k / 2 >= least) {
+    each([&](auto g) PENDULA_WRITTEN_OUT { even[g] = first(k / 2, g) * second(k / 2, g); });
+  }
+  for (std::size_t j = (k - 1) / 2; j >= least; --j) {
+    each([&](auto g) PENDULA_WRITTEN_OUT {
+      even[g] = fma(first(j, g), second(k - j, g), even[g]);
+      odd[g] = fma(first(k - j, g), second(j, g), odd[g]);
+    });
+  }
+  each([&](auto g) PENDULA_WRITTEN_OUT { (even[g] + odd[g]).store(sums + at + 8 * g); });
+}
+
+/// All of them.
 template <std::size_t least = 1>
 [[gnu::always_inline]] inline void sums_in_lanes(const double* operands, std::size_t lanes, std::size_t k,
                                                  double* sums) {
-  using Lanes = Pack<8, RegisterFor<8>>;
-  for (std::size_t at = 0; at < lanes; at += 8) {
-    const auto first = [&](std::size_t j) { return Lanes::load(operands + 2 * lanes * j + at); };
-    const auto second = [&](std::size_t j) { return Lanes::load(operands + (2 * j + 1) * lanes + at); };
-    Lanes even = k % 2 == 0 && k / 2 >= least ? first(k / 2) * second(k / 2) : Lanes(0.0), odd(0.0);
-    for (std::size_t j = (k - 1) / 2; j >= least; --j) {
-      even = fma(first(j), second(k - j), even);
-      odd = fma(first(k - j), second(j), odd);
-    }
-    (even + odd).store(sums + at);
-  }
+  std::size_t at = 0;
+  for (; at + 16 <= lanes; at += 16) sums_in_groups<2, least>(operands, lanes, at, k, sums);
+  if (at < lanes) sums_in_groups<1, least>(operands, lanes, at, k, sums);
 }
 
 /// The sums of W motions: `operands` has rows of W numbers of each operand.
