@@ -20,8 +20,14 @@ from test_model_kernels import LINKED, read
 
 ORDER = 12
 FORMS = [True, False]
-# Angles, distances, rates: the squares of the first three distances make one, so that their root is a fraction.
-ANGLES = [Fraction(k, 7) for k in (5, 11, 17, 3, -4, 6, -8, 2, 9, -5, 13, 1)]
+# Angles of which no whole combination is another one: that would be a relation between their sines.
+ANGLES = [
+    Fraction(k, prime)
+    for k, prime in zip(
+        (5, 11, 17, 3, -4, 6, -8, 2, 9, -5, 13, 1), (7, 13, 19, 23, 29, 5, 11, 3, 17, 31, 37, 41), strict=True
+    )
+]
+# The squares of the distances make one, so that their root is a fraction.
 DISTANCES = [Fraction(k, 2) for k in (1, 2, 2)]
 RATES = [Fraction(k, 3) for k in (1, -2, 4, -1, 3, 2, -3, 1, 2, -1, 5, 1)]
 INPUTS = [[Fraction(k + 1, 2), Fraction(-1, 3), Fraction(1, 5)] for k in range(9)]
