@@ -92,7 +92,7 @@ class Case:
             true = [series[k] for series in q]
             if k < order:
                 true += [series[k] for series in p] if has_momenta else [(k + 1) * x[k + 1] for x in q]
-            size = max(abs(value) for value in true)
+            size = max(abs(value) for value in true) or numbers.of(1)
             worst = max(worst, *(abs(x - y) / size for x, y in zip(row, true, strict=False)))
         return worst
 
@@ -141,6 +141,33 @@ def test_large_linear_systems(tmp_path):
     with mpmath.workdps(50):
         case = case_of(own(MANY, "many", tmp_path, links=12))
         assert max(case.differences(Decimals(), 5)) < 1e-46
+
+
+# What built-in models do not have, by the body of their file.
+OTHERS = {
+    "nothing acts": "model.lagrangian = v**2 / 2 + w**2",
+    "linear": "model.lagrangian = (v**2 + w**2) / 2 + v * w / 3 - x**2 + x * y - 3 * y",
+    "quotients": """
+    model.lagrangian = (v**2 / (1 + y**2) + w**2 * (2 + x / (3 + y**2))) / 2 + v * w / (5 + x**2)
+    model.lagrangian -= x * y / (x**2 + y**2 + 1) ** 2""",
+    "powers": "model.lagrangian = v**2 * x**4 / 3 + w**2 - 1 / x**6 + x**5 * y",
+    "time": "model.lagrangian = (v**2 + w**2) * (2 + t**2) / 2 + v * x * t**3 - x**3 / (1 + t**2)",
+    "rates in the Lagrangian": "model.lagrangian = (v**2 + w**2) / 2 + (x * w - y * v) * (x**2 + y**2)",
+    "drag": """
+    model.lagrangian = (v**2 + w**2) / 2 - y
+    model.force(x, -v * (2 + v**2 + w**2) ** 3)
+    model.force(y, -w * v / (1 + w**2))""",
+}
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_coefficients_of_other_models(what, tmp_path):
+    head = """
+def define(model, links):
+    x, y, t = model.coordinate("x", "m"), model.coordinate("y", "m"), model.time
+    v, w = model.rate(x), model.rate(y)
+    """
+    assert case_of(own(head + OTHERS[what] + "\n", "other", tmp_path)).differences(Rationals()) == [0, 0]
 
 
 # The momentum is 3 (x_dot + x)² − 3 x_dot²: linear once multiplied out, which keeps fewer digits.
