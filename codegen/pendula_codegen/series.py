@@ -70,7 +70,7 @@ class Series:
 
     has_momenta   whether the state is q, p; else q, v
     size          coordinates
-    solved        values that are p, or E: linear in the unknown v or a
+    solved        values that are p, or E: linear in the unknown v or a, on which each of them depends
     forces        values that are f; none in the form of second order
     order         the nodes that are needed, each after its parts
     sums          of products of coefficients, by their operands
@@ -102,7 +102,7 @@ class Series:
     @property
     def is_linear(self) -> bool:
         """Whether what is solved for stands in linear terms alone."""
-        return all(node is None or self.graph.is_linear(node) for _, node in self.solved)
+        return all(map(self.graph.is_linear, (node for _, node in self.solved)))
 
     def sums_of(self, node: int) -> list[int]:
         """Which sums a node needs."""

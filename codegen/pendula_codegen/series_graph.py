@@ -63,6 +63,7 @@ class SeriesGraph:
         self.nodes: list[Node] = []
         self._known: dict[Node, int] = {}
         self._depends: list[bool] = []
+        self._linear: dict[int, bool] = {}
         self._unknown_first = unknown_first
 
     def node(self, kind: str, *parts: int, **more: object) -> int:
@@ -79,6 +80,11 @@ class SeriesGraph:
 
     def is_linear(self, place: int) -> bool:
         """In what is solved for, as it stands: no terms cancel."""
+        if place not in self._linear:
+            self._linear[place] = self._is_linear(place)
+        return self._linear[place]
+
+    def _is_linear(self, place: int) -> bool:
         node = self.nodes[place]
         if not self._depends[place] or node.kind == "unknown":
             return True

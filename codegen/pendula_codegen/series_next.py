@@ -22,6 +22,7 @@ class Next:
         self.tape = Tape()
         self._sums = Sums(self.tape, lambda size: self._kept(start.constant(size)))
         self._values: dict[int, Value] = {}
+        self._rests: dict[int, Value | None] = {}
         self._depths: dict[int, int] = {}
         self._share = self.tape.read(("order", 1))
         for place in series.order:
@@ -159,7 +160,7 @@ class Next:
         zero = tape.number(0.0)
         right = []
         for k, (constant, node) in enumerate(series.solved):
-            rest = None if node is None else self._rest(node)
+            rest = self._rest(node)
             value = None if rest is None else self._sums.linear([(constant, rest)])
             if series.has_momenta:
                 p = tape.read(("state", n + k))
@@ -184,6 +185,11 @@ class Next:
 
     def _rest(self, place: int) -> Value | None:
         """Of what is linear in the unknowns, what it is without those of this order; None where that is 0."""
+        if place not in self._rests:
+            self._rests[place] = self._rest_of(place)
+        return self._rests[place]
+
+    def _rest_of(self, place: int) -> Value | None:
         node, tape = self._graph.nodes[place], self.tape
         if not self._graph.depends(place):
             return self._at(place)

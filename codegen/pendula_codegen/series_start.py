@@ -61,11 +61,6 @@ class Sums:
             return x
         return y if self.tape.number_of(x) == 1 else self.tape.multiply(x, y)
 
-    def plus(self, x: Value | None, y: Value | None) -> Value | None:
-        if x is None or y is None:
-            return y if x is None else x
-        return self.tape.add(x, y)
-
 
 class Start:
     """Order 0.
@@ -82,6 +77,8 @@ class Start:
         self.tape = constants.tape
         self._sums = Sums(self.tape, constants)
         self._values: dict[int, Value] = {}
+        self._slopes: dict[tuple[int, int], Value | None] = {}
+        self._rests: dict[int, Value | None] = {}
         self.kept: dict[Value, int] = {}
         self.inverse: list[list[Value]] = []
         self.factors: list[Value] = []
@@ -196,14 +193,12 @@ class Start:
         lower = []
         for i, (constant, node) in enumerate(series.solved):
             for j in range(i + 1):
-                slope = None if node is None else self._slope(node, j)
-                lower.append(zero if slope is None else self._times_constant(constant, slope))
+                slope = self._slope(node, j)
+                lower.append(zero if slope is None else self._sums.linear([(constant, slope)]))
         right = []
         for k, (constant, node) in enumerate(series.solved):
-            rest = constant if node is None else self._rest(node)
-            value = self._constant_of(rest) if node is None else rest
-            if value is not None and node is not None:
-                value = self._times_constant(constant, value)
+            rest = self._rest(node)
+            value = None if rest is None else self._sums.linear([(constant, rest)])
             if series.has_momenta:
                 p = tape.read(("state", n + k))
                 right.append(p if value is None else tape.subtract(p, value))
@@ -219,14 +214,13 @@ class Start:
             self.inverse = [elimination.solve(self.factors, column) for column in units]
         return elimination.solve(self.factors, right)
 
-    def _constant_of(self, constant: Expr) -> Value | None:
-        return None if constant == 0 else self._times_constant(constant, self.tape.number(1.0))
-
-    def _times_constant(self, constant: Expr, value: Value) -> Value:
-        return self._sums.linear([(constant, value)])
-
     def _slope(self, place: int, unknown: int) -> Value | None:
         """Of what is linear in the unknowns, how it changes with one of them."""
+        if (place, unknown) not in self._slopes:
+            self._slopes[place, unknown] = self._slope_of(place, unknown)
+        return self._slopes[place, unknown]
+
+    def _slope_of(self, place: int, unknown: int) -> Value | None:
         node = self._graph.nodes[place]
         if not self._graph.depends(place):
             return None
@@ -245,6 +239,11 @@ class Start:
 
     def _rest(self, place: int) -> Value | None:
         """Of the same, what it is without the unknowns; None where that is 0."""
+        if place not in self._rests:
+            self._rests[place] = self._rest_of(place)
+        return self._rests[place]
+
+    def _rest_of(self, place: int) -> Value | None:
         node = self._graph.nodes[place]
         if not self._graph.depends(place):
             return self.at(place)

@@ -238,7 +238,9 @@ class OwnedKernel {
       read_sum(lines, info);
       if (!lines.next()) lines.fail("a function", "the end of the file");
     }
-    if (sums_.size() != static_cast<std::size_t>(info.series.sums)) lines.fail("as many sums as series have", "others");
+    if (sums_.size() != static_cast<std::size_t>(info.series.sums)) {
+      lines.fail(std::to_string(info.series.sums) + " sums", std::to_string(sums_.size()));
+    }
     program_.sums = sums_;
     while (lines.kind() == "function") read_function(lines, info);
     if (lines.kind() != "end") lines.fail("a function or the end", lines.kind());

@@ -17,8 +17,8 @@ std::string_view cut(std::string_view& text, char end) {
   return before;
 }
 
-constexpr int many = 1'000'000;       // upper bound of counts
-constexpr int most_operands = 65535;  // of series: SeriesSum has numbers of them
+constexpr int many = 1'000'000;   // upper bound of counts
+constexpr int most_rows = 65535;  // of arrays of series
 
 }  // namespace
 
@@ -100,8 +100,8 @@ bool KernelDescription::take(KernelText& text) {
   } else if (kind == "series") {
     series_.has_momenta = text.flag();
     series_.sums = text.whole(0, many);
-    series_.operands = text.whole(0, most_operands);
-    series_.kept = text.whole(0, many);
+    series_.operands = text.whole(0, most_rows);
+    series_.kept = text.whole(0, most_rows);
   } else {
     return false;
   }
