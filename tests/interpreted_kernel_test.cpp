@@ -19,7 +19,7 @@ namespace pendula::test {
 namespace {
 
 // A mass m on a spring k with a force u, as the generator writes it, with bars in place of tabs.
-constexpr std::string_view spring = R"(program|10
+constexpr std::string_view spring = R"(program|11
 name|spring
 model|spring
 links|1
@@ -30,6 +30,7 @@ parameter|m|kg|1|1.0|1|0
 parameter|k|N/m|1|1.0|0|0
 input|u|N
 point|bob|2
+series|0|0|0|2
 function|hamiltonian_form|6
 read|0|parameters|0
 read|1|p|0
@@ -167,6 +168,39 @@ read|0|v|0
 number|1|0.0
 write|0|r_dot|0
 write|1|r_dot|1
+function|series_start|6
+read|0|parameters|0
+read|1|parameters|1
+read|2|inputs|0
+read|3|state|0
+read|4|state|1
+read|5|unit|0
+negative|2|2
+inverse|0|0
+multiply|4|4|5
+multiply_add|2|1|3|2
+negative|2|2
+multiply|2|2|0
+multiply|2|2|5
+write|4|next|0
+write|2|next|1
+write|1|kept|0
+write|0|kept|1
+function|series_next|6
+read|0|inputs|0
+read|1|state|0
+read|2|kept|0
+read|3|kept|1
+read|4|state|1
+read|5|order|2
+negative|0|0
+multiply|4|4|5
+multiply_add|0|1|2|0
+negative|0|0
+multiply|0|0|3
+multiply|0|0|5
+write|4|next|0
+write|0|next|1
 end
 )";
 
@@ -192,6 +226,7 @@ std::string changed(std::string_view from, std::string_view to) {
 template <int W>
 class Springs {
   static constexpr std::size_t width = W;
+  static constexpr std::size_t rows_of_series = 5;
 
  public:
   explicit Springs(const SystemTable& table) : table_(table), functions_(functions_of<W>(table)) {
@@ -217,6 +252,35 @@ class Springs {
       EXPECT_DOUBLE_EQ(found_[3][lane], -k * given_[2][lane] / m);
       EXPECT_DOUBLE_EQ(found_[4][lane], m * v * v / 2);
       EXPECT_DOUBLE_EQ(found_[5][lane], m * v * v / 2 + k * x * x / 2);
+    }
+  }
+
+  /// Its motion begins with x, v, (u - k x) / 2m, …
+  void check_series() {
+    PackRows<width> unit(1), inputs(3), state(4 * series_state_row(1, width) / width), kept(2), operands(1);
+    const std::size_t row = series_state_row(1, width);
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      unit[0][lane] = 0.5;
+      inputs[0][lane] = inputs_[0][lane];
+      inputs[1][lane] = 0.25;
+      state[0][lane] = given_[0][lane];
+      state[0][width + lane] = given_[1][lane];
+    }
+    const Conditions there{table_.context, parameters_[0], times_[0], inputs[0]};
+    const SeriesRows rows{unit[0], state[0], kept[0], operands[0]};
+    functions_.series_start(there, rows);
+    functions_.series_next(there, rows, 1, 2);
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const double m = parameters_[0][lane], k = parameters_[1][lane], u = inputs_[0][lane];
+      const double x = given_[0][lane], v = given_[1][lane], a = (u - k * x) / m, jerk = (0.25 - k * v / 2) / m;
+      const auto at = [&](std::size_t order, std::size_t which) {
+        return state[0][order * row + which * width + lane];
+      };
+      EXPECT_DOUBLE_EQ(at(1, 0), v / 2);
+      EXPECT_DOUBLE_EQ(at(1, 1), a / 2);
+      EXPECT_DOUBLE_EQ(at(2, 0), a / 8);
+      EXPECT_DOUBLE_EQ(at(2, 1), jerk / 4);
+      EXPECT_DOUBLE_EQ(at(3, 0), jerk / 24);
     }
   }
 
@@ -259,6 +323,13 @@ class Springs {
     functions_.acceleration_along(at(), g, g, g, g, o, o);
     functions_.momentum_form_along(at(), g, g, g, g, o, o);
     if (functions_.call_arguments != nullptr) functions_.call_arguments(at(), g, g, o);
+    const SeriesInfo& info = table_.info.series;
+    PackRows<width> unit(1), inputs(rows_of_series), kept(static_cast<std::size_t>(info.kept) + 1);
+    PackRows<width> state(rows_of_series * series_state_row(1, width) / width);
+    PackRows<width> operands(rows_of_series * series_operand_row(info, width) / width + 1);
+    const SeriesRows rows{unit[0], state[0], kept[0], operands[0]};
+    functions_.series_start(at(), rows);
+    functions_.series_next({table_.context, parameters_[0], times_[0], inputs[0]}, rows, 1, 3);
   }
 
  private:
@@ -283,6 +354,14 @@ TEST(InterpretedKernel, IteratesOnStages) {
   Springs<8>(*table).check_iteration();
 }
 
+TEST(InterpretedKernel, HasTheSeriesOfItsProgram) {
+  const auto table = read(with_tabs(spring));
+  Springs<1>(*table).check_series();
+  Springs<2>(*table).check_series();
+  Springs<4>(*table).check_series();
+  Springs<8>(*table).check_series();
+}
+
 TEST(InterpretedKernel, SaysWhatItsProgramSays) {
   const auto table = read(with_tabs(spring));
   const SystemInfo& info = table->info;
@@ -305,19 +384,24 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
     return "nothing";
   };
   EXPECT_EQ(told(""), "line 0: expected a program, got ");
-  EXPECT_EQ(told(changed("program|10", "program|9")), "line 1: expected a whole number from 10 to 10, got 9");
+  EXPECT_EQ(told(changed("program|11", "program|9")), "line 1: expected a whole number from 11 to 11, got 9");
   EXPECT_EQ(told(changed("links|1", "links|one")), "line 4: expected a whole number from 1 to 1000000, got one");
   EXPECT_EQ(told(changed("kg|1|1.0|1|0", "kg|1|1.0|1")), "line 8: expected another word, got the end of the line");
   EXPECT_EQ(told(changed("bob|2", "bob|2|3")), "line 11: expected the end of the line, got 3");
   EXPECT_EQ(told(changed("hamiltonian_form", "hamiltonian")),
-            "line 12: expected a function that kernels have, got hamiltonian");
-  EXPECT_EQ(told(changed("read|1|p|0", "read|1|v|0")), "line 14: expected an array of this function, got v");
-  EXPECT_EQ(told(changed("read|1|p|0", "read|1|p|1")), "line 14: expected a whole number from 0 to 0, got 1");
-  EXPECT_EQ(told(changed("factor|1|5|0", "factor|3|5|0")), "line 18: expected a whole number from 0 to 0, got 5");
-  EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 18: expected an operation, got invert");
-  EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 20: expected a whole number from 0 to 5, got 6");
-  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 22: expected a write to every row of every output, got function");
-  EXPECT_EQ(told(changed("point|bob|2\n", "")), "line 141: expected an array of this function, got r");
+            "line 13: expected a function that kernels have, got hamiltonian");
+  EXPECT_EQ(told(changed("read|1|p|0", "read|1|v|0")), "line 15: expected an array of this function, got v");
+  EXPECT_EQ(told(changed("read|1|p|0", "read|1|p|1")), "line 15: expected a whole number from 0 to 0, got 1");
+  EXPECT_EQ(told(changed("factor|1|5|0", "factor|3|5|0")), "line 19: expected a whole number from 0 to 0, got 5");
+  EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 19: expected an operation, got invert");
+  EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 21: expected a whole number from 0 to 5, got 6");
+  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 23: expected a write to every row of every output, got function");
+  EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|2|1|2\nsum|0|0")), "line 14: expected 2 sums, got 1");
+  EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|1|1|2\nsum|0|1")),
+            "line 13: expected a whole number from 0 to 0, got 1");
+  EXPECT_EQ(told(changed("write|1|kept|0\n", "")).substr(10),
+            "expected a write to every row of every output, got function");
+  EXPECT_EQ(told(changed("point|bob|2\n", "")), "line 142: expected an array of this function, got r");
   EXPECT_EQ(told(changed("coordinate|x|m|0|0\n", "")),
             "expected a name, a model, links and coordinates, got a description without one of them");
 }

@@ -399,8 +399,8 @@ class SystemKernel(ABC):
     # --- programs
 
     @cached_property
-    def _vocabularies(self) -> list[Vocabulary]:
+    def shared_vocabularies(self) -> list[Vocabulary]:
         return self.vocabularies()
 
     def program(self, function: Function) -> Program:
-        return shortest_program(function.candidates(), self._vocabularies)
+        return shortest_program(function.candidates(), self.shared_vocabularies)

@@ -6,13 +6,14 @@ from pathlib import Path
 
 from pendula_codegen.backends.bytecode import function_lines
 from pendula_codegen.backends.c import CALLS, INTERFACE, print_functions, print_plain, quoted
+from pendula_codegen.backends.c_series import print_series
 from pendula_codegen.backends.llvm import print_kernel
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.render import ENVIRONMENT, banner, links_argument
 from pendula_codegen.system_info import info_lines
-from pendula_codegen.table import kernel_table
+from pendula_codegen.table import kernel_table, series_functions
 
 
 def render_c(model: Model, source: str, file: str) -> str:
@@ -33,9 +34,11 @@ def render_c(model: Model, source: str, file: str) -> str:
         widths=(1, 2, 4, 8),
         unrolled=UNROLLED,
         size=len(model.coordinates),
-        description=[quoted(line) for line in info_lines(kernel)],
+        description=[quoted(line) for line in info_lines(kernel, table.series)],
         functions=print_functions(table),
         plain=print_plain(table),
+        series=print_series(table.series, table.names),
+        inputs=len(model.inputs),
         used=used,
         calls=sorted(used & CALLS),
     )
@@ -45,10 +48,13 @@ def render_bytecode(model: Model) -> str:
     """The kernel of a model for the interpreter: a line of words with tabs between them for each thing it says."""
     kernel = ModelKernel(model)
     table = kernel_table(kernel)
-    functions = [function for function in (*table.of_many, *table.plain) if function]
+    functions = [
+        function for function in (*table.of_many, *table.plain, *series_functions(table)) if function
+    ]
     lines = [
         f"program\t{INTERFACE}",
-        *info_lines(kernel),
+        *info_lines(kernel, table.series),
+        *(f"sum\t{first}\t{second}" for first, second in table.series.series.places),
         *(line for function in functions for line in function_lines(function)),
         "end",
     ]
@@ -58,4 +64,5 @@ def render_bytecode(model: Model) -> str:
 def render_llvm(model: Model, instruction_set: str) -> str:
     """The kernel of a model as LLVM's text, for an instruction set of the library."""
     kernel = ModelKernel(model)
-    return print_kernel(kernel_table(kernel), len(model.coordinates), info_lines(kernel), instruction_set)
+    table = kernel_table(kernel)
+    return print_kernel(table, len(model.coordinates), info_lines(kernel, table.series), instruction_set)

@@ -16,6 +16,7 @@ from sympy import Symbol
 from pendula_codegen import __version__
 from pendula_codegen.backends import cpp
 from pendula_codegen.backends.cpp import Counts
+from pendula_codegen.backends.cpp_series import kernel_series, render_series, series_constants
 from pendula_codegen.chain import Chain
 from pendula_codegen.chain_kernel import ChainKernel
 from pendula_codegen.entry_points import SystemKernel
@@ -55,6 +56,8 @@ KINDS = {
     "backends/bytecode.py": {"program"},
     "backends/c.py": {"program"},
     **{f"backends/{name}.py": {"program"} for name in ("llvm", "llvm_functions", "llvm_loops", "llvm_text")},
+    "backends/c_series.py": {"program"},
+    "backends/cpp_series.py": {"kernel", "model"},
     "blocks.py": {"kernel"},
     "chain.py": {"kernel"},
     "chain_kernel.py": {"kernel"},
@@ -63,10 +66,15 @@ KINDS = {
     "kernel_program.py": {"program"},
     "linear_solve.py": {"kernel", "model", "program"},
     "mechanics.py": {"kernel", "model", "program"},
+    "series.py": {"kernel", "model", "program"},
+    "series_graph.py": {"kernel", "model", "program"},
+    "series_next.py": {"kernel", "model", "program"},
+    "series_start.py": {"kernel", "model", "program"},
+    "series_tape.py": {"kernel", "model", "program"},
     "simplify.py": {"kernel", "model", "program"},
     "system_info.py": {"kernel", "model", "program"},
     "table.py": {"program"},
-    "tape.py": {"program"},
+    "tape.py": {"kernel", "model", "program"},
     "templates/kernel.hpp.j2": {"kernel", "model"},
     "comparison.py": set(),
     "exact.py": {"model", "program"},
@@ -79,7 +87,7 @@ KINDS = {
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
     **{
         f"templates/{name}.c.j2": {"program"}
-        for name in ("kernel", "sincos", "exp", "log", "solve", "iterate")
+        for name in ("kernel", "sincos", "exp", "log", "solve", "iterate", "series")
     },
     "__main__.py": set(),
     "counts.py": set(),
@@ -271,18 +279,24 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
 def _render(kernel: SystemKernel, words: Words) -> Header:
     periodic = [c.is_angle and is_periodic(kernel.system, c.symbol) for c in words.coordinates]
     functions = [cpp.render_function(kernel, function) for function in kernel.functions()]
+    tapes = kernel_series(kernel)
+    if tapes is not None:
+        functions += render_series(kernel, tapes)
     text = ENVIRONMENT.get_template("kernel.hpp.j2").render(
         words=words,
         struct=words.struct,
-        constants=cpp.constants(
-            words.coordinates,
-            words.parameters,
-            words.inputs,
-            words.points,
-            has_constant_masses(kernel),
-            periodic,
-            words.bases,
-        ),
+        constants=[
+            *cpp.constants(
+                words.coordinates,
+                words.parameters,
+                words.inputs,
+                words.points,
+                has_constant_masses(kernel),
+                periodic,
+                words.bases,
+            ),
+            *(series_constants(tapes) if tapes is not None else []),
+        ],
         assignments=cpp.read_statements(words.parameters),
         places=cpp.place_statements(words.parameters),
         casts=cpp.cast_statements(words.parameters, words.holds_time),

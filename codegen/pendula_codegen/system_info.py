@@ -10,10 +10,11 @@ from pendula_codegen.entry_points import SystemKernel
 from pendula_codegen.mechanics import LagrangianSystem
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.series_tape import SeriesTapes
 
 
-def info_lines(kernel: ModelKernel) -> list[str]:
-    """One thing in a line, its words with tabs between them: src/pendula/system/info_text.hpp reads it."""
+def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
+    """One thing in a line, its words with tabs between them: src/pendula/system/kernel_text.hpp reads it."""
     model = kernel.model
     rows: list[tuple[object, ...]] = [
         ("name", model.name),
@@ -31,6 +32,8 @@ def info_lines(kernel: ModelKernel) -> list[str]:
     rows += [("input", i.symbol.name, i.unit) for i in model.inputs]
     rows += [("point", p.name, len(p.components)) for p in model.points]
     rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
+    series = tapes.series
+    rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
     return [
         "\t".join(str(int(word)) if isinstance(word, bool) else str(word) for word in row) for row in rows
     ]

@@ -13,6 +13,7 @@ from pendula_codegen.forward import slopes
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.places import Place
 from pendula_codegen.program import Program
+from pendula_codegen.series_tape import SeriesTapes, series_tapes
 from pendula_codegen.tape import Row, Solved, Tape, Value
 
 CONDITIONS = ("parameters", "times", "inputs")  # what functions are taken at, whatever they are taken of
@@ -52,19 +53,22 @@ class KernelTable:
 
     of_many   as OF_MANY has them
     plain     as PLAIN has them
+    series    Taylor series of motions
     names     what people call what is read
     rows      how many rows arrays have that functions take
     """
 
     of_many: list[TableFunction | None]
     plain: list[TableFunction | None]
+    series: SeriesTapes
     names: Mapping[Row, str]
     rows: Mapping[str, int]
 
     def operations(self) -> set[str]:
         """Those that any function takes."""
         functions = filter(None, (*self.of_many, *self.plain))
-        return {step.operation for function in functions for step in function.tape.steps}
+        tapes = [self.series.start, self.series.next, *(function.tape for function in functions)]
+        return {step.operation for tape in tapes for step in tape.steps}
 
 
 def kernel_table(kernel: ModelKernel) -> KernelTable:
@@ -93,7 +97,8 @@ class _Tables:
 
         leaves = (*self._kernel.leaves(), *self._kernel.motion())
         names = {self._row(leaf.place): leaf.symbol.name for leaf in leaves}
-        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], names, self._rows())
+        series = series_tapes(self._kernel, self._row)
+        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, names, self._rows())
 
     def _rows(self) -> dict[str, int]:
         system = self._kernel.system
@@ -168,3 +173,13 @@ class _Tables:
 
 def _taken(function: Function) -> tuple[str, ...]:
     return tuple(argument.name for argument in function.inputs if argument.type == "vector")
+
+
+def series_functions(table: KernelTable) -> tuple[TableFunction, TableFunction]:
+    """The tapes of a kernel's series as functions; what they take besides the conditions is said there."""
+    return (
+        TableFunction("series_start", ("unit", "state"), ("next", "kept"), table.series.start),
+        TableFunction(
+            "series_next", ("order", "state", "kept", "sums"), ("next", "operands"), table.series.next
+        ),
+    )

@@ -55,6 +55,7 @@ class Tape:
         self.steps: list[Step] = []
         self.outputs: dict[Row, Value] = {}
         self._known: dict[tuple, Value] = {}
+        self._numbers: dict[Value, float] = {}
         self.values = 0
 
     def _add(self, operation: str, *operands: Value, count: int = 1, **more: object) -> Value:
@@ -69,7 +70,13 @@ class Tape:
         return step.first
 
     def number(self, value: float) -> Value:
-        return self._add("number", number=value)
+        found = self._add("number", number=value)
+        self._numbers[found] = value
+        return found
+
+    def number_of(self, value: Value) -> float | None:
+        """Of a value that is a number."""
+        return self._numbers.get(value)
 
     def read(self, row: Row) -> Value:
         return self._add("read", row=row)
@@ -141,7 +148,7 @@ class Tape:
     def written_out(self, size: int) -> Tape:
         """The same tape with linear systems of up to so many unknowns in products and sums."""
         whole, place = Tape(), {}
-        elimination = _Elimination(whole)
+        elimination = Elimination(whole)
         for step in self.steps:
             operands = [place[value] for value in step.operands]
             if step.operation == "factor" and step.count <= triangle(size):
@@ -158,12 +165,12 @@ class Tape:
         return whole.give({row: place[value] for row, value in self.outputs.items()})
 
 
-class _Elimination:
-    """Linear systems in products and sums, but for those with what is known to be 0."""
+class Elimination:
+    """Linear systems in products and sums, but for those with what is known to be 0 or 1."""
 
     def __init__(self, tape: Tape):
         self._tape = tape
-        self._zero = tape.number(0.0)
+        self._zero, self._one = tape.number(0.0), tape.number(1.0)
 
     def factor(self, lower: Sequence[Value]) -> list[Value]:
         """L and 1/D."""
@@ -190,7 +197,11 @@ class _Elimination:
         return x
 
     def _product(self, x: Value, y: Value) -> Value:
-        return self._zero if self._zero in (x, y) else self._tape.multiply(x, y)
+        if self._zero in (x, y):
+            return self._zero
+        if self._one in (x, y):
+            return y if x == self._one else x
+        return self._tape.multiply(x, y)
 
     def _less(self, x: Value, factor: Value, y: Value) -> Value:
         """x − factor y."""

@@ -45,6 +45,7 @@ class Atom:
     function     what is computed of the place, or of the argument
     definition   what the atom stands for
     argument     of the function, in other atoms
+    difference   a function, and two angles of whose difference the atom is that function
     """
 
     name: str
@@ -53,6 +54,7 @@ class Atom:
     function: Call = ""
     definition: Expr | None = None
     argument: Polynomial | None = None
+    difference: tuple[str, Symbol, Symbol] | None = None
     position: int = 0  # among all atoms, as the arguments have them
 
     @property
@@ -144,7 +146,9 @@ class Vocabulary:
                 for function in (sin, cos):
                     name = f"{function.__name__}_{_both(first.name, second.name)}"
                     definition = _of_sum(function, [(1, first), (-1, second)])
-                    number = self._add(Symbol(name), Atom(name, "pair", definition=definition))
+                    of = (function.__name__, first, second)
+                    atom = Atom(name, "pair", definition=definition, difference=of)
+                    number = self._add(Symbol(name), atom)
                     self._pairs[(function, first, second)] = number
 
     def polynomial(self, expression: Expr) -> Polynomial:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import shutil
 import subprocess
 from importlib.util import find_spec
@@ -10,6 +11,7 @@ from pathlib import Path
 from platform import machine
 from typing import Any
 
+from pendula_codegen.backends.c_series import lanes_of, padded_state
 from pendula_codegen.kernel_program import render_c, render_llvm
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
@@ -22,6 +24,7 @@ FEATURES = Path("/proc/cpuinfo").read_text() if machine() == "x86_64" else ""
 WIDEST = "avx512" if " avx512dq " in FEATURES else "avx2" if " avx2 " in FEATURES else "baseline"
 INSTRUCTION_SETS = {"native": WIDEST, "haswell": "avx2", "x86-64": "sse2"}
 WIDTHS = (1, 2, 4, 8)
+SERIES_FUNCTIONS = (1, 2)  # after those of a table, and the iteration
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=fast", "-fno-math-errno", "-Wall", "-Wextra", "-Werror")
 
 Rows = list[list[float]]  # of a coordinate, a parameter …, a number of each state
@@ -42,6 +45,10 @@ class _Kernel(ctypes.Structure):
 
 class _StageIteration(ctypes.Structure):
     _fields_ = [(name, ctypes.c_void_p) for name in ("m", "hb", "start", "weights", "increments")]
+
+
+class _SeriesRows(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_void_p) for name in ("unit", "state", "kept", "operands")]
 
 
 class _IterationChange(ctypes.Structure):
@@ -140,6 +147,44 @@ class LoadedKernel:
         change = function(ctypes.addressof(conditions), ctypes.addressof(on))
         del kept
         return held["increments"].all(), change.change, change.size
+
+    def series(
+        self, width: int, given: dict[str, Rows], inputs: list[Rows], unit: list[float], parts: list[range]
+    ) -> list[Rows]:
+        """The state's coefficients, order by order.
+
+        given    parameters, times, and the state at order 0
+        inputs   their coefficients, order by order
+        parts    orders that are asked for together
+        """
+        tapes = self.table.series
+        order, size = parts[-1].stop, 2 * tapes.series.size
+        state_row = padded_state(tapes.series.size) if width == 1 else size * width
+        lanes = 2 * lanes_of(len(tapes.series.sums))
+        row = lanes if width == 1 else len(tapes.series.operands) * width
+        flat_state = [number for each in given["state"] for number in each]
+        held = {
+            "unit": Numbers(unit),
+            "state": Numbers([*flat_state, *[math.nan] * (state_row * (order + 1) - len(flat_state))]),
+            "kept": Numbers([math.nan] * max(1, tapes.kept * width)),
+            "operands": Numbers([math.nan] * max(1, row * order)),
+        }
+        rows = _SeriesRows(**{name: numbers.address for name, numbers in held.items()})
+        conditions, kept = self._conditions({**given, "inputs": [each for rows in inputs for each in rows]})
+        place = ctypes.addressof(conditions), ctypes.addressof(rows)
+        start, following = (
+            self._kernel.functions[WIDTHS.index(width)][len(OF_MANY) + k] for k in SERIES_FUNCTIONS
+        )
+        ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(start)(*place)
+        take = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int, ctypes.c_int)(following)
+        for part in parts:
+            take(*place, part.start, part.stop - 1)
+        del kept
+        found = held["state"].all()
+        return [
+            [found[k * state_row + i * width : k * state_row + (i + 1) * width] for i in range(size)]
+            for k in range(order + 1)
+        ]
 
     @staticmethod
     def _conditions(given: dict[str, Rows]) -> tuple[_Conditions, list[Numbers]]:

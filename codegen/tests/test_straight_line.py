@@ -110,7 +110,7 @@ def test_one_sine_and_one_cosine_an_angle(space, n, fresh_headers):
         calls = re.findall(r"\b(sin|cos|sine_and_cosine)\((.*?)[,)]", body)
         angles = [angle for _, angle in calls]
         assert len(angles) == len(set(angles)) <= len(chain(space, n).coordinates)
-        assert all(re.fullmatch(r"q\[\d\]", angle) for angle in angles)
+        assert all(re.fullmatch(r"(q|state)\[\d\]", angle) for angle in angles)
 
 
 def test_residual_alone_computes_nothing_of_its_jacobian(fresh_headers):

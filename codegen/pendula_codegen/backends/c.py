@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import accumulate
 
@@ -10,7 +10,7 @@ from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 from pendula_codegen.tape import Row, Step, Tape, Value
 
-INTERFACE = 10  # system_interface of pendula/system/system_table.hpp
+INTERFACE = 11  # system_interface of pendula/system/system_table.hpp
 # Functions of one argument that are taken of numbers one by one.
 CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
 # What of so many states nothing asks for within steps: it is compiled for eight, and others go that way.
@@ -54,7 +54,7 @@ def _of_any_width(table: KernelTable, function: TableFunction, place: int) -> li
 def _function(function: TableFunction, names: Mapping[Row, str]) -> list[str]:
     tape = function.tape.written_out(UNROLLED)
     read = {step.row[0] for step in tape.steps if step.operation == "read"}
-    lines = _Printer(names).lines(tape)
+    lines = Printer(names).lines(tape)
     return [_head(function, read), "  EACH_REGISTER {", *(f"    {line}" for line in lines), "  }", "}"]
 
 
@@ -97,25 +97,45 @@ def quoted(text: str) -> str:
     return f'"{text}\\n"'
 
 
-class _Printer:
-    def __init__(self, names: Mapping[Row, str]):
+class Printer:
+    """Writes the steps of a tape.
+
+    names       what people call what is read
+    variables   what is read, and has a name already
+    conditions  arrays that stand in Conditions
+    """
+
+    def __init__(
+        self,
+        names: Mapping[Row, str],
+        variables: Mapping[Row, str] | None = None,
+        conditions: Sequence[str] = CONDITIONS,
+    ):
+        self._variables = variables or {}
+        self._conditions = conditions
         self._called = names
         self._taken: set[str] = set()
         self._names: dict[Value, str] = {}
         self._numbers: dict[Value, float] = {}
 
     def lines(self, tape: Tape) -> list[str]:
-        steps = [line for step in tape.steps for line in self._step(step)]
-        return [*steps, *(f"WRITE({name}, {k}) = {self._pack(v)};" for (name, k), v in tape.outputs.items())]
+        steps = self.steps(tape)
+        return [*steps, *(f"WRITE({name}, {k}) = {self.pack(v)};" for (name, k), v in tape.outputs.items())]
+
+    def steps(self, tape: Tape) -> list[str]:
+        return [line for step in tape.steps for line in self._step(step)]
 
     def _step(self, step: Step) -> list[str]:
         if step.operation == "number":
             self._numbers[step.first] = step.number
             return []
         if step.operation == "read":
+            if step.row in self._variables:
+                self._names[step.first] = self._variables[step.row]
+                return []
             self._names[step.first] = self._name_of(step.row)
             array, k = step.row
-            array = f"at->{array}" if array in CONDITIONS else array
+            array = f"at->{array}" if array in self._conditions else array
             return [f"const V {self._names[step.first]} = READ({array}, {k});"]
         if step.operation in ("factor", "solve"):
             return self._array(step)
@@ -125,14 +145,14 @@ class _Printer:
             sine, cosine = step.results
             names = f"{self._names[sine]}, {self._names[cosine]}"
             addresses = f"&{self._names[sine]}, &{self._names[cosine]}"
-            return [f"V {names};", f"NAME(sincos)({self._pack(step.operands[0])}, {addresses});"]
+            return [f"V {names};", f"NAME(sincos)({self.pack(step.operands[0])}, {addresses});"]
         return [f"const V {self._names[step.first]} = {self._expression(step)};"]
 
     def _array(self, step: Step) -> list[str]:
         """A linear system that is too large to be written out."""
         name = f"t{step.first}"
         self._names |= {value: f"{name}[{k}]" for k, value in enumerate(step.results)}
-        given = ", ".join(map(self._pack, step.operands[-step.count :]))
+        given = ", ".join(map(self.pack, step.operands[-step.count :]))
         factors = (
             "" if step.operation == "factor" else f"{self._names[step.operands[0]].removesuffix('[0]')}, "
         )
@@ -144,17 +164,18 @@ class _Printer:
             x, y = map(self._operand, step.operands)
             return f"{x} {_SIGNS[step.operation]} {y}"
         if step.operation == "negative":
-            return f"-{self._pack(first)}"
+            return f"-{self.pack(first)}"
         if step.operation == "inverse":
-            return f"1.0 / {self._pack(first)}"
+            return f"1.0 / {self.pack(first)}"
         more = f", {step.number!r}" if step.operation == "pow" else ""
-        return f"NAME({step.operation})({self._pack(first)}{more})"
+        return f"NAME({step.operation})({self.pack(first)}{more})"
 
     def _operand(self, value: Value) -> str:
         """Of an operation whose other operand is a pack."""
         return self._names.get(value) or repr(self._numbers[value])
 
-    def _pack(self, value: Value) -> str:
+    def pack(self, value: Value) -> str:
+        """A value that steps gave."""
         return self._names.get(value) or f"SPLAT({self._numbers[value]!r})"
 
     def _name_of(self, row: Row) -> str:

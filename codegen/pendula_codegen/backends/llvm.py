@@ -26,6 +26,7 @@ INSTRUCTION_SETS = {
     "avx2": (4, _AVX2),
     "avx512": (8, f"{_AVX2},+avx512f,+avx512cd,+avx512dq,+avx512bw,+avx512vl"),
 }
+_NO_SERIES = ["ptr null", "ptr null"]
 _ARITHMETIC = {"add": "fadd", "subtract": "fsub", "multiply": "fmul"}
 
 
@@ -72,7 +73,7 @@ def _tables(table: KernelTable, description: Sequence[str]) -> list[str]:
     functions = ", ".join(f"ptr @functions_{states}" for states in WIDTHS)
     kinds = f"{{ i32, ptr, [{len(WIDTHS)} x ptr], ptr }}"
     return [
-        *(list_of(f"functions_{n}", table.of_many, n, [f"ptr @iterate_{n}"]) for n in WIDTHS),
+        *(list_of(f"functions_{n}", table.of_many, n, [f"ptr @iterate_{n}", *_NO_SERIES]) for n in WIDTHS),
         list_of("plain_functions", table.plain, 1, []),
         f'@description = internal constant [{len(text)} x i8] c"{written}"',
         f"@pendula_kernel = constant {kinds} {{ i32 {INTERFACE}, ptr @description, "

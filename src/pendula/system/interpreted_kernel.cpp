@@ -16,7 +16,21 @@ namespace pendula {
 namespace {
 
 /// Number of rows of an array.
-enum class Rows { none, one, coordinates, square, parameters, inputs, components, arguments };
+enum class Rows {
+  none,
+  one,
+  coordinates,
+  square,
+  parameters,
+  inputs,
+  components,
+  arguments,
+  state,
+  order,
+  sums,
+  kept,
+  operands
+};
 
 struct Array {
   std::string_view name;
@@ -37,7 +51,7 @@ constexpr Array q{"q", Rows::coordinates}, v{"v", Rows::coordinates}, a{"a", Row
     p{"p", Rows::coordinates}, f{"f", Rows::coordinates}, E{"E", Rows::coordinates};
 
 /// In the order of Program::functions.
-constexpr std::array<Signature, Program::many + Program::plain> signatures = {{
+constexpr std::array<Signature, Program::many + Program::plain + Program::series> signatures = {{
     {"hamiltonian_form", 2, {q, p, v, f}},
     {"momentum_form", 2, {q, v, p, f}},
     {"momentum_form_with_jacobians",
@@ -67,6 +81,15 @@ constexpr std::array<Signature, Program::many + Program::plain> signatures = {{
     {"residual", 3, {q, v, a, E}},
     {"positions", 1, {q, {"r", Rows::components}}},
     {"velocities", 2, {q, v, {"r_dot", Rows::components}}},
+    {"series_start", 2, {{{"unit", Rows::one}, {"state", Rows::state}, {"next", Rows::state}, {"kept", Rows::kept}}}},
+    {"series_next",
+     4,
+     {{{"order", Rows::order},
+       {"state", Rows::state},
+       {"kept", Rows::kept},
+       {"sums", Rows::sums},
+       {"next", Rows::state},
+       {"operands", Rows::operands}}}},
 }};
 
 struct OperationName {
@@ -209,6 +232,16 @@ class OwnedKernel {
     }
     const SystemInfo info = description_.info();
     program_.coordinates = info.coordinates.size();
+    program_.inputs = info.inputs.size();
+    program_.series_info = info.series;
+    while (lines.kind() == "sum") {
+      read_sum(lines, info);
+      if (!lines.next()) lines.fail("a function", "the end of the file");
+    }
+    if (sums_.size() != static_cast<std::size_t>(info.series.sums)) {
+      lines.fail(std::to_string(info.series.sums) + " sums", std::to_string(sums_.size()));
+    }
+    program_.sums = sums_;
     while (lines.kind() == "function") read_function(lines, info);
     if (lines.kind() != "end") lines.fail("a function or the end", lines.kind());
     if (lines.next()) lines.fail("nothing after the end", lines.kind());
@@ -237,6 +270,13 @@ class OwnedKernel {
     program_.functions[which] = functions_[which].function();
   }
 
+  void read_sum(KernelText& lines, const SystemInfo& info) {
+    const int first = lines.whole(0, info.series.operands - 1);
+    const int second = lines.whole(0, info.series.operands - 1);
+    end_line(lines);
+    sums_.push_back({static_cast<unsigned short>(first), static_cast<unsigned short>(second)});
+  }
+
   static std::size_t count(Rows rows, const SystemInfo& info) {
     const auto total = [](std::span<const int> sizes) {
       return static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0));
@@ -259,6 +299,16 @@ class OwnedKernel {
         return total(info.point_sizes);
       case Rows::arguments:
         return info.argument_is_base.size();
+      case Rows::state:
+        return 2 * n;
+      case Rows::order:
+        return 4;
+      case Rows::sums:
+        return static_cast<std::size_t>(info.series.sums);
+      case Rows::kept:
+        return static_cast<std::size_t>(info.series.kept);
+      case Rows::operands:
+        return static_cast<std::size_t>(info.series.operands);
     }
     return 0;
   }
@@ -280,6 +330,7 @@ class OwnedKernel {
 
   std::string text_;
   KernelDescription description_;
+  std::vector<SeriesSum> sums_;
   std::array<OwnedFunction, signatures.size()> functions_;
   Program program_;
   SystemTable table_;

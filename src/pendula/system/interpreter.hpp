@@ -12,6 +12,7 @@
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/stage_product.hpp>
 #include <pendula/system/program.hpp>
+#include <pendula/system/series_sums.hpp>
 
 namespace pendula {
 
@@ -27,8 +28,8 @@ class Interpreter : NumbersOfStates<W> {
 
  public:
   static constexpr SystemFunctions functions() {
-    return {&call<0>, &call<1>, &call<2>, &call<3>,  &call<4>,  &call<5>,  &call<6>,
-            &call<7>, &call<8>, &call<9>, &call<10>, &call<11>, &call<12>, &iterate};
+    return {&call<0>, &call<1>, &call<2>,  &call<3>,  &call<4>,  &call<5>, &call<6>,      &call<7>,
+            &call<8>, &call<9>, &call<10>, &call<11>, &call<12>, &iterate, &series_start, &series_next};
   }
   static constexpr PlainFunctions plain_functions() {
     constexpr std::size_t first = Program::many;
@@ -236,6 +237,58 @@ class Interpreter : NumbersOfStates<W> {
     for (const double sum : each_of(all)) total += sum;
     const double size = std::ranges::max(each_of(scale));
     return {std::isfinite(total) ? std::ranges::max(each_of(largest)) : std::numeric_limits<double>::quiet_NaN(), size};
+  }
+
+  // --- Taylor series ---
+
+  static void series_start(const Conditions& at, const SeriesRows& rows) {
+    const auto& program = *static_cast<const Program*>(at.context);
+    double* const next = rows.state + series_state_row(program.coordinates, width);
+    run_at(program.functions[Program::series_start], at, at.inputs, {rows.unit, rows.state, next, rows.kept});
+  }
+
+  static void series_next(const Conditions& at, const SeriesRows& rows, int first, int last) {
+    const auto& program = *static_cast<const Program*>(at.context);
+    const SeriesInfo& info = program.series_info;
+    const std::size_t state_row = series_state_row(program.coordinates, width);
+    const std::size_t operand_row = series_operand_row(info, width);
+    static thread_local PackRows<width> sums, found;
+    const auto operands = static_cast<std::size_t>(info.operands);
+    if (sums.rows() < series_lanes(info)) sums = PackRows<width>(series_lanes(info));
+    if (found.rows() < operands) found = PackRows<width>(operands);
+    alignas(pack_alignment) double order[4 * width];
+    const L unit = load(rows.unit);
+    for (auto k = static_cast<std::size_t>(first); k <= static_cast<std::size_t>(last); ++k) {
+      const double share = 1.0 / static_cast<double>(k);
+      store(L(static_cast<double>(k)), order);
+      store(L(share), order + width);
+      store(unit * L(1.0 / static_cast<double>(k + 1)), order + 2 * width);
+      store(k == 1 ? unit : L(0.0), order + 3 * width);
+      double *const state = rows.state + k * state_row, *const row = rows.operands + k * operand_row;
+      if constexpr (W == 1) {
+        sums_in_lanes(rows.operands, series_lanes(info), k, sums[0]);
+      } else {
+        sums_of_many<W>(rows.operands, program.sums, operand_row, k, sums[0]);
+      }
+      run_at(program.functions[Program::series_next], at, at.inputs + k * program.inputs * width,
+             {order, state, rows.kept, sums[0], state + state_row, W == 1 ? found[0] : row});
+      if constexpr (W == 1) {
+        for (std::size_t m = 0; m < program.sums.size(); ++m) {
+          row[m] = found[program.sums[m].first][0];
+          row[series_lanes(info) + m] = found[program.sums[m].second][0];
+        }
+      }
+    }
+  }
+
+  /// Runs a function that takes the conditions, with other inputs, and these arrays.
+  template <std::size_t count>
+  static void run_at(const ProgramFunction& function, const Conditions& at, const double* inputs,
+                     const double* const (&arrays)[count]) {
+    std::array<double*, 3 + count> all{const_cast<double*>(at.parameters), const_cast<double*>(at.times),
+                                       const_cast<double*>(inputs)};
+    for (std::size_t k = 0; k < count; ++k) all[3 + k] = const_cast<double*>(arrays[k]);
+    run(function, all.data());
   }
 
   static std::array<double, width> each_of(const Lanes& numbers) {

@@ -10,6 +10,8 @@
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/numbers_of_states.hpp>
 #include <pendula/numeric/stage_product.hpp>
+#include <pendula/system/kernel_numbers.hpp>
+#include <pendula/system/kernel_series.hpp>
 #include <pendula/system/system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
@@ -20,16 +22,15 @@ namespace detail {
 
 /// The functions of the generated kernel S for W states at once.
 template <System S, int W>
-class KernelFunctions : NumbersOfStates<W> {
-  using typename NumbersOfStates<W>::L;
-  using NumbersOfStates<W>::load, NumbersOfStates<W>::store;
-  static constexpr auto width = static_cast<std::size_t>(W);
+class KernelFunctions : KernelNumbers<S, W> {
+  using Crossing = KernelNumbers<S, W>;
+  using Crossing::inputs, Crossing::parameters, Crossing::vector, Crossing::write, Crossing::write_columns;
+  using Crossing::load, Crossing::store, Crossing::width;
+  using typename Crossing::L, typename Crossing::Rows, typename Crossing::VariedRows;
   template <class Number>
   using Vector = typename S::template Vector<Number>;
   template <class Number>
   using Matrix = typename S::template Matrix<Number>;
-  template <class Number>
-  using Parameters = typename S::template Parameters<Number>;
   template <class Number>
   using Inputs = typename S::template Inputs<Number>;
 
@@ -48,7 +49,9 @@ class KernelFunctions : NumbersOfStates<W> {
             &acceleration_along,
             &momentum_form_along,
             tells_arguments<S> ? &call_arguments : nullptr,
-            &iterate};
+            &iterate,
+            has_series<S> ? &KernelSeries<S, W>::start : nullptr,
+            has_series<S> ? &KernelSeries<S, W>::next : nullptr};
   }
 
   static void residual(const Conditions& at, const double* q, const double* v, const double* a, double* E) {
@@ -79,49 +82,6 @@ class KernelFunctions : NumbersOfStates<W> {
   }
 
  private:
-  // --- Numbers as they cross ---
-
-  // Rows of W numbers, without and with their derivatives.
-  struct Rows {
-    const double* from;
-    L operator[](std::size_t k) const { return load(from + k * W); }
-  };
-  struct VariedRows {
-    const double *from, *slopes;
-    Dual<L> operator[](std::size_t k) const { return {load(from + k * W), load(slopes + k * W)}; }
-  };
-
-  // Inlined, so that compilers see which numbers a function uses, and read no others.
-  template <class Number, class From>
-  [[gnu::always_inline]] static Parameters<Number> read_parameters(const From& from, const Conditions& at) {
-    Parameters<Number> parameters;
-    S::template read_parameters<Number>(from, parameters);
-    if constexpr (holds_time<S>) parameters.time = Number(load(at.times));
-    return parameters;
-  }
-  [[gnu::always_inline]] static Parameters<L> parameters(const Conditions& at) {
-    return read_parameters<L>(Rows{at.parameters}, at);
-  }
-  template <class Matrix, class From>
-  [[gnu::always_inline]] static Matrix read(const From& from) {
-    Matrix numbers;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(Matrix::SizeAtCompileTime); ++k) numbers.data()[k] = from[k];
-    return numbers;
-  }
-  [[gnu::always_inline]] static Inputs<L> inputs(const Conditions& at) { return read<Inputs<L>>(Rows{at.inputs}); }
-  [[gnu::always_inline]] static Vector<L> vector(const double* from) { return read<Vector<L>>(Rows{from}); }
-
-  template <class Matrix>
-  [[gnu::always_inline]] static void write(const Matrix& numbers, double* to) {
-    for (Eigen::Index i = 0; i < numbers.rows(); ++i) {
-      for (Eigen::Index j = 0; j < numbers.cols(); ++j, to += W) store(numbers(i, j), to);
-    }
-  }
-  template <class Matrix>
-  [[gnu::always_inline]] static void write_columns(const Matrix& numbers, double* to) {
-    for (Eigen::Index k = 0; k < numbers.size(); ++k) store(numbers.data()[k], to + k * W);
-  }
-
   // --- The functions ---
 
   static void hamiltonian_form(const Conditions& at, const double* q, const double* p, double* v, double* f) {
@@ -206,10 +166,10 @@ class KernelFunctions : NumbersOfStates<W> {
     const Inputs<L> given = inputs(at);
     Inputs<Dual<L>> fixed;
     for (Eigen::Index k = 0; k < given.size(); ++k) fixed.data()[k] = Dual<L>(given.data()[k]);
-    const Parameters<Dual<L>> parameters = read_parameters<Dual<L>>(Rows{at.parameters}, at);
+    const auto parameters = Crossing::template read_parameters<Dual<L>>(Rows{at.parameters}, at);
     Vector<Dual<L>> found;
-    S::acceleration(parameters, read<Vector<Dual<L>>>(VariedRows{q, dq}), read<Vector<Dual<L>>>(VariedRows{v, dv}),
-                    fixed, found);
+    S::acceleration(parameters, Crossing::template read<Vector<Dual<L>>>(VariedRows{q, dq}),
+                    Crossing::template read<Vector<Dual<L>>>(VariedRows{v, dv}), fixed, found);
     for (Eigen::Index k = 0; k < found.size(); ++k) {
       store(found[k].value, a + k * W);
       store(found[k].slope, da + k * W);
@@ -223,8 +183,9 @@ class KernelFunctions : NumbersOfStates<W> {
       fixed_q[k] = Dual<L>(places[k]);
       fixed_v[k] = Dual<L>(rates[k]);
     }
-    S::momentum_form(read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at), fixed_q, fixed_v,
-                     read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}), momenta, forces);
+    S::momentum_form(Crossing::template read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at),
+                     fixed_q, fixed_v, Crossing::template read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}),
+                     momenta, forces);
     for (Eigen::Index k = 0; k < momenta.size(); ++k) {
       store(momenta[k].slope, dp + k * W);
       store(forces[k].slope, df + k * W);

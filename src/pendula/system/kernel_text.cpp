@@ -17,7 +17,8 @@ std::string_view cut(std::string_view& text, char end) {
   return before;
 }
 
-constexpr int many = 1'000'000;  // upper bound of counts
+constexpr int many = 1'000'000;   // upper bound of counts
+constexpr int most_rows = 65535;  // of arrays of series
 
 }  // namespace
 
@@ -96,6 +97,11 @@ bool KernelDescription::take(KernelText& text) {
     point_sizes_.push_back(text.whole(2, 3));
   } else if (kind == "argument") {
     argument_is_base_.push_back(text.flag());
+  } else if (kind == "series") {
+    series_.has_momenta = text.flag();
+    series_.sums = text.whole(0, many);
+    series_.operands = text.whole(0, most_rows);
+    series_.kept = text.whole(0, most_rows);
   } else {
     return false;
   }
@@ -127,7 +133,8 @@ SystemInfo KernelDescription::info() const {
           point_sizes_,
           depends_on_time_,
           constant_masses_,
-          argument_is_base_.all()};
+          argument_is_base_.all(),
+          series_};
 }
 
 }  // namespace pendula

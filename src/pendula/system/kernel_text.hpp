@@ -66,6 +66,7 @@ class KernelDescription {
 
   std::string_view name_, model_;
   int links_ = 0;
+  SeriesInfo series_;
   bool depends_on_time_ = false, constant_masses_ = false;
   Names coordinates_, coordinate_units_, parameters_, parameter_units_, inputs_, input_units_, points_;
   Flags is_angle_, is_periodic_, is_positive_, is_per_link_, argument_is_base_;

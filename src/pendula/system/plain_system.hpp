@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pendula/system/series_info.hpp>
 #include <pendula/system/system.hpp>
 #include <span>
 #include <string_view>
@@ -53,6 +54,7 @@ struct SystemInfo {
   /// For each argument of the model's functions that may change fast: whether it is the base of a power
   /// (field_look.hpp).
   std::span<const bool> argument_is_base;
+  SeriesInfo series;
 };
 
 /// The description of the generated kernel S.
@@ -77,7 +79,8 @@ constexpr SystemInfo info_of() {
           S::point_sizes,
           holds_time<S>,
           S::constant_masses,
-          argument_bases<S>()};
+          argument_bases<S>(),
+          series_of<S>()};
 }
 
 }  // namespace pendula

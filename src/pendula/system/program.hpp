@@ -61,11 +61,15 @@ struct ProgramFunction {
 /// A whole kernel: the context of its SystemTable. Whoever makes one must ensure that operations stay within the
 /// registers, and moves within the arrays.
 struct Program {
-  /// Numbers of functions: those of SystemFunctions except iterate, then those of PlainFunctions.
-  static constexpr std::size_t many = 13, plain = 3;
+  /// Numbers of functions: those of SystemFunctions except iterate, then those of PlainFunctions, and
+  /// series_start and series_next.
+  static constexpr std::size_t many = 13, plain = 3, series = 2;
+  static constexpr std::size_t series_start = many + plain, series_next = series_start + 1;
 
-  std::size_t coordinates = 0;
-  std::array<ProgramFunction, many + plain> functions;
+  std::size_t coordinates = 0, inputs = 0;
+  SeriesInfo series_info;
+  std::span<const SeriesSum> sums;
+  std::array<ProgramFunction, many + plain + series> functions;
 };
 
 /// The functions of every table whose context is a Program.

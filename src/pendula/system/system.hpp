@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <pendula/system/series_info.hpp>
 #include <span>
 #include <string_view>
 
@@ -59,6 +60,21 @@ inline constexpr bool tells_arguments = requires {
 template <class S>
 constexpr std::span<const bool> argument_bases() {
   if constexpr (tells_arguments<S>) return S::argument_is_base;
+  return {};
+}
+
+/// Whether a kernel provides the Taylor series of its motions.
+template <class S>
+inline constexpr bool has_series = requires {
+  S::series_sums;
+};
+
+/// What it says of them.
+template <class S>
+constexpr SeriesInfo series_of() {
+  if constexpr (has_series<S>) {
+    return {S::series_has_momenta, static_cast<int>(S::series_sums.size()), S::series_operands, S::series_kept};
+  }
   return {};
 }
 

@@ -32,6 +32,15 @@ struct IterationChange {
   double size;    ///< the largest weighted increment
 };
 
+/// Taylor series of W motions about their states: Σ c_k τ^k at the time t + unit τ. Rows of coefficients, order after
+/// order; how long they are says series_info.hpp. The memory belongs to the caller.
+struct SeriesRows {
+  const double* unit;  ///< (W)  [s]
+  double* state;       ///< (order + 1, row): of q, then of p, or of v where there are no momenta
+  double* kept;        ///< (SeriesInfo::kept, W)
+  double* operands;    ///< (order, row): the first row is not used
+};
+
 /// The functions of a kernel for W states at once, as generated kernels define them (pendula_codegen/entry_points.py).
 /// Outputs come last, and overlap no other array.
 struct SystemFunctions {
@@ -59,6 +68,13 @@ struct SystemFunctions {
   void (*call_arguments)(const Conditions&, Numbers q, Numbers v, double* found);
 
   IterationChange (*iterate)(const Conditions&, const StageIteration&);
+
+  /// Reads row 0 of the state, and gives row 1 and what is kept. This and the next one are null if the kernel has no
+  /// series.
+  void (*series_start)(const Conditions&, const SeriesRows&);
+  /// From rows up to `first` of the state gives rows first + 1 … last + 1, and rows first … last of the operands;
+  /// first ≥ 1. Here Conditions::inputs has the coefficients of the inputs, (last + 1, inputs, W).
+  void (*series_next)(const Conditions&, const SeriesRows&, int first, int last);
 };
 
 /// Functions of one state that are not needed within steps.
@@ -106,6 +122,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 10;
+inline constexpr int system_interface = 11;
 
 }  // namespace pendula
