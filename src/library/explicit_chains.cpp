@@ -6,6 +6,7 @@
 #include <pendula/explicit/single_integrator.hpp>
 
 #include "library/explicit_methods.hpp"
+#include "library/taylor_integrator.hpp"
 
 namespace pendula {
 namespace {
@@ -25,6 +26,7 @@ struct Make {
     return make_extrapolation_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain),
                                          Space::dof * chain.links(), chain.links(), options.tolerance, "");
   }
+  std::unique_ptr<PlainIntegrator> by_series() const { return make_taylor_integrator(chain, options); }
 };
 
 }  // namespace

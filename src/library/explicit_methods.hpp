@@ -26,7 +26,7 @@ std::unique_ptr<PlainIntegrator> make_explicit_system(const SystemTable& table, 
 
 namespace detail {
 
-/// Returns make.of<Method>() for a method of explicit_tableau.hpp, or make.by_extrapolation().
+/// Returns make.of<Method>() for a method of explicit_tableau.hpp, or make.by_extrapolation(), or make.by_series().
 template <class Make>
 std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const Make& make) {
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
@@ -41,13 +41,13 @@ std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const 
       return make.template of<Fehlberg8>();
     case Method::bulirsch_stoer:
       return make.by_extrapolation();
+    case Method::taylor:
+      return make.by_series();
     case Method::gauss:
     case Method::radau:
-    case Method::taylor:
       break;
   }
-  throw std::invalid_argument("method: expected one for any system, got " + std::string(name_of(options.method)) +
-                              (options.method == Method::taylor ? ", which is for chains only" : ""));
+  throw std::invalid_argument("method: expected an explicit one, got " + std::string(name_of(options.method)));
 }
 
 }  // namespace detail

@@ -5,6 +5,9 @@
 #include <pendula/explicit/system_accelerations.hpp>
 #include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/system/member_systems.hpp>
+#include <pendula/taylor/series_steps.hpp>
+#include <stdexcept>
+#include <string>
 
 #include "library/explicit_methods.hpp"
 
@@ -28,6 +31,15 @@ struct Make {
     const auto coordinates = static_cast<int>(model.coordinates());
     return make_extrapolation_integrator(std::make_unique<SystemForwardDynamics>(model), coordinates, coordinates,
                                          options.tolerance, table.info.name);
+  }
+  std::unique_ptr<PlainIntegrator> by_series() const {
+    if (table.of_1.series_next == nullptr) {
+      throw std::invalid_argument("method: expected another one than taylor, got taylor and the kernel " +
+                                  std::string(table.info.name) + ", which has no series");
+    }
+    using Subject = ExplicitSystem<MemberSystems<double>, TaylorSeries>;
+    return std::make_unique<SingleIntegrator<SeriesSteps, Subject>>(
+        Subject(table, plain, options.tolerance), options.tolerance, SeriesSteps::Options{options.tolerance});
   }
 };
 

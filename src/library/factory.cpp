@@ -10,7 +10,6 @@
 #include "library/explicit_methods.hpp"
 #include "library/solver_choice.hpp"
 #include "library/system_integrator.hpp"
-#include "library/taylor_integrator.hpp"
 
 namespace pendula {
 namespace {
@@ -50,7 +49,6 @@ std::unique_ptr<PlainIntegrator> make_over(const SystemTable& kernel, const Plai
 
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
-  if (options.method == Method::taylor) return make_taylor_integrator(chain_of<Space>(chain), options);
   return make_explicit_chain(chain_of<Space>(chain), options);
 }
 

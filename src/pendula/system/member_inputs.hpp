@@ -56,6 +56,25 @@ class MemberInputs {
     }
   }
 
+  /// Writes the coefficients of their Taylor series in (t - time)/unit, order by order: a row of each input.
+  void series(const L& time, const L& unit, int order, PackRows<width_of<L>>& coefficients) const {
+    using std::sin, std::cos;
+    const std::size_t count = constant_.size();
+    for (std::size_t k = 0; k < count; ++k) to_row(constant_[k], coefficients[k]);
+    for (std::size_t k = count; k < count * static_cast<std::size_t>(order + 1); ++k) to_row(L(0.0), coefficients[k]);
+    for (const Sine& sine : sines_) {
+      const L angle = fma(sine.frequency, time, sine.phase), turn = sine.frequency * unit;
+      L up = sine.amplitude * sin(angle), ahead = sine.amplitude * cos(angle);
+      for (int k = 0; k <= order; ++k) {
+        double* const input = coefficients[static_cast<std::size_t>(k) * count + static_cast<std::size_t>(sine.input)];
+        to_row(from_row<L>(input) + up, input);
+        const L share = L(1.0 / (k + 1)) * turn, before = up;
+        up = share * ahead;
+        ahead = L(0.0) - share * before;
+      }
+    }
+  }
+
  private:
   // A sine that members add to an input. A member with fewer sines than others has zero amplitudes.
   struct Sine {

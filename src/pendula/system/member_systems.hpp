@@ -60,6 +60,16 @@ class MemberSystems {
     call(now_[0], function, numbers...);
   }
 
+  /// Computes the Taylor series of motions about the states in the first row of `rows.state`, up to t^order. `inputs`
+  /// has (order + 1) rows of each input.
+  void expand(const L& time, const L& unit, int order, PackRows<width_of<L>>& inputs, const SeriesRows& rows) {
+    to_row(time, now_[0]);
+    const Conditions there = at(now_[0]);
+    functions_.series_start(there, rows);
+    inputs_.series(time, unit, order, inputs);
+    functions_.series_next({there.context, there.parameters, there.times, inputs[0]}, rows, 1, order - 1);
+  }
+
  private:
   static std::size_t parameter_count(const SystemInfo& info) {
     return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), std::size_t{0});
