@@ -512,7 +512,7 @@ def a_model(seed: int, number: int) -> Case:
     drives = model.drives(dice)
     if drives:
         system["drive"] = drives
-    run = {"duration": duration, **settings(dice, model.fastest, series=False)}
+    run = {"duration": duration, **settings(dice, model.fastest, series=True)}
     tables = {
         "system": system,
         "start": start,
@@ -527,7 +527,7 @@ def a_model_brought(seed: int, number: int) -> Case:
     dice = random.Random(f"models:{seed}:{number}")
     name, tables = model_drawing.brought(dice)
     fastest, duration = tables.pop("fastest"), tables["run"]["duration"]
-    tables["run"] |= settings(dice, fastest, series=False, long=duration * fastest > 300)
+    tables["run"] |= settings(dice, fastest, series=True, long=duration * fastest > 300)
     tables["output"] = output(dice, duration)
     return Case("models", seed, number, name, tables, (BROUGHT / f"{name}.py").read_text())
 
