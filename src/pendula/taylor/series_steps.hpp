@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -76,6 +77,8 @@ class SeriesSteps {
         n_(static_cast<std::size_t>(systems.coordinates())),
         row_(series_state_row(n_, 1)),
         order_(order_for(options.tolerance)),
+        looks_(is_smooth(systems.info()) ? 1 : most_looks),
+        largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
         log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
         state_((static_cast<std::size_t>(order_) + 5) * row_),
@@ -85,6 +88,7 @@ class SeriesSteps {
         now_{PackRows<1>(row_), PackRows<1>(row_), Parts(systems.coordinates()), 0},
         trial_(now_),
         begin_(now_),
+        seen_(2 * n_),
         rates_(n_),
         scales_(2 * n_) {}
 
@@ -136,7 +140,8 @@ class SeriesSteps {
     return longest_;
   }
 
-  /// Tries a step of `h` from `time`. Returns whether its end is finite. The state is unchanged.
+  /// Tries a step of `h` from `time`. Returns whether its end is finite, and the series solves the equations on the
+  /// way: its last terms know nothing of what is narrow and ahead. The state is unchanged.
   bool solve(double time, double h, bool /*wanted*/) {
     time_ = time;
     if (!is_expanded_) expand();
@@ -152,7 +157,11 @@ class SeriesSteps {
     read_rates(time + h, trial_.state, trial_.parts);
     for (int i = 0; i < links(); ++i) none += trial_.parts[i].rate[0] - trial_.parts[i].rate[0];
     trial_.last = h;
-    return none == 0;
+    if (none != 0) return false;
+    for (int k = 1; k <= looks_; ++k) {
+      if (!solves(time, h, static_cast<double>(k) / looks_)) return false;
+    }
+    return true;
   }
 
   const Parts& tried() const { return trial_.parts; }
@@ -202,7 +211,12 @@ class SeriesSteps {
 
  private:
   static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14;
-  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 8;
+  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 8, most_looks = 4;
+
+  /// Whether nothing but sines, powers and logarithms stands in the equations, and no time.
+  static bool is_smooth(const SystemInfo& info) {
+    return !info.depends_on_time && std::ranges::all_of(info.argument_is_base, std::identity());
+  }
 
   /// The order that needs the fewest operations for a tolerance.
   static int order_for(double tolerance) {
@@ -238,6 +252,15 @@ class SeriesSteps {
     return sum;
   }
 
+  /// Σ (k+2) (k+1) c_(k+2) τ^k
+  double bend(std::size_t k, double tau) const {
+    double sum = 0;
+    for (auto order = static_cast<std::size_t>(order_); order > 1; --order) {
+      sum = std::fma(sum, tau, static_cast<double>(order * (order - 1)) * coefficient(order, k));
+    }
+    return sum;
+  }
+
   void read_rates(double time, PackRows<1>& state, Parts& parts) {
     const double* v = state[n_];
     if (info_.has_momenta) {
@@ -245,6 +268,21 @@ class SeriesSteps {
       v = rates_.data();
     }
     for (int i = 0; i < links(); ++i) parts[i] = {{*state[i]}, {v[i]}};
+  }
+
+  /// Whether accelerations at a fraction of the step are those of the series, to what terms beyond its order may be.
+  bool solves(double time, double h, double share) {
+    const double tau = share * h / unit_;
+    for (std::size_t i = 0; i < n_; ++i) {
+      seen_[i] = coefficient(0, i) + tau * rise(i, tau);
+      seen_[n_ + i] = info_.has_momenta ? slope(i, tau) / unit_ : coefficient(0, n_ + i) + tau * rise(n_ + i, tau);
+    }
+    systems_.here(time + share * h, &SystemFunctions::acceleration, seen_.data(), seen_.data() + n_, rates_.data());
+    for (std::size_t i = 0; i < n_; ++i) {
+      const double by_series = info_.has_momenta ? bend(i, tau) / (unit_ * unit_) : slope(n_ + i, tau) / unit_;
+      if (!(h * std::abs(rates_[i] - by_series) * scales_[n_ + i] <= largest_defect_)) return false;
+    }
+    return true;
   }
 
   /// Computes the series in a unit of time near the step size, so that coefficients are neither huge nor tiny.
@@ -311,9 +349,12 @@ class SeriesSteps {
   SeriesInfo info_;
   std::size_t n_, row_;
   int order_;
-  double log_reach_;  // step size relative to the estimated radius of convergence, as a logarithm
+  int looks_;              // at the way of a step
+  double largest_defect_;  // of accelerations, times h, relative to scales
+  double log_reach_;       // step size relative to the estimated radius of convergence, as a logarithm
   PackRows<1> state_, kept_, operands_, inputs_;
   Place now_, trial_, begin_;
+  std::vector<double> seen_;            // a motion on the way of a step
   std::vector<double> rates_, scales_;  // of the terms of coordinates, then of rates
   double time_ = 0, begin_time_ = 0;
   double tried_ = 0, step_ = 1;  // of the tried step, of the last one
