@@ -1,4 +1,4 @@
-"""Kernels in C and as LLVM's text: no warnings, equal to what models say, for any number of states, by any compiler."""
+"""Kernels in C and as LLVM's text: no warnings, equal to what models say, for any number of states."""
 
 import math
 import random
