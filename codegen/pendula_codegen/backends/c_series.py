@@ -110,7 +110,7 @@ def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
     return [*lines, "}"]
 
 
-def groups_of(places: list[tuple[int, int]], registers: int = AT_A_TIME) -> list[list[int]]:
+def groups_of(places: list[tuple[int, int]]) -> list[list[int]]:
     """Sums that share operands, as many as registers hold with them."""
     waiting, groups = [*range(len(places))], []
     while waiting:
@@ -121,7 +121,7 @@ def groups_of(places: list[tuple[int, int]], registers: int = AT_A_TIME) -> list
 
         while waiting:
             best = min(waiting, key=lambda k: (more(k, held), k))
-            if group and len(group) + 1 + 2 * (len(held) + more(best, held)) > registers:
+            if group and len(group) + 1 + 2 * (len(held) + more(best, held)) > AT_A_TIME:
                 break
             waiting.remove(best)
             group.append(best)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
-from pendula_codegen.backends.c_series import AT_A_TIME, NEWEST_ADDED, groups_of, lanes_of, padded_state
+from pendula_codegen.backends.c_series import NEWEST_ADDED, groups_of, lanes_of, padded_state
 from pendula_codegen.backends.llvm_steps import Steps
 from pendula_codegen.backends.llvm_text import LlvmFunction, literal
 from pendula_codegen.linear_solve import UNROLLED
-from pendula_codegen.table import KernelTable
+from pendula_codegen.series import Series
+from pendula_codegen.table import CONDITIONS, KernelTable
 
 TOGETHER = 4  # registers of one motion's sums that one loop makes
 
@@ -29,58 +31,41 @@ def series_start(table: KernelTable, states: int, width: int) -> str:
 
 def series_next(table: KernelTable, states: int, width: int, most: int) -> str:
     """`most`: numbers of the widest register."""
-    tape, state_row = table.series.next, _state_row(table, states)
     head = f"internal void @series_next_{states}(ptr readonly %at, ptr readonly %rows, i32 %first, i32 %last)"
     f = LlvmFunction(head, width)
-    one = f.of_width(1)
+    series, tape, state_row = table.series.series, table.series.next, _state_row(table, states)
     unit, state, kept, operands = (f.pointer("%rows", k) for k in range(4))
-    inputs = f.pointer("%at", 3)
+    inputs = f.pointer("%at", 1 + CONDITIONS.index("inputs"))
     first, last = (f.let(f"sext i32 %{name} to i64") for name in ("first", "last"))
-    places = table.series.series.places
-    sums = (
-        _OneMotion(f, places, operands, most) if states == 1 else _Motions(f, places, operands, states, most)
-    )
+    sums = _OneMotion(f, series, operands, most) if states == 1 else _Motions(f, series, operands, states)
     read = {step.row for step in tape.steps if step.operation == "read"}
-    moving = [row for row in tape.outputs if row[0] == "next" and ("state", row[1]) in read]
 
     with f.each_register(states) as lane:
-        unit_here = f.read(f.place(unit, lane))
-        share = one.slot("double")
-        one.write(share, _inverse(one, first))
-        # What an order gives to the next one stays in registers.
+        orders = _Orders(f, f.read(f.place(unit, lane)), first)
+        # What an order gives to the next one has slots: it stays in registers.
         begun = Steps(f, states, lane, arrays={"state": f.place(state, f.whole("mul", first, state_row))})
-        held = {("state", k): f.slot(f.numbers) for _, k in moving}
-        for row, slot in held.items():
-            f.write(slot, f.read(begun.place(row)))
+        held = {k: f.slot(f.numbers) for k in range(2 * series.size) if ("state", k) in read}
+        for k, slot in held.items():
+            f.write(slot, f.read(begun.place(("state", k))))
         sums.begin(first, lane)
-        with f.each(first, f.whole("add", last, 1)) as k:
-            following = f.whole("add", k, 1)
-            number, share_here = one.let(f"sitofp i64 {k} to double"), one.read(share)
-            share_next = _inverse(one, following)
-            one.write(share, share_next)
-            is_first = f.let(f"icmp eq i64 {k}, 1")
-            given = {
-                ("order", 0): f.splat(number),
-                ("order", 1): f.splat(share_here),
-                ("order", 2): f.multiply(unit_here, f.splat(share_next)),
-                ("order", 3): f.let(
-                    f"select i1 {is_first}, {f.numbers} {unit_here}, {f.numbers} {f.number(0.0)}"
-                ),
-            }
-            given |= {row: f.read(slot) for row, slot in held.items()}
-            given |= {("sums", m): found for m, found in enumerate(sums.found(k))}
+        with _each(f, first, f.whole("add", last, 1)) as order:
+            following = f.whole("add", order, 1)
+            given = {("order", k): value for k, value in enumerate(orders.of(order, following))}
+            given |= {("state", k): f.read(slot) for k, slot in held.items()}
+            given |= {("sums", k): value for k, value in enumerate(sums.of(order))}
             arrays = {
                 "kept": kept,
-                "inputs": f.place(inputs, f.whole("mul", k, table.rows["inputs"] * states)),
+                "inputs": f.place(inputs, f.whole("mul", order, table.rows["inputs"] * states)),
                 "next": f.place(state, f.whole("mul", following, state_row)),
             }
             steps = Steps(f, states, lane, given, arrays)
             steps.carry_out(tape)
-            values = {row: steps.names[value] for row, value in tape.outputs.items()}
-            steps.write({row: value for row, value in tape.outputs.items() if row[0] == "next"})
-            sums.keep(k, [value for (array, _), value in values.items() if array == "operands"])
-            for row in moving:
-                f.write(held["state", row[1]], values[row])
+            made = {row: steps.names[value] for row, value in tape.outputs.items()}
+            for k in range(2 * series.size):
+                f.write(steps.place(("next", k)), made["next", k])
+            sums.keep(order, [made["operands", k] for k in range(len(series.operands))])
+            for k, slot in held.items():
+                f.write(slot, made["next", k])
     f.line("ret void")
     return f.text()
 
@@ -90,34 +75,55 @@ def _state_row(table: KernelTable, states: int) -> int:
     return padded_state(size) if states == 1 else 2 * size * states
 
 
-def _inverse(one: LlvmFunction, k: str) -> str:
-    return one.do("fdiv", literal(1.0), one.let(f"sitofp i64 {k} to double"))
+class _Orders:
+    """What a tape reads of an order k: k, 1/k, unit/(k + 1), and unit for k = 1."""
+
+    def __init__(self, f: LlvmFunction, unit: str, first: str):
+        self._f = f
+        self._one = f.of_width(1)
+        self._unit = unit
+        self._share = self._one.slot("double")
+        self._one.write(self._share, self._inverse(first))
+
+    def of(self, order: str, following: str) -> list[str]:
+        f, one, unit = self._f, self._one, self._unit
+        share, next_share = one.read(self._share), self._inverse(following)
+        one.write(self._share, next_share)
+        is_first = one.let(f"icmp eq i64 {order}, 1")
+        time = f.let(f"select i1 {is_first}, {f.numbers} {unit}, {f.numbers} {f.number(0.0)}")
+        return [f.splat(self._number(order)), f.splat(share), f.multiply(unit, f.splat(next_share)), time]
+
+    def _number(self, order: str) -> str:
+        return self._one.let(f"sitofp i64 {order} to double")
+
+    def _inverse(self, order: str) -> str:
+        return self._one.do("fdiv", literal(1.0), self._number(order))
 
 
 class _OneMotion:
     """Each sum has a lane: rows of operands have the first ones of all sums, then the second ones."""
 
-    def __init__(self, f: LlvmFunction, places: list[tuple[int, int]], operands: str, most: int):
+    def __init__(self, f: LlvmFunction, series: Series, operands: str, most: int):
         self._f = f
         self._wide = f.of_width(most)
-        self._places = places
+        self._places = series.places
         self._operands = operands
-        self._lanes = lanes_of(len(places))
-        self._adds_newest = len(places) <= NEWEST_ADDED
+        self._lanes = lanes_of(len(series.sums))
+        self._adds_newest = len(series.sums) <= NEWEST_ADDED
         self._last: dict[int, str] = {}  # operands of the order before
 
     def begin(self, first: str, lane: int | str) -> None:
-        f = self._f
         if not self._adds_newest:
             return
+        f = self._f
         before = self._row(f.whole("sub", first, 1))
         there_is_one = f.let(f"icmp sgt i64 {first}, 1")
         for operand, k in sorted(self._place_of_each().items()):
             self._last[operand] = f.slot("double")
             f.write(self._last[operand], f.choose(there_is_one, f.read(f.place(before, k)), f.number(0.0)))
 
-    def found(self, k: str) -> list[str]:
-        """From the middle outward, so that rows that were just written come last.
+    def of(self, k: str) -> list[str]:
+        """The sums of order k, from the middle outward, so that rows that were just written come last.
 
         Where newest ones are added, those of orders 1 and k − 1 are left out: registers cannot be read yet where their
         numbers were just written one by one.
@@ -170,7 +176,7 @@ class _OneMotion:
             middle = self._row(f.let(f"lshr i64 {k}, 1"))
             for lane, (total, _) in zip(lanes, totals, strict=True):
                 add(total, lane, middle, middle)
-        with f.each(_before_middle(f, k), least - 1, step=-1) as j:
+        with _each(f, _before_middle(f, k), least - 1, step=-1) as j:
             early, late = self._row(j), self._row(f.whole("sub", k, j))
             for lane, both in zip(lanes, totals, strict=True):
                 add(both[0], lane, early, late)
@@ -193,20 +199,18 @@ class _OneMotion:
 class _Motions:
     """Each motion has a lane; some sums are made together, whose operands are read once."""
 
-    def __init__(self, f: LlvmFunction, places: list[tuple[int, int]], operands: str, states: int, most: int):
+    def __init__(self, f: LlvmFunction, series: Series, operands: str, states: int):
         self._f = f
         self._states = states
-        self._places = places
+        self._places = series.places
         self._operands = operands
+        self._row_length = len(series.operands) * states
         self._lane: int | str = 0
-        self._row_length = (1 + max((m for pair in places for m in pair), default=-1)) * states
-        # Of 32 registers or 16.
-        self._groups = groups_of(places, AT_A_TIME if most == 8 else AT_A_TIME // 2)
 
     def begin(self, first: str, lane: int | str) -> None:
         self._lane = lane
 
-    def found(self, k: str) -> list[str]:
+    def of(self, k: str) -> list[str]:
         f, totals = self._f, [self._f.slot(self._f.numbers) for _ in self._places]
 
         def add(m: int, x: str, y: str) -> None:
@@ -214,8 +218,8 @@ class _Motions:
 
         for total in totals:
             f.write(total, f.number(0.0))
-        for group in self._groups:
-            with f.each(_before_middle(f, k), 0, step=-1) as j:
+        for group in groups_of(self._places):
+            with _each(f, _before_middle(f, k), 0, step=-1) as j:
                 operands = {operand for m in group for operand in self._places[m]}
                 early, late = (self._read(row, operands) for row in (j, f.whole("sub", k, j)))
                 pairs = [(m, *self._places[m]) for m in group]
@@ -248,6 +252,14 @@ class _Motions:
     def _read(self, k: str, operands: set[int]) -> dict[int, str]:
         f, row = self._f, self._row(k)
         return {operand: f.read(f.place(row, operand * self._states)) for operand in sorted(operands)}
+
+
+@contextmanager
+def _each(f: LlvmFunction, first: int | str, end: int | str, step: int = 1) -> Iterator[str]:
+    """A loop over orders whose addresses LLVM leaves as they are: to look for better ones takes it a fourth of the time
+    that series take, and was measured to gain nothing."""
+    with f.each(first, end, step) as k:
+        yield f.let(f"freeze i64 {k}")
 
 
 def _before_middle(f: LlvmFunction, k: str) -> str:
