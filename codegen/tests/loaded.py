@@ -84,6 +84,9 @@ def jit(text: str) -> Any:
     module = llvm.parse_assembly(text)
     module.verify()
     machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_sroa_pass()  # as python/pendula/_jit.py has it
+    passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
     engine = llvm.create_mcjit_compiler(module, machine)
     engine.finalize_object()
     return engine

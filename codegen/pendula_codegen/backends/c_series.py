@@ -85,7 +85,7 @@ def lanes_of(count: int) -> int:
 def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
     """Some together, whose operands are read once."""
     lines = [f"V {', '.join(f'sum_{k} = SPLAT(0.0)' for k in range(len(places)))};"]
-    for group in _groups(places):
+    for group in groups_of(places):
         operands = sorted({operand for k in group for operand in places[k]})
         lines += [
             "for (int j = (k - 1) / 2; j > 0; --j) {",
@@ -110,7 +110,7 @@ def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
     return [*lines, "}"]
 
 
-def _groups(places: list[tuple[int, int]]) -> list[list[int]]:
+def groups_of(places: list[tuple[int, int]]) -> list[list[int]]:
     """Sums that share operands, as many as registers hold with them."""
     waiting, groups = [*range(len(places))], []
     while waiting:

@@ -5,17 +5,18 @@ What stands in the table of a kernel is as in C (templates/kernel.c.j2), and so 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate
 
 from pendula_codegen.backends.c import INTERFACE, SELDOM
-from pendula_codegen.backends.llvm_functions import call_of, functions_of, library_declarations
+from pendula_codegen.backends.llvm_functions import functions_of, library_declarations
 from pendula_codegen.backends.llvm_loops import factorization, iteration, rows_of_eight, solution
+from pendula_codegen.backends.llvm_series import series_next, series_start
+from pendula_codegen.backends.llvm_steps import Steps
 from pendula_codegen.backends.llvm_text import LlvmFunction
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
-from pendula_codegen.tape import Row, Step, Tape, Value
 
 WIDTHS = (1, 2, 4, 8)
 _AVX2 = "+avx2,+fma"
@@ -26,8 +27,6 @@ INSTRUCTION_SETS = {
     "avx2": (4, _AVX2),
     "avx512": (8, f"{_AVX2},+avx512f,+avx512cd,+avx512dq,+avx512bw,+avx512vl"),
 }
-_NO_SERIES = ["ptr null", "ptr null"]
-_ARITHMETIC = {"add": "fadd", "subtract": "fsub", "multiply": "fmul"}
 
 
 def print_kernel(table: KernelTable, size: int, description: Sequence[str], instruction_set: str) -> str:
@@ -47,6 +46,7 @@ def print_kernel(table: KernelTable, size: int, description: Sequence[str], inst
             seldom = states in SELDOM.get(function.name, ())
             parts.append(_by_eight(table, function, states) if seldom else _function(function, states, width))
         parts.append(_iteration(of_many[0], states, width, size))
+        parts += [series_start(table, states, width), series_next(table, states, width, most)]
     parts += [_function(function, 1, 1) for function in filter(None, plain)]
     target = f' "target-cpu"="x86-64" "target-features"="{features}"' if features else ""
     parts += [*_tables(table, description), f"attributes #0 = {{ nounwind{target} }}"]
@@ -71,9 +71,10 @@ def _tables(table: KernelTable, description: Sequence[str]) -> list[str]:
     text = "".join(f"{line}\n" for line in description).encode() + b"\0"
     written = "".join(chr(c) if 32 <= c < 127 and c not in b'"\\' else f"\\{c:02X}" for c in text)
     functions = ", ".join(f"ptr @functions_{states}" for states in WIDTHS)
+    more = ("iterate", "series_start", "series_next")
     kinds = f"{{ i32, ptr, [{len(WIDTHS)} x ptr], ptr }}"
     return [
-        *(list_of(f"functions_{n}", table.of_many, n, [f"ptr @iterate_{n}", *_NO_SERIES]) for n in WIDTHS),
+        *(list_of(f"functions_{n}", table.of_many, n, [f"ptr @{name}_{n}" for name in more]) for n in WIDTHS),
         list_of("plain_functions", table.plain, 1, []),
         f'@description = internal constant [{len(text)} x i8] c"{written}"',
         f"@pendula_kernel = constant {kinds} {{ i32 {INTERFACE}, ptr @description, "
@@ -114,10 +115,9 @@ def _by_eight(table: KernelTable, function: TableFunction, states: int) -> str:
 def _function(function: TableFunction, states: int, width: int) -> str:
     f = LlvmFunction(_head(function, states), width)
     with f.each_register(states) as lane:
-        steps = _Steps(f, states, lane)
+        steps = Steps(f, states, lane)
         steps.carry_out(function.tape)
-        for row, value in function.tape.outputs.items():
-            f.write(steps.place(row), steps.names[value])
+        steps.write(function.tape.outputs)
     f.line("ret void")
     return f.text()
 
@@ -127,72 +127,10 @@ def _iteration(hamiltonian_form: TableFunction, states: int, width: int, size: i
         given = {
             (array, k): reached[first + k] for array, first in (("q", 0), ("p", size)) for k in range(size)
         }
-        steps = _Steps(f, states, lane, given)
+        steps = Steps(f, states, lane, given)
         steps.carry_out(hamiltonian_form.tape)
         outputs = hamiltonian_form.tape.outputs
         return [steps.names[outputs[array, k]] for array in ("v", "f") for k in range(size)]
 
     head = f"internal {{ double, double }} @iterate_{states}(ptr readonly %at, ptr readonly %on)"
     return iteration(LlvmFunction(head, width), states, size, form)
-
-
-class _Steps:
-    """The steps of a tape, of the register that begins at the state `lane`, of so many.
-
-    names   what values are called
-    given   rows that need not be read
-    """
-
-    def __init__(self, f: LlvmFunction, states: int, lane: int | str, given: Mapping[Row, str] | None = None):
-        self.names: dict[Value, str] = {}
-        self._f = f
-        self._states = states
-        self._lane = lane
-        self._given = given or {}
-        self._arrays: dict[Value, str] = {}  # of a linear system, by its first result
-        self._places: dict[str, str] = {}
-
-    def carry_out(self, tape: Tape) -> None:
-        for step in tape.steps:
-            self._step(step)
-
-    def place(self, row: Row) -> str:
-        f, (array, k) = self._f, row
-        if array not in self._places:
-            base = f.pointer("%at", 1 + CONDITIONS.index(array)) if array in CONDITIONS else f"%{array}"
-            self._places[array] = f.place(base, self._lane)
-        return f.place(self._places[array], k * self._states)
-
-    def _step(self, step: Step) -> None:
-        f, names = self._f, self.names
-        given = [names[value] for value in step.operands]
-        match step.operation:
-            case "number":
-                names[step.first] = f.number(step.number)
-            case "read":
-                names[step.first] = self._given.get(step.row) or f.read(self.place(step.row))
-            case "add" | "subtract" | "multiply":
-                names[step.first] = f.do(_ARITHMETIC[step.operation], *given)
-            case "negative":
-                names[step.first] = f.let(f"fneg contract {f.numbers} {given[0]}")
-            case "inverse":
-                names[step.first] = f.do("fdiv", f.number(1.0), given[0])
-            case "sincos":
-                pair = f.let(f"call fastcc {f.pairs} @sincos.{f.width}({f.numbers} {given[0]})")
-                names |= zip(step.results, f.of_pair(pair), strict=True)
-            case "factor" | "solve":
-                self._system(step, given)
-            case _:
-                names[step.first] = call_of(f, step.operation, given[0], step.number)
-
-    def _system(self, step: Step, given: list[str]) -> None:
-        """A linear system that is too large to be written out: it is an array."""
-        f = self._f
-        array = self._arrays[step.first] = f.slot(f.numbers, step.count)
-        places = [f.place(array, k * f.width) for k in range(step.count)]
-        for place, name in zip(places, given[-step.count :], strict=True):
-            f.write(place, name)
-        factors = [] if step.operation == "factor" else [self._arrays[step.operands[0]]]
-        passed = ", ".join(f"ptr {one}" for one in (*factors, array))
-        f.line(f"call fastcc void @{step.operation}.{f.width}({passed})")
-        self.names |= {value: f.read(place) for value, place in zip(step.results, places, strict=True)}

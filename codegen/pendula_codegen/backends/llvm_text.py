@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
+from itertools import count
 
 ROUNDED = {"fadd", "fsub", "fmul"}  # products go into sums unrounded, where the processor has that
 Pair = tuple[str, str]
@@ -25,15 +27,24 @@ class LlvmFunction:
     """
 
     def __init__(self, head: str, width: int, attributes: str = "#0"):
+        self._head = f"define {head} {attributes} {{"
+        self._slots: list[str] = []
+        self._lines: list[str] = []
+        self._names = count(1)
+        self._have(width)
+
+    def _have(self, width: int) -> None:
         self.width = width
         self.numbers = self._of("double")
         self.integers = self._of("i64")
         self.bits = self._of("i1")
         self.pairs = f"{{ {self.numbers}, {self.numbers} }}"
-        self._head = f"define {head} {attributes} {{"
-        self._slots: list[str] = []
-        self._lines: list[str] = []
-        self._names = 0
+
+    def of_width(self, width: int) -> LlvmFunction:
+        """The same function, where it has registers of another width."""
+        other = copy(self)
+        other._have(width)
+        return other
 
     def _of(self, type_: str) -> str:
         return type_ if self.width == 1 else f"<{self.width} x {type_}>"
@@ -53,8 +64,7 @@ class LlvmFunction:
         self._lines.append(f"  {text}")
 
     def name(self) -> str:
-        self._names += 1
-        return f"%v{self._names}"
+        return f"%v{next(self._names)}"
 
     def let(self, text: str) -> str:
         name = self.name()
@@ -193,6 +203,15 @@ class LlvmFunction:
         else:
             with self.each(0, states, self.width) as lane:
                 yield lane
+
+    @contextmanager
+    def only_if(self, condition: str) -> Iterator[None]:
+        holds, done = self.name(), self.name()
+        self.line(f"br i1 {condition}, label {holds}, label {done}")
+        self.label(holds)
+        yield
+        self.line(f"br label {done}")
+        self.label(done)
 
     def whole(self, operation: str, x: int | str, y: int | str) -> str:
         """Of counters."""
