@@ -75,7 +75,7 @@ def test_the_documentation_says_what_must_be_given(scenario_schema):
         for key, row in found.get(name, {}).items()
         if key in table.get("required", []) and row.count("|") > 3  # with a column for it
     }
-    assert len(told) == 10 and all(told.values()), told
+    assert len(told) == 14 and all(told.values()), told
 
 
 def test_the_documentation_has_every_key_of_summaries():
