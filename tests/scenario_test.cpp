@@ -267,10 +267,10 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       // unknown keys, with the one that may be meant
       {"masses  =", "mases =",
        "file.toml:4: chain.mases: expected one of space, links, masses, lengths, gravity, damping, "
-       "torque, units, drive, got the unknown key \"mases\" (did you mean masses?)"},
+       "torque, units, drive, feedback, got the unknown key \"mases\" (did you mean masses?)"},
       {"units   =", "theta =",
        "file.toml:9: chain.theta: expected one of space, links, masses, lengths, gravity, damping, "
-       "torque, units, drive, got the unknown key \"theta\" (did you mean start.theta?)"},
+       "torque, units, drive, feedback, got the unknown key \"theta\" (did you mean start.theta?)"},
       {"phase = 0.4", "delay = 0.4",
        "file.toml:15: chain.drive[1].delay: expected one of link, amplitude, frequency, "
        "phase, got the unknown key \"delay\""},

@@ -175,4 +175,7 @@ def test_llvm_is_for_python_alone(pendula):
 def test_what_nobody_runs_kernels_by_is_refused(pendula):
     ended = pendula("build", "spring_pendulum", PENDULA_KERNELS_BY="magic")
     assert ended.returncode == 2
-    assert ended.stderr == "pendula: PENDULA_KERNELS_BY: expected compiler, llvm, interpreter or auto, got magic\n"
+    assert (
+        ended.stderr
+        == "pendula: PENDULA_KERNELS_BY: expected compiler, llvm, interpreter or auto, got magic\n"
+    )
