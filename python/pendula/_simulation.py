@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,11 +13,13 @@ import numpy as np
 
 from . import _core, _toml
 from ._core import InputError
-from ._runs import merged, number, places, plainly, tell, warn
+from ._runs import mapping, merged, number, places, plainly, tell, warn
 from ._systems import System
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    Controller = Callable[[float, NDArray[np.float64]], Mapping[str, float]]
 
 RUN_OPTIONS = ("method", "stages", "form", "solver", "iteration")
 
@@ -205,11 +208,35 @@ class Simulation:
         return self
 
     def step(
-        self, duration: float, inputs: Mapping[str, float] | None = None, /, **more: float
+        self,
+        duration: float,
+        inputs: Mapping[str, float] | Controller | None = None,
+        sample: float | None = None,
+        /,
+        **more: float,
     ) -> Simulation:
-        """Holds inputs, and goes on by ``duration``, in s: a zero-order hold, with steps chosen inside."""
-        end = self.time + number("duration", duration)
-        return self.hold(inputs, **more).advance_to(end)
+        """Holds inputs, and goes on by ``duration``, in s: a zero-order hold, with steps chosen inside.
+
+        ``inputs`` may be a function of the time and the state, which gives inputs by name: it is called every
+        ``sample`` seconds, or once. For a law that is an expression of the columns, see ``feedback`` of the system.
+
+        >>> import pendula
+        >>> cart = pendula.Simulation(pendula.Model("cart_chain"), {"theta": 0.1})
+        >>> cart.step(1.0, lambda t, y: {"push": -2 * y[2]}, 0.01).inputs["push"] != 0
+        True
+        """
+        begin, left = self.time, number("duration", duration)
+        if not callable(inputs):
+            if sample is not None:
+                raise InputError("sample: expected none where inputs are no function, got one")
+            return self.hold(inputs, **more).advance_to(begin + left)
+        every = left if sample is None else number("sample", sample)
+        if not every > 0 and left > 0:
+            raise InputError(f"sample: expected a time > 0, got {sample!r}")
+        for k in range(max(1, math.ceil(left / every * (1 - 1e-12))) if left > 0 else 0):
+            self.hold(mapping("inputs", inputs(self.time, self.state)), **more)
+            self.advance_to(begin + min(left, (k + 1) * every))
+        return self
 
     def at(self, time: float) -> NDArray[np.float64]:
         """The state at any time since the start, at the full order of the method."""

@@ -33,6 +33,31 @@ def test_sampled_feedback_is_what_a_program_would_hold() -> None:
     assert np.abs(run["push"][:-1] - pushes).max() < 1e-9  # measured 2e-15
 
 
+def test_a_function_gives_inputs_of_a_simulation() -> None:
+    def control(t: float, state: Any) -> dict[str, float]:
+        return {"push": law(state)}
+
+    plant = pendula.Model("cart_chain", links=1)
+    once, often = (pendula.Simulation(plant, START, tolerance=1e-10) for _ in range(2))
+    once.step(2.05, control, 0.1)
+    for duration in [0.1] * 20 + [0.05]:
+        often.step(duration, push=law(often.state))
+    assert once.time == often.time == 2.05
+    assert np.abs(once.state - often.state).max() < 1e-12  # measured MEASURED
+    once.step(0.5, control)  # asked once
+    often.step(0.5, push=law(often.state))
+    assert np.abs(once.state - often.state).max() < 1e-12
+    with pytest.raises(pendula.InputError, match=r"sample: expected a time > 0, got 0\.0"):
+        once.step(0.5, control, 0.0)
+    with pytest.raises(pendula.InputError, match="sample: expected none where inputs are no function"):
+        once.step(0.5, {"push": 1.0}, 0.1)
+    with pytest.raises(pendula.InputError, match="inputs: expected a mapping"):
+        once.step(0.5, lambda t, y: 3.0, 0.1)  # type: ignore[arg-type, return-value]
+    with pytest.raises(ZeroDivisionError):
+        once.step(0.5, lambda t, y: {"push": 1 / 0}, 0.1)
+    assert once.time == often.time
+
+
 def test_continuous_feedback_is_differentiated() -> None:
     moved = pendula.differentiate(cart(), 1.0, start=START, tolerance=1e-12)
     step = 1e-5
