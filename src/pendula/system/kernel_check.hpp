@@ -21,7 +21,7 @@ struct KernelCheck {
     }
   };
 
-  std::array<Line, 11> lines;
+  std::array<Line, 12> lines;
   int count = 0;
 };
 

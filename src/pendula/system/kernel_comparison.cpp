@@ -5,6 +5,7 @@
 #include <numeric>
 #include <pendula/system/kernel_comparison.hpp>
 #include <pendula/system/kernel_widths.hpp>
+#include <pendula/system/series_check.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -125,9 +126,9 @@ KernelCheck KernelComparison::check() const {
         return residuals;
     }
   };
-  const std::size_t lanes = add(width_line);
+  const std::size_t lanes = add(width_line), series = table_.of_1.series_next == nullptr ? lanes : add(series_line);
   std::vector<KernelPoint> all;
-  std::array<int, 11> compared{};
+  std::array<int, 12> compared{};
   const auto keep = [&](std::size_t line, double error) {
     check.lines[line].keep(error);
     ++compared[line];
@@ -149,8 +150,9 @@ KernelCheck KernelComparison::check() const {
     }
     compare_solved(point, values, [&](double error) { keep(solutions, error); });
   }
-  check.lines[lanes].limit = width_limit;
+  for (const std::size_t line : {lanes, series}) check.lines[line].limit = width_limit;
   if (!all.empty()) keep(lanes, width_error(table_, all));
+  if (!all.empty() && series != lanes) keep(series, series_error(table_, all));
   for (int k = 0; k < check.count; ++k) {
     if (compared[static_cast<std::size_t>(k)] == 0) {
       check.lines[static_cast<std::size_t>(k)].error = std::numeric_limits<double>::quiet_NaN();
