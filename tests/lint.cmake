@@ -24,7 +24,6 @@ file(WRITE "${BUILD}/lint.txt" "${lines}\n")
 # The compilation database is the compiler's: clang-tidy need not know each of its warnings, nor g++'s symbols, and
 # cannot read another compiler's precompiled headers.
 string(REPLACE " -fno-gnu-unique" "" database "${database}")
-string(REPLACE " -Wno-shadow" "" database "${database}")
 string(REGEX REPLACE " -Winvalid-pch -include [^ ]+" "" database "${database}")
 string(REGEX REPLACE " -Winvalid-pch (-Xclang )?-include-pch -Xclang [^ ]+ -Xclang -include -Xclang [^ ]+" "" database
        "${database}")

@@ -25,7 +25,7 @@ struct ModelKernel {
 
 /// Finds the kernel of a model in this build or in the cache, or makes it. tell(what) is called before anything takes
 /// long. Throws ModelError if the model is wrong, or something is missing to make it.
-ModelKernel find_kernel(const ModelName& name, const Toolchain& toolchain,
+ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
                         const std::function<void(const std::string&)>& tell);
 
 /// The text of a model's file; empty if its kernel is part of this program. Throws as find_kernel.

@@ -71,7 +71,7 @@ using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>, SystemScen
 using FindSystem = std::function<std::shared_ptr<const SystemTable>(const ModelName& name)>;
 
 /// Finds kernels of this build only.
-std::shared_ptr<const SystemTable> built_in_system(const ModelName& name);
+std::shared_ptr<const SystemTable> built_in_system(const ModelName& model);
 
 /// Reads a scenario from TOML text; `name` stands for the file in messages. Each override is `key.path=value`, the
 /// value in TOML, or a bare word for a string; it replaces what the text says. Keys and defaults: docs/scenario.md.

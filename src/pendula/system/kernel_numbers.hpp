@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <pendula/numeric/dual.hpp>
 #include <pendula/numeric/numbers_of_states.hpp>

@@ -147,17 +147,17 @@ class SeriesSteps {
     if (!is_expanded_) expand();
     tried_ = h;
     const double tau = h / unit_;
-    double none = 0;
+    bool is_finite = true;
     for (std::size_t k = 0; k < 2 * n_; ++k) {
       const double x = *now_.state[k], change = tau * rise(k, tau) + *now_.low[k], there = x + change;
       *trial_.state[k] = there;
       *trial_.low[k] = change - (there - x);
-      none += there - there;
+      is_finite &= std::isfinite(there);
     }
     read_rates(time + h, trial_.state, trial_.parts);
-    for (int i = 0; i < links(); ++i) none += trial_.parts[i].rate[0] - trial_.parts[i].rate[0];
+    for (int i = 0; i < links(); ++i) is_finite &= std::isfinite(trial_.parts[i].rate[0]);
     trial_.last = h;
-    if (none != 0) return false;
+    if (!is_finite) return false;
     for (int k = 1; k <= looks_; ++k) {
       if (!solves(time, h, static_cast<double>(k) / looks_)) return false;
     }
@@ -330,13 +330,13 @@ class SeriesSteps {
   }
 
   double size_of_term(std::size_t order) const {
-    double largest = 0, none = 0;
+    double largest = 0;
     for (std::size_t i = 0; i < n_; ++i) {
       const double moved = coefficient(order, i) * scales_[i], turned = rate(order, i) * scales_[n_ + i];
+      if (!std::isfinite(moved) || !std::isfinite(turned)) return std::numeric_limits<double>::infinity();
       largest = std::max({largest, std::abs(moved), std::abs(turned)});
-      none += (moved - moved) + (turned - turned);
     }
-    return largest + none;
+    return largest;
   }
 
   /// A coefficient of a rate.
