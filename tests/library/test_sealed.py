@@ -32,6 +32,7 @@ ONCE = [
         "kernel_values",
         "kernel_widths",
         "library",
+        "series_check",
     )
 ]
 
