@@ -30,6 +30,11 @@ class ChainKernel(SystemKernel):
         self.chain = chain
         self.paper_blocks = paper_blocks
 
+    @property
+    def moves_by_series(self) -> bool:
+        """Not in space: there rods have series without poles, which take less time."""
+        return self.chain.model.dimension == 2
+
     @cached_property
     def blocks(self) -> Blocks:
         return collect_blocks(self.chain)

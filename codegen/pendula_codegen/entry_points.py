@@ -136,6 +136,11 @@ class SystemKernel(ABC):
 
     # --- what a kind of system says of itself
 
+    @property
+    def moves_by_series(self) -> bool:
+        """Whether Taylor series of it are of use."""
+        return True
+
     @abstractmethod
     def leaves(self) -> list[Leaf]:
         """Parameters and inputs, and where they stand."""

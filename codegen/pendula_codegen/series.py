@@ -41,7 +41,7 @@ mass matrix that is singular, or a function at a point where it has none. Coeffi
 overflow takes a smaller unit. Where nothing moves, all coefficients but those of order 0 are zero.
 
 SeriesInfo tells the form and how many sums, operands and kept numbers there are. Kernels in C++ of more than ten
-coordinates have no series: their functions are null there.
+coordinates, and of chains in space, have no series: their functions are null there.
 """
 
 from __future__ import annotations

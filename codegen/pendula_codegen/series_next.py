@@ -156,21 +156,11 @@ class Next:
     # --- the linear system
 
     def _solve(self) -> list[Value]:
-        series, tape, n = self._series, self.tape, self._series.size
-        zero = tape.number(0.0)
-        right = []
-        for k, (constant, node) in enumerate(series.solved):
-            rest = self._rest(node)
-            value = None if rest is None else self._sums.linear([(constant, rest)])
-            if series.has_momenta:
-                p = tape.read(("state", n + k))
-                right.append(p if value is None else tape.subtract(p, value))
-            else:
-                right.append(zero if value is None else tape.negative(value))
+        right = self._sums.right_sides(self._series, self._rest)
         if self._start.inverse:
-            return [self._row(k, right) for k in range(n)]
+            return [self._row(k, right) for k in range(self._series.size)]
         factors = [self._kept(value) for value in self._start.factors]
-        return Elimination(tape).solve(factors, right)
+        return Elimination(self.tape).solve(factors, right)
 
     def _row(self, k: int, right: Sequence[Value]) -> Value:
         """M⁻¹ times the right-hand side."""

@@ -61,6 +61,19 @@ class Sums:
             return x
         return y if self.tape.number_of(x) == 1 else self.tape.multiply(x, y)
 
+    def right_sides(self, series: Series, rest: Callable[[int], Value | None]) -> list[Value]:
+        """Of the linear system: p or 0, less what stands on the left without the unknowns, `rest` of a node."""
+        tape, right = self.tape, []
+        for k, (constant, node) in enumerate(series.solved):
+            left = rest(node)
+            value = None if left is None else self.linear([(constant, left)])
+            if series.has_momenta:
+                p = tape.read(("state", series.size + k))
+                right.append(p if value is None else tape.subtract(p, value))
+            else:
+                right.append(tape.number(0.0) if value is None else tape.negative(value))
+        return right
+
 
 class Start:
     """Order 0.
@@ -195,15 +208,7 @@ class Start:
             for j in range(i + 1):
                 slope = self._slope(node, j)
                 lower.append(zero if slope is None else self._sums.linear([(constant, slope)]))
-        right = []
-        for k, (constant, node) in enumerate(series.solved):
-            rest = self._rest(node)
-            value = None if rest is None else self._sums.linear([(constant, rest)])
-            if series.has_momenta:
-                p = tape.read(("state", n + k))
-                right.append(p if value is None else tape.subtract(p, value))
-            else:
-                right.append(zero if value is None else tape.negative(value))
+        right = self._sums.right_sides(series, self._rest)
         if n > UNROLLED:
             self.factors = [*tape.factor(lower)]
             return [*tape.solve(self.factors, right)]

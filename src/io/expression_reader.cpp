@@ -363,6 +363,11 @@ class ExpressionReader {
 
 }  // namespace
 
+std::string_view function_name(Operation operation) {
+  const auto found = std::ranges::find(functions, operation, &Function::operation);
+  return found == functions.end() ? std::string_view() : found->name;
+}
+
 ExpressionProgram read_expression(const std::string& text, std::span<const std::string> names) {
   return ExpressionReader(text, names).read();
 }

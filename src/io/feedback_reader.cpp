@@ -1,11 +1,13 @@
 #include "io/feedback_reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <mutex>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/feedback.hpp>
 #include <pendula/run/inputs.hpp>
+#include <pendula/run/state_columns.hpp>
 #include <string_view>
 #include <utility>
 
@@ -63,11 +65,7 @@ std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
   };
   const std::vector<std::string> names = names_for(*subject, plan.sample == 0);
   auto expression = told_at(plan, [&] { return std::make_shared<Expression>(plan.value, names); });
-  std::size_t coordinates = 0;
-  for (const Quantity& quantity : subject->quantities()) {
-    if (quantity.role == Role::coordinate) coordinates += quantity.size();
-  }
-  const auto size = static_cast<Eigen::Index>(coordinates);
+  const auto size = static_cast<Eigen::Index>(state_columns(*subject).size() / 2);
   const Motion any(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size));
   const auto shared = std::make_shared<Guarded>(subject, std::move(expression), any);
   return [shared](const Motion& motion) {
@@ -76,36 +74,22 @@ std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
   };
 }
 
-/// The name of a smooth function; empty for what is none.
-std::string_view smooth_name(Operation operation) {
-  switch (operation) {
-    case Operation::sine:
-      return "sin";
-    case Operation::cosine:
-      return "cos";
-    case Operation::tangent:
-      return "tan";
-    case Operation::arcsine:
-      return "asin";
-    case Operation::arccosine:
-      return "acos";
-    case Operation::arctangent:
-      return "atan";
-    case Operation::hyperbolic_sine:
-      return "sinh";
-    case Operation::hyperbolic_cosine:
-      return "cosh";
-    case Operation::hyperbolic_tangent:
-      return "tanh";
-    case Operation::exponential:
-      return "exp";
-    case Operation::logarithm:
-      return "log";
-    case Operation::root:
-      return "sqrt";
-    default:
-      return "";
-  }
+/// Functions that models may have, too.
+bool is_smooth(Operation operation) {
+  using enum Operation;
+  constexpr std::array smooth = {sine,
+                                 cosine,
+                                 tangent,
+                                 arcsine,
+                                 arccosine,
+                                 arctangent,
+                                 hyperbolic_sine,
+                                 hyperbolic_cosine,
+                                 hyperbolic_tangent,
+                                 exponential,
+                                 logarithm,
+                                 root};
+  return std::ranges::find(smooth, operation) != smooth.end();
 }
 
 std::string_view sign_of(Operation operation) {
@@ -131,13 +115,13 @@ std::string_view sign_of(Operation operation) {
 std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names) {
   std::vector<std::string> words;
   for (const ExpressionProgram::Node& node : program.nodes) {
-    const std::string_view function = smooth_name(node.operation), sign = sign_of(node.operation);
+    const std::string_view sign = sign_of(node.operation);
     if (node.operation == Operation::constant) {
       words.push_back(shortest(node.number));
     } else if (node.operation == Operation::column) {
       words.push_back(names[program.columns[node.a]]);
-    } else if (!function.empty()) {
-      words.push_back(std::string(function) + "()");
+    } else if (is_smooth(node.operation)) {
+      words.push_back(std::string(function_name(node.operation)) + "()");
     } else if (!sign.empty()) {
       words.emplace_back(sign);
     } else {

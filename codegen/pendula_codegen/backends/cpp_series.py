@@ -17,8 +17,8 @@ _SIGNS = {"add": "+", "subtract": "-", "multiply": "*"}
 
 
 def kernel_series(kernel: SystemKernel) -> SeriesTapes | None:
-    """None where there are too many coordinates for all of it to be written out."""
-    if len(kernel.system.coordinates) > UNROLLED:
+    """None where nothing moves by it, and where there are too many coordinates for all of it to be written out."""
+    if not kernel.moves_by_series or len(kernel.system.coordinates) > UNROLLED:
         return None
     return series_tapes(kernel, lambda where: (place(where, eigen_entry), 0))
 

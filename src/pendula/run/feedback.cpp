@@ -3,6 +3,7 @@
 #include <optional>
 #include <pendula/run/feedback.hpp>
 #include <pendula/run/inputs.hpp>
+#include <pendula/run/state_columns.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/plain_integrator.hpp>
 #include <stdexcept>
@@ -40,7 +41,7 @@ class HeldInputs : public PlainIntegrator {
   }
 
   Outcome start(double time, const double* q, const double* v) override {
-    const auto size = fed_coordinates();
+    const Eigen::Index size = now_->state().q.size();
     done_ = all_ = {};
     before_.reset();
     const Motion motion(time, Eigen::Map<const Eigen::VectorXd>(q, size), Eigen::Map<const Eigen::VectorXd>(v, size));
@@ -54,7 +55,7 @@ class HeldInputs : public PlainIntegrator {
   }
 
   Outcome step(double h) override {
-    if (before_) before_.reset();
+    before_.reset();
     const double next = next_sample(), left = next - time();
     const bool reaches = h >= left * (1 - rounding);
     const Outcome stepped = now_->step(reaches ? left : h);
@@ -113,8 +114,6 @@ class HeldInputs : public PlainIntegrator {
 
  private:
   static constexpr double rounding = 1e-12;
-
-  Eigen::Index fed_coordinates() const { return now_->state().q.size(); }
 
   static void write(const Motion& motion, double* q, double* v) {
     std::ranges::copy(motion.q, q);
@@ -184,7 +183,7 @@ class FedSubject : public Subject {
   }
 
   std::unique_ptr<Integrator> make_integrator(const RunOptions& options) const override {
-    const auto size = static_cast<Eigen::Index>(coordinates_of(*fed_.subject));
+    const auto size = static_cast<Eigen::Index>(state_columns(*fed_.subject).size() / 2);
     return std::make_unique<Integrator>(std::make_unique<HeldInputs>(fed_, options), size, "system with feedback");
   }
 
@@ -256,14 +255,6 @@ class FedSubject : public Subject {
       if (std::ranges::find(inputs, law.input) == inputs.end()) inputs.push_back(law.input);
     }
     return inputs;
-  }
-
-  static std::size_t coordinates_of(const Subject& subject) {
-    std::size_t count = 0;
-    for (const Quantity& quantity : subject.quantities()) {
-      if (quantity.role == Role::coordinate) count += quantity.size();
-    }
-    return count;
   }
 
   Fed fed_;

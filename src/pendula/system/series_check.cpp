@@ -57,7 +57,7 @@ class Series {
 
   /// Of the motion in a lane, the smallest of several times; NaN where it has no numbers.
   double error(std::size_t lane) const {
-    double radius = 1;
+    double radius = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < n_; ++i) {
       const double size = std::max(1.0, std::abs(coefficient(0, i, lane)));
       for (std::size_t k = order - 3; k <= order + 1; ++k) {
@@ -65,6 +65,7 @@ class Series {
         if (term > 0) radius = std::min(radius, std::pow(term, -1 / static_cast<double>(k)));
       }
     }
+    if (std::isinf(radius)) radius = 1;  // where nothing but the start moves it
     double least = std::numeric_limits<double>::quiet_NaN(), time = share * radius;
     for (int k = 0; k < nearer; ++k, time /= 8) least = std::fmin(least, error(lane, time, radius));
     return least;
