@@ -6,8 +6,11 @@
 #include <cstdio>
 #include <ctime>
 #include <numbers>
+#include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/ensemble/member_queue.hpp>
+#include <pendula/kernels/planar_2.hpp>
+#include <pendula/system/kernel_table.hpp>
 #include <random>
 #include <type_traits>
 #include <vector>
@@ -51,7 +54,7 @@ std::vector<ChainMember<Planar, N>> members_of(int links, int count, double end,
 
 // Of nine runs, a member's, sorted.
 template <class Queue>
-std::vector<double> times_of(Queue& queue, const std::vector<PlainMember<PlainChain>>& members, MemberEnds& ends) {
+std::vector<double> times_of(Queue& queue, const std::vector<typename Queue::MemberType>& members, MemberEnds& ends) {
   std::vector<double> times;
   for (int run = 0; run < 9; ++run) {
     const double start = processor_time();
@@ -132,14 +135,17 @@ double median_error(MemberEnds& ends, const MemberEnds& reference) {
 }
 
 template <class Queue>
-void race(const char* what, const Chain<Planar, 2>& chain, const std::vector<ChainMember<Planar, 2>>& members,
+void race(const char* what, typename Queue::Subject subject, const std::vector<typename Queue::MemberType>& members,
           const MemberEnds& reference, const QueueOptions& options) {
   MemberEnds ends(2, members.size());
-  Queue queue(2, options);
-  const std::vector<double> times = times_of(queue, plain_members(chain, members), ends);
-  std::printf("%-10s %s %-6.0e %7.2f us a member (best %7.2f), error %.1e\n", what,
+  Queue queue(subject, options);
+  const std::vector<double> times = times_of(queue, members, ends);
+  double steps = 0;
+  for (const MemberEnd& end : ends.all()) steps += static_cast<double>(end.steps);
+  std::printf("%-12s %s %-6.0e %7.2f us a member (best %7.2f), %5.1f ns a step, error %.1e\n", what,
               options.step > 0 ? "step     " : "tolerance", options.step > 0 ? options.step : options.tolerance,
-              times[4] * 1e6, times[0] * 1e6, median_error(ends, reference));
+              times[4] * 1e6, times[0] * 1e6, times[4] * 1e9 * static_cast<double>(members.size()) / steps,
+              median_error(ends, reference));
 }
 
 void race_all(const char* file) {
@@ -149,7 +155,7 @@ void race_all(const char* file) {
   GaussLanes<Planar, 8, 2>(2, {.step = 1.0 / 512}).run(plain_members(chain, members), reference.all());
   write(file, members, reference);
   const auto go = [&](auto queue, const char* what, const QueueOptions& options) {
-    race<typename decltype(queue)::type>(what, chain, members, reference, options);
+    race<typename decltype(queue)::type>(what, 2, plain_members(chain, members), reference, options);
   };
   for (const double tolerance : {1e-5, 1e-6, 1e-7}) {
     go(std::type_identity<GaussLanes<Planar, 4, 2>>(), "4 stages", {.tolerance = tolerance});
@@ -167,7 +173,17 @@ void race_all(const char* file) {
     go(std::type_identity<ExplicitLanes<Planar, Fehlberg8, 2>>(), "fehlberg78", {.tolerance = tolerance});
   }
   for (const double tolerance : {1e-6, 1e-7, 1e-8, 1e-11, 1e-13, 1e-14, 1e-16}) {
-    go(std::type_identity<TaylorLanes<Planar, 2>>(), "taylor", {.tolerance = tolerance});
+    go(std::type_identity<TaylorLanes<Planar, 2>>(), "taylor, rods", {.tolerance = tolerance});
+  }
+  const ChainSystem numbers(plain(chain, {}), Planar::torque_components);
+  std::vector<PlainMember<PlainSystem>> systems;
+  for (const auto& member : members) {
+    systems.push_back({numbers.plain(), 0, member.end, member.start.q.data(), member.start.v.data()});
+  }
+  using Lanes = SystemSeriesLanes<>;
+  MemberSystems<Lanes::L> kernel(system_table<kernels::Planar2>);
+  for (const double tolerance : {1e-6, 1e-7, 1e-8, 1e-11, 1e-13, 1e-14, 1e-16}) {
+    race<Lanes>("taylor", kernel, systems, reference, {.tolerance = tolerance});
   }
 }
 

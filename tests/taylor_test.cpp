@@ -10,6 +10,7 @@
 #include <numbers>
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/library.hpp>
 #include <pendula/run/run.hpp>
 #include <set>
 #include <stdexcept>
@@ -102,7 +103,7 @@ TYPED_TEST(Taylor, SeesHowLongStepsMayBeWhereCoefficientsAreMissing) {
       Eigen::VectorXd q = Eigen::VectorXd::Zero(TypeParam::dof * links);
       q.head(links).setConstant(angle);
       const Motion start(0, q, Eigen::VectorXd::Zero(q.size()));
-      EXPECT_LT(off(chain, start, taylor(1e-12), 1), 2e-12) << links << ", " << angle;  // measured 2e-13
+      EXPECT_LT(off(chain, start, taylor(1e-12), 1), 2e-11) << links << ", " << angle;  // measured 2.4e-12
     }
   }
 }
@@ -155,10 +156,11 @@ TYPED_TEST(Taylor, SpinsWithoutGravity) {
   EXPECT_EQ(rest.last.q[0], 0.4);
 }
 
-// The steps are those of a chain alone, whatever the number of links: written out for two and three.
+// The steps are those of a chain alone, whatever the number of links: written out for two and three. Where there is a
+// kernel, one chain moves by its series, and many without loads by those of rods.
 TYPED_TEST(Taylor, OfManyInLanesIsThatOfOne) {
   Random random(5);
-  for (const int links : {1, 2, 3, 4}) {
+  for (const int links : {1, 2, 3, 4, 5}) {
     std::vector<RunSetup> setups;
     for (int k = 0; k < 19; ++k) {
       const Chain<TypeParam> chain = random_chain<TypeParam>(random, links);
@@ -168,11 +170,40 @@ TYPED_TEST(Taylor, OfManyInLanesIsThatOfOne) {
     for (std::size_t k = 0; k < setups.size(); ++k) {
       ASSERT_TRUE(lane_kind(setups[k]));
       const RunReport expected = run_of(setups[k]);
+      if (series_kernel<TypeParam>(links, false, false) != nullptr) {
+        EXPECT_LT(setups[k].subject->distance(found[k].last, expected.last), 5e-8);  // measured 5e-9
+        continue;
+      }
       EXPECT_EQ(found[k].statistics.steps, expected.statistics.steps);
       EXPECT_EQ(found[k].statistics.rejected_steps, expected.statistics.rejected_steps);
       // Of rates near poles, too; measured 4e-15 and 2.8e-13: the last step is cut by another rounding.
       EXPECT_LT((found[k].last.q - expected.last.q).cwiseAbs().maxCoeff(), 4e-14) << links << ", " << k;
       EXPECT_LT((found[k].last.v - expected.last.v).cwiseAbs().maxCoeff(), 3e-12) << links << ", " << k;
+    }
+  }
+}
+
+// With loads they move by the series of a kernel: many as one.
+TEST(TaylorOfKernels, OfManyInLanesIsThatOfOne) {
+  Random random(9);
+  for (const int links : {1, 2, 3, 4}) {
+    std::vector<RunSetup> setups;
+    for (int k = 0; k < 19; ++k) {
+      const auto q = random.matrix<Eigen::VectorXd>(links, 1, -3, 3),
+                 v = random.matrix<Eigen::VectorXd>(links, 1, -3, 3);
+      setups.push_back(setup_of(random_chain<Planar>(random, links, true), {0, q, v}, taylor(1e-11), 2));
+    }
+    const std::vector<RunReport> found = run_members(setups);
+    for (std::size_t k = 0; k < setups.size(); ++k) {
+      ASSERT_TRUE(lane_kind(setups[k]));
+      ASSERT_FALSE(tangent_lane_kind(setups[k], setups[k].options));
+      const RunReport expected = run_of(setups[k]);
+      EXPECT_EQ(found[k].statistics.steps, expected.statistics.steps);
+      EXPECT_LT((found[k].last.q - expected.last.q).cwiseAbs().maxCoeff(), 1e-12) << links;  // measured 1.1e-13
+      EXPECT_LT((found[k].last.v - expected.last.v).cwiseAbs().maxCoeff(), 1e-11) << links;  // measured 1e-12
+      RunSetup by_gauss = setups[k];
+      by_gauss.options = exact();
+      EXPECT_LT(setups[k].subject->distance(found[k].last, run_of(by_gauss).last), 3e-9) << links;  // measured 4e-10
     }
   }
 }
@@ -255,8 +286,9 @@ std::string refusal(Make make) {
 
 TEST(TaylorRefuses, WhatItHasNoSeriesOf) {
   Random random(6);
-  const std::string loaded = refusal([&] { make_integrator(random_chain<Planar>(random, 2, true), taylor(1e-9)); });
-  EXPECT_EQ(loaded.find("method: taylor is for chains without damping, torques and drives, got taylor"), 0U) << loaded;
+  const std::string loaded = refusal([&] { make_integrator(random_chain<Spatial>(random, 2, true), taylor(1e-9)); });
+  EXPECT_EQ(loaded.find("method: taylor takes damping, torques and drives where there is a planar kernel"), 0U)
+      << loaded;
   const std::string vague = refusal([&] { make_integrator(equal_chain<Planar>(2), taylor(0)); });
   EXPECT_EQ(vague.find("tolerance: expected a positive number"), 0U) << vague;
 }

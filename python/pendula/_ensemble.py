@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._core import InputError
 from ._ensemble_data import dataset_of, open_ensemble
-from ._ensemble_text import Design, ensemble_text
+from ._ensemble_text import Design, ensemble_text, first_start
 from ._events import event_tables
 from ._progress import progress_line
 from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
@@ -133,12 +133,16 @@ def ensemble(
     kept = [keep] if isinstance(keep, str) else keep
     keeps_exponents = isinstance(kept, Sequence) and not EXPONENTS.isdisjoint(kept)
     method = options.pop("method", None if step is not None or options or keeps_exponents else "auto")
-    at_zero = system.at_zero() if isinstance(system, System) else {}
-    made = Beginning.of(system, at_zero, tolerance=None, step=None, options={}).prepare()
+    starts, keys, drawn = mapping("start", start), mapping("axes", axes), mapping("random", random)
+    # A model may have no start where all is zero: its coordinates are known from the first member's.
+    first = {}
+    if isinstance(system, System):
+        first = system.at_zero() or first_start(starts, keys, drawn)
+    made = Beginning.of(system, first, tolerance=None, step=None, options={}).prepare()
     design = Design(system, [made.columns[k] for k in made.state])
-    design.add_start(mapping("start", start))
-    design.add_axes(mapping("axes", axes))
-    design.add_random(mapping("random", random))
+    design.add_start(starts)
+    design.add_axes(keys)
+    design.add_random(drawn)
     if step is None and tolerance is None and accuracy is None:
         tolerance = 1e-9
     run = {

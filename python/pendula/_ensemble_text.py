@@ -31,6 +31,7 @@ class Design:
         self._axes: dict[str, NDArray[np.float64]] = {}
         self._lists: dict[str, NDArray[np.float64]] = {}
         self._random: list[dict[str, object]] = []
+        self._drawn: dict[str, object] = {}
         self._families = dict.fromkeys(system.at_zero())  # of a chain's start: theta, phi, ...
 
     def add_start(self, start: Mapping[str, object]) -> None:
@@ -54,6 +55,7 @@ class Design:
             expected = f'random: expected ("normal", mean, deviation) or ("uniform", from, to) for {key}'
             if not isinstance(given, Sequence) or len(given) != 3 or str(given[0]) not in DRAWN:
                 raise InputError(f"{expected}, got {given!r}")
+            self._drawn[key] = given
             self._random.append({"key": key, **dict(zip(DRAWN[given[0]], given[1:], strict=True))})
 
     def tables(self) -> dict[str, Any]:
@@ -120,7 +122,7 @@ class Design:
 
     def _start(self) -> dict[str, object]:
         if not isinstance(self._system, Chain):
-            return self._fixed
+            return {**first_start({}, {**self._axes, **self._lists}, self._drawn), **self._fixed}
         return {name: [self._fixed.get(one, 0.0) for one in self._links_of(name)] for name in self._families}
 
     def _write_as_array(self, tables: dict[str, Any], key: str) -> None:
@@ -134,6 +136,28 @@ class Design:
         if known and np.ndim(one) == 0:  # None, too
             links = sum(1 for column in self._coordinates if column.startswith("theta_"))
             table[name] = [0.0 if one is None else one] * links
+
+
+def first_start(
+    start: Mapping[str, object], keys: Mapping[str, object], random: Mapping[str, object]
+) -> dict[str, object]:
+    """Where about the first member starts: of what is drawn, the first number. Nothing is checked."""
+    first = {key: given[1] for key, given in random.items() if isinstance(given, Sequence) and len(given) > 1}
+    first |= {key: _first(given) for key, given in keys.items()}
+    named = {key.removeprefix("start."): one for key, one in first.items() if key.startswith("start.")}
+    return named | {name: _first(given) for name, given in start.items()}
+
+
+def _first(given: object) -> object:
+    """Of an array, its first number or row; of a tuple, that of each."""
+    if isinstance(given, tuple):
+        firsts = [_first(one) for one in given]
+        return firsts[0] if len(firsts) == 1 else firsts
+    if isinstance(given, str) or np.ndim(given) == 0:  # type: ignore[arg-type]
+        return given
+    array = np.asarray(given)
+    first = array[0] if array.size else np.zeros(1)
+    return first.item() if first.size == 1 else first.tolist()
 
 
 def ensemble_text(

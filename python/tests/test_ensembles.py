@@ -536,3 +536,31 @@ def test_examples_are_ensembles():
     few = {"run.duration": 3.0, "ensemble.axis[1].count": 9, "ensemble.axis[2].count": 5}
     data = pendula.Scenario(scenario, few).ensemble()
     assert data["event_flip"].shape == (9, 5) and data["event_flip"].attrs["units"] == "s"
+
+
+MACHINE = {"r": np.array([1.0, 1.1]), "theta": np.array([0.3, 0.5])}
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"start": MACHINE},
+        {"start": {"r": 1.0, "theta": ([0.3, 0.5],)}},
+        {"start": {"theta": 0.5}, "axes": {"start.r": [1.0, 1.1]}},
+        {"start": {"theta": 0.5}, "random": {"start.r": ("uniform", 0.9, 1.1)}, "members": 2},
+    ],
+)
+def test_a_model_needs_no_start_where_all_is_zero(given):
+    """A swinging Atwood machine whose thread has no length has no inertia."""
+    data = pendula.ensemble(pendula.Model("swinging_atwood"), 1.0, **given)
+    assert (data.status == 0).all() and data.r.size == 2
+
+
+def test_members_that_differ_in_starts_alone_are_those_that_differ_in_more():
+    """They are read once, others one by one."""
+    double = pendula.Chain(masses=[1, 2], lengths=[1, 0.5])
+    grid = {"start.theta[1]": [0.1, 0.2], "start.theta_dot[2]": [0.0, 0.5, 1.0]}
+    shared = pendula.ensemble(double, 2.0, {"theta_2": 0.3}, axes=grid)
+    each = pendula.ensemble(double, 2.0, {"theta_2": 0.3}, axes={**grid, "chain.gravity": [9.81]})
+    for name in ("theta_1", "theta_2", "theta_dot_1", "theta_dot_2", "energy_error", "steps"):
+        assert (shared[name].values == each[name].values[..., 0]).all(), name

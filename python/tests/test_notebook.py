@@ -121,7 +121,7 @@ def test_a_run_of_some_seconds_has_a_bar(monkeypatch):
     auto.tqdm = Bar
     monkeypatch.setitem(sys.modules, "tqdm.auto", auto)
     long = {"step": 2e-4, "estimate": False, "every": 1000, "method": "rk4"}
-    pendula.Chain(links=100).simulate(64.0, theta=1.0, progress=True, **long)
+    pendula.Chain(links=200).simulate(64.0, theta=1.0, progress=True, **long)
     assert told[-1] == "closed" and len(told) > 3 and told[:-1] == sorted(told[:-1]) and told[-2] <= 64
     told.clear()
     pendula.Chain(links=2).simulate(0.1, theta=1.0, progress=True)

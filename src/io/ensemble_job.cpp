@@ -38,12 +38,9 @@ EnsembleJob::EnsembleJob(const EnsembleSource& source, MemberScenarios::Tell tel
       runs_(scenarios_, kept_, std::move(stop)) {}
 
 bool EnsembleJob::go_in_lanes() const {
-  const auto goes = [&](const auto& scenario) {
-    const RunSetup setup = member_setup(scenario);
-    return lane_kind(setup).has_value() ||
-           (scenarios_.plan().chooses_method && lane_kind(setup, quickest_in_lanes(setup)));
-  };
-  return std::visit(goes, base_);
+  const RunSetup setup = MemberScenario(base_).setup();
+  return lane_kind(setup).has_value() ||
+         (scenarios_.plan().chooses_method && lane_kind(setup, quickest_in_lanes(setup)));
 }
 
 RunOrigin EnsembleJob::origin(const std::string& command) const {

@@ -16,6 +16,39 @@
 
 namespace pendula::io {
 
+namespace {
+
+double& number_at(Motion& start, Eigen::Index place) {
+  return place < start.q.size() ? start.q[place] : start.v[place - start.q.size()];
+}
+
+/// Whether its start is one that is read without an error.
+bool can_start(const MemberScenario& member) {
+  const Motion& start = member.start;
+  if (!start.q.allFinite() || !start.v.allFinite()) return false;
+  const auto* const other = std::get_if<SystemScenario>(member.scenario.get());
+  return other == nullptr || other->system->has_inertia(start.q);
+}
+
+}  // namespace
+
+MemberScenario::MemberScenario(AnyScenario read)
+    : scenario(std::make_shared<const AnyScenario>(std::move(read))),
+      subject(std::visit([](const auto& of) { return subject_of(of); }, *scenario)),
+      start(std::visit([](const auto& of) -> Motion { return of.start; }, *scenario)) {}
+
+RunSetup MemberScenario::setup() const {
+  const RunPlan& asked = plan();
+  return {.subject = subject,
+          .start = start,
+          .options = asked.run,
+          .duration = asked.duration,
+          .every = asked.every,
+          .accuracy = asked.places.contains("accuracy") ? asked.accuracy : Accuracy{},
+          .doubted = false,
+          .estimate = asked.estimate};
+}
+
 MemberScenarios::MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell)
     : text_(std::move(text)),
       overrides_(std::move(overrides)),
@@ -37,8 +70,46 @@ AnyScenario MemberScenarios::of_member(std::int64_t member) {
   }
 }
 
-AnyScenario MemberScenarios::quickly_of_member(std::int64_t member) {
-  return document_.with(plan().keys(), plan().values(member), find());
+MemberScenario MemberScenarios::quickly_of_member(std::int64_t member) {
+  std::call_once(is_looked_for_, [this] { shared_ = find_shared(); });
+  const std::vector<double> numbers = plan().values(member);
+  if (shared_) {
+    MemberScenario found = shared_->scenario;
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      for (const Eigen::Index place : shared_->places[k]) number_at(found.start, place) = numbers[k];
+    }
+    if (can_start(found)) return found;
+  }
+  return MemberScenario(with(numbers));
+}
+
+/// Two scenarios are read with other numbers: these must be found in the start, which else does not depend on them.
+std::optional<MemberScenarios::Shared> MemberScenarios::find_shared() {
+  const std::vector<std::string> keys = plan().keys();
+  const auto is_of_start = [](const std::string& key) { return key.starts_with("start."); };
+  if (!std::ranges::all_of(keys, is_of_start)) return {};
+  std::vector<double> one(keys.size()), other(keys.size());
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    one[k] = 0.375 + 0.0625 * static_cast<double>(k);
+    other[k] = one[k] + 0.125 / static_cast<double>(k + 1);
+  }
+  try {
+    Shared shared{MemberScenario(with(one)), std::vector<std::vector<Eigen::Index>>(keys.size())};
+    MemberScenario second(with(other));
+    Motion &first = shared.scenario.start, &then = second.start;
+    for (Eigen::Index place = 0; place < first.q.size() + first.v.size(); ++place) {
+      const double here = number_at(first, place), there = number_at(then, place);
+      if (here == there) continue;
+      const auto k = static_cast<std::size_t>(std::ranges::find(one, here) - one.begin());
+      if (k == one.size() || there != other[k]) return {};
+      shared.places[k].push_back(place);
+    }
+    const auto is_nowhere = [](const std::vector<Eigen::Index>& places) { return places.empty(); };
+    if (std::ranges::any_of(shared.places, is_nowhere)) return {};
+    return shared;
+  } catch (const InputError&) {
+    return {};
+  }
 }
 
 std::shared_ptr<const SystemTable> MemberScenarios::find_system(const ModelName& name) {
@@ -59,9 +130,10 @@ MemberRuns::MemberRuns(MemberScenarios& scenarios, const Kept& kept, std::functi
 
 /// A member, its scenario and its report.
 struct MemberRuns::Member {
-  std::optional<AnyScenario> scenario;  // empty if it cannot be read
+  std::optional<MemberScenario> scenario;  // empty if it cannot be read
   std::string problem;
-  std::optional<RunSetup> setup;  // of a member that is run together with others
+  std::optional<RunSetup> setup;  // of a member that waits to be run together with others
+  bool is_together = false;
   RunReport report;
   bool is_looked_at = false;
   std::optional<LyapunovSpectrum> exponent;  // if it is kept, and was found in lanes
@@ -73,7 +145,9 @@ DoneChunk MemberRuns::run(const Chunk& members) const {
   SharedExpressions shared;
   for (std::int64_t number = members.first; number < members.last; ++number) {
     all.push_back(member(number, shared));
-    if (all.back().setup) waiting.push_back(*all.back().setup);
+    Member& last = all.back();
+    last.is_together = last.setup.has_value();
+    if (last.is_together) waiting.push_back(*std::exchange(last.setup, std::nullopt));
   }
   std::vector<RunReport> reports = run_members(waiting, stop_, method());
   if (kept_.chaos()) find_exponents(all);
@@ -82,7 +156,7 @@ DoneChunk MemberRuns::run(const Chunk& members) const {
   done.members = members;
   done.rows.reserve(static_cast<std::size_t>(members.size()) * width_);
   for (std::size_t k = 0; k < all.size(); ++k) {
-    if (all[k].setup) all[k].report = std::move(*next++);
+    if (all[k].is_together) all[k].report = std::move(*next++);
     const std::string message = append(all[k], done.rows);
     if (!message.empty()) done.messages.push_back({members.first + static_cast<std::int64_t>(k), message});
   }
@@ -106,7 +180,7 @@ MemberRuns::Member MemberRuns::member(std::int64_t number, SharedExpressions& sh
   } catch (const InputError&) {
   }
   try {
-    return member_of(scenarios_.of_member(number), number, shared);
+    return member_of(MemberScenario(scenarios_.of_member(number)), number, shared);
   } catch (const InputError& error) {
     Member unreadable;
     unreadable.problem = error.what();
@@ -114,30 +188,21 @@ MemberRuns::Member MemberRuns::member(std::int64_t number, SharedExpressions& sh
   }
 }
 
-MemberRuns::Member MemberRuns::member_of(AnyScenario scenario, std::int64_t number, SharedExpressions& shared) const {
+MemberRuns::Member MemberRuns::member_of(MemberScenario scenario, std::int64_t number,
+                                         SharedExpressions& shared) const {
   Member member;
   member.scenario = std::move(scenario);
-  RunSetup setup = setup_of(*member.scenario, shared);
+  RunSetup setup = member.scenario->setup();
+  setup.events = events_of(member.scenario->plan().events, setup.subject, setup.start, shared);
   // Trials for an accuracy say of each member how far it can be trusted.
   setup.doubted = setup.estimate && (setup.accuracy.error > 0 || is_looked_at(number));
   member.is_looked_at = setup.doubted;
   if (lane_kind(setup, lane_options(setup, method()))) {
     member.setup = std::move(setup);
   } else {
-    member.report = std::visit([&](const auto& read) { return run_alone(read, std::move(setup)); }, *member.scenario);
+    member.report = run_alone(*member.scenario, std::move(setup));
   }
   return member;
-}
-
-RunSetup MemberRuns::setup_of(const AnyScenario& scenario, SharedExpressions& shared) const {
-  RunSetup setup = std::visit(
-      [&](const auto& read) {
-        RunSetup found = member_setup(read);
-        found.events = events_of(read.events, found.subject, read.start, shared);
-        return found;
-      },
-      scenario);
-  return setup;
 }
 
 // Exponents of the members that run in lanes with a tangent. Not for Gauss methods with method = "run": the exponents
@@ -147,7 +212,7 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<Member*> members;
   for (Member& member : all) {
     if (!member.scenario) continue;
-    RunSetup setup = std::visit([](const auto& read) { return member_setup(read); }, *member.scenario);
+    RunSetup setup = member.scenario->setup();
     if (method() == MemberMethod::asked && !is_explicit(setup.options.method)) continue;
     setups.push_back(std::move(setup));
     members.push_back(&member);
@@ -157,35 +222,33 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
   for (std::size_t k = 0; k < members.size(); ++k) members[k]->exponent = std::move(found[k]);
 }
 
-template <class Scenario>
-RunReport MemberRuns::run_alone(const Scenario& scenario, RunSetup setup) const {
-  Run one = told_at_keys(scenario, scenarios_.text().name, [&] { return Run(std::move(setup)); });
+RunReport MemberRuns::run_alone(const MemberScenario& scenario, RunSetup setup) const {
+  Run one = told_at_keys(scenario.plan(), scenarios_.text().name, [&] { return Run(std::move(setup)); });
   return one.go(stop_);
 }
 
 // Appends the row of a member. Returns its message, or an empty one.
 std::string MemberRuns::append(const Member& member, std::vector<double>& rows) const {
   const std::size_t begin = rows.size();
-  const auto add = [&](const auto& scenario) {
+  const auto add = [&](const MemberScenario& scenario) {
     const RunReport& report = member.report;
     if (report.end == RunEnd::stopped) throw Interrupted();
-    const std::shared_ptr<const Subject> subject = subject_of(scenario);
     std::vector<std::string> events;
-    events.reserve(scenario.events.size());
-    for (const EventPlan& event : scenario.events) events.push_back(event.name);
-    const Ending ending = ending_of(report, subject->coordinates(), events);
+    events.reserve(scenario.plan().events.size());
+    for (const EventPlan& event : scenario.plan().events) events.push_back(event.name);
+    const Ending ending = ending_of(report, scenario.subject->coordinates(), events);
     LyapunovSpectrum spectrum;
     if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
     const int status = member_status(ending.status);
     const auto trusted = static_cast<double>(report.warnings.empty() ? Trusted::yes : Trusted::no);
     rows.push_back(status);
     rows.push_back(member.is_looked_at && is_ok(status) ? trusted : std::nan(""));
-    kept_.append(*subject, report, spectrum, rows);
+    kept_.append(*scenario.subject, report, spectrum, rows);
     return ending.message;
   };
   std::string problem = member.problem;
   try {
-    if (member.scenario) return std::visit(add, *member.scenario);
+    if (member.scenario) return add(*member.scenario);
   } catch (const InputError& error) {
     problem = error.what();
   }
@@ -195,13 +258,13 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
   return problem;
 }
 
-template <class Scenario>
-LyapunovSpectrum MemberRuns::leading_exponent(const Scenario& scenario) const {
-  const double step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  LyapunovRun found = told_at_keys(scenario, scenarios_.text().name, [&] {
-    const auto integrator = subject_of(scenario)->make_integrator(scenario.run);
+LyapunovSpectrum MemberRuns::leading_exponent(const MemberScenario& scenario) const {
+  const RunPlan& plan = scenario.plan();
+  const double step = is_adaptive(plan.run) ? std::numeric_limits<double>::infinity() : plan.run.step;
+  LyapunovRun found = told_at_keys(plan, scenarios_.text().name, [&] {
+    const auto integrator = scenario.subject->make_integrator(plan.run);
     return find_lyapunov_spectrum(
-        *integrator, scenario.start, step, scenario.duration, 1, [](const LyapunovProgress&) {}, stop_);
+        *integrator, scenario.start, step, plan.duration, 1, [](const LyapunovProgress&) {}, stop_);
   });
   if (found.result.stopped) throw Interrupted();
   return found;

@@ -30,18 +30,20 @@ namespace pendula::io {
 /// Thrown when a member is stopped.
 struct Interrupted {};
 
-/// The setup of a member's run, without events. Trials for an accuracy are made only if one is asked for.
-template <class Scenario>
-RunSetup member_setup(const Scenario& scenario) {
-  return {.subject = subject_of(scenario),
-          .start = scenario.start,
-          .options = scenario.run,
-          .duration = scenario.duration,
-          .every = scenario.every,
-          .accuracy = scenario.places.contains("accuracy") ? scenario.accuracy : Accuracy{},
-          .doubted = false,
-          .estimate = scenario.estimate};
-}
+/// What a member runs. Members that differ in their starts alone share all else.
+struct MemberScenario {
+  std::shared_ptr<const AnyScenario> scenario;  ///< but for its start
+  std::shared_ptr<const Subject> subject;
+  Motion start;
+
+  explicit MemberScenario(AnyScenario read);
+
+  const RunPlan& plan() const {
+    return std::visit([](const auto& read) -> const RunPlan& { return read; }, *scenario);
+  }
+  /// Without events. Trials for an accuracy are made only if one is asked for.
+  RunSetup setup() const;
+};
 
 /// The scenario of an ensemble, and those of its members, which have other numbers.
 class MemberScenarios {
@@ -62,9 +64,17 @@ class MemberScenarios {
   /// The scenario of a member; "quickly" is without places in the file (ScenarioDocument). Several threads may call
   /// them. Throws InputError.
   AnyScenario of_member(std::int64_t member);
-  AnyScenario quickly_of_member(std::int64_t member);
+  MemberScenario quickly_of_member(std::int64_t member);
 
  private:
+  /// A scenario, and of each key where its number stands in the start: in q, then in v.
+  struct Shared {
+    MemberScenario scenario;
+    std::vector<std::vector<Eigen::Index>> places;
+  };
+  AnyScenario with(std::span<const double> numbers) { return document_.with(plan().keys(), numbers, find()); }
+  std::optional<Shared> find_shared();
+
   std::shared_ptr<const SystemTable> find_system(const ModelName& name);
 
   FindSystem find() {
@@ -79,6 +89,8 @@ class MemberScenarios {
   std::mutex guard_;
   std::map<ModelName, std::shared_ptr<const SystemTable>> systems_;
   std::string model_;
+  std::once_flag is_looked_for_;
+  std::optional<Shared> shared_;  // if keys are numbers of the start alone
 };
 
 /// Runs members. Several threads may share it.
@@ -97,14 +109,11 @@ class MemberRuns {
   MemberMethod method() const { return plan_.chooses_method ? MemberMethod::quickest : MemberMethod::asked; }
   bool is_looked_at(std::int64_t number) const;
   Member member(std::int64_t number, SharedExpressions& shared) const;
-  Member member_of(AnyScenario scenario, std::int64_t number, SharedExpressions& shared) const;
-  RunSetup setup_of(const AnyScenario& scenario, SharedExpressions& shared) const;
+  Member member_of(MemberScenario scenario, std::int64_t number, SharedExpressions& shared) const;
   void find_exponents(std::vector<Member>& all) const;
-  template <class Scenario>
-  RunReport run_alone(const Scenario& scenario, RunSetup setup) const;
+  RunReport run_alone(const MemberScenario& scenario, RunSetup setup) const;
   std::string append(const Member& member, std::vector<double>& rows) const;
-  template <class Scenario>
-  LyapunovSpectrum leading_exponent(const Scenario& scenario) const;
+  LyapunovSpectrum leading_exponent(const MemberScenario& scenario) const;
 
   MemberScenarios& scenarios_;
   const EnsemblePlan& plan_;

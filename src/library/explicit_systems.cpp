@@ -38,8 +38,9 @@ struct Make {
                                   std::string(table.info.name) + ", which has no series");
     }
     using Subject = ExplicitSystem<MemberSystems<double>, TaylorSeries>;
-    return std::make_unique<SingleIntegrator<SeriesSteps, Subject>>(
-        Subject(table, plain, options.tolerance), options.tolerance, SeriesSteps::Options{options.tolerance});
+    using Steps = SeriesSteps<double>;
+    return std::make_unique<SingleIntegrator<Steps, Subject>>(Subject(table, plain, options.tolerance),
+                                                              options.tolerance, Steps::Options{options.tolerance});
   }
 };
 

@@ -27,16 +27,8 @@ std::string no_kernel_message(int links) {
 }
 
 template <class Space>
-const SystemTable* find_kernel(int links) {
-  for (const SystemTable* kernel : library_of<Space>().kernels) {
-    if (kernel->info.links == links) return kernel;
-  }
-  return nullptr;
-}
-
-template <class Space>
 const SystemTable& require_kernel(int links) {
-  if (const SystemTable* kernel = find_kernel<Space>(links)) return *kernel;
+  if (const SystemTable* kernel = kernel_of<Space>(links)) return *kernel;
   throw NoKernel(no_kernel_message<Space>(links));
 }
 
@@ -48,8 +40,13 @@ std::unique_ptr<PlainIntegrator> make_over(const SystemTable& kernel, const Plai
 }
 
 template <class Space>
-std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& chain, const RunOptions& options) {
-  return make_explicit_chain(chain_of<Space>(chain), options);
+std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& plain, const RunOptions& options) {
+  const Chain<Space> chain = chain_of<Space>(plain);
+  if (options.method == Method::taylor) {
+    const SystemTable* const kernel = series_kernel<Space>(plain.links, chain.loaded(), false);
+    if (kernel != nullptr) return make_over<Space>(*kernel, plain, options);
+  }
+  return make_explicit_chain(chain, options);
 }
 
 }  // namespace
@@ -58,7 +55,7 @@ template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options) {
   if (is_explicit(options.method)) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
-  if (solver_for<Space>(chain.links, options, find_kernel<Space>(chain.links) != nullptr) == Solver::chain)
+  if (solver_for<Space>(chain.links, options, kernel_of<Space>(chain.links) != nullptr) == Solver::chain)
     return make_chain_integrator(chain_of<Space>(chain), options);
   return make_over<Space>(require_kernel<Space>(chain.links), chain, options);
 }

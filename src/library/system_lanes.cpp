@@ -4,7 +4,7 @@ namespace pendula {
 namespace {
 
 struct SystemMoves {
-  static MoveSystemMembers* by_series() { return nullptr; }
+  static MoveSystemMembers* by_series() { return &move_systems<SystemSeriesLanes<>>; }
   template <class Method>
   static MoveSystemMembers* by() {
     return &move_systems<SystemLanes<Method>>;

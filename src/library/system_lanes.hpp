@@ -4,7 +4,8 @@
 
 namespace pendula {
 
-/// Moves members of generated kernels in lanes, by explicit and Gauss methods; nullptr for other methods.
+/// Moves members of generated kernels in lanes, by explicit and Gauss methods and Taylor series; nullptr for
+/// other methods.
 MoveSystemMembers* system_lanes(const RunOptions& options);
 /// The same by the Gauss method with this number of stages.
 MoveSystemMembers* gauss_system_lanes(int stages);

@@ -46,7 +46,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   // As MemberQueue takes steps of a member.
   Outcome step(double h) override {
-    double wanted = std::min(longest_, stepper_.expand()[lane]);
+    double wanted = std::min(longest_, stepper_.longest_step()[lane]);
     for (int attempt = 0; attempt < most_attempts; ++attempt) {
       const bool is_cut = !(wanted * (1 + 1e-9) < h);
       const double size = is_cut ? h : wanted;
@@ -197,8 +197,9 @@ std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Space>& chai
   }
   if (chain.loaded()) {
     throw std::invalid_argument(
-        "method: taylor is for chains without damping, torques and drives, got taylor and a chain with some; gauss "
-        "takes them all");
+        "method: taylor takes damping, torques and drives where there is a planar kernel for the number of links, "
+        "got " +
+        std::string(Space::name) + ':' + std::to_string(chain.links()) + "; gauss takes them all");
   }
   return std::make_unique<TaylorIntegrator<Space>>(chain, options.tolerance);
 }

@@ -37,13 +37,13 @@ def moved(pendula, tmp_path):
     return move
 
 
-# Largest differences seen: 4e-6 of Atwood's machine, 7e-5 of rates of 12 rad/s that are shaken.
+# Largest differences seen: 4e-6 of Atwood's machine, 5e-5 of rates of 12 rad/s that are shaken.
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_members_in_lanes_end_where_others_do(name, moved):
     text = SCENARIOS[name]
     alone = moved(text, ALONE)
     lanes = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
-    asked = moved(text, '--set=run.method="fehlberg78"', "--set=run.tolerance=1e-9")
+    asked = moved(text, '--set=run.method="taylor"', f"--set=run.tolerance={0.01 * 1e-7}")
     assert not (alone["steps"] == lanes["steps"]).all()  # so they went by another method
     for key in alone.keys() - {"steps"}:
         if (name, key) != ("furuta", "energy_error"):  # a drive's, as seen at other times
@@ -68,10 +68,10 @@ def test_long_runs_of_models_stay_in_lanes(moved):
     text = text[: text.rindex("\n[[ensemble.axis]]")].replace("to = 2.5", "to = 1.5")  # regular ones
     alone = moved(text)
     lanes = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
-    assert (lanes["steps"] > 2000).all()  # measured 4090 at least
+    assert (lanes["steps"] > 2000).all()  # measured 2503 at least
     assert not (alone["steps"] == lanes["steps"]).any()
-    assert lanes["energy_error"].max() < 1e-7  # measured 5.6e-8
-    assert np.abs(lanes["theta"] - alone["theta"]).max() < 1e-3  # measured 1.9e-5
+    assert lanes["energy_error"].max() < 3e-8  # measured 3.6e-9
+    assert np.abs(lanes["theta"] - alone["theta"]).max() < 3e-4  # measured 3e-5
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -115,18 +115,14 @@ def test_exponents_in_lanes_are_those_of_gauss_steps(name, moved):
     assert (np.abs(alone["lyapunov"] - lanes["lyapunov"]) < 2 * error).all()
 
 
-def test_who_loses_energy_there_goes_as_the_scenario_says(moved):
-    """A bob that passes through the pivot of its spring, where no step of an explicit method is short enough."""
-    text = (
-        '[system]\nmodel = "spring_pendulum"\nparameters = { stiffness = 33.0, rest_length = 0.1 }\n'
-        + "[start]\nx = 0.7\nz = -0.5\n[run]\nduration = 10.0\ntolerance = 1e-6\n"
-        + '[ensemble]\nkeep = ["final", "energy_error", "steps"]\n'
-        + AXIS.format("start.y", 0.3, 2.8)
-    )
+def test_who_takes_long_there_goes_as_the_scenario_says(moved):
+    """A series is tried for 20,000 steps at most."""
+    text = SCENARIOS["atwood"].replace("mu = 2.5", "mu = 3.0")
+    text = text[: text.index("\n[[ensemble.axis]]")] + AXIS.format("run.duration", 200.0, 2000.0)
     alone = moved(text)
     tried = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
     same = alone["steps"] == tried["steps"]
-    assert same.any()
+    assert same.any() and not same.all()
     for key in alone:
         assert (alone[key][same] == tried[key][same]).all(), key
-    assert (tried["energy_error"][~same] < 1e-6).all()
+    assert (tried["energy_error"][~same] < 1e-7).all()

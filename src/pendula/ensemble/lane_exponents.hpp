@@ -54,9 +54,11 @@ class LaneExponent {
 template <class Members>
 class LaneExponents : private MemberWatch {
  public:
-  /// `setups`, all of one lane_kind by `options`, must outlive it; their own options are how they would be run alone.
-  LaneExponents(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop)
-      : setups_(setups), options_(options), stop_(stop), members_(setups) {
+  /// `setups`, whose tangent_lane_kind by `options` is `kind`, must outlive it; their own options are how they would be
+  /// run alone.
+  LaneExponents(const LaneKind& kind, std::span<const RunSetup* const> setups, const RunOptions& options,
+                const std::function<bool()>& stop)
+      : setups_(setups), options_(options), stop_(stop), members_(setups, kind) {
     exponents_.reserve(setups.size());
     for (const RunSetup* setup : setups) exponents_.emplace_back(setup->duration);
   }

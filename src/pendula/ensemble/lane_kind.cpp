@@ -18,24 +18,33 @@ bool misses_loads(const RunSetup& setup, const RunOptions& options) {
 
 // Names the chain or kernel in `kind`; false if there are no lanes for it.
 template <class Space>
-bool name_chain(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
+bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tangents, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
-  if (chain == nullptr || library_of<Space>().lanes(options) == nullptr) return false;
-  if (options.method == Method::taylor && setup.subject->loaded()) return false;
+  const SpaceLibrary& lanes = library_of<Space>();
+  if (chain == nullptr || (with_tangents ? lanes.tangent_lanes : lanes.lanes)(options) == nullptr) return false;
+  kind.dimension = Space::dimension;
+  kind.links = chain->chain().links();
+  if (options.method == Method::taylor) {
+    const bool is_loaded = setup.subject->loaded();
+    if (!with_tangents) kind.kernel = series_kernel<Space>(kind.links, is_loaded, true);
+    return kind.kernel != nullptr || !is_loaded;
+  }
   if (!is_explicit(options.method)) {
     if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
     // Fixed points hardly converge by steps that do not resolve a chain; chosen steps become shorter.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
-  kind.dimension = Space::dimension;
-  kind.links = chain->chain().links();
   return true;
 }
-bool name_kernel(const RunSetup& setup, const RunOptions& options, LaneKind& kind) {
+bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tangents, LaneKind& kind) {
   const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
-  if (system == nullptr || library().system_lanes(options) == nullptr) return false;
-  const bool is_seen = !system->info().depends_on_time && !misses_loads(setup, options);
-  if (!is_explicit(options.method) && !is_seen) return false;
+  const Library& lanes = library();
+  if (system == nullptr) return false;
+  if ((with_tangents ? lanes.system_tangent_lanes : lanes.system_lanes)(options) == nullptr) return false;
+  const bool by_series = options.method == Method::taylor;
+  if (by_series && system->table().of_1.series_next == nullptr) return false;
+  if (!is_explicit(options.method) && misses_loads(setup, options)) return false;
+  if ((!is_explicit(options.method) || by_series) && system->info().depends_on_time) return false;
   if (system->may_be_narrow()) return false;  // lanes do not look between their stages
   kind.kernel = &system->table();
   return true;
@@ -47,15 +56,18 @@ bool detail::has_to_be_tried(const Subject& subject) {
   return subject.loaded() || dynamic_cast<const SystemSubject*>(&subject) != nullptr;
 }
 
-std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
+namespace {
+
+std::optional<LaneKind> kind_of(const RunSetup& setup, const RunOptions& options, bool with_tangents) {
   const double chosen = is_adaptive(options) ? options.tolerance : options.step;
   const bool by_fixed_point = options.form == Form::momentum && options.iteration != Iteration::newton;
   const bool fits = (by_fixed_point || is_explicit(options.method)) && chosen > 0 && std::isfinite(chosen) &&
                     setup.every >= 1 && setup.duration > 0 && std::isfinite(setup.duration) && !setup.rows.any() &&
                     setup.accuracy.error == 0;
   LaneKind kind;
-  if (!fits || !(name_chain<Planar>(setup, options, kind) || name_chain<Spatial>(setup, options, kind) ||
-                 name_kernel(setup, options, kind))) {
+  if (!fits ||
+      !(name_chain<Planar>(setup, options, with_tangents, kind) ||
+        name_chain<Spatial>(setup, options, with_tangents, kind) || name_kernel(setup, options, with_tangents, kind))) {
     return {};
   }
   if (options.method == Method::gauss) kind.stages = options.stages;
@@ -65,8 +77,17 @@ std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& optio
   kind.every = setup.every;
   return kind;
 }
+
+}  // namespace
+
+std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options) {
+  return kind_of(setup, options, false);
+}
 std::optional<LaneKind> lane_kind(const RunSetup& setup) {
   return lane_kind(setup, setup.options);
+}
+std::optional<LaneKind> tangent_lane_kind(const RunSetup& setup, const RunOptions& options) {
+  return kind_of(setup, options, true);
 }
 
 }  // namespace pendula

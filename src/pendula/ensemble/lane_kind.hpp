@@ -13,7 +13,7 @@ namespace pendula {
 /// What runs must have in common to go in lanes together.
 struct LaneKind {
   int dimension = 0, links = 0;         // of chains
-  const SystemTable* kernel = nullptr;  // of others
+  const SystemTable* kernel = nullptr;  // of others, and of chains that move by its series
   int stages = 0;
   Method method = Method::gauss;
   Iteration iteration = Iteration::automatic;
@@ -27,10 +27,12 @@ struct LaneKind {
 
 /// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
 /// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
-/// on time by nothing but inputs; all chains and systems by explicit Runge–Kutta methods. None of systems whose forces
-/// may be narrow by other functions than powers and logarithms.
+/// on time by nothing but inputs, these by Taylor series, too; all chains and systems by explicit Runge–Kutta methods.
+/// None of systems whose forces may be narrow by other functions than powers and logarithms.
 std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options);
 std::optional<LaneKind> lane_kind(const RunSetup& setup);
+/// The same where each member has a tangent.
+std::optional<LaneKind> tangent_lane_kind(const RunSetup& setup, const RunOptions& options);
 
 namespace detail {
 

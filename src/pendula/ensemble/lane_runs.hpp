@@ -40,7 +40,8 @@ template <class Space>
 class PlainChains : public MemberEnds {
  public:
   /// `setups` must outlive it.
-  explicit PlainChains(std::span<const RunSetup* const> setups) : MemberEnds(setups[0]->start.q.size(), setups.size()) {
+  PlainChains(std::span<const RunSetup* const> setups, const LaneKind& /*kind*/)
+      : MemberEnds(setups[0]->start.q.size(), setups.size()) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const Chain<Space>& chain = static_cast<const ChainSubject<Space>&>(*setup->subject).chain();
@@ -59,23 +60,23 @@ class PlainChains : public MemberEnds {
   }
 
   /// What solves the stage equations.
-  static Description description(const RunSetup& /*setup*/) { return {"chain", "fixed-point", ""}; }
+  Description description() const { return {"chain", "fixed-point", ""}; }
 
  private:
   std::deque<std::vector<PlainChain::Drive>> drives_;  // members point to them: a deque does not move its elements
   std::vector<PlainMember<PlainChain>> members_;
 };
 
-/// The same for systems of a generated kernel.
+/// The same for systems of one kernel, and for planar chains that move as such.
 class PlainSystems : public MemberEnds {
  public:
   /// `setups` must outlive it.
-  explicit PlainSystems(std::span<const RunSetup* const> setups)
-      : MemberEnds(setups[0]->start.q.size(), setups.size()), table_(system(*setups[0]).table()) {
+  PlainSystems(std::span<const RunSetup* const> setups, const LaneKind& kind)
+      : MemberEnds(setups[0]->start.q.size(), setups.size()), table_(*kind.kernel) {
     for (const RunSetup* setup : setups) {
       const Motion& start = setup->start;
       const double end = start.time + setup->duration;
-      members_.push_back({system(*setup).numbers().plain(), start.time, end, start.q.data(), start.v.data()});
+      members_.push_back({numbers_of(*setup->subject), start.time, end, start.q.data(), start.v.data()});
     }
   }
 
@@ -86,16 +87,18 @@ class PlainSystems : public MemberEnds {
     return library().system_tangent_lanes(options)(table_, options, 0, members_, all(), watch);
   }
 
-  static Description description(const RunSetup& setup) {
-    return {"dense", "fixed-point", std::string(system(setup).info().name)};
-  }
+  Description description() const { return {"dense", "fixed-point", std::string(table_.info.name)}; }
 
  private:
-  static const SystemSubject& system(const RunSetup& setup) {
-    return static_cast<const SystemSubject&>(*setup.subject);
+  PlainSystem numbers_of(const Subject& subject) {
+    if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) return system->numbers().plain();
+    const Chain<Planar>& chain = static_cast<const ChainSubject<Planar>&>(subject).chain();
+    const std::vector<PlainChain::Drive> drives = plain_drives(chain);
+    return chains_.emplace_back(plain(chain, drives), Planar::torque_components).plain();
   }
 
   const SystemTable& table_;
+  std::deque<ChainSystem> chains_;  // members point to them: a deque does not move its elements
   std::vector<PlainMember<PlainSystem>> members_;
 };
 
@@ -105,11 +108,11 @@ class PlainSystems : public MemberEnds {
 template <class Members>
 class LaneRuns : private MemberWatch {
  public:
-  /// `setups` are all of one lane_kind by `options`; their own options tell how they would be run alone. `tracks` has a
-  /// track to be filled for each, or null. Both must outlive it.
-  LaneRuns(std::span<const RunSetup* const> setups, const RunOptions& options, const std::function<bool()>& stop,
-           std::span<Track* const> tracks)
-      : setups_(setups), options_(options), stop_(stop), tracks_(tracks), members_(setups) {
+  /// `kind` is the lane_kind of all `setups` by `options`; their own options tell how they would be run alone. `tracks`
+  /// has a track to be filled for each, or null. Both must outlive it.
+  LaneRuns(const LaneKind& kind, std::span<const RunSetup* const> setups, const RunOptions& options,
+           const std::function<bool()>& stop, std::span<Track* const> tracks)
+      : setups_(setups), options_(options), stop_(stop), tracks_(tracks), members_(setups, kind) {
     watches_.reserve(setups.size());
     for (std::size_t k = 0; k < setups.size(); ++k) {
       const RunSetup& setup = *setups[k];
@@ -166,7 +169,7 @@ class LaneRuns : private MemberWatch {
     report.rows = 1 + (end.steps + setup.every - 1) / setup.every;
     report.statistics.steps = end.steps;
     report.statistics.rejected_steps = end.rejected_steps;
-    if (!is_explicit(options_.method)) report.description = Members::description(setup);
+    if (!is_explicit(options_.method)) report.description = members_.description();
     report.events = watches_[k].tallies();
     report.event_cost = watches_[k].cost();
     report.warnings = event_warnings(setup.events, report.events);
@@ -316,9 +319,11 @@ inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, con
 inline std::vector<std::optional<RunReport>> run_in_lanes(const LaneKind& kind, std::span<const RunSetup* const> alike,
                                                           const RunOptions& options, const std::function<bool()>& stop,
                                                           std::span<Track* const> tracks) {
-  if (kind.kernel != nullptr) return LaneRuns<PlainSystems>(alike, options, stop, tracks).go();
-  if (kind.dimension == Planar::dimension) return LaneRuns<PlainChains<Planar>>(alike, options, stop, tracks).go();
-  return LaneRuns<PlainChains<Spatial>>(alike, options, stop, tracks).go();
+  if (kind.kernel != nullptr) return LaneRuns<PlainSystems>(kind, alike, options, stop, tracks).go();
+  if (kind.dimension == Planar::dimension) {
+    return LaneRuns<PlainChains<Planar>>(kind, alike, options, stop, tracks).go();
+  }
+  return LaneRuns<PlainChains<Spatial>>(kind, alike, options, stop, tracks).go();
 }
 
 }  // namespace detail

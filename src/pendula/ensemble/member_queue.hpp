@@ -13,6 +13,7 @@
 #include <pendula/gauss/members_stepper.hpp>
 #include <pendula/gauss/system_members.hpp>
 #include <pendula/run/plain_members.hpp>
+#include <pendula/taylor/series_steps.hpp>
 #include <pendula/taylor/taylor_steps.hpp>
 #include <span>
 #include <stdexcept>
@@ -322,6 +323,10 @@ using TaylorTangentLanes = MemberQueue<TaylorSteps<ChainAccelerations<Space, N, 
 template <class Method, class Register = MemberRegister>
 using SystemLanes = MemberQueue<ExplicitSteps<SystemAccelerations<LanePack<Register>>, Method>,
                                 SystemSeats<ExplicitSteps<SystemAccelerations<LanePack<Register>>, Method>>>;
+
+/// The same by Taylor series.
+template <class Register = MemberRegister>
+using SystemSeriesLanes = MemberQueue<SeriesSteps<LanePack<Register>>, SystemSeats<SeriesSteps<LanePack<Register>>>>;
 
 /// The same by Gauss steps of S stages.
 template <int S, class Register = MemberRegister>

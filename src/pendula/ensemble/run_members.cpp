@@ -7,7 +7,9 @@
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/ensemble/second_looks.hpp>
 #include <pendula/run/chain_subject.hpp>
+#include <pendula/run/library.hpp>
 #include <pendula/run/run.hpp>
+#include <pendula/run/system_subject.hpp>
 #include <pendula/run/track.hpp>
 #include <utility>
 
@@ -45,11 +47,17 @@ double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
 }
 
-// Series of few links are summed in registers (library/lane_methods.hpp).
+// Series of few links are summed in registers (library/lane_methods.hpp); those of kernels must fit the nearest memory.
 bool goes_by_series(const RunSetup& setup) {
-  const bool is_short = links_of<Planar>(*setup.subject) + links_of<Spatial>(*setup.subject) <= 3;
-  return setup.options.tolerance >= 1e-13 && is_short && std::isfinite(natural_pace(*setup.subject)) &&
-         !setup.subject->loaded();
+  constexpr int most_links = 3, most_operands = 30;
+  const Subject& subject = *setup.subject;
+  if (setup.options.tolerance < 1e-13) return false;
+  const auto* const system = dynamic_cast<const SystemSubject*>(&subject);
+  const SystemTable* kernel = system == nullptr ? nullptr : &system->table();
+  const int links = links_of<Planar>(subject) + links_of<Spatial>(subject);
+  if (subject.loaded() && links_of<Planar>(subject) > 0) kernel = series_kernel<Planar>(links, true, true);
+  if (kernel != nullptr) return kernel->info.series.operands <= most_operands;
+  return links <= most_links && std::isfinite(natural_pace(subject)) && !subject.loaded();
 }
 
 // A tolerance by which a run loses no more energy than a short one. A hundredth, since the motion amplifies the errors
@@ -84,8 +92,8 @@ RunOptions quickest_with_tangents(const RunSetup& setup) {
   if (options.method != Method::gauss || options.step != 0) return options;
   options.method = Method::fehlberg78;
   options.tolerance = detail::tolerance_of_steps(setup, 1e-13);
-  const bool is_tried = lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
-  return is_tried || lane_kind(setup) ? options : setup.options;
+  const bool is_tried = tangent_lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
+  return is_tried || tangent_lane_kind(setup, setup.options) ? options : setup.options;
 }
 
 RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
@@ -102,25 +110,28 @@ struct Tried {
   std::optional<Track> track;  // of a run that gets a second look
 };
 
-// Runs without a report, if their lanes are others than before.
+// Runs without a report, if their lanes are others than before. Those that are followed by a track go in lanes of their
+// own: looking at every step takes time.
 void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const std::function<bool()>& stop,
                   std::vector<Tried>& tried) {
-  RunsByKind kinds;
+  RunsByKind followed, others;
   for (std::size_t k = 0; k < setups.size(); ++k) {
     if (tried[k].report) continue;
     const auto kind = lane_kind(setups[k], lane_options(setups[k], method));
     if (!kind || tried[k].kind == kind) continue;
     tried[k].kind = kind;
-    kinds[*kind].push_back(k);
+    (is_estimated(setups[k]) ? followed : others)[*kind].push_back(k);
   }
-  for (const auto& [kind, numbers] : kinds) {
-    const std::vector<const RunSetup*> alike = chosen(setups, numbers);
-    std::vector<Track*> tracks;
-    for (const std::size_t k : numbers) {
-      tracks.push_back(is_estimated(setups[k]) ? &tried[k].track.emplace(lane_track()) : nullptr);
+  for (const RunsByKind* kinds : {&followed, &others}) {
+    for (const auto& [kind, numbers] : *kinds) {
+      const std::vector<const RunSetup*> alike = chosen(setups, numbers);
+      std::vector<Track*> tracks;
+      for (const std::size_t k : numbers) {
+        tracks.push_back(kinds == &followed ? &tried[k].track.emplace(lane_track()) : nullptr);
+      }
+      auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop, tracks);
+      for (std::size_t k = 0; k < numbers.size(); ++k) tried[numbers[k]].report = std::move(reports[k]);
     }
-    auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop, tracks);
-    for (std::size_t k = 0; k < numbers.size(); ++k) tried[numbers[k]].report = std::move(reports[k]);
   }
 }
 
@@ -162,9 +173,9 @@ std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(const LaneKind& 
                                                                 std::span<const RunSetup* const> alike,
                                                                 const RunOptions& options,
                                                                 const std::function<bool()>& stop) {
-  if (kind.kernel != nullptr) return LaneExponents<PlainSystems>(alike, options, stop).go();
-  if (kind.dimension == Planar::dimension) return LaneExponents<PlainChains<Planar>>(alike, options, stop).go();
-  return LaneExponents<PlainChains<Spatial>>(alike, options, stop).go();
+  if (kind.kernel != nullptr) return LaneExponents<PlainSystems>(kind, alike, options, stop).go();
+  if (kind.dimension == Planar::dimension) return LaneExponents<PlainChains<Planar>>(kind, alike, options, stop).go();
+  return LaneExponents<PlainChains<Spatial>>(kind, alike, options, stop).go();
 }
 
 }  // namespace
@@ -188,7 +199,7 @@ std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(std::span<const 
   for (const auto& options_of : attempts) {
     detail::RunsByKind kinds;
     for (std::size_t k = 0; k < setups.size(); ++k) {
-      const auto kind = lane_kind(setups[k], options_of(setups[k]));
+      const auto kind = tangent_lane_kind(setups[k], options_of(setups[k]));
       if (!kind || exponents[k] || tried[k] == kind) continue;
       tried[k] = kind;
       kinds[*kind].push_back(k);

@@ -56,7 +56,13 @@ class ExplicitSystem {
     steps.start(0, time, numbers_.plain(), q, v);
     std::fill(fastest_.begin(), fastest_.end(), 0.0);
     field_.forget();
-    const std::size_t part = first_not_finite(time, q, v);
+    for (const double* numbers : {q, v}) {
+      const std::size_t part = first_not_finite(numbers);
+      if (part < count()) return {.status = Status::not_finite, .time = time, .part = static_cast<int>(part)};
+    }
+    // At a pole accelerations are infinite, and starting there would fail later with a less clear message.
+    forward_->acceleration(time, q, v, end_.data());
+    const std::size_t part = first_not_finite(end_.data());
     if (part < count()) {
       return {.status = Status::singular_mass_matrix, .time = time, .part = static_cast<int>(part)};
     }
@@ -132,17 +138,10 @@ class ExplicitSystem {
     }
   }
 
-  // Index of the first rate or acceleration that is not finite: at a pole accelerations are infinite, and starting
-  // there would fail later with a less clear message.
-  std::size_t first_not_finite(double time, const double* q, const double* v) {
-    std::vector<double> found(count());
-    forward_->acceleration(time, q, v, found.data());
-    for (const double* numbers : {v, static_cast<const double*>(found.data())}) {
-      for (std::size_t k = 0; k < count(); ++k) {
-        if (!std::isfinite(numbers[k])) return k;
-      }
-    }
-    return count();
+  // The coordinate of the first one that is not finite; their number if there is none.
+  std::size_t first_not_finite(const double* numbers) const {
+    const auto* const found = std::find_if_not(numbers, numbers + count(), [](double x) { return std::isfinite(x); });
+    return static_cast<std::size_t>(found - numbers);
   }
 
   SystemModel model_;

@@ -237,7 +237,7 @@ class SingleIntegrator final : public PlainIntegrator {
     return false;
   }
 
-  double smallest_step() const { return 1e-14 * std::max(1.0, std::abs(time())); }
+  double smallest_step() const { return 1e-14 * std::abs(time()); }
 
   Subject subject_;
   Steps steps_;

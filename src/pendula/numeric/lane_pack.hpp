@@ -70,6 +70,11 @@ class LanePack {
     sincos(a.held_, sine, cosine);
     return LanePack(sine);
   }
+  friend LanePack cos(const LanePack& a) {
+    Register sine, cosine;
+    sincos(a.held_, sine, cosine);
+    return LanePack(cosine);
+  }
   friend LanePack floor(const LanePack& a) { return LanePack(Register(xsimd::floor(a.held_))); }
   friend LanePack exp(const LanePack& a) { return LanePack(Register(xsimd::exp(a.held_))); }
   friend LanePack log(const LanePack& a) { return LanePack(Register(xsimd::log(a.held_))); }

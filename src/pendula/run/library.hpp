@@ -63,4 +63,21 @@ const SpaceLibrary& library_of() {
   return Space::dof == 1 ? library().planar : library().spatial;
 }
 
+/// The fixed-n kernel of this build for a chain; nullptr if there is none.
+template <class Space>
+const SystemTable* kernel_of(int links) {
+  for (const SystemTable* kernel : library_of<Space>().kernels) {
+    if (kernel->info.links == links) return kernel;
+  }
+  return nullptr;
+}
+
+/// The kernel by whose Taylor series a chain moves; nullptr where it moves by those of rods, which need no kernel but
+/// take no loads and are the faster ones in lanes.
+template <class Space>
+const SystemTable* series_kernel(int links, bool is_loaded, bool in_lanes) {
+  const SystemTable* const kernel = kernel_of<Space>(links);
+  return kernel != nullptr && kernel->of_1.series_next != nullptr && (is_loaded || !in_lanes) ? kernel : nullptr;
+}
+
 }  // namespace pendula

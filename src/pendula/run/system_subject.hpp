@@ -38,6 +38,7 @@ class SystemSubject : public Subject {
       throw std::invalid_argument("sines: expected an input from 0 to before " + std::to_string(info().inputs.size()) +
                                   ", got " + std::to_string(sine.input));
     }
+    loaded_ = !feedback_.empty() || SystemModel(*table_, numbers_.plain()).loaded();
   }
 
   const SystemTable& table() const { return *table_; }
@@ -72,9 +73,12 @@ class SystemSubject : public Subject {
     return v;
   }
 
+  /// Whether momenta have rates at time 0: not where the mass matrix is singular.
+  bool has_inertia(const Eigen::VectorXd& q) const { return rates(0, q, Eigen::VectorXd::Ones(q.size())).allFinite(); }
+
   std::optional<double> energy_scale() const override { return std::nullopt; }
-  bool loaded() const override { return !feedback_.empty() || SystemModel(*table_, numbers_.plain()).loaded(); }
-  bool damped() const override { return loaded(); }
+  bool loaded() const override { return loaded_; }
+  bool damped() const override { return loaded_; }
   /// Forces that depend on time may exchange energy many times within one step of the motion.
   bool balances(Method method) const override { return !info().depends_on_time && Subject::balances(method); }
   std::vector<std::string> expected_trouble(const RunOptions& /*options*/) const override { return {}; }
@@ -208,6 +212,7 @@ class SystemSubject : public Subject {
   std::shared_ptr<const SystemTable> table_;
   SystemNumbers numbers_;
   std::vector<InputFunction> feedback_;
+  bool loaded_ = false;
 };
 
 }  // namespace pendula

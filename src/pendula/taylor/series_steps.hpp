@@ -7,99 +7,82 @@
 #include <functional>
 #include <limits>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/width.hpp>
 #include <pendula/system/member_systems.hpp>
 #include <pendula/system/moving_part.hpp>
 #include <pendula/system/series_info.hpp>
 #include <pendula/system/system_table.hpp>
-#include <vector>
+#include <pendula/taylor/series_controller.hpp>
+#include <utility>
 
 namespace pendula {
 
-/// How the steps of Taylor series are checked for forces that their coefficients do not show: as those of a method with
-/// so many nodes.
+/// What ExplicitSystem asks of a method: forces are looked at during a step as densely as by a quadrature of this
+/// order.
 struct TaylorSeries {
   static constexpr int error_order = 14;
   static constexpr bool is_blind = false;
 };
 
-/// The sizes of Taylor steps: as the series allow, unless a step failed.
-class SeriesSizes {
- public:
-  explicit SeriesSizes(double /*tolerance*/) {}
-
-  template <class Stepper>
-  void start(bool /*which*/, Stepper& /*stepper*/) {
-    longest_ = unlimited;
-  }
-  template <class Stepper>
-  double step(Stepper& stepper) const {
-    return std::min(longest_, stepper.longest_step());
-  }
-  template <class Stepper>
-  bool accepts(bool /*which*/, double /*h*/, Stepper& /*stepper*/) const {
-    return true;
-  }
-  void shrink(bool /*which*/, double h, double factor) { longest_ = factor * h; }
-  template <class Stepper>
-  void move_on(bool /*which*/, double /*h*/, Stepper& /*stepper*/) {
-    longest_ = unlimited;
-  }
-  template <class Numbers>
-  void member(Numbers& numbers) {
-    numbers(longest_);
-  }
-
- private:
-  static constexpr double unlimited = 1e300;
-
-  double longest_ = unlimited;
-};
-
-/// Steps of one motion of a system by the Taylor series of its kernel; the stepper of SingleIntegrator. The order
-/// follows from the tolerance, the step size from the last terms of the series. The state is kept in twice the digits,
-/// so that what many steps add is not lost to rounding.
+/// Steps by the Taylor series of a kernel, of one motion (the stepper of SingleIntegrator) or of several members at
+/// once, one in each lane (a stepper of MemberQueue). The order follows from the tolerance, the step size from the last
+/// terms of the series. The state is kept in twice the digits, so that what many steps add is not lost to rounding.
+template <class Num>
 class SeriesSteps {
  public:
-  static constexpr bool can_choose = true;
-  using Part = MovingPart<double, 1>;
-  using Parts = detail::PerLink<Part, Eigen::Dynamic>;
-  using Controller = SeriesSizes;
+  using L = Num;
+  using Mask = MaskOf<L>;
+  using SpaceType = CoordinateSpace;
+  using Subject = MemberSystems<L>&;
+  using Chain = SeriesSteps;
+  static constexpr std::size_t D = 1;
+  static constexpr int stages = 1, links_known = Eigen::Dynamic;
+  static constexpr bool is_implicit = false, can_choose = true, has_tangent = false;
+  using Part = MovingPart<L, D>;
+  using Parts = detail::PerLink<Part, links_known>;
+  using Controller = SeriesController<L>;
 
   struct Options {
     double tolerance = 1e-9;  ///< error of a step relative to the size of the motion
   };
 
   /// `systems` must outlive this object, and have series.
-  SeriesSteps(MemberSystems<double>& systems, Options options)
+  SeriesSteps(MemberSystems<L>& systems, Options options)
       : systems_(systems),
         info_(systems.info().series),
         n_(static_cast<std::size_t>(systems.coordinates())),
-        row_(series_state_row(n_, 1)),
+        row_(series_state_row(n_, W) / W),
         order_(order_for(options.tolerance)),
         looks_(is_smooth(systems.info()) ? 1 : most_looks),
         largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
-        log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
+        log_reach_(std::log(std::max(options.tolerance, finest)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
         state_((static_cast<std::size_t>(order_) + 5) * row_),
         kept_(static_cast<std::size_t>(info_.kept) + 1),
-        operands_(static_cast<std::size_t>(order_) * series_operand_row(info_, 1) + 1),
+        operands_(static_cast<std::size_t>(order_) * series_operand_row(info_, W) / W + 1),
         inputs_((static_cast<std::size_t>(order_) + 1) * systems.info().inputs.size() + 1),
-        now_{PackRows<1>(row_), PackRows<1>(row_), Parts(systems.coordinates()), 0},
+        now_{PackRows<W>(row_), PackRows<W>(row_), Parts(systems.coordinates())},
         trial_(now_),
         begin_(now_),
         seen_(2 * n_),
-        rates_(n_),
-        scales_(2 * n_) {}
+        rates_(n_ + 2),
+        scales_(2 * n_),
+        unit_row_(1) {
+    for (int i = 0; i < links(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
+  }
 
+  SeriesSteps& chain() { return *this; }
+  const SeriesSteps& chain() const { return *this; }
   int links() const { return static_cast<int>(n_); }
   const Parts& parts() const { return now_.parts; }
 
   /// A state, with everything that the next steps depend on.
   struct Place {
-    PackRows<1> state, low;  // q, then p or v; and their rounding errors
-    Parts parts;             // q and v
-    double last = 0;         // size of the step that led here; 0: none  [s]
+    PackRows<width_of<L>> state, low;  // q, then p or v; and their rounding errors
+    Parts parts;                       // q and v
+    L unit{1.0};                       // of time, for the series about this state  [s]
   };
   Place place() const { return now_; }
   void go_to(const Place& place) {
@@ -107,67 +90,105 @@ class SeriesSteps {
     is_expanded_ = false;
   }
 
+  /// A member comes into a lane, with its numbers, at q and v at `time`. The first one comes into all lanes, so that
+  /// they have numbers to compute with.
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v) {
-    systems_.take(lane, system);
-    time_ = time;
-    for (std::size_t k = 0; k < row_; ++k) *now_.state[k] = *now_.low[k] = 0;
-    for (int i = 0; i < links(); ++i) now_.parts[i] = {{q[i]}, {v[i]}};
-    std::copy_n(q, n_, now_.state[0]);
-    std::copy_n(v, n_, now_.state[n_]);
-    if (info_.has_momenta) {
-      systems_.here(time, &SystemFunctions::momentum_from_velocity, now_.state[0], v, now_.state[n_]);
+    if (!is_seated_) {
+      is_seated_ = true;
+      for (int other = 0; other < static_cast<int>(W); ++other) start(other, time, system, q, v);
     }
-    now_.last = 0;
+    systems_.take(lane, system);
+    set(time_, lane, time);
+    for (int i = 0; i < links(); ++i) {
+      set(now_.parts[i].place[0], lane, q[i]);
+      set(now_.parts[i].rate[0], lane, v[i]);
+      to_row(now_.parts[i].place[0], seen_[i]);
+      to_row(now_.parts[i].rate[0], seen_[links() + i]);
+    }
+    systems_.here(time_, &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
+    set(now_.unit, lane, first_unit(lane, q, v));
+    if (info_.has_momenta) {
+      systems_.here(time_, &SystemFunctions::momentum_from_velocity, seen_[0], seen_[n_], rates_[0]);
+    }
+    for (std::size_t k = 0; k < n_; ++k) {
+      const double* const rate = info_.has_momenta ? rates_[k] : seen_[n_ + k];
+      now_.state[k][lane] = q[k];
+      now_.state[n_ + k][lane] = rate[lane];
+      now_.low[k][lane] = now_.low[n_ + k][lane] = 0;
+    }
     is_expanded_ = false;
   }
 
+  /// Visits the numbers of one motion, as MemberNumbers does.
   template <class Numbers>
-  void member(Numbers& numbers) {
-    numbers(now_.state, now_.low, now_.last, time_);
+  void member(Numbers& numbers) requires(!is_batch<L>) {
+    numbers(now_.state, now_.low, now_.unit, time_);
     for (int i = 0; i < links(); ++i) numbers(now_.parts[i].place, now_.parts[i].rate);
     is_expanded_ = false;
   }
 
-  std::array<long double, 1> exact_place(int i) const { return {sum_of(i)}; }
-  std::array<long double, 1> exact_rate(int i) const {
+  std::array<long double, 1> exact_place(int i) const requires(!is_batch<L>) { return {sum_of(i)}; }
+  std::array<long double, 1> exact_rate(int i) const requires(!is_batch<L>) {
     if (!info_.has_momenta) return {sum_of(links() + i)};
     return {now_.parts[i].rate[0]};
   }
+  const std::array<L, D>& along(int i) const { return now_.parts[i].place; }
 
-  /// The largest step that the series about the current state allows.
-  double longest_step() {
+  /// Calls visit(i, q̇_i, …) for all coordinates.
+  template <class Visit>
+  void for_each_rate(Visit visit) const {
+    for (int i = 0; i < links(); ++i) visit(i, now_.parts[i].rate, L(0.0));
+  }
+
+  /// T + U  [J].
+  L energy() {
+    for (int i = 0; i < links(); ++i) {
+      to_row(now_.parts[i].place[0], seen_[i]);
+      to_row(now_.parts[i].rate[0], seen_[links() + i]);
+    }
+    double *const kinetic = rates_[n_], *const total = rates_[n_ + 1];
+    systems_.here(time_, &SystemFunctions::energies, seen_[0], seen_[n_], kinetic, total);
+    const L T = from_row<L>(kinetic), energy = from_row<L>(total);
+    energy_sum_ = abs(T) + abs(energy - T);
+    return energy;
+  }
+  /// |T| + |U| at the last call of energy()  [J].
+  const L& energy_sum() const { return energy_sum_; }
+
+  /// The largest steps that the series about the current states allow.
+  L longest_step() {
     if (!is_expanded_) expand();
     return longest_;
   }
 
-  /// Tries a step of `h` from `time`. Returns whether its end is finite, and the series solves the equations on the
-  /// way: its last terms know nothing of what is narrow and ahead. The state is unchanged.
-  bool solve(double time, double h, bool /*wanted*/) {
+  /// Tries a step of `h` from `time`. Returns of which `wanted` members its end is finite, and the series solves the
+  /// equations on the way: its last terms know nothing of what is narrow and ahead. The state is unchanged.
+  PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
     time_ = time;
     if (!is_expanded_) expand();
     tried_ = h;
-    const double tau = h / unit_;
-    bool is_finite = true;
+    const L tau = h / unit_;
+    L none(0.0);
     for (std::size_t k = 0; k < 2 * n_; ++k) {
-      const double x = *now_.state[k], change = tau * rise(k, tau) + *now_.low[k], there = x + change;
-      *trial_.state[k] = there;
-      *trial_.low[k] = change - (there - x);
-      is_finite &= std::isfinite(there);
+      const L x = from_row<L>(now_.state[k]), change = fma(tau, rise(k, tau), from_row<L>(now_.low[k])),
+              there = x + change;
+      to_row(there, trial_.state[k]);
+      to_row(change - (there - x), trial_.low[k]);
+      none = none + (there - there);
     }
     read_rates(time + h, trial_.state, trial_.parts);
-    for (int i = 0; i < links(); ++i) is_finite &= std::isfinite(trial_.parts[i].rate[0]);
-    trial_.last = h;
-    if (!is_finite) return false;
-    for (int k = 1; k <= looks_; ++k) {
-      if (!solves(time, h, static_cast<double>(k) / looks_)) return false;
-    }
-    return true;
+    for (int i = 0; i < links(); ++i) none = none + (trial_.parts[i].rate[0] - trial_.parts[i].rate[0]);
+    // Near the size that its steps will have; a step that the end of a run has cut short says nothing of that.
+    trial_.unit = select(longest_ <= most_growth * unit_, longest_, unit_);
+    Mask found = wanted & (none == L(0.0));
+    for (int k = 1; k <= looks_ && any(found); ++k) found = found & solves(time, h, static_cast<double>(k) / looks_);
+    return found;
   }
 
   const Parts& tried() const { return trial_.parts; }
 
   /// The first coordinate of the tried step that is not finite; −1: none.
-  int part_not_finite() const {
+  int part_not_finite() const requires(!is_batch<L>) {
     for (int i = 0; i < links(); ++i) {
       const Part& part = trial_.parts[i];
       if (!std::isfinite(part.place[0]) || !std::isfinite(part.rate[0])) return i;
@@ -175,42 +196,70 @@ class SeriesSteps {
     return -1;
   }
 
-  /// Moves to the end of the tried step. Its series stays for dense output, until the next one is expanded.
-  void accept(bool /*which*/) {
-    std::swap(begin_, now_);
-    std::swap(now_, trial_);
-    begin_time_ = time_;
-    time_ += tried_;
-    step_ = tried_;
+  /// Moves these members to the end of the tried step. Their series stay for dense output, until the next ones are
+  /// expanded.
+  void accept(const Mask& which) {
+    if constexpr (is_batch<L>) {
+      for (auto rows : {std::pair(&trial_.state, &now_.state), {&trial_.low, &now_.low}}) {
+        for (std::size_t k = 0; k < 2 * n_; ++k) {
+          double* const to = (*rows.second)[k];
+          to_row(select(which, from_row<L>((*rows.first)[k]), from_row<L>(to)), to);
+        }
+      }
+      for (int i = 0; i < links(); ++i) {
+        const Part& from = trial_.parts[i];
+        Part& to = now_.parts[i];
+        to = {{select(which, from.place[0], to.place[0])}, {select(which, from.rate[0], to.rate[0])}};
+      }
+      now_.unit = select(which, trial_.unit, now_.unit);
+    } else {
+      std::swap(begin_, now_);
+      std::swap(now_, trial_);
+    }
+    begin_time_ = select(which, time_, begin_time_);
+    time_ = select(which, time_ + tried_, time_);
+    step_ = select(which, tried_, step_);
     is_expanded_ = false;
   }
 
   /// A coordinate and its rate at the fraction `share` of the last step, by the series of the coordinate.
   Part glance(int i, double share) const {
-    const double tau = share * step_ / unit_;
+    const L tau = L(share) * step_ / unit_;
     const auto k = static_cast<std::size_t>(i);
-    const double place = coefficient(0, k) + tau * rise(k, tau);
-    return {{place}, {info_.has_momenta ? slope(k, tau) / unit_ : coefficient(0, n_ + k) + tau * rise(n_ + k, tau)}};
+    const L place = fma(tau, rise(k, tau), coefficient(0, k));
+    return {{place}, {info_.has_momenta ? slope(k, tau) / unit_ : fma(tau, rise(n_ + k, tau), coefficient(0, n_ + k))}};
+  }
+  /// Calls visit(i, q, v) for all coordinates.
+  template <class Visit>
+  void for_each_glance(double share, Visit visit) const {
+    for (int i = 0; i < links(); ++i) {
+      const Part there = glance(i, share);
+      visit(i, there.place, there.rate);
+    }
   }
 
-  /// Calls visit(i, q, v) for all coordinates: rates are those of the momenta there.
+  /// The same where rates are those of the momenta there.
   template <class Visit>
   void for_each_look(double share, Visit visit) {
-    const double tau = share * step_ / unit_;
-    for (std::size_t k = 0; k < 2 * n_; ++k) *trial_.state[k] = coefficient(0, k) + tau * rise(k, tau);
-    read_rates(begin_time_ + share * step_, trial_.state, trial_.parts);
+    const L tau = L(share) * step_ / unit_;
+    for (std::size_t k = 0; k < 2 * n_; ++k) {
+      to_row(fma(tau, rise(k, tau), coefficient(0, k)), trial_.state[k]);
+    }
+    read_rates(fma(L(share), step_, begin_time_), trial_.state, trial_.parts);
     for (int i = 0; i < links(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
   }
 
-  const Place& begin() const { return begin_; }
-  void set_step(const Place& begin, double time, double h) {
+  const Place& begin() const requires(!is_batch<L>) { return begin_; }
+  void set_step(const Place& begin, double time, double h) requires(!is_batch<L>) {
     begin_ = begin;
     begin_time_ = time;
     step_ = h;
   }
 
  private:
-  static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14;
+  static constexpr std::size_t W = width_of<L>;
+  static constexpr double most_growth = 1e3;  // of the unit from step to step: an equilibrium allows any
+  static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14, shorter_unit = 1e-6;
   static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 8, most_looks = 4;
 
   /// Whether nothing but sines, powers and logarithms stands in the equations, and no time.
@@ -224,142 +273,165 @@ class SeriesSteps {
     return std::clamp(static_cast<int>(std::lround(order)), least_order, most_order);
   }
 
+  /// The time in which the motion changes by itself, or 1 rad; 1 s where nothing moves. `rates_` has accelerations.
+  double first_unit(int lane, const double* q, const double* v) const {
+    double squared = 0;
+    for (std::size_t k = 0; k < n_; ++k) {
+      const double size = std::max(1.0, std::abs(q[k])), fast = v[k] / size;
+      squared = std::max(squared, fast * fast + std::abs(rates_[k][lane]) / size);
+    }
+    const double unit = 1 / std::sqrt(squared);
+    return unit > 0 && std::isfinite(unit) ? unit : 1;
+  }
+
   long double sum_of(int k) const { return static_cast<long double>(*now_.state[k]) + *now_.low[k]; }
 
-  double coefficient(std::size_t order, std::size_t k) const { return *state_[order * row_ + k]; }
+  L coefficient(std::size_t order, std::size_t k) const { return from_row<L>(state_[order * row_ + k]); }
 
   /// Σ c_(k+1) τ^k, in four strands that do not wait for one another.
-  double rise(std::size_t k, double tau) const {
-    const double tau2 = tau * tau, tau4 = tau2 * tau2;
+  L rise(std::size_t k, const L& tau) const {
+    const L tau2 = tau * tau, tau4 = tau2 * tau2;
     std::size_t order = (static_cast<std::size_t>(order_) + 3) / 4 * 4;
-    double a = coefficient(order - 3, k), b = coefficient(order - 2, k), c = coefficient(order - 1, k),
-           d = coefficient(order, k);
+    L a = coefficient(order - 3, k), b = coefficient(order - 2, k), c = coefficient(order - 1, k),
+      d = coefficient(order, k);
     for (order -= 4; order > 0; order -= 4) {
-      a = std::fma(a, tau4, coefficient(order - 3, k));
-      b = std::fma(b, tau4, coefficient(order - 2, k));
-      c = std::fma(c, tau4, coefficient(order - 1, k));
-      d = std::fma(d, tau4, coefficient(order, k));
+      a = fma(a, tau4, coefficient(order - 3, k));
+      b = fma(b, tau4, coefficient(order - 2, k));
+      c = fma(c, tau4, coefficient(order - 1, k));
+      d = fma(d, tau4, coefficient(order, k));
     }
-    return std::fma(std::fma(d, tau, c), tau2, std::fma(b, tau, a));
+    return fma(fma(d, tau, c), tau2, fma(b, tau, a));
   }
 
   /// Σ (k+1) c_(k+1) τ^k
-  double slope(std::size_t k, double tau) const {
-    double sum = 0;
+  L slope(std::size_t k, const L& tau) const {
+    L sum(0.0);
     for (auto order = static_cast<std::size_t>(order_); order > 0; --order) {
-      sum = std::fma(sum, tau, static_cast<double>(order) * coefficient(order, k));
+      sum = fma(sum, tau, L(static_cast<double>(order)) * coefficient(order, k));
     }
     return sum;
   }
 
   /// Σ (k+2) (k+1) c_(k+2) τ^k
-  double bend(std::size_t k, double tau) const {
-    double sum = 0;
+  L bend(std::size_t k, const L& tau) const {
+    L sum(0.0);
     for (auto order = static_cast<std::size_t>(order_); order > 1; --order) {
-      sum = std::fma(sum, tau, static_cast<double>(order * (order - 1)) * coefficient(order, k));
+      sum = fma(sum, tau, L(static_cast<double>(order * (order - 1))) * coefficient(order, k));
     }
     return sum;
   }
 
-  void read_rates(double time, PackRows<1>& state, Parts& parts) {
-    const double* v = state[n_];
+  void read_rates(const L& time, PackRows<W>& state, Parts& parts) {
     if (info_.has_momenta) {
-      systems_.here(time, &SystemFunctions::velocity_from_momentum, state[0], state[n_], rates_.data());
-      v = rates_.data();
+      systems_.here(time, &SystemFunctions::velocity_from_momentum, state[0], state[n_], rates_[0]);
     }
-    for (int i = 0; i < links(); ++i) parts[i] = {{*state[i]}, {v[i]}};
+    for (int i = 0; i < links(); ++i) {
+      parts[i] = {{from_row<L>(state[i])}, {from_row<L>(info_.has_momenta ? rates_[i] : state[links() + i])}};
+    }
   }
 
-  /// Whether accelerations at a fraction of the step are those of the series, to what terms beyond its order may be.
-  bool solves(double time, double h, double share) {
-    const double tau = share * h / unit_;
+  /// Whether accelerations at a fraction of the step are those of the series, but for what terms beyond its order may
+  /// add.
+  Mask solves(const L& time, const L& h, double share) {
+    const L inverse = L(1.0) / unit_, tau = L(share) * h * inverse;
     for (std::size_t i = 0; i < n_; ++i) {
-      seen_[i] = coefficient(0, i) + tau * rise(i, tau);
-      seen_[n_ + i] = info_.has_momenta ? slope(i, tau) / unit_ : coefficient(0, n_ + i) + tau * rise(n_ + i, tau);
+      to_row(fma(tau, rise(i, tau), coefficient(0, i)), seen_[i]);
+      to_row(info_.has_momenta ? slope(i, tau) * inverse : fma(tau, rise(n_ + i, tau), coefficient(0, n_ + i)),
+             seen_[n_ + i]);
     }
-    systems_.here(time + share * h, &SystemFunctions::acceleration, seen_.data(), seen_.data() + n_, rates_.data());
+    systems_.here(fma(L(share), h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
+    Mask found(L(0.0) == L(0.0));
     for (std::size_t i = 0; i < n_; ++i) {
-      const double by_series = info_.has_momenta ? bend(i, tau) / (unit_ * unit_) : slope(n_ + i, tau) / unit_;
-      if (!(h * std::abs(rates_[i] - by_series) * scales_[n_ + i] <= largest_defect_)) return false;
+      const L by_series = info_.has_momenta ? bend(i, tau) * (inverse * inverse) : slope(n_ + i, tau) * inverse;
+      const L defect = h * unit_ * abs(from_row<L>(rates_[i]) - by_series) * from_row<L>(scales_[n_ + i]);
+      found = found & (defect <= L(largest_defect_));
     }
-    return true;
+    return found;
   }
 
   /// Computes the series in a unit of time near the step size, so that coefficients are neither huge nor tiny.
   void expand() {
-    unit_ = now_.last > 0 ? now_.last : 1;
-    for (int attempt = 0; attempt < most_units; ++attempt, unit_ *= 1e-6) {
-      for (std::size_t k = 0; k < 2 * n_; ++k) *state_[k] = *now_.state[k];
+    unit_ = now_.unit;
+    for (int attempt = 0; attempt < most_units; ++attempt) {
+      for (std::size_t k = 0; k < 2 * n_; ++k) to_row(from_row<L>(now_.state[k]), state_[k]);
+      to_row(unit_, unit_row_[0]);
       systems_.expand(time_, unit_, order_, inputs_,
-                      {.unit = &unit_, .state = state_[0], .kept = kept_[0], .operands = operands_[0]});
+                      {.unit = unit_row_[0], .state = state_[0], .kept = kept_[0], .operands = operands_[0]});
       longest_ = size_by_terms();
-      if (longest_ > 0) break;
+      const Mask is_good = longest_ > L(0.0);
+      if (all(is_good)) break;
+      unit_ = select(is_good, unit_, L(shorter_unit) * unit_);
     }
     is_expanded_ = true;
   }
 
   /// From the decay of the last terms, relative to the size of the motion; 0 if one is not finite. Several terms are
   /// used, because motions that start at rest, and symmetric ones, have only every second or fourth term.
-  double size_by_terms() {
+  L size_by_terms() {
     const int last = order_ - (info_.has_momenta ? 1 : 0);
-    double log_radius = 1e3;
+    L log_radius(1e3);
+    Mask is_finite(L(0.0) == L(0.0));
     find_scales();
     for (int k = last - looked_at + 1; k <= last; ++k) {
-      const double term = size_of_term(static_cast<std::size_t>(k));
-      if (!(term <= std::numeric_limits<double>::max())) return 0;
-      log_radius = std::min(log_radius, -std::log2(std::max(term, tiny)) / k);
+      const L term = size_of_term(static_cast<std::size_t>(k));
+      is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
+      log_radius = min(log_radius, L(-1.0 / k) * log(max(term, L(tiny))));
     }
-    return std::exp2(std::min(log_radius + log_reach_, 600.0)) * unit_;
+    return select(is_finite, exp(min(log_radius + L(log_reach_), L(400.0))) * unit_, L(0.0));
   }
 
-  /// Terms are relative to each coordinate or rate itself, plus 1 rad or 1/s, or the size of the whole motion if that
-  /// is smaller, so that oscillations of 1e-9 rad are resolved like any other.
+  /// Terms are relative to each coordinate itself, plus 1 rad or the size of the whole motion if that is smaller, so
+  /// that oscillations of 1e-9 rad are resolved like any other; rates, times the unit of time, likewise.
   void find_scales() {
-    double q = 0, v = 0, a = 0;
+    L q(0.0), v(0.0), a(0.0);
     for (std::size_t i = 0; i < n_; ++i) {
-      q = std::max(q, std::abs(coefficient(0, i)));
-      v = std::max(v, std::abs(rate(0, i)));
-      a = std::max(a, std::abs(rate(1, i)));
+      q = max(q, abs(coefficient(0, i)));
+      v = max(v, abs(rate(0, i)));
+      a = max(a, abs(rate(1, i)));
     }
-    const double places = std::clamp(std::max(q, unit_ * v), nothing, 1.0);
-    const double speeds = std::clamp(std::max({v, a, rounded * q / unit_}), nothing, 1.0);
+    const auto within = [](const L& x) { return min(max(x, L(nothing)), L(1.0)); };
+    const L places = within(max(q, v)), speeds = within(max(max(v, a), L(rounded) * q));
     for (std::size_t i = 0; i < n_; ++i) {
-      scales_[i] = 1 / (places + std::abs(coefficient(0, i)));
-      scales_[n_ + i] = 1 / (speeds + std::abs(rate(0, i)));
+      to_row(L(1.0) / (places + abs(coefficient(0, i))), scales_[i]);
+      to_row(L(1.0) / (speeds + abs(rate(0, i))), scales_[n_ + i]);
     }
   }
 
-  double size_of_term(std::size_t order) const {
-    double largest = 0;
+  /// NaN if it is not finite.
+  L size_of_term(std::size_t order) const {
+    L largest(0.0), none(0.0);
     for (std::size_t i = 0; i < n_; ++i) {
-      const double moved = coefficient(order, i) * scales_[i], turned = rate(order, i) * scales_[n_ + i];
-      if (!std::isfinite(moved) || !std::isfinite(turned)) return std::numeric_limits<double>::infinity();
-      largest = std::max({largest, std::abs(moved), std::abs(turned)});
+      const L moved = coefficient(order, i) * from_row<L>(scales_[i]),
+              turned = rate(order, i) * from_row<L>(scales_[n_ + i]);
+      none = none + ((moved - moved) + (turned - turned));
+      largest = max(largest, max(abs(moved), abs(turned)));
     }
-    return largest;
+    return largest + none;
   }
 
-  /// A coefficient of a rate.
-  double rate(std::size_t order, std::size_t i) const {
-    if (!info_.has_momenta) return coefficient(order, n_ + i);
-    return static_cast<double>(order + 1) * coefficient(order + 1, i) / unit_;
+  /// A coefficient of a rate, times the unit of time.
+  L rate(std::size_t order, std::size_t i) const {
+    if (!info_.has_momenta) return unit_ * coefficient(order, n_ + i);
+    return L(static_cast<double>(order + 1)) * coefficient(order + 1, i);
   }
 
-  MemberSystems<double>& systems_;
+  MemberSystems<L>& systems_;
   SeriesInfo info_;
   std::size_t n_, row_;
   int order_;
-  int looks_;              // at the way of a step
+  int looks_;              // places of a step where accelerations are compared
   double largest_defect_;  // of accelerations, times h, relative to scales
   double log_reach_;       // step size relative to the estimated radius of convergence, as a logarithm
-  PackRows<1> state_, kept_, operands_, inputs_;
-  Place now_, trial_, begin_;
-  std::vector<double> seen_;            // a motion on the way of a step
-  std::vector<double> rates_, scales_;  // of the terms of coordinates, then of rates
-  double time_ = 0, begin_time_ = 0;
-  double tried_ = 0, step_ = 1;  // of the tried step, of the last one
-  double unit_ = 1, longest_ = 0;
-  bool is_expanded_ = false;
+  PackRows<W> state_, kept_, operands_, inputs_;
+  Place now_, trial_, begin_;  // begin_: of one motion
+  PackRows<W> seen_;           // a motion on the way of a step
+  PackRows<W> rates_;
+  PackRows<W> scales_;  // of the terms of coordinates, then of rates: what they are multiplied by
+  PackRows<W> unit_row_;
+  L time_{0.0}, begin_time_{0.0};
+  L tried_{0.0}, step_{1.0};  // of the tried step, of the last one
+  L unit_{1.0}, longest_{0.0}, energy_sum_{0.0};
+  bool is_expanded_ = false, is_seated_ = false;
 };
 
 }  // namespace pendula

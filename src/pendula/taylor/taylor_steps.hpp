@@ -7,46 +7,9 @@
 #include <pendula/explicit/explicit_state.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/taylor/chain_series.hpp>
+#include <pendula/taylor/series_controller.hpp>
 
 namespace pendula {
-
-/// Chooses the step of every member from its Taylor series.
-template <class L>
-class SeriesController {
- public:
-  using Mask = typename L::Mask;
-
-  explicit SeriesController(double /*tolerance*/) {}
-
-  template <class Stepper>
-  void start(const Mask& which, Stepper& /*stepper*/) {
-    longest_ = select(which, L(unlimited), longest_);
-  }
-
-  /// Size of the next step, unless the run ends before.
-  template <class Stepper>
-  L step(Stepper& stepper) {
-    return min(longest_, stepper.expand());
-  }
-
-  template <class Stepper>
-  Mask accepts(const Mask& which, const L& /*h*/, Stepper& /*stepper*/) const {
-    return which;
-  }
-
-  /// The next step of these members is `factor` times a failed one.
-  void shrink(const Mask& which, const L& h, const L& factor) { longest_ = select(which, factor * h, longest_); }
-
-  template <class Stepper>
-  void move_on(const Mask& which, const L& /*h*/, Stepper& /*stepper*/) {
-    longest_ = select(which, L(unlimited), longest_);
-  }
-
- private:
-  static constexpr double unlimited = 1e300;
-
-  L longest_{unlimited};
-};
 
 /// Taylor series steps for several chains at once, one in each lane; a stepper of MemberQueue. The order follows from
 /// the tolerance, the step size from the last terms of the series. After each step, rods are restored to their lengths
@@ -82,20 +45,20 @@ class TaylorSteps : public ExplicitState<Rods> {
     State::seat(lane, time, start...);
   }
 
-  /// Computes the series about the current states, and returns the largest steps that they allow.
+  /// Computes the series about the current states; the largest steps that they allow.
   ///
   /// A light rod between heavy ones may soon turn much faster than anything does now, which overflows the coefficients:
   /// then a shorter unit of time is used.
-  L expand() {
+  L longest_step() {
     const L found = sqrt(State::pace_squared()), now = select(found > L(0.0), found, L(1.0));
     pace_ = now;
     for (int k = 0; k < most_units; ++k) {
       series_.expand(dynamics_, parts_, pace_);
-      const L step = longest_step(now);
+      const L step = size_by_terms(now);
       if (xsimd::all(step > L(0.0))) return step;
       pace_ = select(step > L(0.0), pace_, L(shorter_unit) * pace_);
     }
-    return longest_step(now);
+    return size_by_terms(now);
   }
 
   /// Tries a step of `h` from `time` with the current series. Returns which of the `wanted` members turn by less than
@@ -162,7 +125,7 @@ class TaylorSteps : public ExplicitState<Rods> {
 
   // From the decay of the last terms, relative to the size of the motion. Several terms are used, because motions that
   // start at rest, and symmetric ones, have only every second or fourth term.
-  PENDULA_IN_REGISTERS [[gnu::noinline]] L longest_step(const L& now) {
+  PENDULA_IN_REGISTERS [[gnu::noinline]] L size_by_terms(const L& now) {
     const L pace = now * now, units = pace_ / now;
     const L moves = (units * units) * term_squared(1, pace);  // where it is, or will be
     const L log_size = log(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)));
