@@ -301,7 +301,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       {"\"spatial\"", "3", "file.toml:2: chain.space: expected \"planar\" or \"spatial\", got 3"},
       {"\"gauss\"", "\"euler\"",
        "file.toml:24: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or \"fehlberg78\" or "
-       "\"bulirsch-stoer\" or \"taylor\", got \"euler\""},
+       "\"bulirsch-stoer\" or \"taylor\" or \"auto\", got \"euler\""},
       {"\"SI\"", "\"imperial\"", "file.toml:9: chain.units: expected \"SI\" or \"natural\", got \"imperial\""},
       // wrong lengths
       {"masses  = [1.0, 0.5, 2.0]", "masses = [1.0, 0.5]",
@@ -540,7 +540,7 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
        "--set run.method=eulr: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or "
-       "\"fehlberg78\" or \"bulirsch-stoer\" or \"taylor\", got \"eulr\""},
+       "\"fehlberg78\" or \"bulirsch-stoer\" or \"taylor\" or \"auto\", got \"eulr\""},
       {"run=3", "--set run=3: run: expected a table, got 3"},
       {"chain.masses.first=3",
        "--set chain.masses.first=3: chain.masses.first: expected a table before the last dot (an "

@@ -208,9 +208,14 @@ std::vector<std::string> degree_warnings(const Section& start) {
   return warnings;
 }
 
+/// Whether the method is "auto", the last of the names.
+bool chooses_method(const Section& run) {
+  return static_cast<std::size_t>(run.choice("method")) == names_of<Method>.size();
+}
+
 RunOptions read_run(const Section& run) {
   RunOptions options;
-  options.method = run.option<Method>("method");
+  if (!chooses_method(run)) options.method = run.option<Method>("method");
   const auto stages = run.find("stages"), step = run.find("step");
   if (stages) {
     options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer());
@@ -298,6 +303,7 @@ RowTimes read_row_times(const Section& section, double duration) {
 /// Reads [run] and [output].
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
+  plan.chooses_method = chooses_method(sections.run) && plan.run.step == 0;
   plan.accuracy = read_accuracy(sections.run, plan.run);
   plan.duration = read_duration(sections.run, plan.run);
   plan.estimate = sections.run.truth("estimate");

@@ -35,6 +35,7 @@ inline constexpr double max_steps = 9e15;
 /// What a scenario says about a run, checked.
 struct RunPlan {
   RunOptions run;
+  bool chooses_method = false;  ///< Taylor series may take the place of Gauss steps
   Accuracy accuracy;
   bool estimate = true;  ///< whether to estimate how far the rows can be trusted
   double duration = 0;

@@ -124,9 +124,17 @@ constexpr std::array<ScenarioKey, 6> start = {
 /// Smaller errors cannot be told from rounding.
 constexpr Bound errors{1e-16, false};
 
+/// Those of Method, then "auto".
+constexpr auto methods = [] {
+  std::array<std::string_view, names_of<Method>.size() + 1> names;
+  std::ranges::copy(names_of<Method>, names.begin());
+  names.back() = "auto";
+  return names;
+}();
+
 constexpr std::array<ScenarioKey, 10> run = {
-    one_of("method", names_of<Method>, name_of(options.method),
-           "Gauss-Legendre, Radau IIA where damping is stiff, or an explicit method"),
+    one_of("method", methods, name_of(options.method),
+           "Gauss-Legendre, Radau IIA where damping is stiff, or an explicit method; auto: Taylor series or Gauss"),
     an_integer("stages", 1, 8, InWords{"2 with a step, else as many as the tolerance wants"},
                "of gauss; of radau 2 or 3"),
     one_of("form", names_of<Form>, name_of(options.form), "of gauss: symplectic in momenta, or in velocities"),

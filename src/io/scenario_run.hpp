@@ -43,7 +43,8 @@ RunSetup setup_of(const ScenarioType& scenario) {
           .accuracy = scenario.accuracy,
           .estimate = scenario.estimate,
           .checkpoint = scenario.checkpoint,
-          .events = events_of(scenario.events, subject, scenario.start)};
+          .events = events_of(scenario.events, subject, scenario.start),
+          .chooses_method = scenario.chooses_method};
 }
 
 /// The names of the events that a run looks for.

@@ -87,6 +87,7 @@ std::string settings(const Summary& summary) {
               std::to_string(2 * summary.options.stages - (summary.options.method == Method::radau ? 1 : 0)) + "), " +
               std::string(name_of(summary.options.form)) + " form";
   }
+  if (!summary.method_reason.empty()) method += "; chosen: " + summary.method_reason;
   text += line("method", method);
   const Description& description = summary.description;
   std::string solver = description.solver.empty() ? "" : description.solver + ", " + description.iteration;
@@ -96,9 +97,12 @@ std::string settings(const Summary& summary) {
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
   if (summary.aimed) text += line("accuracy", shortest(summary.accuracy));
-  text += is_adaptive(summary.options) ? line("tolerance", summary.aimed ? rounded(summary.options.tolerance, 3)
-                                                                         : shortest(summary.options.tolerance))
-                                       : line("step", shortest(summary.options.step) + time);
+  std::string tolerance = summary.aimed ? rounded(summary.options.tolerance, 3) : shortest(summary.options.tolerance);
+  if (summary.motion_tolerance > 0 && !summary.aimed) {
+    tolerance = shortest(summary.motion_tolerance) + ", by one of a step of " + rounded(summary.options.tolerance, 1);
+  }
+  text +=
+      is_adaptive(summary.options) ? line("tolerance", tolerance) : line("step", shortest(summary.options.step) + time);
   text += line("duration", shortest(summary.duration) + time + ", " + rows_text(summary, time));
   if (model.natural) {
     text += line("units", "l_1 = " + rounded(model.natural->length) + " m, M_1 = " + rounded(model.natural->mass) +

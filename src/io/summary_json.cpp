@@ -156,7 +156,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
                                           unit_systems = {"SI", "natural"};
 constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
 
-constexpr std::array<JsonRow, 40> rows = {{
+constexpr std::array<JsonRow, 41> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
@@ -170,8 +170,10 @@ constexpr std::array<JsonRow, 40> rows = {{
     {{"parameters", parameters_schema, "of the model, by name", "", systems},
      [](const Summary& s) { return named(s.model.parameters); }},
     {{"feedback", texts_schema, "inputs that have some"}, [](const Summary& s) { return Json(s.model.feedback); }},
-    {{"method", "string", "as in the scenario", "", anything, names_of<Method>},
+    {{"method", "string", "that moved it", "", anything, names_of<Method>},
      [](const Summary& s) { return Json(name_of(s.options.method)); }},
+    {{"method_reason", "string null", "why, where the scenario leaves it to the program"},
+     [](const Summary& s) { return or_null(s.method_reason); }},
     {{"stages", "integer null", "of gauss and radau"},
      [](const Summary& s) { return where(has_stages(s), s.options.stages); }},
     {{"form", "string null", "of gauss and radau", "", anything, names_of<Form>},

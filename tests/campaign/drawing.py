@@ -82,13 +82,16 @@ def settings(dice: random.Random, fastest: float, series: bool, long: bool = Fal
     methods = ["dopri5", "fehlberg78", "bulirsch-stoer"] + (["taylor"] if series else [])
     step = power(dice, -2 if long else -3, -0.5) / fastest
     kind = dice.random()
+    chosen = dice.choice([{}, {"method": "auto"}])
     if kind < 0.28:
-        return {}
+        return chosen
     if kind < 0.40:
-        return {"accuracy": power(dice, -11, -4)}
+        return chosen | {"accuracy": power(dice, -11, -4)}
     if kind < 0.55:
-        return {"tolerance": power(dice, -12, -4)} | dice.choice(
-            [{}, {}, {"stages": dice.randint(1 if not long else 3, 8)}]
+        return (
+            chosen
+            | {"tolerance": power(dice, -12, -4)}
+            | dice.choice([{}, {}, {"stages": dice.randint(1 if not long else 3, 8)}])
         )
     if kind < 0.72:
         form = {"form": "velocity"} if dice.random() < 0.1 else {}

@@ -79,6 +79,8 @@ class Verdict:
 def asked_of(run: dict, ensemble: bool = False) -> tuple[str, float]:
     """accuracy, tolerance or step, and the number; of a step what nobody asked for."""
     method = run.get("method", "gauss")
+    if method == "auto":
+        method = "gauss"  # whose tolerance Taylor series keep that take its place
     if method == "rk4" or ("step" in run and method not in ADAPTIVE):
         return "step", NOTHING_ASKED
     if "accuracy" in run:
@@ -98,7 +100,8 @@ def limits(run: dict, growth: np.ndarray, ensemble: bool = False) -> np.ndarray:
     # A run tells what error it expects. Members do not: of those by explicit methods docs/ensembles.md promises this.
     if ensemble and run.get("method") in ADAPTIVE:
         return np.full(len(growth), NOTHING_ASKED)
-    room = ROOM_FOR_TOLERANCE.get(run.get("method", "gauss"), ROOM_FOR_TOLERANCE["radau"])
+    method = run.get("method", "auto")
+    room = ROOM_FOR_TOLERANCE.get("gauss" if method == "auto" else method, ROOM_FOR_TOLERANCE["radau"])
     return np.minimum(room * asked * growth, NOTHING_ASKED)
 
 

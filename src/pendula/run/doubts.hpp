@@ -152,6 +152,7 @@ inline std::optional<SecondLook> finer(const RunOptions& run) {
 /// a motion without chaos.
 inline double trusted_error(const RunSetup& setup) {
   if (setup.accuracy.error > 0) return close_to_wanted * setup.accuracy.error;
+  if (setup.motion_tolerance > 0) return std::min(visible, 1000 * setup.motion_tolerance);
   const bool is_of_motion = is_adaptive(setup.options) && !is_explicit(setup.options.method);
   return is_of_motion ? std::min(visible, 1000 * setup.options.tolerance) : visible;
 }

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <pendula/run/doubts.hpp>
+#include <pendula/run/method_choice.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/schedule.hpp>
 #include <stdexcept>
@@ -22,11 +23,31 @@ double row_spacing(const RunSetup& setup) {
 
 Run::Run(RunSetup setup)
     : setup_(std::move(setup)),
+      asked_(setup_.options),
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, row_spacing(setup_)),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
             {}},
-      description_(integrator_->describe()) {}
+      description_(integrator_->describe()) {
+  if (!setup_.chooses_method) return;
+  MethodChoice choice = choose_method(setup_);
+  method_reason_ = std::move(choice.reason);
+  if (choice.series_tolerance > 0) go_by_series(choice.series_tolerance);
+}
+
+// A tolerance of 0: by what was asked for.
+void Run::go_by_series(double tolerance) {
+  setup_.options = asked_;
+  if (tolerance > 0) {
+    setup_.options.method = Method::taylor;
+    setup_.options.tolerance = tolerance;
+  }
+  setup_.motion_tolerance = tolerance > 0 ? asked_.tolerance : 0;
+  kept_.series = tolerance;
+  integrator_ = setup_.subject->make_integrator(setup_.options);
+  description_ = integrator_->describe();
+  kept_.watch.set_degree(detail::glance_degree(setup_.options));
+}
 
 RunReport Run::go(const std::function<bool()>& stop) {
   if (!is_aimed() || aim(stop)) return go(nullptr, stop);
@@ -37,7 +58,13 @@ RunReport Run::go(const std::function<bool()>& stop) {
 }
 
 RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
+  const double series = kept_.series;
   become(kept_, checkpoint.record);
+  if (kept_.series != series) {
+    if (!setup_.chooses_method)
+      throw std::invalid_argument("checkpoint: expected one of a run whose method was asked for");
+    go_by_series(kept_.series);  // the run that goes on had another end
+  }
   if (is_aimed() != (kept_.aim.tolerance > 0)) {
     throw std::invalid_argument(
         std::string("checkpoint: expected one of a run ") +
@@ -61,6 +88,7 @@ Track Run::try_out(const RunOptions& options, double share, Track track,
   trial.every = std::numeric_limits<std::int64_t>::max();
   trial.rows = {};
   trial.doubted = false;
+  trial.chooses_method = false;
   std::erase_if(trial.events, [](const Event& event) { return !event.stop; });
   Run run(std::move(trial));
   run.track_ = std::move(track);
@@ -130,6 +158,8 @@ void Run::conclude(RunReport& report) {
   report.last = kept_.record.last();
   report.rows = rows_;
   report.options = setup_.options;
+  report.method_reason = method_reason_;
+  report.motion_tolerance = setup_.motion_tolerance;
   if (is_aimed()) report.aimed = kept_.aim;
   if (integrator_) {
     report.statistics = integrator_->statistics();

@@ -65,6 +65,7 @@ class Run {
   Track try_out(const RunOptions& options, double share, Track track,
                 const std::function<bool(const Track&)>& stop) const;
   Track own_track() const { return Track(is_adaptive(setup_.options) ? Track::apart / 2 : Track::apart); }
+  void go_by_series(double tolerance);
   void choose_stages(RunOptions& options) const;
   bool aim(const std::function<bool()>& stop);
   void follow_aim();
@@ -88,14 +89,16 @@ class Run {
     RunRecord record;  // of the rows; with rows at times also of the first and the last state
     EventWatch watch;
     AccuracyAim aim;
+    double series = 0;  // tolerance of the series that were chosen; 0: none were
 
     template <class Numbers>
     void member(Numbers& numbers) {
-      numbers(record, watch, aim);
+      numbers(record, watch, aim, series);
     }
   };
 
   RunSetup setup_;
+  RunOptions asked_;
   std::unique_ptr<Integrator> integrator_;     // one at a time: for a million links it takes a gigabyte
   std::vector<Observer*> observers_, takers_;  // all of them; those that take the rows of the run
   std::vector<Viewer> viewers_;                // observers with row times of their own
@@ -103,6 +106,7 @@ class Run {
   std::optional<Track> track_;  // of this run, if another is compared with it
   Kept kept_;
   Description description_;
+  std::string method_reason_;
   std::int64_t rows_ = 0;           // so far
   double step_ = 0, step_end_ = 0;  // size and end of the last step
   std::optional<double> missed_;    // start of the first step with too large a defect

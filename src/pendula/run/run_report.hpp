@@ -33,6 +33,8 @@ struct RunSetup {
   double checkpoint = std::numeric_limits<double>::infinity();  ///< wall time between checkpoints  [s]
   /// Events to find.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
+  bool chooses_method = false;     ///< whether Taylor series take the place of Gauss steps that take longer
+  double motion_tolerance = 0;     ///< that series were chosen for: that of `options` is one of a step then
 };
 
 /// How far a run can be trusted, found by comparison with another run.
@@ -61,6 +63,8 @@ struct RunReport {
   Motion last;                 ///< the last state that is a row; the start if there is none
   std::int64_t rows = 0;
   RunOptions options;                ///< as used
+  std::string method_reason;         ///< why this method; empty if it was asked for
+  double motion_tolerance = 0;       ///< as RunSetup's
   std::optional<AccuracyAim> aimed;  ///< for RunSetup::accuracy
   Trust trust;                       ///< if the run was doubted
   Description description;

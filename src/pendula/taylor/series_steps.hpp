@@ -331,7 +331,7 @@ class SeriesSteps {
   }
 
   /// Whether accelerations at a fraction of the step are those of the series, but for what terms beyond its order may
-  /// add.
+  /// add, and for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
   Mask solves(const L& time, const L& h, double share) {
     const L inverse = L(1.0) / unit_, tau = L(share) * h * inverse;
     for (std::size_t i = 0; i < n_; ++i) {
@@ -340,11 +340,13 @@ class SeriesSteps {
              seen_[n_ + i]);
     }
     systems_.here(fma(L(share), h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
+    L farthest(0.0);
+    for (std::size_t i = 0; i < n_; ++i) farthest = max(farthest, abs(coefficient(0, i)));
     Mask found(L(0.0) == L(0.0));
     for (std::size_t i = 0; i < n_; ++i) {
       const L by_series = info_.has_momenta ? bend(i, tau) * (inverse * inverse) : slope(n_ + i, tau) * inverse;
-      const L defect = h * unit_ * abs(from_row<L>(rates_[i]) - by_series) * from_row<L>(scales_[n_ + i]);
-      found = found & (defect <= L(largest_defect_));
+      const L defect = max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(rounded) * farthest, L(0.0));
+      found = found & (defect * from_row<L>(scales_[n_ + i]) <= L(largest_defect_));
     }
     return found;
   }

@@ -1,0 +1,84 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/integrator.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/run/linearize.hpp>
+#include <pendula/run/method_choice.hpp>
+#include <pendula/run/system_subject.hpp>
+#include <stdexcept>
+
+namespace pendula {
+namespace {
+
+constexpr int most_coordinates = 10;    // a generated kernel writes its series out up to there
+constexpr int always_few = 2, few = 3;  // links: of three, Gauss steps are the faster ones below fine_tolerance
+constexpr double fine_tolerance = 1e-10;
+constexpr double finest = 1e-16;   // tolerance of a step: of a smaller one rounding leaves nothing
+constexpr double short_run = 100;  // steps
+
+/// Why there are no series of a subject, or Gauss steps take less time; empty: series do.
+std::string against_series(const Subject& subject, double tolerance) {
+  if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) {
+    if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
+    if (system->info().coordinates.size() > most_coordinates) return "many coordinates";
+    if (system->info().depends_on_time) return "time in the equations";
+    return system->may_be_narrow() ? "forces that may be narrow" : "";
+  }
+  const auto* const chain = dynamic_cast<const ChainSubject<Planar>*>(&subject);
+  if (chain == nullptr) return "a chain in space, or feedback that is sampled";
+  const int links = chain->chain().links();
+  if (links > (tolerance < fine_tolerance ? always_few : few)) return "many links";
+  return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";
+}
+
+/// Whether damping at the start is much faster than anything that swings or turns there: explicit steps follow it.
+bool is_stiff(const Subject& subject, const Motion& start) {
+  constexpr double much = 5;
+  const Eigen::Index n = 2 * start.q.size();
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> a(n, n);
+  linearize(subject, start, a.data(), nullptr);
+  if (!a.allFinite()) return true;
+  double decay = 0, pace = start.v.cwiseAbs().maxCoeff();
+  for (const std::complex<double>& rate : a.eigenvalues()) {
+    decay = std::max(decay, -rate.real());
+    pace = std::max({pace, rate.real(), std::abs(rate.imag())});
+  }
+  return decay > much * pace;
+}
+
+/// The size of the first step; 0 if there is none.
+double first_step(const RunSetup& setup, const RunOptions& options) {
+  const auto integrator = setup.subject->make_integrator(options);
+  if (!integrator->start(setup.start) || !integrator->step(setup.duration)) return 0;
+  return integrator->time() - setup.start.time;
+}
+
+}  // namespace
+
+MethodChoice choose_method(const RunSetup& setup) {
+  const double asked = setup.accuracy.error > 0 ? setup.accuracy.error : setup.options.tolerance;
+  const Subject& subject = *setup.subject;
+  if (std::string reason = against_series(subject, asked); !reason.empty()) return {0, std::move(reason)};
+  if (!(setup.duration > 0)) return {0, "no motion"};
+  RunOptions options = setup.options;
+  options.method = Method::taylor;
+  options.tolerance = std::max(finest, 0.01 * asked);
+  try {
+    if (subject.damped() && is_stiff(subject, setup.start)) return {0, "strong damping"};
+    const double step = first_step(setup, options);
+    if (step == 0) return {0, "a start from which series take no step"};
+    const double steps = setup.duration / step;
+    if (steps * finest > asked) return {0, "a long run, in which series lose energy"};
+    // Powers of ten, so that the tolerance looks like one.
+    const double longer = std::pow(10, std::ceil(std::log10(std::max(1.0, steps / short_run))));
+    options.tolerance = std::max(finest, 0.01 * asked / longer);
+  } catch (const std::invalid_argument& error) {
+    return {0, error.what()};
+  }
+  return {options.tolerance, "few coordinates, and series take less time"};
+}
+
+}  // namespace pendula
