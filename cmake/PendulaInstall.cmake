@@ -21,7 +21,7 @@ endif()
 
 install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codegen_dir}" COMPONENT program
         FILES_MATCHING PATTERN "*.py" PATTERN "*.j2" PATTERN "__pycache__" EXCLUDE)
-install(FILES "${PENDULA_CODEGEN_DIR}/requirements.txt" DESTINATION "${codegen_dir}")
+install(FILES "${PENDULA_CODEGEN_DIR}/requirements.txt" DESTINATION "${codegen_dir}" COMPONENT program)
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/pendula")
 
 configure_package_config_file(

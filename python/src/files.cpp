@@ -122,8 +122,8 @@ void save(const Result& result, const std::string& file) {
     return;
   }
   if (!result.saved.has_rows) {
-    throw io::InputError(file + ": expected a CSV file, got a run file, which begins with rows that " + result.file +
-                         " does not have");
+    throw io::InputError(
+        file + ": expected a CSV file, got a run file, whose first rows the file that was opened does not have");
   }
   io::RunFile written(file, result.saved.origin, result.contents);
   tell_again(result, written);

@@ -157,6 +157,28 @@ def test_endings_decide(tmp_path):
         run.save(tmp_path / "nowhere" / "run.h5")
 
 
+def test_a_file_without_rows_goes_on(tmp_path):
+    """Where they were taken out of it; what it goes on to is rows only."""
+    run = pendula.Chain(links=2).simulate(1.0, theta=1.0, step=0.01)
+    run.save(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "a") as file:
+        for name in set(file) - {"run"}:
+            del file[name]
+    opened = pendula.open(tmp_path / "run.h5")
+    assert opened.t.size == 0
+    gone_on, whole = opened.go_on(2.0), run.go_on(2.0)
+    assert gone_on.t[0] == 1.0
+    assert np.array_equal(gone_on.y, whole.y[:, whole.t >= 1.0])
+    gone_on.save(tmp_path / "rows.csv")
+    assert len((tmp_path / "rows.csv").read_text().splitlines()) == 1 + gone_on.t.size
+    for rowless in (opened, gone_on):
+        with pytest.raises(
+            pendula.InputError, match=r"^.*more.h5: expected a CSV file, got a run file, whose"
+        ):
+            rowless.save(tmp_path / "more.h5")
+    assert not (tmp_path / "more.h5").exists()
+
+
 def test_solutions_can_be_pickled():
     run = pendula.Chain(links=2).simulate(1.0, theta=1.0, step=0.01, events={"low": "theta_1"})
     again = pickle.loads(pickle.dumps(run))
