@@ -13,7 +13,8 @@ ScenarioDocument::ScenarioDocument(std::string_view text, std::string_view name,
 }
 
 AnyScenario ScenarioDocument::with(std::span<const std::string> overrides, const FindSystem& find) const {
-  toml::table changed = root_;
+  if (overrides.empty()) return read_document(root_, name_, find);
+  toml::table changed = root_;  // a copy knows no lines
   for (const std::string& override : overrides) apply_override(changed, override);
   return read_document(changed, name_, find);
 }

@@ -21,10 +21,10 @@ class ScenarioDocument {
 
   const EnsemblePlan& plan() const { return plan_; }
 
-  /// The scenario with further overrides.
+  /// The scenario with further overrides. An InputError names these; lines of the file only where there are none.
   AnyScenario with(std::span<const std::string> overrides, const FindSystem& find) const;
   /// The scenario with numbers[k] as the value of keys[k]. Neither it nor the InputError that it throws knows places in
-  /// the file; the one above does.
+  /// the file.
   AnyScenario with(std::span<const std::string> keys, std::span<const double> numbers, const FindSystem& find) const;
 
  private:

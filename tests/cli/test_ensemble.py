@@ -445,12 +445,14 @@ def test_exponents_are_kept(pendula, tmp_path):
         (("[run]", "[ensemble]\ncount = 5\n[run]"), "ensemble.count: expected a count of each axis"),
         (("[run]", "[ensemble]\nkeep = [\"all\"]\n[run]"), 'expected some of final, points'),
         (("start.theta[1]", "start.thetas[1]"), "scenario.toml: ensemble: start.thetas[1]="),
+        (("[run]", "[run]\nmethod = \"eulr\""), 'run.method: expected "gauss" or'),
     ],
 )  # fmt: skip
 def test_wrong_tables_are_told(tmp_path, change, message):
     done = run(tmp_path, scenario=MAP.replace(*change))
     assert done.status == 2
     assert message in done.err
+    assert "scenario.toml:" in done.err
     assert not (tmp_path / "out.h5").exists()
     assert not (tmp_path / "out.h5.parts").exists()
 

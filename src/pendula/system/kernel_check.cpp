@@ -7,6 +7,7 @@
 #include <numeric>
 #include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_widths.hpp>
+#include <pendula/system/series_check.hpp>
 #include <random>
 #include <tuple>
 #include <utility>
@@ -287,6 +288,10 @@ KernelCheck check_chain_kernel(const SystemTable& table, unsigned seed) {
   }
   check.lines[items.size()] = {width_line, width_error(table, points), 1e-13};  // 5.5e-16
   check.count = static_cast<int>(items.size()) + 1;
+  if (table.of_1.series_next != nullptr) {
+    check.lines[items.size() + 1] = {series_line, series_error(table, points), 1e-6};  // 2.5e-15
+    ++check.count;
+  }
   return check;
 }
 
