@@ -260,7 +260,7 @@ class SeriesSteps {
   static constexpr std::size_t W = width_of<L>;
   static constexpr double most_growth = 1e3;  // of the unit from step to step: an equilibrium allows any
   static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14, shorter_unit = 1e-6;
-  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 8, most_looks = 4;
+  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 30, most_looks = 4;
 
   /// Whether nothing but sines, powers and logarithms stands in the equations, and no time.
   static bool is_smooth(const SystemInfo& info) {
@@ -341,10 +341,13 @@ class SeriesSteps {
     }
     systems_.here(fma(L(share), h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
     Mask found(L(0.0) == L(0.0));
+    L rounding(0.0);
+    for (std::size_t i = 0; i < n_; ++i) rounding = max(rounding, L(rounded) * abs(coefficient(0, i)));
     for (std::size_t i = 0; i < n_; ++i) {
       const L by_series = info_.has_momenta ? bend(i, tau) * (inverse * inverse) : slope(n_ + i, tau) * inverse;
-      const L defect = h * unit_ * abs(from_row<L>(rates_[i]) - by_series) * from_row<L>(scales_[n_ + i]);
-      found = found & (defect <= L(largest_defect_));
+      // Beside an equilibrium accelerations are as large as what rounding makes of those that cancel.
+      const L defect = h * unit_ * abs(from_row<L>(rates_[i]) - by_series), scale = from_row<L>(scales_[n_ + i]);
+      found = found & (defect * scale <= fma(rounding, scale, L(largest_defect_)));
     }
     return found;
   }
