@@ -138,7 +138,8 @@ def ensemble(
     first = {}
     if isinstance(system, System):
         first = system.at_zero() or first_start(starts, keys, drawn)
-    made = Beginning.of(system, first, tolerance=None, step=None, options={}).prepare()
+    # Names alone are asked for, which feedback does not change; a program cannot step what is sampled.
+    made = Beginning.of(system, first, tolerance=None, step=None, options={}, feeds_back=False).prepare()
     design = Design(system, [made.columns[k] for k in made.state])
     design.add_start(starts)
     design.add_axes(keys)

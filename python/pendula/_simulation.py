@@ -42,13 +42,19 @@ class Beginning(NamedTuple):
         step: float | None,
         options: Mapping[str, object],
         remember: bool = True,
+        feeds_back: bool = True,
     ) -> Beginning:
         if not isinstance(system, System):
             raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
         if step is None and tolerance is None:
             tolerance = 1e-9
         run = {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
-        text = _toml.document({**system.tables(), "start": start, "run": run})
+        tables = {
+            key: table
+            for key, table in system.tables().items()
+            if feeds_back or not key.endswith(".feedback")
+        }
+        text = _toml.document({**tables, "start": start, "run": run})
         file = system.model_file()
         return cls(text, remember, None if file is None else str(file), _hash(file))
 

@@ -104,3 +104,13 @@ def test_chains_have_it() -> None:
 def test_wrong_feedback_is_refused(feedback: Any, message: str) -> None:
     with pytest.raises(pendula.InputError, match=message):
         pendula.Model("cart_chain", links=1, feedback=feedback).simulate(1.0)
+
+
+def test_members_of_an_ensemble_have_sampled_feedback() -> None:
+    fed = cart(sample=0.1)
+    angles = np.array([3.0, 3.1])
+    ends = pendula.ensemble(fed, 1.0, {"x": 0.1, "theta_1": angles}, tolerance=1e-10)
+    alone = [
+        fed.simulate(1.0, start={"x": 0.1, "theta_1": angle}, tolerance=1e-10).y[0, -1] for angle in angles
+    ]
+    assert np.abs(ends["x"].to_numpy() - alone).max() < 1e-9  # measured 0

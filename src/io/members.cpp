@@ -88,6 +88,8 @@ std::optional<MemberScenarios::Shared> MemberScenarios::find_shared() {
   const std::vector<std::string> keys = plan().keys();
   const auto is_of_start = [](const std::string& key) { return key.starts_with("start."); };
   if (!std::ranges::all_of(keys, is_of_start)) return {};
+  // A mass matrix may be 1 at both places that are tried, and another elsewhere.
+  if (document_.starts_with_momenta()) return {};
   std::vector<double> one(keys.size()), other(keys.size());
   for (std::size_t k = 0; k < keys.size(); ++k) {
     one[k] = 0.375 + 0.0625 * static_cast<double>(k);

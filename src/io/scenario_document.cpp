@@ -1,5 +1,6 @@
 #include "io/scenario_document.hpp"
 
+#include <algorithm>
 #include <cstddef>
 
 #include "io/section.hpp"
@@ -10,6 +11,18 @@ namespace pendula::io {
 ScenarioDocument::ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides)
     : name_(name), root_(parse_toml(text, name, overrides)), plan_(read_ensemble(Section(root_), name_)) {
   root_.erase("ensemble");
+}
+
+bool ScenarioDocument::starts_with_momenta() const {
+  constexpr std::string_view prefix = "p_", table = "start.";
+  const auto is_momentum = [&](std::string_view key) { return key.starts_with(prefix); };
+  const auto is_key_of_momentum = [&](const std::string& key) {
+    return key.starts_with(table) && is_momentum(std::string_view(key).substr(table.size()));
+  };
+  if (std::ranges::any_of(plan_.keys(), is_key_of_momentum)) return true;
+  const toml::table* const start = root_["start"].as_table();
+  return start != nullptr &&
+         std::ranges::any_of(*start, [&](const auto& entry) { return is_momentum(entry.first.str()); });
 }
 
 AnyScenario ScenarioDocument::with(std::span<const std::string> overrides, const FindSystem& find) const {

@@ -21,6 +21,9 @@ class ScenarioDocument {
 
   const EnsemblePlan& plan() const { return plan_; }
 
+  /// Whether it starts with momenta, of which rates are made by the mass matrix at the coordinates.
+  bool starts_with_momenta() const;
+
   /// The scenario with further overrides. An InputError names these; lines of the file only where there are none.
   AnyScenario with(std::span<const std::string> overrides, const FindSystem& find) const;
   /// The scenario with numbers[k] as the value of keys[k]. Neither it nor the InputError that it throws knows places in

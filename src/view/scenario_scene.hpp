@@ -8,17 +8,33 @@
 #include "io/natural_units.hpp"
 #include "io/run_source.hpp"
 #include "io/scenario.hpp"
+#include "io/scenario_run.hpp"
 #include "view/scene.hpp"
 
 namespace pendula::view {
 
-/// The description of a scenario's subject for a page.
+namespace detail {
+
+/// What is drawn: feedback has no part in it.
 template <class Space>
-Scene subject_scene(const io::Scenario<Space>& scenario) {
+Scene drawn_scene(const io::Scenario<Space>& scenario) {
   return scene_of(ChainSubject<Space>(scenario.chain));
 }
-inline Scene subject_scene(const io::SystemScenario& scenario) {
+inline Scene drawn_scene(const io::SystemScenario& scenario) {
   return scene_of(*scenario.system);
+}
+
+}  // namespace detail
+
+/// The description of a scenario's subject for a page. Its rows are those of the subject with its feedback, whose
+/// torques a chain has as further columns.
+template <class Scenario>
+Scene subject_scene(const Scenario& scenario) {
+  Scene scene = detail::drawn_scene(scenario);
+  const auto subject = io::subject_of(scenario);
+  scene.columns = subject->columns();
+  scene.loaded = subject->loaded();
+  return scene;
 }
 
 /// What a page is told of a run besides its rows.

@@ -126,3 +126,24 @@ def test_who_takes_long_there_goes_as_the_scenario_says(moved):
     for key in alone:
         assert (alone[key][same] == tried[key][same]).all(), key
     assert (tried["energy_error"][~same] < 1e-7).all()
+
+
+HEAVY = """
+def define(model, links):
+    x = model.coordinate("x", "m")
+    from sympy import exp
+    model.lagrangian = (1 + exp(-100 * (x - 1.5) ** 2)) * model.rate(x) ** 2 / 2
+"""
+
+
+@pytest.mark.parametrize("method", ["taylor", "gauss"])
+def test_momenta_become_rates_by_the_mass_at_each_start(moved, tmp_path, method):
+    """A mass that is 1 but about x = 1.5, where it is 2."""
+    (tmp_path / "heavy.py").write_text(HEAVY)
+    ends = moved(
+        f'[system]\nmodel = "heavy.py"\n[run]\nmethod = "{method}"\nduration = 1e-9\ntolerance = 1e-9\n'
+        '[[ensemble.list]]\nkey = "start.x"\nvalues = [0.0, 1.5]\n'
+        '[[ensemble.list]]\nkey = "start.p_x"\nvalues = [1.0, 1.0]\n'
+    )
+    # measured 0; 0.5 by the mass of another start
+    assert np.abs(ends["x_dot"] - [1.0, 0.5]).max() < 1e-7

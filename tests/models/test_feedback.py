@@ -246,6 +246,29 @@ def test_torques_in_space(moved, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("space", "torque", "rate", "phi"),
+    [("planar", "torque_2", "theta_dot_2", ""), ("spatial", "torque_z_2", "phi_dot_2", "phi_dot = 1.0")],
+)
+def test_a_page_of_a_chain_has_its_torques(pendula, tmp_path, space, torque, rate, phi):
+    file, page = tmp_path / "chain.toml", tmp_path / "chain.html"
+    file.write_text(CHAIN.format(space=space, input=torque, rate=rate, phi=phi))
+    ended = pendula("simulate", file, "--quiet", "--view", page, "--copies", "1")
+    assert ended.returncode == 0, ended.stderr
+    assert f'"{torque}"' in page.read_text()
+
+
+def test_rows_at_samples_have_what_is_held_from_there_on(moved, tmp_path):
+    """The third sample of 0.1 s is at 0.30000000000000004 s, the sixth at 0.6000000000000001 s."""
+    file = tmp_path / "chain.toml"
+    text = CHAIN.format(space="planar", input="torque_1", rate="theta_dot_1", phi="")
+    text = text.replace("sample = 0.001", "sample = 0.1").replace("duration = 2.0", "duration = 0.6")
+    file.write_text(text.replace("interval = 0.1", "times = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]"))
+    rows = moved(file)
+    # measured 0; 0.46 where it is held from before
+    assert np.abs(rows["torque_1"] + 0.8 * rows["theta_dot_1"]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
     ("table", "message"),
     [
         (feedback(input="pull"), 'feedback[1].input: expected an input: push; got "pull"'),

@@ -161,3 +161,34 @@ def test_events_are_found_within_steps(pendula, tmp_path):
     assert zero["count"] == 32
     assert abs(zero["first"] - np.pi / 2) < 1e-14  # measured 7e-16
     assert abs(zero["last"] - 31.5 * np.pi) < 1e-12  # measured 2e-14
+
+
+BESIDE = """
+[chain]
+space = "planar"
+masses = [1.0, 1.0]
+lengths = 1.0
+damping = 0.1
+[start]
+theta = {theta}
+[run]
+method = "taylor"
+tolerance = 1e-9
+duration = 10.0
+estimate = false
+"""
+
+
+@pytest.mark.parametrize(
+    ("theta", "most"),
+    [
+        ("[3.141592653589793, 0.0]", 100),
+        ("[1e-150, 0.0]", 10),
+    ],  # measured 29 and 1; 19357, and none at all, before
+)
+def test_rounding_beside_an_equilibrium_takes_no_steps(pendula, tmp_path, theta, most):
+    file = tmp_path / "beside.toml"
+    file.write_text(BESIDE.format(theta=theta))
+    ended = pendula("simulate", file, "--json")
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout)["steps"] <= most

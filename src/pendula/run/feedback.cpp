@@ -71,7 +71,8 @@ class HeldInputs : public PlainIntegrator {
   void read_state(double* q, double* v) const override { write(now_->state(), q, v); }
 
   std::span<const double> held(double time) const override {
-    return before_ && time < now_->time() ? before_held_ : held_;
+    // A row at 0.3 s is at the third sample of 0.1 s, which rounding puts behind it.
+    return before_ && time < now_->time() * (1 - rounding) ? before_held_ : held_;
   }
 
   void remember_steps(bool wanted) override {

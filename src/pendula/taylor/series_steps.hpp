@@ -260,7 +260,7 @@ class SeriesSteps {
   static constexpr std::size_t W = width_of<L>;
   static constexpr double most_growth = 1e3;  // of the unit from step to step: an equilibrium allows any
   static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14, shorter_unit = 1e-6;
-  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 8, most_looks = 4;
+  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 30, most_looks = 4;
 
   /// Whether nothing but sines, powers and logarithms stands in the equations, and no time.
   static bool is_smooth(const SystemInfo& info) {
