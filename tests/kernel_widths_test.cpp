@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/kernels/spatial_1.hpp>
 #include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_table.hpp>
 #include <pendula/system/kernel_widths.hpp>
+#include <pendula/system/series_check.hpp>
+#include <pendula/system/series_info.hpp>
+#include <string_view>
 #include <utility>
 
 namespace pendula::test {
@@ -15,11 +19,12 @@ namespace {
 
 constexpr SystemTable planar = system_table<kernels::Planar2>, spatial = system_table<kernels::Spatial1>;
 
-KernelCheck::Line widths_of(const SystemTable& table) {
+KernelCheck::Line line_of(std::string_view what, const SystemTable& table) {
   const KernelCheck check = check_chain_kernel(table, 1);
-  const KernelCheck::Line line = check.lines[static_cast<std::size_t>(check.count - 1)];
-  EXPECT_EQ(line.what, width_line);
-  return line;
+  return *std::ranges::find(check.lines, what, &KernelCheck::Line::what);
+}
+KernelCheck::Line widths_of(const SystemTable& table) {
+  return line_of(width_line, table);
 }
 
 bool is_ok(const KernelCheck::Line& line) {
@@ -101,6 +106,19 @@ TEST(KernelWidths, AnIterationThatIsWrongIsFound) {
     return IterationChange{change.change * (1 + off), change.size};
   };
   EXPECT_FALSE(is_ok(widths_of(broken)));
+}
+
+/// The series, but for its coefficient of order 2.
+void wrong_series(const Conditions& at, const SeriesRows& rows, int first, int last) {
+  planar.of_1.series_next(at, rows, first, last);
+  rows.state[2 * series_state_row(2, 1)] *= 1.001;
+}
+
+TEST(KernelSeriesCheck, FindsACoefficientThatIsWrong) {
+  EXPECT_TRUE(is_ok(line_of(series_line, planar)));
+  SystemTable broken = planar;
+  broken.of_1.series_next = wrong_series;
+  EXPECT_FALSE(is_ok(line_of(series_line, broken)));
 }
 
 }  // namespace

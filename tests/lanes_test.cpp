@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/sincos.hpp>
 #include <random>
 
@@ -76,6 +78,16 @@ TEST(SinCos, OfFloatsIsRightToAnUlpAndAQuarter) {
   for (const auto sincos_of : {sincos_all<float>, sincos_by_packs<4, float>, sincos_by_packs<8, float>}) {
     for (double range : {0.8, 10.0, 1e5}) EXPECT_LT(largest_error<float>(range, sincos_of), 1.25) << range;
   }  // measured 1.14
+}
+
+TEST(LogarithmNear, IsOffByLessThanAThousandth) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(-1000, 1000);
+  for (int k = 0; k < 1000; ++k) {
+    const double expected = uniform(random), x = std::exp2(expected);
+    EXPECT_NEAR(log2_near(x), expected, 7e-4);  // measured 6.4e-4
+    EXPECT_NEAR(log2_near(LanePack<MemberRegister>(x))[0], expected, 7e-4);
+  }
 }
 
 }  // namespace

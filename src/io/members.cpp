@@ -18,6 +18,12 @@ namespace pendula::io {
 
 namespace {
 
+/// A message that knows no line of its scenario, with the name of its file.
+std::string located(const std::string& told, const std::string& file) {
+  constexpr std::string_view nowhere = "scenario:0";
+  return told.starts_with(nowhere) ? file + told.substr(nowhere.size()) : told;
+}
+
 double& number_at(Motion& start, Eigen::Index place) {
   return place < start.q.size() ? start.q[place] : start.v[place - start.q.size()];
 }
@@ -61,12 +67,12 @@ AnyScenario MemberScenarios::of_member(std::int64_t member) {
     return document_.with(plan().overrides(member), find());
   } catch (const InputError& error) {
     // The members' numbers are overrides, too; messages must not call them --set.
-    const std::string_view told = error.what();
+    const std::string told = located(error.what(), text_.name);
     const auto is_of = [&](const std::string& key) {
-      return told.substr(override_prefix.size()).starts_with(key + '=');
+      return std::string_view(told).substr(override_prefix.size()).starts_with(key + '=');
     };
-    if (!told.starts_with(override_prefix) || std::ranges::none_of(plan().keys(), is_of)) throw;
-    throw InputError(text_.name + ": ensemble: " + std::string(told.substr(override_prefix.size())));
+    if (!told.starts_with(override_prefix) || std::ranges::none_of(plan().keys(), is_of)) throw InputError(told);
+    throw InputError(text_.name + ": ensemble: " + told.substr(override_prefix.size()));
   }
 }
 
@@ -185,7 +191,7 @@ MemberRuns::Member MemberRuns::member(std::int64_t number, SharedExpressions& sh
     return member_of(MemberScenario(scenarios_.of_member(number)), number, shared);
   } catch (const InputError& error) {
     Member unreadable;
-    unreadable.problem = error.what();
+    unreadable.problem = located(error.what(), scenarios_.text().name);
     return unreadable;
   }
 }

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/ordered_sum.hpp>
 #include <pendula/numeric/sincos.hpp>
 #include <pendula/numeric/written_out.hpp>
@@ -78,6 +80,11 @@ class LanePack {
   friend LanePack floor(const LanePack& a) { return LanePack(Register(xsimd::floor(a.held_))); }
   friend LanePack exp(const LanePack& a) { return LanePack(Register(xsimd::exp(a.held_))); }
   friend LanePack log(const LanePack& a) { return LanePack(Register(xsimd::log(a.held_))); }
+  friend LanePack log2_near(const LanePack& a) {
+    xsimd::batch<std::int64_t, typename Register::arch_type> exponent;
+    const LanePack half(xsimd::frexp(a.held_, exponent));  // 1/2 to 1
+    return LanePack(Register(xsimd::to_float(exponent))) - LanePack(1.0) + detail::log2_of_mantissa(half + half);
+  }
   friend LanePack max(const LanePack& a, const LanePack& b) { return LanePack(Register(xsimd::max(a.held_, b.held_))); }
   friend LanePack min(const LanePack& a, const LanePack& b) { return LanePack(Register(xsimd::min(a.held_, b.held_))); }
   friend LanePack select(const Mask& which, const LanePack& yes, const LanePack& no) {

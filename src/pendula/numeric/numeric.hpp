@@ -67,6 +67,23 @@ Real fma(const Real& a, const Real& b, const Real& c) {
   }
 }
 
+namespace detail {
+
+/// log₂ of the mantissa m of a number, 1 ≤ m < 2, to 7e-4.
+template <class Num>
+Num log2_of_mantissa(const Num& m) {
+  return ((Num(0.158248749) * m + Num(-1.051875031)) * m + Num(3.047884161)) * m + Num(-2.153620718);
+}
+
+}  // namespace detail
+
+/// log₂ x of a positive normal number, to 7e-4: for the sizes of steps.
+inline double log2_near(double x) {
+  int exponent = 0;
+  const double half = std::frexp(x, &exponent);  // 1/2 to 1
+  return exponent - 1 + detail::log2_of_mantissa(half + half);
+}
+
 using std::abs;
 using std::exp;
 using std::floor;

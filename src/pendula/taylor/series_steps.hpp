@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -57,7 +58,7 @@ class SeriesSteps {
         order_(order_for(options.tolerance)),
         looks_(is_smooth(systems.info()) ? 1 : most_looks),
         largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
-        log_reach_(std::log(std::max(options.tolerance, finest)) / order_),
+        log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
         state_((static_cast<std::size_t>(order_) + 5) * row_),
         kept_(static_cast<std::size_t>(info_.kept) + 1),
@@ -377,9 +378,10 @@ class SeriesSteps {
     for (int k = last - looked_at + 1; k <= last; ++k) {
       const L term = size_of_term(static_cast<std::size_t>(k));
       is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
-      log_radius = min(log_radius, L(-1.0 / k) * log(max(term, L(tiny))));
+      log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(tiny))));
     }
-    return select(is_finite, exp(min(log_radius + L(log_reach_), L(400.0))) * unit_, L(0.0));
+    const L log_step = std::numbers::ln2 * min(log_radius + L(log_reach_), L(600.0));
+    return select(is_finite, exp(log_step) * unit_, L(0.0));
   }
 
   /// Terms are relative to each coordinate itself, plus 1 rad or the size of the whole motion if that is smaller, so
@@ -423,7 +425,7 @@ class SeriesSteps {
   int order_;
   int looks_;              // places of a step where accelerations are compared
   double largest_defect_;  // of accelerations, times h, relative to scales
-  double log_reach_;       // step size relative to the estimated radius of convergence, as a logarithm
+  double log_reach_;       // step size relative to the estimated radius of convergence, log₂
   PackRows<W> state_, kept_, operands_, inputs_;
   Place now_, trial_, begin_;  // begin_: of one motion
   PackRows<W> seen_;           // a motion on the way of a step

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <pendula/explicit/chain_accelerations.hpp>
 #include <pendula/explicit/explicit_state.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
@@ -34,7 +35,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   };
   explicit TaylorSteps(Subject subject, Options options = {})
       : State(subject), series_(dynamics_, order_for(options.tolerance)), trial_(parts_), terms_(parts_) {
-    log_reach_ = std::log(std::max(options.tolerance, finest)) / series_.order();
+    log_reach_ = std::log2(std::max(options.tolerance, finest)) / series_.order();
   }
 
   TaylorSteps& chain() { return *this; }
@@ -128,7 +129,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   PENDULA_IN_REGISTERS [[gnu::noinline]] L size_by_terms(const L& now) {
     const L pace = now * now, units = pace_ / now;
     const L moves = (units * units) * term_squared(1, pace);  // where it is, or will be
-    const L log_size = log(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)));
+    const L log_size = log2_near(max(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)), L(tiny)));
     L log_radius(1e3);
     for (int k = series_.order() - looked_at + 1; k <= series_.order(); ++k) {
       L squared = term_squared(k, pace);
@@ -136,9 +137,9 @@ class TaylorSteps : public ExplicitState<Rods> {
         const L tangent = dynamics_.tangent_squared(terms_) / dynamics_.tangent_squared(parts_);
         squared = max(squared, L(tangent_share * tangent_share) * tangent);
       }
-      log_radius = min(log_radius, L(-0.5 / k) * (log(max(squared, L(tiny))) - log_size));
+      log_radius = min(log_radius, L(-0.5 / k) * (log2_near(max(squared, L(tiny))) - log_size));
     }
-    return exp(min(log_radius + L(log_reach_), L(600.0))) / pace_;
+    return exp(std::numbers::ln2 * min(log_radius + L(log_reach_), L(900.0))) / pace_;
   }
 
   // Squared coefficient of t^k, the largest over all rods and rates, relative to lengths and the pace.
@@ -148,7 +149,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   }
 
   ChainSeries<Rods> series_;
-  double log_reach_;          // step size relative to the estimated radius of convergence, as a logarithm
+  double log_reach_;          // step size relative to the estimated radius of convergence, log₂
   L pace_{1.0};               // inverse of the unit of time
   L tried_{0.0}, step_{1.0};  // tried steps, last accepted steps
   L tried_from_{0.0};         // times at which these began
