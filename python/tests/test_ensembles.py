@@ -283,8 +283,8 @@ def test_wrong_starts_are_named(start, message):
         ({"file": "x.csv"}, "x.csv: expected .*HDF5"),
         ({"client": 5, "file": "x.h5"}, "client: expected no file beside it"),
         ({"client": 5}, "client: expected a Client of dask.distributed that waits, got int"),
-        ({"method": "euler"}, "run.method: expected"),
-        ({"tolerance": 0.0}, "run.tolerance: expected"),
+        ({"method": "euler"}, "^method: expected"),
+        ({"tolerance": 0.0}, "^tolerance: expected"),
     ],
 )
 def test_wrong_ensembles_are_named(given, message):
