@@ -61,7 +61,7 @@ TEST(SeriesSteps, LooksIntoStepsAreStepsThatEndThere) {
   ASSERT_TRUE(cut->step(middle - begin));
   Motion found;
   ASSERT_TRUE(whole->look(middle, found));
-  EXPECT_LT(apart(found, cut->state()), 4e-14);          // measured 4e-15
+  EXPECT_LT(apart(found, cut->state()), 4e-14);           // measured 4e-15
   EXPECT_LT(apart(whole->glance(middle), found), 3e-13);  // measured 3e-14
 }
 
@@ -103,7 +103,7 @@ TEST(SeriesSteps, KnowNoUnitOfTime) {
     Motion end = integrator->state();
     end.v /= pace;
     EXPECT_LT(apart(end, moved(atwood(), by(Method::taylor, 1e-12), 2)), 5e-14) << pace;  // measured 6e-15
-    EXPECT_LT(integrator->statistics().steps, 60) << pace;                               // measured 31
+    EXPECT_LT(integrator->statistics().steps, 60) << pace;                                // measured 31
   }
 }
 

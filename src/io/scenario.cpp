@@ -210,7 +210,7 @@ std::vector<std::string> degree_warnings(const Section& start) {
 
 /// Whether the method is "auto", the last of the names.
 bool chooses_method(const Section& run) {
-  return static_cast<std::size_t>(run.choice("method")) == names_of<Method>.size();
+  return run.choice("method") == names_of<Method>.size();
 }
 
 RunOptions read_run(const Section& run) {
