@@ -5,13 +5,22 @@ from __future__ import annotations
 import importlib.util
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 def _is_watched() -> bool:
     """Whether somebody looks: at a terminal, or at a notebook."""
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+
+
+def _tqdm() -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # in notebooks without ipywidgets it draws with text
+        from tqdm.auto import tqdm  # type: ignore[import-untyped]
+    return tqdm
 
 
 @contextmanager
@@ -26,11 +35,11 @@ def bar(duration: object, wanted: bool | None) -> Iterator[Callable[[float], Non
         yield None
         return
     try:
-        from tqdm.auto import tqdm  # type: ignore[import-untyped]
+        tqdm = _tqdm()
     except ImportError:
         raise ImportError("progress: expected tqdm, got none (pip install pendula[progress])") from None
     total = duration if isinstance(duration, (int, float)) else None
-    shown: list[tqdm] = []
+    shown: list[Any] = []
 
     def told(time: float) -> None:
         if not shown:
@@ -55,7 +64,7 @@ def progress_line(wanted: bool, members: int) -> Iterator[Callable[[int], None] 
         yield None
         return
     try:
-        from tqdm.auto import tqdm
+        tqdm = _tqdm()
     except ImportError:
         began = time.monotonic()
 
