@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._core import InputError
 from ._ensemble_data import dataset_of, open_ensemble
-from ._ensemble_text import Design, ensemble_text, first_start
+from ._ensemble_text import Design, ensemble_text, some_start
 from ._events import event_tables
 from ._progress import progress_line
 from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
@@ -134,12 +134,12 @@ def ensemble(
     keeps_exponents = isinstance(kept, Sequence) and not EXPONENTS.isdisjoint(kept)
     method = options.pop("method", None if step is not None or options or keeps_exponents else "auto")
     starts, keys, drawn = mapping("start", start), mapping("axes", axes), mapping("random", random)
-    # A model may have no start where all is zero: its coordinates are known from the first member's.
-    first = {}
+    # A model may have no start where all is zero.
+    begin = {}
     if isinstance(system, System):
-        first = system.at_zero() or first_start(starts, keys, drawn)
+        begin = system.at_zero() or some_start(starts, keys, drawn)
     # Names alone are asked for, which feedback does not change; a program cannot step what is sampled.
-    made = Beginning.of(system, first, tolerance=None, step=None, options={}, feeds_back=False).prepare()
+    made = Beginning.of(system, begin, tolerance=None, step=None, options={}, feeds_back=False).prepare()
     design = Design(system, [made.columns[k] for k in made.state])
     design.add_start(starts)
     design.add_axes(keys)

@@ -30,8 +30,7 @@ class Design:
         self._fixed: dict[str, object] = {}
         self._axes: dict[str, NDArray[np.float64]] = {}
         self._lists: dict[str, NDArray[np.float64]] = {}
-        self._random: list[dict[str, object]] = []
-        self._drawn: dict[str, object] = {}
+        self._drawn: dict[str, Sequence[object]] = {}
         self._families = dict.fromkeys(system.at_zero())  # of a chain's start: theta, phi, ...
 
     def add_start(self, start: Mapping[str, object]) -> None:
@@ -56,23 +55,25 @@ class Design:
             if not isinstance(given, Sequence) or len(given) != 3 or str(given[0]) not in DRAWN:
                 raise InputError(f"{expected}, got {given!r}")
             self._drawn[key] = given
-            self._random.append({"key": key, **dict(zip(DRAWN[given[0]], given[1:], strict=True))})
 
     def tables(self) -> dict[str, Any]:
         """Those of a scenario that say what moves, where it starts, and which numbers members have."""
-        of_each = bool(self._lists or self._random)
+        of_each = bool(self._lists or self._drawn)
         if bool(self._axes) == of_each:
             raise InputError(
                 "ensemble: expected axes of a grid, or numbers of each member (arrays of starts, random keys), got "
                 + ("both" if of_each else "neither")
             )
         tables: dict[str, Any] = {**self._system.tables(), "start": self._start()}
-        keys = [*self._axes, *(str(one["key"]) for one in self._random)]
+        keys = [*self._axes, *self._drawn]
         if isinstance(self._system, Chain):
             for key in keys:
                 self._write_as_array(tables, key)
         tables["ensemble.axis"] = [{"key": key, "values": values} for key, values in self._axes.items()]
-        tables["ensemble.random"] = self._random
+        tables["ensemble.random"] = [
+            {"key": key, **dict(zip(DRAWN[str(given[0])], given[1:], strict=True))}
+            for key, given in self._drawn.items()
+        ]
         tables["ensemble.list"] = [{"key": key, "values": values} for key, values in self._lists.items()]
         return tables
 
@@ -122,7 +123,7 @@ class Design:
 
     def _start(self) -> dict[str, object]:
         if not isinstance(self._system, Chain):
-            return {**first_start({}, {**self._axes, **self._lists}, self._drawn), **self._fixed}
+            return {**some_start({}, {**self._axes, **self._lists}, self._drawn), **self._fixed}
         return {name: [self._fixed.get(one, 0.0) for one in self._links_of(name)] for name in self._families}
 
     def _write_as_array(self, tables: dict[str, Any], key: str) -> None:
@@ -138,26 +139,37 @@ class Design:
             table[name] = [0.0 if one is None else one] * links
 
 
-def first_start(
+def some_start(
     start: Mapping[str, object], keys: Mapping[str, object], random: Mapping[str, object]
 ) -> dict[str, object]:
-    """Where about the first member starts: of what is drawn, the first number. Nothing is checked."""
-    first = {key: given[1] for key, given in random.items() if isinstance(given, Sequence) and len(given) > 1}
-    first |= {key: _first(given) for key, given in keys.items()}
-    named = {key.removeprefix("start."): one for key, one in first.items() if key.startswith("start.")}
-    return named | {name: _first(given) for name, given in start.items()}
+    """A start from among those of the members: at the ends of a range a model is singular more often than amid it.
+    Nothing is checked."""
+    found = {key: _middle(given) for key, given in keys.items()}
+    for key, given in random.items():
+        if isinstance(given, Sequence) and len(given) == 3:
+            found[key] = _mean(given)
+    named = {key.removeprefix("start."): one for key, one in found.items() if key.startswith("start.")}
+    return named | {name: _middle(given) for name, given in start.items()}
 
 
-def _first(given: object) -> object:
-    """Of an array, its first number or row; of a tuple, that of each."""
+def _mean(given: Sequence[Any]) -> object:
+    """Of ("normal", mean, deviation) or ("uniform", from, to)."""
+    try:
+        return given[1] if given[0] == "normal" else (given[1] + given[2]) / 2
+    except TypeError:
+        return given[1]  # no number, which the reader tells
+
+
+def _middle(given: object) -> object:
+    """Of an array, the number or row in its middle; of a tuple, that of each."""
     if isinstance(given, tuple):
-        firsts = [_first(one) for one in given]
-        return firsts[0] if len(firsts) == 1 else firsts
+        all_of_them = [_middle(one) for one in given]
+        return all_of_them[0] if len(all_of_them) == 1 else all_of_them
     if isinstance(given, str) or np.ndim(given) == 0:  # type: ignore[arg-type]
         return given
     array = np.asarray(given)
-    first = array[0] if array.size else np.zeros(1)
-    return first.item() if first.size == 1 else first.tolist()
+    one = array[len(array) // 2] if array.size else np.zeros(1)
+    return one.item() if one.size == 1 else one.tolist()
 
 
 def ensemble_text(

@@ -6,15 +6,30 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import matplotlib
 import pytest
+from playwright.sync_api import Browser, sync_playwright
 
 matplotlib.use("Agg")
 
 ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if not Path(os.environ.get("PENDULA_CHROMIUM", "")).is_file():
+        pytest.skip("Chromium was not found")
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=os.environ["PENDULA_CHROMIUM"],
+            args=["--disable-gpu", "--enable-unsafe-swiftshader"],
+            chromium_sandbox=False,
+        )
+        yield chromium
+        chromium.close()
 
 
 @pytest.fixture(scope="session")

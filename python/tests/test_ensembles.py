@@ -547,7 +547,7 @@ MACHINE = {"r": np.array([1.0, 1.1]), "theta": np.array([0.3, 0.5])}
         {"start": MACHINE},
         {"start": {"r": 1.0, "theta": ([0.3, 0.5],)}},
         {"start": {"theta": 0.5}, "axes": {"start.r": [1.0, 1.1]}},
-        {"start": {"theta": 0.5}, "random": {"start.r": ("uniform", 0.9, 1.1)}, "members": 2},
+        {"start": {"theta": 0.5}, "random": {"start.r": ("uniform", 0.0, 2.0)}, "members": 2, "seed": 1},
     ],
 )
 def test_a_model_needs_no_start_where_all_is_zero(given):

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, Frame, Page, sync_playwright
+from playwright.sync_api import Browser, Frame, Page
 
 pytest.importorskip("jupyterlab")
 
@@ -120,20 +120,6 @@ def server(theme: str, notebook: Path, tmp_path: Path) -> Iterator[str]:
                 process.wait()
 
 
-@pytest.fixture
-def browser() -> Iterator[Browser]:
-    if not Path(os.environ.get("PENDULA_CHROMIUM", "")).is_file():
-        pytest.skip("Chromium was not found")
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=os.environ["PENDULA_CHROMIUM"],
-            args=["--disable-gpu", "--enable-unsafe-swiftshader"],
-            chromium_sandbox=False,
-        )
-        yield chromium
-        chromium.close()
-
-
 def run_all(page: Page, address: str) -> None:
     page.goto(address)
     page.locator('.jp-StatusBar-TextItem:has-text("| Idle")').wait_for()
@@ -181,8 +167,7 @@ def test_a_solution_is_shown_by_jupyterlab(server: str, theme: str, notebook: Pa
     outputs = [output for cell in json.loads(text)["cells"] for output in cell["outputs"]]
     assert [output["output_type"] for output in outputs] == ["execute_result"] * 2
     assert text.count("<iframe") == 2
-    assert (
-        len(text) < 800_000
-    )  # measured 661_684: 160_318 of the plane, 446_611 of space, escaped again as JSON
+    # Measured 661_684: 160_318 of the plane, 446_611 of space, escaped again as JSON.
+    assert len(text) < 800_000
     assert wrong == []
     assert hosts - {None} == {urlsplit(server).hostname}

@@ -5,27 +5,12 @@ import subprocess
 import sys
 import time
 import types
-from collections.abc import Iterator
 from pathlib import Path
 
 import pendula
 import PIL.Image
 import pytest
-from playwright.sync_api import Browser, Frame, sync_playwright
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    if not Path(os.environ.get("PENDULA_CHROMIUM", "")).is_file():
-        pytest.skip("Chromium was not found")
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=os.environ["PENDULA_CHROMIUM"],
-            args=["--disable-gpu", "--enable-unsafe-swiftshader"],
-            chromium_sandbox=False,
-        )
-        yield chromium
-        chromium.close()
+from playwright.sync_api import Browser, Frame
 
 
 def shown(browser: Browser, html: str) -> tuple[Frame, list[str]]:

@@ -8,6 +8,7 @@
 #include <pendula/ensemble/second_looks.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/run/method_choice.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/run/track.hpp>
@@ -60,12 +61,10 @@ bool goes_by_series(const RunSetup& setup) {
   return links <= most_links && std::isfinite(natural_pace(subject)) && !subject.loaded();
 }
 
-// A tolerance by which a run loses no more energy than a short one. A hundredth, since the motion amplifies the errors
-// of steps. Rounded to powers of ten, so that runs of about the same length go in lanes together.
+// Runs of about the same length go in lanes together.
 double tolerance_of_steps(const RunSetup& setup, double finest) {
   const double length = run_length(setup);
-  const double longer = length > short_run && std::isfinite(length) ? length / short_run : 1;
-  return std::max(finest, 0.01 * setup.options.tolerance / std::pow(10, std::ceil(std::log10(longer))));
+  return step_tolerance(setup.options.tolerance, std::isfinite(length) ? length / short_run : 1, finest);
 }
 
 }  // namespace

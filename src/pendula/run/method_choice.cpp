@@ -27,8 +27,9 @@ std::string against_series(const Subject& subject, double tolerance) {
     if (system->info().depends_on_time) return "time in the equations";
     return system->may_be_narrow() ? "forces that may be narrow" : "";
   }
+  if (dynamic_cast<const ChainSubject<Spatial>*>(&subject) != nullptr) return "a chain in space";
   const auto* const chain = dynamic_cast<const ChainSubject<Planar>*>(&subject);
-  if (chain == nullptr) return "a chain in space, or feedback that is sampled";
+  if (chain == nullptr) return "sampled feedback";
   const int links = chain->chain().links();
   if (links > (tolerance < fine_tolerance ? always_few : few)) return "many links";
   return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";
@@ -58,6 +59,10 @@ double first_step(const RunSetup& setup, const RunOptions& options) {
 
 }  // namespace
 
+double step_tolerance(double asked, double longer, double finest) {
+  return std::max(finest, asked / (100 * std::pow(10, std::ceil(std::log10(std::max(1.0, longer))))));
+}
+
 MethodChoice choose_method(const RunSetup& setup) {
   const double asked = setup.accuracy.error > 0 ? setup.accuracy.error : setup.options.tolerance;
   const Subject& subject = *setup.subject;
@@ -65,16 +70,14 @@ MethodChoice choose_method(const RunSetup& setup) {
   if (!(setup.duration > 0)) return {0, "no motion"};
   RunOptions options = setup.options;
   options.method = Method::taylor;
-  options.tolerance = std::max(finest, 0.01 * asked);
+  options.tolerance = step_tolerance(asked, 1, finest);
   try {
     if (subject.damped() && is_stiff(subject, setup.start)) return {0, "strong damping"};
     const double step = first_step(setup, options);
     if (step == 0) return {0, "a start from which series take no step"};
     const double steps = setup.duration / step;
     if (steps * finest > asked) return {0, "a long run, in which series lose energy"};
-    // Powers of ten, so that the tolerance looks like one.
-    const double longer = std::pow(10, std::ceil(std::log10(std::max(1.0, steps / short_run))));
-    options.tolerance = std::max(finest, 0.01 * asked / longer);
+    options.tolerance = step_tolerance(asked, steps / short_run, finest);
   } catch (const std::invalid_argument& error) {
     return {0, error.what()};
   }

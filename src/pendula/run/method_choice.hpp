@@ -11,9 +11,14 @@ struct MethodChoice {
   std::string reason;           ///< a few words
 };
 
+/// A tolerance of a step by which a motion keeps the tolerance that is asked for: a hundredth, since the motion
+/// amplifies the errors of steps; less for a run that is `longer` than a short one, as many times, since errors of the
+/// energy add up. Rounded to a power of ten, so that runs of about the same length have the same one.
+double step_tolerance(double asked, double longer, double finest);
+
 /// Whether a run that is set up for Gauss steps takes less time by Taylor series: of models and planar chains of few
-/// links, not long, not damped strongly, without forces that are narrow or depend on time. Their tolerance, of a step,
-/// is a hundredth of that of the motion, less for long runs, whose energy drifts. It depends on the setup alone.
+/// links, not long, not damped strongly, without forces that are narrow or depend on time. It depends on the setup
+/// alone.
 MethodChoice choose_method(const RunSetup& setup);
 
 }  // namespace pendula

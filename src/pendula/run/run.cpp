@@ -63,7 +63,8 @@ RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& 
   if (kept_.series != series) {
     if (!setup_.chooses_method)
       throw std::invalid_argument("checkpoint: expected one of a run whose method was asked for");
-    go_by_series(kept_.series);  // the run that goes on had another end
+    go_by_series(kept_.series);
+    method_reason_ = "as for the end that the run had before";
   }
   if (is_aimed() != (kept_.aim.tolerance > 0)) {
     throw std::invalid_argument(
