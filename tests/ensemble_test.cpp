@@ -427,9 +427,9 @@ TEST(RunsOfLoadedChains, ChooseTheQuickestMethodThatWorks) {
                       .doubted = false});
   }
   const bool is_here = lane_kind(setups[0], quickest_in_lanes(setups[0])).has_value();  // not where lanes are few
-  const auto never = [] { return false; };
-  const std::vector<RunReport> found = run_members(setups, never, MemberMethod::quickest);
-  const std::vector<RunReport> asked = run_members(setups, never);
+  const std::vector<RunReport> asked = run_members(setups);
+  for (RunSetup& setup : setups) setup.chooses_method = true;
+  const std::vector<RunReport> found = run_members(setups);
   for (const std::size_t k : {0U, 2U}) {
     EXPECT_EQ(found[k].statistics.steps != asked[k].statistics.steps, is_here);
     EXPECT_LT((found[k].last.q - asked[k].last.q).cwiseAbs().maxCoeff(), 2e-7);  // seen: 8e-9
@@ -445,16 +445,16 @@ TEST(RunsOfLoadedChains, SeeForcesThatDependOnTimeAlone) {
   parameters.gravity = 0;
   const double frequency = 10, end = 10;
   parameters.drives = {{.link = 0, .amplitude = Torque<Planar, 1>::Constant(1), .frequency = frequency, .phase = 0}};
-  const RunSetup setup{.subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
-                       .start = Motion(0, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1)),
-                       .options = chosen(1e-6),
-                       .duration = end,
-                       .every = 1,
-                       .doubted = false};
+  RunSetup setup{.subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
+                 .start = Motion(0, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1)),
+                 .options = chosen(1e-6),
+                 .duration = end,
+                 .every = 1,
+                 .doubted = false};
   const double expected = end / frequency - std::sin(frequency * end) / (frequency * frequency);
-  for (const MemberMethod method : {MemberMethod::asked, MemberMethod::quickest}) {
-    const auto found = run_members(
-        std::vector{setup}, [] { return false; }, method);
+  for (const bool chooses_method : {false, true}) {
+    setup.chooses_method = chooses_method;
+    const auto found = run_members(std::vector{setup});
     EXPECT_NEAR(found[0].last.q[0], expected, 1e-6);  // measured 1.4e-9
   }
 }
@@ -600,8 +600,8 @@ TEST(ExponentsOfLoadedChains, AreFoundInLanes) {
                                   hung(Eigen::VectorXd::Constant(1, 2.0), 0), hung(Eigen::Vector2d(0.2, 0.1), 3),
                                   hung(Eigen::Vector2d(0.2, 0.1), 5), hung(Eigen::VectorXd::Constant(1, 300.0), 0)};
   setups[4].start.q.setConstant(0.01);
-  const auto never = [] { return false; };
-  const auto found = exponents_in_lanes(setups, never, MemberMethod::quickest);
+  for (RunSetup& setup : setups) setup.chooses_method = true;
+  const auto found = exponents_in_lanes(setups);
   if (!lane_kind(setups[0], quickest_with_tangents(setups[0]))) return;  // lanes are few
   const auto exponent = [&](std::size_t k) { return found[k]->exponents[0]; };
   for (const auto& each : found) ASSERT_TRUE(each);

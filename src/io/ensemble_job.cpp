@@ -38,9 +38,9 @@ EnsembleJob::EnsembleJob(const EnsembleSource& source, MemberScenarios::Tell tel
       runs_(scenarios_, kept_, std::move(stop)) {}
 
 bool EnsembleJob::go_in_lanes() const {
-  const RunSetup setup = MemberScenario(base_).setup();
-  return lane_kind(setup).has_value() ||
-         (scenarios_.plan().chooses_method && lane_kind(setup, quickest_in_lanes(setup)));
+  RunSetup setup = MemberScenario(base_).setup();
+  setup.chooses_method |= scenarios_.plan().chooses_method;
+  return lane_kind(setup) || lane_kind(setup, lane_options(setup));
 }
 
 RunOrigin EnsembleJob::origin(const std::string& command) const {

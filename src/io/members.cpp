@@ -157,7 +157,7 @@ DoneChunk MemberRuns::run(const Chunk& members) const {
     last.is_together = last.setup.has_value();
     if (last.is_together) waiting.push_back(*std::exchange(last.setup, std::nullopt));
   }
-  std::vector<RunReport> reports = run_members(waiting, stop_, method());
+  std::vector<RunReport> reports = run_members(waiting, stop_);
   if (kept_.chaos()) find_exponents(all);
   auto next = reports.begin();
   DoneChunk done;
@@ -201,11 +201,12 @@ MemberRuns::Member MemberRuns::member_of(MemberScenario scenario, std::int64_t n
   Member member;
   member.scenario = std::move(scenario);
   RunSetup setup = member.scenario->setup();
+  setup.chooses_method |= plan_.chooses_method;
   setup.events = events_of(member.scenario->plan().events, setup.subject, setup.start, shared);
   // Trials for an accuracy say of each member how far it can be trusted.
   setup.doubted = setup.estimate && (setup.accuracy.error > 0 || is_looked_at(number));
   member.is_looked_at = setup.doubted;
-  if (lane_kind(setup, lane_options(setup, method()))) {
+  if (lane_kind(setup, lane_options(setup))) {
     member.setup = std::move(setup);
   } else {
     member.report = run_alone(*member.scenario, std::move(setup));
@@ -213,7 +214,7 @@ MemberRuns::Member MemberRuns::member_of(MemberScenario scenario, std::int64_t n
   return member;
 }
 
-// Exponents of the members that run in lanes with a tangent. Not for Gauss methods with method = "run": the exponents
+// Exponents of the members that run in lanes with a tangent. Not for Gauss methods without ensemble.method = "auto": the exponents
 // are those of `pendula lyapunov` then, whose tangents begin otherwise than those in lanes.
 void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<RunSetup> setups;
@@ -221,11 +222,12 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
   for (Member& member : all) {
     if (!member.scenario) continue;
     RunSetup setup = member.scenario->setup();
-    if (method() == MemberMethod::asked && !is_explicit(setup.options.method)) continue;
+    setup.chooses_method = plan_.chooses_method;
+    if (!setup.chooses_method && !is_explicit(setup.options.method)) continue;
     setups.push_back(std::move(setup));
     members.push_back(&member);
   }
-  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(setups, stop_, method());
+  std::vector<std::optional<LyapunovSpectrum>> found = exponents_in_lanes(setups, stop_);
   if (found.size() < members.size()) throw Interrupted();
   for (std::size_t k = 0; k < members.size(); ++k) members[k]->exponent = std::move(found[k]);
 }

@@ -106,7 +106,6 @@ class MemberRuns {
  private:
   struct Member;
 
-  MemberMethod method() const { return plan_.chooses_method ? MemberMethod::quickest : MemberMethod::asked; }
   bool is_looked_at(std::int64_t number) const;
   Member member(std::int64_t number, SharedExpressions& shared) const;
   Member member_of(MemberScenario scenario, std::int64_t number, SharedExpressions& shared) const;

@@ -208,14 +208,16 @@ std::vector<std::string> degree_warnings(const Section& start) {
   return warnings;
 }
 
-/// Whether the method is "auto", the last of the names.
+/// Whether the method is "auto", the last of the names, in words or because nothing of [run] is for one method.
 bool chooses_method(const Section& run) {
-  return run.choice("method") == names_of<Method>.size();
+  if (run.find("step") || run.choice("method") != names_of<Method>.size()) return false;
+  constexpr std::array<std::string_view, 4> of_gauss = {"stages", "form", "solver", "iteration"};
+  return run.find("method") || std::ranges::none_of(of_gauss, [&](auto key) { return run.find(key).has_value(); });
 }
 
 RunOptions read_run(const Section& run) {
   RunOptions options;
-  if (!chooses_method(run)) options.method = run.option<Method>("method");
+  if (run.choice("method") != names_of<Method>.size()) options.method = run.option<Method>("method");
   const auto stages = run.find("stages"), step = run.find("step");
   if (stages) {
     options.stages = static_cast<int>(options.method == Method::radau ? stages->integer(2, 3) : stages->integer());
@@ -303,7 +305,7 @@ RowTimes read_row_times(const Section& section, double duration) {
 /// Reads [run] and [output].
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
-  plan.chooses_method = chooses_method(sections.run) && plan.run.step == 0;
+  plan.chooses_method = chooses_method(sections.run);
   plan.accuracy = read_accuracy(sections.run, plan.run);
   plan.duration = read_duration(sections.run, plan.run);
   plan.estimate = sections.run.truth("estimate");

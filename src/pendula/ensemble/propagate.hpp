@@ -33,7 +33,7 @@ struct EnsembleSchedule {
   /// Looked for in each member.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   bool estimate = false;           ///< whether to look at members again, and warn in their reports
-  MemberMethod method = MemberMethod::asked;  ///< that of `options`, or the quickest that serves
+  bool chooses_method = false;  ///< as RunSetup's
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
   /// Called on the way by several threads at once; if it returns true, all members stop and report that.
@@ -64,9 +64,10 @@ inline void propagate(std::span<const EnsembleMember> members, const EnsembleSch
                         .duration = schedule.duration,
                         .every = schedule.every,
                         .doubted = schedule.estimate,
-                        .events = schedule.events});
+                        .events = schedule.events,
+                        .chooses_method = schedule.chooses_method});
     }
-    const std::vector<RunReport> reports = run_members(setups, schedule.stop, schedule.method);
+    const std::vector<RunReport> reports = run_members(setups, schedule.stop);
     for (std::size_t k = 0; k < reports.size(); ++k) observe(first + k, reports[k]);
   });
 }

@@ -95,12 +95,16 @@ RunOptions quickest_with_tangents(const RunSetup& setup) {
   return is_tried || tangent_lane_kind(setup, setup.options) ? options : setup.options;
 }
 
-RunOptions lane_options(const RunSetup& setup, MemberMethod method) {
-  return method == MemberMethod::quickest ? quickest_in_lanes(setup) : setup.options;
+RunOptions lane_options(const RunSetup& setup) {
+  return setup.chooses_method ? quickest_in_lanes(setup) : setup.options;
 }
 
 namespace detail {
 namespace {
+
+RunOptions options_asked_for(const RunSetup& setup) {
+  return setup.options;
+}
 
 // The lanes in which a run was tried last, and its report if they moved it.
 struct Tried {
@@ -111,12 +115,12 @@ struct Tried {
 
 // Runs without a report, if their lanes are others than before. Those that are followed by a track go in lanes of their
 // own: looking at every step takes time.
-void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const std::function<bool()>& stop,
-                  std::vector<Tried>& tried) {
+void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(const RunSetup&),
+                  const std::function<bool()>& stop, std::vector<Tried>& tried) {
   RunsByKind followed, others;
   for (std::size_t k = 0; k < setups.size(); ++k) {
     if (tried[k].report) continue;
-    const auto kind = lane_kind(setups[k], lane_options(setups[k], method));
+    const auto kind = lane_kind(setups[k], options_of(setups[k]));
     if (!kind || tried[k].kind == kind) continue;
     tried[k].kind = kind;
     (is_estimated(setups[k]) ? followed : others)[*kind].push_back(k);
@@ -128,7 +132,7 @@ void try_in_lanes(std::span<const RunSetup> setups, MemberMethod method, const s
       for (const std::size_t k : numbers) {
         tracks.push_back(kinds == &followed ? &tried[k].track.emplace(lane_track()) : nullptr);
       }
-      auto reports = run_in_lanes(kind, alike, lane_options(*alike[0], method), stop, tracks);
+      auto reports = run_in_lanes(kind, alike, options_of(*alike[0]), stop, tracks);
       for (std::size_t k = 0; k < numbers.size(); ++k) tried[numbers[k]].report = std::move(reports[k]);
     }
   }
@@ -150,17 +154,21 @@ void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<b
 }  // namespace
 }  // namespace detail
 
-std::vector<RunReport> run_members(std::span<const RunSetup> setups, const std::function<bool()>& stop,
-                                   MemberMethod method) {
+std::vector<RunReport> run_members(std::span<const RunSetup> setups, const std::function<bool()>& stop) {
   std::vector<detail::Tried> tried(setups.size());
-  if (method == MemberMethod::quickest) detail::try_in_lanes(setups, method, stop, tried);
-  detail::try_in_lanes(setups, MemberMethod::asked, stop, tried);
+  detail::try_in_lanes(setups, lane_options, stop, tried);
+  detail::try_in_lanes(setups, detail::options_asked_for, stop, tried);
   detail::look_again_in_lanes(setups, stop, tried);
   std::vector<RunReport> reports;
   reports.reserve(setups.size());
   for (std::size_t k = 0; k < setups.size(); ++k) {
     std::optional<RunReport>& report = tried[k].report;
-    reports.push_back(report ? std::move(*report) : Run(setups[k]).go(stop));
+    if (!report) {
+      RunSetup alone = setups[k];
+      if (tried[k].kind) alone.chooses_method = false;
+      report = Run(std::move(alone)).go(stop);
+    }
+    reports.push_back(std::move(*report));
   }
   return reports;
 }
@@ -181,20 +189,18 @@ std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(const LaneKind& 
 }  // namespace detail
 
 std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(std::span<const RunSetup> setups,
-                                                                const std::function<bool()>& stop,
-                                                                MemberMethod method) {
+                                                                const std::function<bool()>& stop) {
   std::vector<std::optional<LyapunovSpectrum>> exponents(setups.size());
   std::vector<std::optional<LaneKind>> tried(setups.size());
-  const auto quickest = [](const RunSetup& setup) { return quickest_with_tangents(setup); };
-  const auto finer = [](const RunSetup& setup) {
-    RunOptions options = quickest_with_tangents(setup);
+  const auto quickest = [](const RunSetup& setup) {
+    return setup.chooses_method ? quickest_with_tangents(setup) : setup.options;
+  };
+  const auto finer = [&](const RunSetup& setup) {
+    RunOptions options = quickest(setup);
     if (options.method != setup.options.method) options.tolerance = std::max(1e-13, 0.01 * options.tolerance);
     return options;
   };
-  const auto asked = [](const RunSetup& setup) { return setup.options; };
-  std::vector<std::function<RunOptions(const RunSetup&)>> attempts;
-  if (method == MemberMethod::quickest) attempts = {quickest, finer};
-  attempts.emplace_back(asked);
+  const std::function<RunOptions(const RunSetup&)> attempts[] = {quickest, finer, detail::options_asked_for};
   for (const auto& options_of : attempts) {
     detail::RunsByKind kinds;
     for (std::size_t k = 0; k < setups.size(); ++k) {

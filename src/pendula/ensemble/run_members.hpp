@@ -21,27 +21,20 @@ RunOptions quickest_in_lanes(const RunSetup& setup);
 /// more energy is lost in all. Only of chains the length is known in swings.
 RunOptions quickest_with_tangents(const RunSetup& setup);
 
-/// How members are moved.
-enum class MemberMethod {
-  asked,    ///< as their options tell
-  quickest  ///< by quickest_in_lanes; by their own options where that fails, in lanes where possible
-};
-
-/// The options by which a run goes in lanes.
-RunOptions lane_options(const RunSetup& setup, MemberMethod method);
+/// The options by which a run goes in lanes: by quickest_in_lanes if its method is to be chosen.
+RunOptions lane_options(const RunSetup& setup);
 
 /// Runs without observers, each as `Run` does one: in lanes where they can go there, else one by one. Runs that are to
-/// be estimated get second looks, those in lanes in lanes. A report depends on its setup alone, to the last bit; of a
+/// be estimated get second looks, those in lanes in lanes. Where a chosen method fails, the options that were asked for are
+/// used. A report depends on its setup alone, to the last bit; of a
 /// stopped run it tells only that. Throws as Run.
 std::vector<RunReport> run_members(
-    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
-    MemberMethod method = MemberMethod::asked);
+    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; });
 
 /// The leading Lyapunov exponents of the runs that go in lanes, each over its whole duration; none of the others. Empty
 /// if it was stopped. A member that loses too much energy by a substituted method is moved again by a hundredth of the
 /// tolerance, and then by its own options.
 std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
-    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; },
-    MemberMethod method = MemberMethod::asked);
+    std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; });
 
 }  // namespace pendula

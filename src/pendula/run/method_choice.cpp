@@ -66,6 +66,7 @@ double step_tolerance(double asked, double longer, double finest) {
 MethodChoice choose_method(const RunSetup& setup) {
   const double asked = setup.accuracy.error > 0 ? setup.accuracy.error : setup.options.tolerance;
   const Subject& subject = *setup.subject;
+  if (setup.options.method != Method::gauss || !is_adaptive(setup.options)) return {0, "other steps are asked for"};
   if (std::string reason = against_series(subject, asked); !reason.empty()) return {0, std::move(reason)};
   if (!(setup.duration > 0)) return {0, "no motion"};
   RunOptions options = setup.options;
