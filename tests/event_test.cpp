@@ -382,14 +382,14 @@ TEST_P(RandomCrossings, AreTheSameAsByBruteForce) {
   const auto per = [](std::int64_t count, std::int64_t of) {
     return static_cast<double>(count) / static_cast<double>(of);
   };
-  EXPECT_LE(per(looks, crossings),
-            given.looks);  // measured 9.1 with one stage, 6.7 by extrapolation, 4.3 with two, else to 2.5
+  // Measured 16.7 with one stage, 6.7 by extrapolation, 5.3 with two, else to 2.5.
+  EXPECT_LE(per(looks, crossings), given.looks);
   EXPECT_LE(per(glances, steps), given.glances);  // measured 15.3 by extrapolation, else 4.2 to 6.7
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, RandomCrossings,
-                         ::testing::Values(Case{"gauss_1", Method::gauss, 1, 0.005, false, 2, 12},
-                                           Case{"gauss_2", Method::gauss, 2, 0.005, false, 2, 5},
+                         ::testing::Values(Case{"gauss_1", Method::gauss, 1, 0.005, false, 2, 22},
+                                           Case{"gauss_2", Method::gauss, 2, 0.005, false, 2, 7},
                                            Case{"gauss_4", Method::gauss, 4, 0.02, false, 3},
                                            Case{"gauss_6", Method::gauss, 6, 0.03, true, 2},
                                            Case{"gauss_8", Method::gauss, 8, 0.05, false, 2},

@@ -21,9 +21,6 @@ from ._systems import System
 if TYPE_CHECKING:
     import xarray
 
-# What is kept of tangents, for which methods differ in which those are.
-EXPONENTS = {"lyapunov", "ftle", "megno"}
-
 
 def ensemble(
     system: System,
@@ -75,9 +72,8 @@ def ensemble(
     events : mapping, optional
         As for :meth:`Chain.simulate`.
     tolerance, step, accuracy, method, stages, form, solver, iteration, estimate
-        As ``[run]`` of a scenario; a tolerance of 1e-9 where nothing says otherwise. ``method="auto"``: an explicit
-        one where that is over sooner, else Gauss steps; it is the default where none of method, step and how Gauss
-        steps are made is given, and no exponents are kept.
+        As ``[run]`` of a scenario; a tolerance of 1e-9 where nothing says otherwise. ``method="auto"`` is
+        that of ``[ensemble]``: exponents, too, go by what is quickest in lanes.
     threads : int
         0: as many as there are processors.
     file : path, optional
@@ -131,8 +127,7 @@ def ensemble(
         if name not in RUN_OPTIONS:
             raise InputError(f"ensemble: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
     kept = [keep] if isinstance(keep, str) else keep
-    keeps_exponents = isinstance(kept, Sequence) and not EXPONENTS.isdisjoint(kept)
-    method = options.pop("method", None if step is not None or options or keeps_exponents else "auto")
+    method = options.pop("method", None)
     starts, keys, drawn = mapping("start", start), mapping("axes", axes), mapping("random", random)
     # A model may have no start where all is zero.
     begin = {}

@@ -256,8 +256,9 @@ class Solution:
 
     @property
     def nfev(self) -> int:
-        """Iterations on the stages of implicit steps, which evaluate the equations at all of them."""
-        return int(self._told("newton_iterations") or 0)
+        """Iterations on the stages of implicit steps, which evaluate the equations at all of them; of other methods,
+        steps that were tried."""
+        return int(self._told("newton_iterations") or self._told("steps") + self._told("rejected_steps"))
 
     @property
     def energy(self) -> NDArray[np.float64]:

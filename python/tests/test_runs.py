@@ -55,7 +55,7 @@ def test_a_solution_has_scipys_names():
     assert run.y_events["low"].shape[1] == 4
     data = run.to_xarray()
     assert data["theta_1"].attrs["units"] == "rad" and data["t"].attrs["units"] == "s"
-    assert "gauss" in repr(run)
+    assert "taylor" in repr(run)
     with pytest.raises(KeyError, match="thetas: expected one of t, theta_1"):
         run["thetas"]
 
@@ -65,7 +65,7 @@ def test_a_solution_is_known_at_any_time():
     assert np.abs(run.sol(run.t[::-1]) - run.y[:, ::-1]).max() < 1e-12  # measured 0
     fine = pendula.Chain(masses=[1, 2]).simulate(t=[0, 0.7, 2], theta=[0.5, -0.2], accuracy=1e-12)
     assert np.abs(run.sol(0.7) - fine.y[:, 1]).max() < 1e-8  # measured 1.2e-10
-    assert run.sol([0.7, 0.7]).shape == (4, 2) and run.nfev > run.nsteps
+    assert run.sol([0.7, 0.7]).shape == (4, 2) and run.nfev >= run.nsteps > 0
     stopped = pendula.Chain(links=1).simulate(
         5.0, theta=0.5, step=0.1, events={"low": {"when": "theta_1", "stop": True}}
     )

@@ -53,7 +53,8 @@ def test_double_pendulum_keeps_its_energy(example):
     assert summary["energy_error_max"] < 1e-11  # measured 4.2e-12
     bob = summary["final"]["bobs"][1]
     assert math.dist(bob, (-1.0407657832461712, -1.7073476624693271)) < 1e-9  # measured 1.7e-12
-    assert summary["step"] is None and summary["stages"] == 8
+    assert summary["method"] == "taylor" and summary["method_reason"]
+    assert summary["step"] is None and summary["stages"] is None
     assert summary["accuracy"] == 1e-9 and 1e-12 < summary["expected_error"] < 1e-9  # told 9e-10
     assert 1e-14 < summary["tolerance"] <= 1e-10  # chosen 6.5e-13
     assert 0 < summary["smallest_step"] < summary["largest_step"]

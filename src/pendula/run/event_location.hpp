@@ -87,7 +87,7 @@ std::optional<double> other_sign(double from, double to, int sign, Value value, 
   constexpr int most_turns = 48;
   if (sign == 0 || sign_of(value(to)) != sign) return {};
   double low = from, high = to, u = low + golden * (high - low), height = sign * value(u);
-  for (int tries = 0; tries < most_turns && height > 0 && goes_on() && high - low > nearest; ++tries) {
+  for (int tries = 0; tries < most_turns && height >= 0 && goes_on() && high - low > nearest; ++tries) {
     const bool is_left = u - low > high - u;  // of the longer part
     const double other = is_left ? u - golden * (u - low) : u + golden * (high - u);
     const double there = sign * value(other);
@@ -200,13 +200,14 @@ class SignSearch {
     for (std::size_t k = 1; k < points; ++k) variation += sizes[k];
     const BernsteinPolynomial polynomial = BernsteinPolynomial::through(values);
     const double tail = std::max(2 * (sizes[points - 2] + sizes[points - 1]), off_at_sixth(polynomial, interval, by));
-    const double missed = by == By::polynomial ? 2 * missed_ : 0;
+    const double width = interval.to - interval.from;
+    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from this part to the step
+    const double last_two = degree_ == 1 ? variation : std::max(sizes[degree_], sizes[degree_ - 1]);
+    const double missed = by == By::polynomial ? 2 * missed_ + last_two * whole : 0;
     if (sizes[0] > variation + tail + missed) return node(interval.to, interval.sign);
     const double largest = std::abs(*std::ranges::max_element(values, {}, [](double v) { return std::abs(v); }));
     const double noise = 4 * epsilon * largest;
     if (tail > 1e-3 * variation + noise) return unresolved(interval, values, halvings, by);
-    const double width = interval.to - interval.from;
-    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from this part to the step
     // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
     const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
     const auto band = [&](double miss) {
@@ -217,7 +218,6 @@ class SignSearch {
     if (!is_measured_) {
       const SignLine before = line_;
       is_unsure_ = false;
-      const double last_two = degree_ == 1 ? variation : std::max(sizes[degree_], sizes[degree_ - 1]);
       resolved(interval, polynomial, by, band(missed_ + last_two * whole));
       if (!is_unsure_) return;
       line_ = before;

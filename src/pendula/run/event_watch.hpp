@@ -31,8 +31,8 @@ class LastStep {
  public:
   explicit LastStep(Integrator& integrator) : integrator_(integrator) {}
 
-  void state(Motion& motion) const { motion = integrator_.state(); }
-  void glance(double /*share*/, double time, Motion& motion) { motion = integrator_.glance(time); }
+  void state(Motion& motion) const { integrator_.read_state(motion); }
+  void glance(double /*share*/, double time, Motion& motion) { integrator_.glance(time, motion); }
   /// `begin` is the state at the start of the step.
   bool look(const Motion& /*begin*/, double time, Motion& motion) { return bool(integrator_.look(time, motion)); }
 
@@ -282,7 +282,8 @@ class EventWatch {
       const SignChange& change = changes[n];
       const bool up = change.sign > 0;
       if (events_[k].direction != Direction::both && (events_[k].direction == Direction::up) != up) continue;
-      const double low = n == 0 ? 0 : changes[n - 1].to, high = n + 1 == changes.size() ? 1 : changes[n + 1].from;
+      // Where a pair is close to a double zero, the sign of the place between may be a rounding error.
+      const double low = n == 0 ? 0 : changes[n - 1].from, high = n + 1 == changes.size() ? 1 : changes[n + 1].to;
       if (!locate(values, change, resolution) && !locate_beside(values, change, low, high, resolution)) {
         found.resize(before);
         return false;

@@ -54,10 +54,13 @@ class Integrator {
   double time() const { return integrator_->time(); }
 
   Motion state() const {
-    Motion motion(time(), Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
-    integrator_->read_state(motion.q.data(), motion.v.data());
-    hold(motion);
+    Motion motion;
+    read_state(motion);
     return motion;
+  }
+  void read_state(Motion& motion) const {
+    make_room(time(), motion);
+    integrator_->read_state(motion.q.data(), motion.v.data());
   }
 
   /// Whether to remember steps from now on, so that glance and look can go back into the last one; this costs a copy of
@@ -67,10 +70,13 @@ class Integrator {
   /// The state at `time` within the last step by dense output, the polynomial through its stages: cheap. Its order is
   /// one more than the number of stages for positions, that number for rates.
   Motion glance(double time) {
-    Motion motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
-    integrator_->glance(time, motion.q.data(), motion.v.data());
-    hold(motion);
+    Motion motion;
+    glance(time, motion);
     return motion;
+  }
+  void glance(double time, Motion& motion) {
+    make_room(time, motion);
+    integrator_->glance(time, motion.q.data(), motion.v.data());
   }
 
   /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
@@ -82,8 +88,7 @@ class Integrator {
 
   /// Also sets `work` to the work of loads until then  [J].
   Outcome look(double time, Motion& motion, double& work) {
-    motion = Motion(time, Eigen::VectorXd(coordinates_), Eigen::VectorXd(coordinates_));
-    hold(motion);
+    make_room(time, motion);
     return integrator_->look(time, motion.q.data(), motion.v.data(), work);
   }
 
@@ -154,9 +159,12 @@ class Integrator {
   }
 
  private:
-  void hold(Motion& motion) const {
-    const std::span<const double> held = integrator_->held(motion.time);
-    if (!held.empty()) motion.held = Eigen::Map<const Eigen::VectorXd>(held.data(), std::ssize(held));
+  void make_room(double time, Motion& motion) const {
+    motion.time = time;
+    motion.q.resize(coordinates_);
+    motion.v.resize(coordinates_);
+    const std::span<const double> held = integrator_->held(time);
+    motion.held = Eigen::Map<const Eigen::VectorXd>(held.data(), std::ssize(held));
   }
 
   void require_size(const char* what, Eigen::Index got) const {

@@ -289,28 +289,29 @@ class SeriesSteps {
 
   L coefficient(std::size_t order, std::size_t k) const { return from_row<L>(state_[order * row_ + k]); }
 
-  /// Σ c_(k+1) τ^k, in four strands that do not wait for one another.
-  L rise(std::size_t k, const L& tau) const {
+  /// Σ term(k+1) τ^k, in four strands that do not wait for one another.
+  template <class Term>
+  L sum(const L& tau, Term term) const {
     const L tau2 = tau * tau, tau4 = tau2 * tau2;
     std::size_t order = (static_cast<std::size_t>(order_) + 3) / 4 * 4;
-    L a = coefficient(order - 3, k), b = coefficient(order - 2, k), c = coefficient(order - 1, k),
-      d = coefficient(order, k);
+    L a = term(order - 3), b = term(order - 2), c = term(order - 1), d = term(order);
     for (order -= 4; order > 0; order -= 4) {
-      a = fma(a, tau4, coefficient(order - 3, k));
-      b = fma(b, tau4, coefficient(order - 2, k));
-      c = fma(c, tau4, coefficient(order - 1, k));
-      d = fma(d, tau4, coefficient(order, k));
+      a = fma(a, tau4, term(order - 3));
+      b = fma(b, tau4, term(order - 2));
+      c = fma(c, tau4, term(order - 1));
+      d = fma(d, tau4, term(order));
     }
     return fma(fma(d, tau, c), tau2, fma(b, tau, a));
   }
 
+  /// Σ c_(k+1) τ^k
+  L rise(std::size_t k, const L& tau) const {
+    return sum(tau, [&](std::size_t order) { return coefficient(order, k); });
+  }
+
   /// Σ (k+1) c_(k+1) τ^k
   L slope(std::size_t k, const L& tau) const {
-    L sum(0.0);
-    for (auto order = static_cast<std::size_t>(order_); order > 0; --order) {
-      sum = fma(sum, tau, L(static_cast<double>(order)) * coefficient(order, k));
-    }
-    return sum;
+    return sum(tau, [&](std::size_t order) { return L(static_cast<double>(order)) * coefficient(order, k); });
   }
 
   /// Σ (k+2) (k+1) c_(k+2) τ^k
