@@ -98,7 +98,7 @@ Json to_json(const Ending& ending) {
   json["iterations"] = ending.step.iterations;
   json["residual"] = ending.step.residual;
   if (ending.coordinate.empty()) {
-    json["link"] = where(ending.step.part >= 0, ending.step.part + 1);
+    json["link"] = where(ending.step.part >= 0 && ending.step.status != Status::stuck_at_switch, ending.step.part + 1);
   } else {
     json["coordinate"] = ending.coordinate;
   }
