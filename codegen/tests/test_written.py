@@ -251,6 +251,7 @@ def functions_of(model: Model) -> list[tuple[str, Program, list[Expr]]]:
         **{"E": said.residual, "E_D_q": said.residual_q, "E_D_v": said.residual_v, "E_D_a": said.mass},
         **{"r": said.positions, "r_dot": said.velocities},
         "found": [value for value, _ in kernel.call_arguments],
+        "g": [switch.value for switch in model.switches],
     }
     right = {
         "v": [p - rest for p, rest in zip(kernel.momentum_symbols, said.momenta_at_rest, strict=True)],
