@@ -294,8 +294,8 @@ class Model:
         for switch in self._switches.held_by(said.value):
             if jump(said.value, switch, self.switches, self._rates()):
                 raise GenerationError(
-                    f"{said.where}: lagrangian: it or a momentum jumps where {switch.value} = 0, which would be a blow: "
-                    "expected pieces that meet"
+                    f"{said.where}: lagrangian: it or a momentum jumps where {switch.value} = 0, which would be a "
+                    "blow: expected pieces that meet"
                 )
 
     def _check_kinetic(self, system: LagrangianSystem, where: str) -> None:
@@ -330,7 +330,9 @@ class Model:
             self._fail(f"{what}: expected a SymPy expression, got {type(value).__name__} {value!r}")
         expression = exact(sympify(value))
         try:
-            expression = self._switches.without_pieces(expression, {s for p in self.parameters for s in p.symbols})
+            expression = self._switches.without_pieces(
+                expression, {s for p in self.parameters for s in p.symbols}
+            )
         except UnknownPieceError as error:
             self._fail(f"{what}: {error}")
         refused = refusal(expression)

@@ -225,9 +225,7 @@ def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol]) -> Expr:
     return piece.func(*args)
 
 
-def jump(
-    value: Expr, switch: Switch, switches: Sequence[Switch], slopes_by: Iterable[Symbol]
-) -> bool:
+def jump(value: Expr, switch: Switch, switches: Sequence[Switch], slopes_by: Iterable[Symbol]) -> bool:
     """Whether `value`, or a derivative of it, jumps where a switching function is zero, as far as numbers tell."""
     above, below = {switch.above: 1, switch.below: 0}, {switch.above: 0, switch.below: 1}
     indicators = {symbol for s in switches for symbol in (s.above, s.below)}
@@ -243,7 +241,8 @@ def jump(
     draw = random.Random(3)
     for _ in range(6):
         place = {
-            s: mpmath.mpf(draw.uniform(0.5, 2)) * (1 if s.is_positive else draw.choice((-1, 1))) for s in symbols
+            s: mpmath.mpf(draw.uniform(0.5, 2)) * (1 if s.is_positive else draw.choice((-1, 1)))
+            for s in symbols
         }
         for moved in [s for s in symbols if s in switch.value.free_symbols]:
             try:
@@ -262,7 +261,7 @@ def _integers(values: dict[Symbol, int]) -> dict[Symbol, Expr]:
     return {symbol: Integer(value) for symbol, value in values.items()}
 
 
-def _difference_at(place, moved, symbols, zeros, this, evaluate):  # noqa: ANN001, ANN202, PLR0913
+def _difference_at(place, moved, symbols, zeros, this, evaluate):
     def flags_at(numbers: list) -> list:
         flags = [1, 0] * len(zeros)
         for _ in zeros:  # one may depend on another
@@ -281,5 +280,7 @@ def _difference_at(place, moved, symbols, zeros, this, evaluate):  # noqa: ANN00
     if not isinstance(root, mpmath.mpf) or (moved.is_positive and root <= 0):
         return None
     numbers = numbers_at(root)
-    found = [mpmath.mpf(x) if not isinstance(x, mpmath.mpc) else x for x in evaluate(*numbers, *flags_at(numbers))]
+    found = [
+        mpmath.mpf(x) if not isinstance(x, mpmath.mpc) else x for x in evaluate(*numbers, *flags_at(numbers))
+    ]
     return found if all(isinstance(x, mpmath.mpf) and mpmath.isfinite(x) for x in found) else None

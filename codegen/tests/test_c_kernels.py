@@ -6,11 +6,9 @@ import re
 
 import mpmath
 import pytest
-from mpmath import mp, mpf
-from sympy import Symbol, lambdify
-
 from conftest import REPOSITORY
 from loaded import COMPILERS, FEATURES, WIDTHS, LoadedKernel
+from mpmath import mp, mpf
 from pendula_codegen.backends.c import INTERFACE, quoted
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
@@ -18,6 +16,7 @@ from pendula_codegen.models import model_names
 from pendula_codegen.table import OF_MANY, PLAIN
 from pendula_codegen.written import DIGITS, written
 from series_error import series_error
+from sympy import Symbol, lambdify
 from test_model_kernels import LINKED, read
 
 CASES = [(name, 2 if name in LINKED else None) for name in model_names()]
@@ -61,7 +60,8 @@ def define(model, links):
     push = model.input("push", "N")
     v, w = model.rate(x), model.rate(y)
     spring = Piecewise((k * x**2 / 2, x < 0), (0, True)) + Max(0, Abs(y) - k) ** 2
-    shell = Piecewise((y**2, y < 1), (1 + log(y + 2) - log(3), True)) + Piecewise((-3 + x**2, x < 1), (-4 / sqrt(x + 3), True))
+    shell = Piecewise((y**2, y < 1), (1 + log(y + 2) - log(3), True))
+    shell += Piecewise((-3 + x**2, x < 1), (-4 / sqrt(x + 3), True))
     model.lagrangian = (v**2 + (1 + Abs(x)) * w**2) / 2 - spring - shell
     model.force(x, Min(k, Max(-k, push)) - v * Abs(v))
     model.force(y, Piecewise((sign(w), (x > 0) & (y < 2) | (v >= 1)), (exp(-w), sin(model.time) > 0), (0, True)))

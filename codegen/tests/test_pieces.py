@@ -3,6 +3,9 @@
 import random
 
 import pytest
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.model import Model
+from pendula_codegen.system_info import depends_on_time, held_expressions, is_periodic
 from sympy import (
     Abs,
     Eq,
@@ -12,7 +15,6 @@ from sympy import (
     Min,
     Ne,
     Piecewise,
-    Xor,
     asin,
     cos,
     cosh,
@@ -24,10 +26,6 @@ from sympy import (
     sqrt,
     tan,
 )
-
-from pendula_codegen.errors import GenerationError
-from pendula_codegen.model import Model
-from pendula_codegen.system_info import depends_on_time, is_periodic, held_expressions
 
 
 def plain(unit: str = "m") -> tuple[Model, Expr, Expr]:
@@ -73,9 +71,9 @@ def test_pieces_are_what_sympy_says():
             truth = float(value.subs(numbers))
             worst = max(worst, abs(value_at(model, taken[name], numbers) - truth) / max(1, abs(truth)))
     assert worst < 1e-14  # measured 2e-16
-    assert len({name for switch in model.switches for name in (switch.above.name, switch.below.name)}) == 2 * len(
-        model.switches
-    )
+    assert len(
+        {name for switch in model.switches for name in (switch.above.name, switch.below.name)}
+    ) == 2 * len(model.switches)
 
 
 def test_equal_switching_functions_are_one():
@@ -94,7 +92,9 @@ def test_derivatives_of_pieces():
     assert model.system.lagrangian.diff(x) == -10 * switch.below * x
     model.dissipation = Abs(v) ** 3
     above, below = model.switches[1].above, model.switches[1].below
-    assert [model.force_along(x).subs({v: s * 2, above: (1 + s) // 2, below: (1 - s) // 2}) for s in (1, -1)] == [-12, 12]
+    assert [
+        model.force_along(x).subs({v: s * 2, above: (1 + s) // 2, below: (1 - s) // 2}) for s in (1, -1)
+    ] == [-12, 12]
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_indicators_have_names_of_their_own():
 
 
 def test_feedback_goes_into_switching_functions():
-    model, x, v = plain()
+    model, x, _v = plain()
     push = model.input("push", "N")
     model.force(x, Max(-1, Min(1, push)))
     model.feed(push, -3 * x)
@@ -175,7 +175,7 @@ def test_feedback_goes_into_switching_functions():
 
 
 def test_time_and_turns_in_switching_functions():
-    model, x, v = plain("rad")
+    model, x, _v = plain("rad")
     model.force(x, sign(sin(x)))
     assert is_periodic(held_expressions(model), x) and not depends_on_time(model)
     model.force(x, sign(x - 1) + sign(cos(model.time)))

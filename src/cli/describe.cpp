@@ -90,7 +90,7 @@ void print_model(const Json& model) {
     return TableRow{text(each, "name"), text(each, "unit")};
   });
   print_list(model, "switches", {"steps end where it is 0"},
-             [](const Json& each) { return TableRow{each.get<std::string>()}; });
+             [](const Json& each) { return TableRow{text(each, "value")}; });
   print_list(model, "points", {"point", "columns"}, [](const Json& each) {
     return TableRow{text(each, "name"), listed(each["columns"])};
   });

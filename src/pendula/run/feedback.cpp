@@ -67,6 +67,8 @@ class HeldInputs : public Relay {
     return has_before() && time < now().time() * (1 - rounding) ? before_held_ : held_;
   }
 
+  bool depends_on_end(double h) const override { return h < next_sample() - time() && now().depends_on_end(h); }
+
   void member(MemberNumbers& numbers) override {
     numbers(held_, since_, done_, all_);
     if (held_ != made_for_) make();

@@ -1,133 +1,31 @@
+#pragma once
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <optional>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/relay.hpp>
 #include <pendula/run/switching.hpp>
-#include <pendula/system/system_model.hpp>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 namespace pendula {
 
-SystemNumbers SwitchingSystem::numbers(const Sides& sides) const {
-  SystemNumbers numbers = numbers_;
-  double* indicator = numbers.parameters.data() + numbers.parameters.size() - 2 * switches();
-  for (const int side : sides) {
-    *indicator++ = side > 0 ? 1 : 0;
-    *indicator++ = side > 0 ? 0 : 1;
-  }
-  return numbers;
-}
+inline constexpr const char* pieces_have_no_derivatives =
+    "derivatives: expected a model whose functions are of one piece, got one that switches between pieces: derivatives "
+    "of its motion jump there, and are not told";
 
-std::vector<double> SwitchingSystem::values(const Sides& sides, const Motion& motion) const {
-  SystemNumbers numbers = this->numbers(sides);
-  for (const InputSine& sine : numbers.sines) {
-    numbers.inputs[static_cast<std::size_t>(sine.input)] +=
-        sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
-  }
-  std::vector<double> found(switches());
-  table_->plain.switches({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()},
-                         motion.q.data(), motion.v.data(), found.data());
-  return found;
-}
-
-SwitchingSystem::Way SwitchingSystem::way(const Motion& motion) const {
-  constexpr std::size_t most_at_once = 8;
-  const std::size_t count = switches();
-  Sides sides(count, 1);
-  std::vector<double> found;
-  for (std::size_t pass = 0; pass <= count; ++pass) {  // one may depend on another
-    found = values(sides, motion);
-    for (std::size_t k = 0; k < count; ++k) sides[k] = found[k] < 0 ? -1 : 1;
-  }
-  // Those that are zero but for rounding: a moment ago or later they are of another size.
-  constexpr double moment = 1e-10;
-  const double soon = moment * pace(sides, motion);
-  const std::vector<double> later = values(sides, ahead(sides, motion, soon));
-  const std::vector<double> before = values(sides, ahead(sides, motion, -soon));
-  std::vector<std::size_t> open;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double change = std::max(std::abs(later[k] - found[k]), std::abs(before[k] - found[k]));
-    if (std::abs(found[k]) <= change || found[k] == 0) open.push_back(k);
-  }
-  if (open.empty()) return {sides, {}};
-  if (open.size() > most_at_once) open.resize(most_at_once);
-  const Sides first = sides;
-  std::optional<std::size_t> stuck;
-  for (unsigned turned = 0; turned < 1U << open.size(); ++turned) {
-    sides = first;
-    for (std::size_t n = 0; n < open.size(); ++n) {
-      if ((turned >> n & 1U) != 0) sides[open[n]] *= -1;
-    }
-    const auto leaves = [&](std::size_t k) { return drift(k, sides, motion) * sides[k] >= 0; };
-    const auto back = std::ranges::find_if_not(open, leaves);
-    if (back == open.end()) return {sides, {}};
-    if (!stuck) stuck = *back;
-  }
-  return {first, stuck};
-}
-
-/// The sign that g soon changes by; 0 if it does not.
-int SwitchingSystem::drift(std::size_t k, const Sides& sides, const Motion& motion) const {
-  constexpr std::array<double, 7> moments{1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4};
-  const double whole = pace(sides, motion), now = values(sides, motion)[k];
-  for (const double moment : moments) {
-    const auto change = [&](double share) {
-      return values(sides, ahead(sides, motion, share * moment * whole))[k] - now;
-    };
-    const double half = change(0.5), all = change(1);
-    // Smooth, and no mere rounding.
-    if (half * all > 0 && std::abs(all) > 1.5 * std::abs(half) && std::abs(all) < 5 * std::abs(half)) {
-      return sign_of(all);
-    }
-  }
-  return 0;
-}
-
-Motion SwitchingSystem::ahead(const Sides& sides, const Motion& motion, double time) const {
-  const std::vector<double> a = accelerations(sides, motion);
-  const Eigen::Map<const Eigen::VectorXd> rate(a.data(), motion.v.size());
-  return {motion.time + time, motion.q + time * (motion.v + time / 2 * rate), motion.v + time * rate};
-}
-
-std::vector<double> SwitchingSystem::accelerations(const Sides& sides, const Motion& motion) const {
-  SystemNumbers numbers = this->numbers(sides);
-  for (const InputSine& sine : numbers.sines) {
-    numbers.inputs[static_cast<std::size_t>(sine.input)] +=
-        sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
-  }
-  std::vector<double> found(static_cast<std::size_t>(motion.v.size()));
-  table_->of_1.acceleration({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()},
-                            motion.q.data(), motion.v.data(), found.data());
-  return found;
-}
-
-/// A time in which the motion changes  [s].
-double SwitchingSystem::pace(const Sides& sides, const Motion& motion) const {
-  const std::vector<double> a = accelerations(sides, motion);
-  double force = 0;
-  for (const double each : a) force = std::max(force, std::abs(each));
-  const double speed = motion.v.size() > 0 ? motion.v.cwiseAbs().maxCoeff() : 0;
-  return speed > 0 && force > 0 && std::isfinite(force) ? std::clamp(speed / force, 1e-3, 1e3) : 1;
-}
-
-std::vector<Sides> SwitchingSystem::all_sides() const {
-  constexpr std::size_t most = 6;
-  std::vector<Sides> all;
-  for (unsigned turned = 0; turned < 1U << std::min(switches(), most); ++turned) {
-    Sides sides(switches(), 1);
-    for (std::size_t k = 0; k < sides.size(); ++k) sides[k] = (turned >> (k % most) & 1U) != 0 ? -1 : 1;
-    all.push_back(std::move(sides));
-  }
-  return all;
-}
-
-namespace {
-
+/// Steps of a system with functions of several pieces: a step ends where one of its switching functions is zero, to
+/// rounding, and from there on a new integrator goes by other pieces. Where the motion cannot leave a zero, the next
+/// step fails.
 class SwitchingIntegrator : public Relay {
  public:
   SwitchingIntegrator(SwitchingSystem system, const RunOptions& options)
@@ -143,7 +41,8 @@ class SwitchingIntegrator : public Relay {
     const Motion motion = motion_of(time, q, v);
     choose(motion);
     switchings_ = 0;
-    limit_ = unlimited;
+    is_of_end_ = false;
+    limit_ = first_limit(motion);
     if (sides_ != made_for_) use(make());
     watch_.start(motion, sides_);
     return begin(motion);
@@ -156,8 +55,7 @@ class SwitchingIntegrator : public Relay {
     const double begin = time();
     const Member before = now().member();
     const Motion there = now().state();
-    limit_ *= 2;
-    for (double most = std::min(h, limit_);; most = limit_ = (time() - begin) / 2) {
+    for (double most = std::min(h, limit_);; most = (time() - begin) / 2) {
       if (time() != begin) now().resume(before);
       const Outcome stepped = now().step(most);
       if (!stepped) return finish(stepped);
@@ -171,9 +69,14 @@ class SwitchingIntegrator : public Relay {
         watch_.resume(there);
         continue;
       }
+      limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
+      // Where a function is zero is known to rounding, which is another in another step.
+      if (first && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
       return finish(first ? cut(before, begin, time(), *first) : stepped);
     }
   }
+
+  bool depends_on_end(double h) const override { return is_of_end_ || (is_adaptive(options_) && h <= limit_); }
 
   void remember_steps(bool wanted) override {
     Relay::remember_steps(wanted);
@@ -181,7 +84,7 @@ class SwitchingIntegrator : public Relay {
   }
 
   void member(MemberNumbers& numbers) override {
-    numbers(sides_, stuck_at_, switchings_, burst_, limit_, done_, all_, watch_);
+    numbers(sides_, stuck_at_, switchings_, burst_, limit_, is_of_end_, done_, all_, watch_);
     if (sides_ != made_for_) use(make());
     own_member(numbers);
     watch_.resume(now().state());
@@ -219,6 +122,11 @@ class SwitchingIntegrator : public Relay {
 
   Outcome stuck() const {
     return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_};
+  }
+
+  /// Steps that are chosen grow from there, so that they do not depend on where the run ends.
+  double first_limit(const Motion& motion) const {
+    return is_adaptive(options_) ? 4 * system_.pace(sides_, motion) : unlimited;
   }
 
   static double rounding_of(double time, double step) {
@@ -297,6 +205,7 @@ class SwitchingIntegrator : public Relay {
     watch_.start(motion, sides_);
     if (stuck_at_ >= 0) return stepped;
     if (sides_ == made_for_) return stepped;
+    limit_ = first_limit(motion);
     const Outcome begun = hand_over(make(), motion);
     now().remember_steps(true);
     return begun ? stepped : begun;
@@ -316,6 +225,7 @@ class SwitchingIntegrator : public Relay {
   }
 
   static constexpr int most_tries = 40;
+  static constexpr double growth = 8;  // of chosen steps, from one to the next
   static constexpr double longest_ = 1e-3;  // s
   static constexpr std::size_t points = 17;
   static constexpr double unlimited = std::numeric_limits<double>::infinity();
@@ -326,14 +236,9 @@ class SwitchingIntegrator : public Relay {
   int stuck_at_ = -1;  // a switching function that the motion cannot leave; −1: none
   std::int64_t switchings_ = 0;
   double limit_ = unlimited;  // of the next step  [s]
+  bool is_of_end_ = false;    // whether the end of the run has affected the state
   double burst_ = 0;  // when the last hundred of them began
   EventWatch watch_;
 };
-
-}  // namespace
-
-std::unique_ptr<PlainIntegrator> make_switching_integrator(const SwitchingSystem& system, const RunOptions& options) {
-  return std::make_unique<SwitchingIntegrator>(system, options);
-}
 
 }  // namespace pendula
