@@ -359,7 +359,7 @@ class Model:
         names = f"above_{number}", f"below_{number}"
         for name in names:
             self._declare(name, "the indicator of a switching function")
-        above, below = (Symbol(name, real=True, nonnegative=True) for name in names)
+        above, below = (Symbol(name, real=True) for name in names)
         return above, below
 
     def _declare(self, name: str, what: str) -> Symbol:

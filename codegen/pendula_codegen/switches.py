@@ -132,6 +132,8 @@ class Switches:
         def of(expression: Expr) -> Expr:
             return self._replaced(expression, known, fixed)
 
+        if _has_gaps(part):
+            part = _of_each_piece(part)
         if isinstance(part, Piecewise):
             return self._chosen(part, of, fixed)
         args = [of(argument) for argument in part.args]
@@ -158,7 +160,7 @@ class Switches:
             here = left & self._condition(condition, of)
             piece = of(value)
             if here != TRUE:
-                piece = _guarded(piece, here, fixed)
+                piece = _guarded(piece, here, fixed, [switch.value for switch in self.all])
             terms.append(_times(here.yes, piece))
             left = left & ~self._condition(condition, of)
             if condition == True:  # noqa: E712  SymPy's
@@ -204,18 +206,48 @@ class Switches:
         return ~above if is_negative else above
 
 
+def _has_gaps(part: Expr) -> bool:
+    """Whether it is taken of one of several pieces, and has no values, or no derivatives, of some numbers."""
+    of_pieces = isinstance(part.args[0], (Abs, Min, Max, Piecewise))
+    return of_pieces and (_is_root(part) or isinstance(part, (log, asin, acos)))
+
+
+def _is_root(part: Expr) -> bool:
+    return part.is_Pow and not (part.exp.is_Integer and part.exp > 0)
+
+
+def _of_each_piece(part: Expr) -> Piecewise:
+    """A function of pieces as pieces."""
+    inner, more = part.args[0], part.args[1:]
+    if isinstance(inner, Abs):
+        pieces = [(inner.args[0], inner.args[0] > 0), (-inner.args[0], True)]
+    elif isinstance(inner, (Min, Max)):
+        first, *others = inner.args
+        other = inner.func(*others)
+        pieces = [(first, first > other if isinstance(inner, Max) else first < other), (other, True)]
+    else:
+        pieces = inner.args
+    return Piecewise(*((part.func(value, *more), condition) for value, condition in pieces))
+
+
 def _times(indicator: Expr, value: Expr) -> Expr:
     """Not multiplied out: SymPy would do that to a number times a sum."""
     return Mul(indicator, value)
 
 
-def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol]) -> Expr:
-    """The same where it is taken, and finite where it is not."""
+def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol], zeros: Sequence[Expr]) -> Expr:
+    """The same where it is taken, and finite where it is not.
+
+    Roots of a switching function go on beyond its zero, as those of its size: a step has to come there to find it.
+    """
     if not piece.args or not piece.free_symbols - set(fixed):
         return piece
-    args = [_guarded(argument, here, fixed) for argument in piece.args]
-    if piece.is_Pow and not (piece.exp.is_Integer and piece.exp > 0):
+    args = [_guarded(argument, here, fixed, zeros) for argument in piece.args]
+    if _is_root(piece):
         base, power = args
+        size = base.as_content_primitive()[1]
+        if piece.exp.is_Rational and piece.exp.q != 1 and (size in zeros or -size in zeros):
+            return (here.yes * base**2 + here.no) ** (power / 2)
         base = base if piece.base.is_positive else here.yes * base + here.no
         return base ** (power if piece.exp.is_number else here.yes * power)
     if isinstance(piece, log):

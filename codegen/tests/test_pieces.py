@@ -15,6 +15,7 @@ from sympy import (
     Min,
     Ne,
     Piecewise,
+    Rational,
     asin,
     cos,
     cosh,
@@ -61,6 +62,7 @@ def test_pieces_are_what_sympy_says():
         "no values": Piecewise((log(x), x > 1), (sqrt(-x) + 1 / x, x < -0.5), (asin(x / 2), True)),
         "too large": Piecewise((exp(800 * x), x < 0), (cosh(800 * y), y**2 < 0.01), (tan(x), True)),
         "a root": sqrt(x**2) + Max(0, x) ** 3,
+        "roots of pieces": Max(0, x, y) ** Rational(5, 2) + sqrt(Abs(x)) + log(Max(1, y)) + Abs(y) ** -0.5,
     }
     taken = {name: model._expression(value, "said") for name, value in said.items()}
     draw = random.Random(1)

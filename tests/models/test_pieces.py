@@ -296,7 +296,7 @@ def test_ensembles_move_them_one_by_one(pendula, tmp_path):
     ended = pendula("ensemble", scenario, "-o", tmp_path / "many.h5", "--json")
     assert ended.returncode == 0, ended.stderr
     with h5py.File(tmp_path / "many.h5") as file:
-        found = file["final_x"][:]
+        found = file["x"][:]
     for x, start in zip(found, (0.5, 1.0, 1.5, 2.0), strict=True):
         assert x == pytest.approx(ball(3, start)[0], abs=1e-8)
 
