@@ -111,8 +111,8 @@ def ball(time: float, height: float = 1.0, k: float = 1000.0, g: float = 9.81) -
     return -a + a * math.cos(s) - b * math.sin(s), -a * w * math.sin(s) - b * w * math.cos(s)
 
 
-# Measured 1.8e-15, 7e-12, 2.3e-10, 1.2e-13 (rk4: 4000 steps), 4e-9, 7e-10, 5e-11, 2e-12
-BALL_BOUNDS = dict(zip(METHODS, (1e-12, 1e-10, 3e-9, 1e-8, 3e-8, 1e-8, 1e-9, 1e-10), strict=True))
+# Measured 5.3e-14, 4.5e-12, 1.5e-10, 2e-11 (by constant steps), 2.5e-9, 4.5e-10, 2.9e-11, 1.2e-12
+BALL_BOUNDS = dict(zip(METHODS, (1e-12, 5e-11, 2e-9, 2e-10, 2e-8, 5e-9, 3e-10, 2e-11), strict=True))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -135,7 +135,7 @@ def test_constant_steps_keep_their_order(method, stages, order, move):
 
     first = 2e-2 if stages == 3 else 5e-3
     slopes = math.log2(error(first) / error(first / 4)) / 2
-    assert slopes > order - 0.35
+    assert slopes > order - 0.2  # measured 2.00, 3.96, 5.97, 2.97, 5.5
 
 
 @pytest.mark.parametrize("method", CHOSEN)
@@ -148,7 +148,7 @@ def test_drag_that_grows_with_the_square_of_the_speed(method, move):
     top, down = -math.log(math.cos(a)) / c, time - up
     x, v = top - math.log(math.cosh(g * down / w)) / c, -w * math.tanh(g * down / w)
     summary = move(DRAG, {"x": 0.0, "x_dot": fast}, time, run__method=f'"{method}"')
-    assert off(summary, x, v) < BALL_BOUNDS[method]
+    assert off(summary, x, v) < BALL_BOUNDS[method]  # measured 2.3e-15 to 3.1e-11
 
 
 @pytest.mark.parametrize("method", CHOSEN)
@@ -160,8 +160,8 @@ def test_dry_friction_until_it_holds(method, move, tmp_path):
     )
     assert summary["outcome"]["status"] == "stuck_at_switch"
     assert STUCK in summary["outcome"]["message"]
-    assert summary["outcome"]["t"] == pytest.approx(8 * math.pi, abs=1e-9)  # measured 3e-11
-    assert off(summary, 5 - 16 * 0.3, 0) < 3e-9  # measured 1e-10
+    assert summary["outcome"]["t"] == pytest.approx(8 * math.pi, abs=1e-9)  # measured 4e-11
+    assert off(summary, 5 - 16 * 0.3, 0) < 2e-9  # measured 1.1e-10
     assert len(rows.read_text().splitlines()) == 1 + 51  # rows until then are kept
     assert summary["energy_final"] == pytest.approx(0.02, abs=1e-9)
 
@@ -188,7 +188,9 @@ def test_a_mass_that_sticks_at_the_start_is_not_moved(move):
 def test_a_belt_that_is_never_as_fast_as_the_mass(method, move):
     """Friction is constant then: swings about mu."""
     summary = move(FRICTION, {"x": 1.0}, 20, system__parameters__belt=2.0, run__method=f'"{method}"')
-    assert off(summary, 0.3 + 0.7 * math.cos(20), -0.7 * math.sin(20)) < BALL_BOUNDS[method]
+    assert (
+        off(summary, 0.3 + 0.7 * math.cos(20), -0.7 * math.sin(20)) < BALL_BOUNDS[method]
+    )  # measured 3e-15 to 3e-11
 
 
 @pytest.mark.parametrize("w", [7.0, 50.0, 400.0])
@@ -202,7 +204,7 @@ def test_a_square_wave_is_not_stepped_over(method, w, move):
         if until == 10:
             break
     summary = move(WAVE, {"x": 1.0}, 10, system__parameters__w=w, run__method=f'"{method}"')
-    assert off(summary, x, v) < BALL_BOUNDS[method]
+    assert off(summary, x, v) < BALL_BOUNDS[method]  # measured 4e-15 to 1.2e-11
 
 
 @pytest.mark.parametrize("depth", [1e-2, 1e-5, 1e-8])
@@ -215,8 +217,32 @@ def test_what_is_crossed_twice_in_a_step_is_seen(method, depth, move):
     down = 2 - there - within
     x, v = 1 - inside * down - 5 * down**2, -inside - 10 * down
     summary = move(LAYER, {"x": 0.0, "x_dot": fast}, 2, run__method=f'"{method}"')
-    assert off(summary, x, v) < 1e-7  # a wrong answer is off by 18 inside/10: 1e-3 at the smallest depth
-    assert within / 2 > 1e-6
+    assert off(summary, x, v) < 1e-10  # measured 8.6e-12; where it is missed 8e-4
+
+
+HERTZ = '''"""A ball on an elastic floor."""
+from sympy import Max, Rational
+
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    model.lagrangian = model.rate(x) ** 2 / 2 - 9.81 * x - 1000 * Max(0, -x) ** Rational(5, 2)
+'''
+
+
+@pytest.mark.parametrize("method", ["gauss", "dopri5", "fehlberg78", "bulirsch-stoer", "auto"])
+def test_roots_of_what_switches_lose_digits_and_nothing_else(method, move):
+    def fall(_, state):
+        return [state[1], -9.81 + 2500 * max(0, -state[0]) ** 1.5]
+
+    truth = solve_ivp(fall, (0, 3), [1, 0], method="DOP853", rtol=1e-13, atol=1e-13, max_step=1e-3).y[:, -1]
+    summary = move(HERTZ, {"x": 1.0}, 3, run__method=f'"{method}"')
+    assert off(summary, *truth) < 1e-6
+
+
+def test_series_of_such_roots_end_with_a_failure(move):
+    summary = move(HERTZ, {"x": 1.0}, 10, code=1, run__method='"taylor"')
+    assert summary["outcome"]["status"] == "tolerance_not_met"
 
 
 @pytest.mark.parametrize("by", ["compiler", "interpreter"])
@@ -227,7 +253,7 @@ def test_all_ways_to_run_a_kernel(by, move, pendula, tmp_path):
     )
     ended = pendula("simulate", tmp_path / "by.toml", "--json", PENDULA_KERNELS_BY=by)
     assert ended.returncode == 0, ended.stderr
-    assert off(json.loads(ended.stdout), *ball(3)) < 1e-11
+    assert off(json.loads(ended.stdout), *ball(3)) < 1e-13  # measured 6.8e-15
 
 
 @pytest.mark.parametrize("method", ["gauss", "taylor", "dopri5"])
@@ -385,4 +411,4 @@ def test_random_models_as_another_integrator_moves_them(seed, move):
         final = move(model, names, 6.0, run__method=f'"{method}"')["final"]
         found = np.array([*final["q"].values(), *final["v"].values()])
         error = np.abs(found - truth).max()
-        assert error < 1e-7, (method, error)  # measured
+        assert error < 2e-8, (method, error)  # measured 2.2e-9
