@@ -51,7 +51,7 @@ def test_a_simulation_ends_its_steps_where_pieces_do():
     for one in (ball, copy):
         for _ in range(10):
             one.step(PERIOD / 4, lift=0.0)
-        assert one.state["x"] == pytest.approx(1, abs=1e-9)
+        assert one["x"] == pytest.approx(1, abs=1e-9)
 
 
 def test_what_holds_it_is_told():
