@@ -36,7 +36,7 @@ def test_the_commands_do_what_the_page_says(folder, pendula):
 
 def test_a_model_of_several_pieces(folder, pendula):
     told = json.loads(pendula("describe", "load.py", "--json", cwd=folder).stdout)
-    assert [switch["value"] for switch in told["switches"]] == ["2*y - 1", "y", "y_dot"]
+    assert [switch["value"] for switch in told["switches"]] == ["y", "2*y - 1", "y_dot"]
     (folder / "load.toml").write_text(
         '[system]\nmodel = "load.py"\n[start]\ny = 2.0\n[run]\nduration = 5.0\n'
     )

@@ -104,9 +104,8 @@ class SwitchingIntegrator : public Relay {
   std::unique_ptr<Integrator> make() {
     made_for_ = sides_;
     const SystemNumbers numbers = system_.numbers(sides_);
-    return std::make_unique<Integrator>(
-        library().make_system_integrator(system_.table(), numbers.plain(), options_, 0),
-        static_cast<Eigen::Index>(system_.table().info.coordinates.size()), "system");
+    return std::make_unique<Integrator>(library().make_system_integrator(system_.table(), numbers.plain(), options_, 0),
+                                        static_cast<Eigen::Index>(system_.table().info.coordinates.size()), "system");
   }
 
   void choose(const Motion& motion) {
@@ -120,9 +119,7 @@ class SwitchingIntegrator : public Relay {
     return outcome;
   }
 
-  Outcome stuck() const {
-    return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_};
-  }
+  Outcome stuck() const { return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_}; }
 
   /// Steps that are chosen grow from there, so that they do not depend on where the run ends.
   double first_limit(const Motion& motion) const {
@@ -136,7 +133,7 @@ class SwitchingIntegrator : public Relay {
   /// Whether a polynomial follows each switching function through the last step: else it might come by zero unseen, as
   /// one that holds a fast sine does in the long steps of a slow motion.
   bool is_resolved(double begin) {
-    constexpr double near = 0.02;                            // of the variation
+    constexpr double near = 0.02;                                            // of the variation
     constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // where nobody looks
     const auto glance = [&](double u) {
       return system_.values(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
@@ -225,7 +222,7 @@ class SwitchingIntegrator : public Relay {
   }
 
   static constexpr int most_tries = 40;
-  static constexpr double growth = 8;  // of chosen steps, from one to the next
+  static constexpr double growth = 8;       // of chosen steps, from one to the next
   static constexpr double longest_ = 1e-3;  // s
   static constexpr std::size_t points = 17;
   static constexpr double unlimited = std::numeric_limits<double>::infinity();
@@ -237,7 +234,7 @@ class SwitchingIntegrator : public Relay {
   std::int64_t switchings_ = 0;
   double limit_ = unlimited;  // of the next step  [s]
   bool is_of_end_ = false;    // whether the end of the run has affected the state
-  double burst_ = 0;  // when the last hundred of them began
+  double burst_ = 0;          // when the last hundred of them began
   EventWatch watch_;
 };
 
