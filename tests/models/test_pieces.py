@@ -184,6 +184,28 @@ def test_a_mass_that_sticks_at_the_start_is_not_moved(move):
     assert (summary["outcome"]["t"], *at_end(summary)) == (0, 0.2, 0)
 
 
+ENDLESS = '''"""A mass between two slopes, with dry friction."""
+from sympy import sign
+
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    v = model.rate(x)
+    model.lagrangian = v**2 / 2
+    model.force(x, -sign(x) - sign(v) / 2)
+'''
+
+
+@pytest.mark.parametrize("method", CHOSEN)
+def test_switchings_without_end_end(method, move):
+    """Each swing is a third of the one before, and takes less time by the root of that: at rest after 6.309 s."""
+    summary = move(ENDLESS, {"x": 1.0}, 40, code=1, run__method=f'"{method}"')
+    # Steps of radau fail before.
+    assert summary["outcome"]["status"] == ("tolerance_not_met" if method == "radau" else "stuck_at_switch")
+    assert summary["outcome"]["t"] == pytest.approx((2 + 2 / 3) / (1 - math.sqrt(1 / 3)), abs=1e-6)
+    assert summary["steps"] < 20000
+
+
 @pytest.mark.parametrize("method", CHOSEN)
 def test_a_belt_that_is_never_as_fast_as_the_mass(method, move):
     """Friction is constant then: swings about mu."""
