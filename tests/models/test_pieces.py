@@ -202,7 +202,7 @@ def test_switchings_without_end_end(method, move):
     summary = move(ENDLESS, {"x": 1.0}, 40, code=1, run__method=f'"{method}"')
     # Steps of radau fail before.
     assert summary["outcome"]["status"] == ("tolerance_not_met" if method == "radau" else "stuck_at_switch")
-    assert summary["outcome"]["t"] == pytest.approx((2 + 2 / 3) / (1 - math.sqrt(1 / 3)), abs=1e-6)
+    assert summary["outcome"]["t"] == pytest.approx((2 + 2 / 3) / (1 - math.sqrt(1 / 3)), abs=1e-4)
     assert summary["steps"] < 20000
 
 
