@@ -21,7 +21,10 @@ from sympy import (
 
 TRIGONOMETRIC = (sin, cos)
 FUNCTIONS: tuple[type[Function], ...] = (acos, asin, atan, cosh, exp, log, sinh, tan, tanh)
-LANGUAGE = "+ − * / powers roots exp log and the functions sin cos tan asin acos atan sinh cosh tanh"
+LANGUAGE = (
+    "+ − * / powers roots exp log and the functions sin cos tan asin acos atan sinh cosh tanh; "
+    "Abs sign Min Max Heaviside and Piecewise in models"
+)
 MOST_FACTORS = 64  # of a power, which is a product of as many
 MOST_DIGITS = 300  # of a number before or after the point
 

@@ -29,6 +29,7 @@ from pendula_codegen.exact import exact
 from pendula_codegen.language import refusal
 from pendula_codegen.mechanics import LagrangianSystem, jacobian, momenta
 from pendula_codegen.simplify import shortest
+from pendula_codegen.switches import Switch, Switches, UnknownPieceError, jump
 
 MAX_LINKS = 64  # a slip of the keyboard should not be derived for ever
 
@@ -104,6 +105,10 @@ class Model:
     _lagrangian: _Said | None = None
     _dissipation: _Said | None = None
     _names: dict[str, str] = field(default_factory=dict)  # name -> what it is
+    _switches: Switches | None = None
+
+    def __post_init__(self) -> None:
+        self._switches = Switches(self._new_indicators)
 
     def __setattr__(self, name: str, value: object) -> None:
         known = name in type(self).__dataclass_fields__ or isinstance(
@@ -215,6 +220,7 @@ class Model:
     def feed(self, to: Symbol, value: Expr) -> None:
         """Adds a value to an input wherever forces hold it."""
         fed = to + self._expression(value, "feedback")
+        self._switches.substitute({to: fed})
         self._forces[:] = [
             (along, _Said(said.value.xreplace({to: fed}), said.where)) for along, said in self._forces
         ]
@@ -222,8 +228,22 @@ class Model:
 
     @property
     def ordered_parameters(self) -> list[Parameter]:
-        """Parameters in the order of the kernel: those of links first."""
-        return sorted(self.parameters, key=lambda parameter: not parameter.per_link)
+        """Parameters in the order of the kernel: those of links first, indicators last."""
+        return [*sorted(self.parameters, key=lambda parameter: not parameter.per_link), *self.indicators]
+
+    @property
+    def switches(self) -> list[Switch]:
+        """What decides between pieces of functions."""
+        return self._switches.all
+
+    @property
+    def indicators(self) -> list[Parameter]:
+        """Parameters that who moves the system gives: of each switching function g, 1 where g > 0, and where g < 0."""
+        return [
+            Parameter(symbol.name, "1", (symbol,), standard, positive=False, per_link=False)
+            for switch in self.switches
+            for symbol, standard in ((switch.above, 1.0), (switch.below, 0.0))
+        ]
 
     @cached_property
     def system(self) -> LagrangianSystem:
@@ -239,7 +259,7 @@ class Model:
             name=self.name,
             coordinates=tuple(c.symbol for c in self.coordinates),
             velocities=self._rates(),
-            parameters=tuple(symbol for p in self.parameters for symbol in p.symbols),
+            parameters=tuple(symbol for p in (*self.parameters, *self.indicators) for symbol in p.symbols),
             inputs=tuple(i.symbol for i in self.inputs),
             lagrangian=shortest(self._lagrangian.value, angles, self._rates()),
             forces=tuple(self._shortest_force(c.symbol, angles) for c in self.coordinates),
@@ -264,13 +284,19 @@ class Model:
         return shortest(self.force_along(q), angles, self._rates())
 
     def _check_lagrangian(self, said: _Said) -> None:
-        inputs = {i.symbol for i in self.inputs} & said.value.free_symbols
+        inputs = {i.symbol for i in self.inputs} & self._switches.behind(said.value)
         if inputs:
             name = min(symbol.name for symbol in inputs)
             raise GenerationError(
                 f"{said.where}: lagrangian: the input {name} may stand in forces only: model.force(q, {name})"
             )
         self._check(said.value, "lagrangian", (*self._positions(), *self._rates(), self.time), said.where)
+        for switch in self._switches.held_by(said.value):
+            if jump(said.value, switch, self.switches, self._rates()):
+                raise GenerationError(
+                    f"{said.where}: lagrangian: it or a momentum jumps where {switch.value} = 0, which would be a "
+                    "blow: expected pieces that meet"
+                )
 
     def _check_kinetic(self, system: LagrangianSystem, where: str) -> None:
         rates = set(system.velocities)
@@ -303,13 +329,19 @@ class Model:
         if not isinstance(value, (Real, Expr)) or isinstance(value, bool):
             self._fail(f"{what}: expected a SymPy expression, got {type(value).__name__} {value!r}")
         expression = exact(sympify(value))
+        try:
+            expression = self._switches.without_pieces(
+                expression, {s for p in self.parameters for s in p.symbols}
+            )
+        except UnknownPieceError as error:
+            self._fail(f"{what}: {error}")
         refused = refusal(expression)
         if refused is not None:
             self._fail(f"{what}: {refused}")
         return expression
 
     def _check(self, value: Expr, what: str, known: Sequence[Symbol], where: str | None = None) -> None:
-        strangers = sorted(value.free_symbols - set(known), key=lambda symbol: symbol.name)
+        strangers = sorted(self._switches.behind(value) - set(known), key=lambda symbol: symbol.name)
         if not strangers:
             return
         symbol = strangers[0]
@@ -322,6 +354,13 @@ class Model:
         else:
             why = f"a symbol '{symbol}' that is not the model's own, {what_it_is}"
         raise GenerationError(f"{where or self._line()}: {what} holds {why}")
+
+    def _new_indicators(self, number: int) -> tuple[Symbol, Symbol]:
+        names = f"above_{number}", f"below_{number}"
+        for name in names:
+            self._declare(name, "the indicator of a switching function")
+        above, below = (Symbol(name, real=True) for name in names)
+        return above, below
 
     def _declare(self, name: str, what: str) -> Symbol:
         self._name(name)

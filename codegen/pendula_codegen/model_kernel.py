@@ -39,13 +39,19 @@ class ModelKernel(SystemKernel):
         return Matrix(components), Matrix(rates)
 
     def functions(self) -> list[EntryPoint]:
-        if not self.call_arguments:
-            return super().functions()
-        values = Matrix([value for value, _ in self.call_arguments])
-        found = Output("found", "arguments", values, f"arguments, ({values.rows})")
-        title = "What functions are taken of that change within a short time where it changes little"
         read = (self.parameters, Q, V, self.inputs)
-        return [*super().functions(), EntryPoint("call_arguments", title, read, (found,))]
+        functions = super().functions()
+        if self.call_arguments:
+            values = Matrix([value for value, _ in self.call_arguments])
+            found = Output("found", "arguments", values, f"arguments, ({values.rows})")
+            title = "What functions are taken of that change within a short time where it changes little"
+            functions.append(EntryPoint("call_arguments", title, read, (found,)))
+        if self.model.switches:
+            values = Matrix([switch.value for switch in self.model.switches])
+            found = Output("g", "switches", values, f"switching functions, ({values.rows})")
+            title = "Switching functions, in whose zeros above_k and below_k change"
+            functions.append(EntryPoint("switches", title, read, (found,)))
+        return functions
 
     @cached_property
     def call_arguments(self) -> list[tuple[Expr, bool]]:
@@ -67,7 +73,7 @@ class ModelKernel(SystemKernel):
     def leaves(self) -> list[Leaf]:
         parameters = [
             Leaf(symbol, Place("parameters", parameter.name, (i,) if parameter.per_link else ()), "parameter")
-            for parameter in self.model.parameters
+            for parameter in (*self.model.parameters, *self.model.indicators)
             for i, symbol in enumerate(parameter.symbols)
         ]
         time = Leaf(self.model.time, Place("parameters", "time"), "parameter")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
 import jinja2
-from sympy import Symbol
+from sympy import Expr, Symbol
 
 from pendula_codegen import __version__
 from pendula_codegen.backends import cpp
@@ -26,7 +26,7 @@ from pendula_codegen.link import LinkKernel
 from pendula_codegen.links import find_link
 from pendula_codegen.model import Coordinate, Input, Model, Parameter
 from pendula_codegen.model_kernel import ModelKernel
-from pendula_codegen.system_info import depends_on_time, has_constant_masses, is_periodic
+from pendula_codegen.system_info import depends_on_time, has_constant_masses, held_expressions, is_periodic
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
 
 PACKAGE = Path(__file__).parent
@@ -137,6 +137,8 @@ class Words:
     fields    of the structure Parameters
     number    what that calls the type of a number
     bases     of what functions are taken of, whether it is a base
+    switches  what decides between pieces of functions
+    held      what moves it
     alias     a further name of the structure
     own       names that somebody else has chosen, and that stand in the header as they are
     """
@@ -157,6 +159,8 @@ class Words:
     has_hamiltonian: bool = False
     number: str = "Real"
     bases: list[bool] = field(default_factory=list)
+    switches: list[str] = field(default_factory=list)
+    held: list[Expr] = field(default_factory=list)
     alias: str = ""
     own: list[str] = field(default_factory=list)
 
@@ -224,6 +228,7 @@ def render_chain(kernel: ChainKernel) -> Header:
         },
         fields=["LinkVector<Real> masses, lengths, damping;", "Real gravity;"],
         has_hamiltonian=True,
+        held=[kernel.system.lagrangian, *kernel.system.forces],
     )
     return _render(kernel, words)
 
@@ -236,6 +241,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
     names = [c.symbol.name for c in model.coordinates]
     holds_time = depends_on_time(model)
     bases = [is_base for _, is_base in kernel.call_arguments]
+    switches = [str(switch.value) for switch in model.switches]
     words = Words(
         name=model.name,
         model=Path(model.file).stem,
@@ -255,6 +261,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
             f"  q, v, a     coordinates, rates, accelerations, ({len(names)}): {', '.join(names)}",
             f"  p           momenta conjugate to q, ({len(names)})",
             f"  inputs      at the time in question, ({inputs})",
+            *_about_switches(switches),
         ],
         sizes={"links": model.links, "coordinates": len(names), "point_components": points},
         coordinates=model.coordinates,
@@ -265,19 +272,33 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
             "Points": cpp.matrix("point_components", 1),
             "Inputs": cpp.matrix(inputs, 1),
             **({"Arguments": cpp.matrix(len(bases), 1)} if bases else {}),
+            **({"Switches": cpp.matrix(len(switches), 1)} if switches else {}),
         },
         fields=[cpp.parameter_field(parameter) for parameter in ordered],
         holds_time=holds_time,
         number="_real",
         bases=bases,
+        switches=switches,
+        held=held_expressions(model),
         alias=alias,
         own=[parameter.name for parameter in ordered] + [alias] * bool(alias),
     )
     return _render(kernel, words)
 
 
+def _about_switches(switches: Sequence[str]) -> list[str]:
+    if not switches:
+        return []
+    return [
+        "",
+        "Functions of several pieces: above_k is 1 and below_k 0 where the switching function k is > 0, else the other",
+        "way round. A step has to end where one of them is 0, and the next one to begin with the other numbers:",
+        *(f"  {k}  {switch}" for k, switch in enumerate(switches, start=1)),
+    ]
+
+
 def _render(kernel: SystemKernel, words: Words) -> Header:
-    periodic = [c.is_angle and is_periodic(kernel.system, c.symbol) for c in words.coordinates]
+    periodic = [c.is_angle and is_periodic(words.held, c.symbol) for c in words.coordinates]
     functions = [cpp.render_function(kernel, function) for function in kernel.functions()]
     tapes = kernel_series(kernel)
     if tapes is not None:
@@ -294,6 +315,7 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
                 has_constant_masses(kernel),
                 periodic,
                 words.bases,
+                words.switches,
             ),
             *(series_constants(tapes) if tapes is not None else []),
         ],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from sympy import Symbol, expand, pi
+from sympy import Expr, Symbol, expand, pi
 
 from pendula_codegen.entry_points import SystemKernel
-from pendula_codegen.mechanics import LagrangianSystem
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.series_tape import SeriesTapes
@@ -24,7 +24,7 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
         ("constant_masses", has_constant_masses(kernel)),
     ]
     for c in model.coordinates:
-        periodic = c.is_angle and is_periodic(model.system, c.symbol)
+        periodic = c.is_angle and is_periodic(held_expressions(model), c.symbol)
         rows.append(("coordinate", c.symbol.name, c.unit, c.is_angle, periodic))
     for p in model.ordered_parameters:
         standard = "nan" if p.default is None else repr(p.default)
@@ -32,6 +32,7 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
     rows += [("input", i.symbol.name, i.unit) for i in model.inputs]
     rows += [("point", p.name, len(p.components)) for p in model.points]
     rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
+    rows += [("switch", switch.value) for switch in model.switches]
     series = tapes.series
     rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
     return [
@@ -39,10 +40,15 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
     ]
 
 
-def is_periodic(system: LagrangianSystem, coordinate: Symbol) -> bool:
+def is_periodic(held: Sequence[Expr], coordinate: Symbol) -> bool:
     """Whether the motion is the same a full turn further: of an angle that nothing winds up."""
     turned = {coordinate: coordinate + 2 * pi}
-    return all(expression.subs(turned) == expression for expression in (system.lagrangian, *system.forces))
+    return all(expression.subs(turned) == expression for expression in held)
+
+
+def held_expressions(model: Model) -> list[Expr]:
+    """What moves it."""
+    return [model.system.lagrangian, *model.system.forces, *(switch.value for switch in model.switches)]
 
 
 def has_constant_masses(kernel: SystemKernel) -> bool:
@@ -53,6 +59,5 @@ def has_constant_masses(kernel: SystemKernel) -> bool:
 
 
 def depends_on_time(model: Model) -> bool:
-    system = model.system
-    held = [system.lagrangian, *system.forces, *(c for p in model.points for c in p.components)]
+    held = [*held_expressions(model), *(c for p in model.points for c in p.components)]
     return any(expression.has(model.time) for expression in held)

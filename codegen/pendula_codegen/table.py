@@ -34,7 +34,7 @@ OF_MANY = (
     "momentum_form_along",
     "call_arguments",
 )
-PLAIN = ("residual", "positions", "velocities")
+PLAIN = ("residual", "positions", "velocities", "switches")
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,8 @@
 import math
 import random
 
-from mpmath import mp, mpf
-
 from loaded import LoadedKernel
+from mpmath import mp, mpf
 from pendula_codegen.written import DIGITS
 from series_truth import Decimals, by_tapes
 

@@ -6,11 +6,9 @@ import re
 
 import mpmath
 import pytest
-from mpmath import mp, mpf
-from sympy import Symbol, lambdify
-
 from conftest import REPOSITORY
 from loaded import COMPILERS, FEATURES, WIDTHS, LoadedKernel
+from mpmath import mp, mpf
 from pendula_codegen.backends.c import INTERFACE, quoted
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
@@ -18,6 +16,7 @@ from pendula_codegen.models import model_names
 from pendula_codegen.table import OF_MANY, PLAIN
 from pendula_codegen.written import DIGITS, written
 from series_error import series_error
+from sympy import Symbol, lambdify
 from test_model_kernels import LINKED, read
 
 CASES = [(name, 2 if name in LINKED else None) for name in model_names()]
@@ -49,6 +48,24 @@ def define(model, links):
     model.force(theta, w + u * y)
     model.point("p", (x, y))
     model.point("r", (x + sin(theta), y, cos(theta) * t))
+"""
+# Functions of several pieces, one in another, and one whose pieces have no values elsewhere.
+PIECES = """
+from sympy import *
+
+
+def define(model, links):
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    k = model.parameter("k", "N/m", default=3.0, positive=True)
+    push = model.input("push", "N")
+    v, w = model.rate(x), model.rate(y)
+    spring = Piecewise((k * x**2 / 2, x < 0), (0, True)) + Max(0, Abs(y) - k) ** 2
+    shell = Piecewise((y**2, y < 1), (1 + log(y + 2) - log(3), True))
+    shell += Piecewise((-3 + x**2, x < 1), (-4 / sqrt(x + 3), True))
+    model.lagrangian = (v**2 + (1 + Abs(x)) * w**2) / 2 - spring - shell
+    model.force(x, Min(k, Max(-k, push)) - v * Abs(v))
+    model.force(y, Piecewise((sign(w), (x > 0) & (y < 2) | (v >= 1)), (exp(-w), sin(model.time) > 0), (0, True)))
+    model.point("p", (x, Abs(y)))
 """
 # More coordinates than linear systems are written out for.
 MANY = """
@@ -162,6 +179,8 @@ class Truth:
                 return {"dp": slope["p"], "df": slope["f"]}
             case "call_arguments":
                 return {"found": self._values("arguments", self._arguments, at)}
+            case "switches":
+                return {"g": self._values("switches", [s.value for s in self.model.switches], at)}
             case "positions":
                 return {"r": said("positions", at)}
             case "velocities":
@@ -239,6 +258,14 @@ def test_every_function_of_models_with_any_instructions(compiler, march, tmp_pat
     loaded, truth = LoadedKernel(model, tmp_path, compiler, march), Truth(model)
     assert max(error(loaded, truth, width, 10 + width) for width in WIDTHS) < 1e-14  # measured 1.3e-15
     assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-13  # measured 6.9e-16
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_functions_of_several_pieces(compiler, tmp_path):
+    model = own(PIECES, "pieces", tmp_path)
+    loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
+    assert max(error(loaded, truth, width, 20 + width) for width in WIDTHS) < 1e-14  # measured 8.9e-16
+    assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-13  # measured 4.9e-15
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)

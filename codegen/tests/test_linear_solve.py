@@ -4,7 +4,6 @@ import random
 import re
 
 import pytest
-
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 
 

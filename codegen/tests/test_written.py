@@ -8,6 +8,15 @@ import random
 
 import pytest
 from mpmath import mp, mpf
+from pendula_codegen.comparison import Start, points
+from pendula_codegen.exact import exact
+from pendula_codegen.language import refusal
+from pendula_codegen.model import Model
+from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.places import Place
+from pendula_codegen.program import Program, shortest_program
+from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
+from pendula_codegen.written import DIGITS, Evaluator, Measured, NotInRangeError, written
 from sympy import (
     Add,
     Expr,
@@ -35,16 +44,6 @@ from sympy import (
     tanh,
     zoo,
 )
-
-from pendula_codegen.comparison import Start, points
-from pendula_codegen.exact import exact
-from pendula_codegen.language import refusal
-from pendula_codegen.model import Model
-from pendula_codegen.model_kernel import ModelKernel
-from pendula_codegen.places import Place
-from pendula_codegen.program import Program, shortest_program
-from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
-from pendula_codegen.written import DIGITS, Evaluator, Measured, NotInRangeError, written
 from test_model_kernels import CASES, random_model, read
 from test_straight_line import evaluate
 
@@ -251,6 +250,7 @@ def functions_of(model: Model) -> list[tuple[str, Program, list[Expr]]]:
         **{"E": said.residual, "E_D_q": said.residual_q, "E_D_v": said.residual_v, "E_D_a": said.mass},
         **{"r": said.positions, "r_dot": said.velocities},
         "found": [value for value, _ in kernel.call_arguments],
+        "g": [switch.value for switch in model.switches],
     }
     right = {
         "v": [p - rest for p, rest in zip(kernel.momentum_symbols, said.momenta_at_rest, strict=True)],

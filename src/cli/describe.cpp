@@ -89,6 +89,8 @@ void print_model(const Json& model) {
   print_list(model, "inputs", {"input", "unit"}, [](const Json& each) {
     return TableRow{text(each, "name"), text(each, "unit")};
   });
+  print_list(model, "switches", {"steps end where it is 0"},
+             [](const Json& each) { return TableRow{text(each, "value")}; });
   print_list(model, "points", {"point", "columns"}, [](const Json& each) {
     return TableRow{text(each, "name"), listed(each["columns"])};
   });

@@ -54,7 +54,7 @@ void make_discrete(const Subject& subject, const RunOptions& options, double ste
                                          .times = times,
                                          .stop = [&] { return guard.interrupted(); }},
                                         of_start, of_parameters);
-  if (!moved.outcome) throw io::InputError(message(moved.outcome, subject.coordinates()));
+  if (!moved.outcome) throw io::InputError(message(moved.outcome, subject.coordinates(), subject.switches()));
   linear.a = moved.variations.front().leftCols(n);
   linear.b = moved.variations.front().rightCols(inputs);
 }

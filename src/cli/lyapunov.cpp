@@ -100,7 +100,9 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
   }
   if (found.result.outcome && !found.result.stopped) return done;
   std::cerr << "pendula: "
-            << (found.result.stopped ? "interrupted" : message(found.result.outcome, subject->coordinates())) << '\n';
+            << (found.result.stopped ? "interrupted"
+                                     : message(found.result.outcome, subject->coordinates(), subject->switches()))
+            << '\n';
   return failed;
 }
 

@@ -64,7 +64,8 @@ std::vector<CheckLine> MotionCheck::lines() const {
   add([this](const Span& span) { return look(span); });
   add([this](const Span& span) { return glance(span); });
   add([this](const Span& span) { return event(span); });
-  if (!subject_.loaded()) add([this](const Span& span) { return tangents(span); });
+  const bool differentiates = !subject_.loaded() && subject_.switches().empty();
+  if (differentiates) add([this](const Span& span) { return tangents(span); });
   return lines;
 }
 

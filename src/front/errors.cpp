@@ -19,7 +19,7 @@ constinit thread_local pendula_status kind = PENDULA_OK;
 }  // namespace
 
 void require(const Outcome& outcome, const Subject& subject) {
-  if (!outcome) throw RunFailure(message(outcome, subject.coordinates()));
+  if (!outcome) throw RunFailure(message(outcome, subject.coordinates(), subject.switches()));
 }
 
 pendula_status fail(pendula_status status, const char* what) noexcept {

@@ -18,9 +18,9 @@ namespace pendula::io {
 
 /// How a member ended, as numbered in the data set `status`: the words of Ending::status, and those that only members
 /// can have.
-inline constexpr std::array<std::string_view, 9> member_statuses = {
-    "ok",         "stopped_by_event",     "not_converged", "wrong_root", "tolerance_not_met",
-    "not_finite", "singular_mass_matrix", "failed",        "wrong_input"};
+inline constexpr std::array<std::string_view, 10> member_statuses = {
+    "ok",         "stopped_by_event",     "not_converged", "wrong_root",  "tolerance_not_met",
+    "not_finite", "singular_mass_matrix", "failed",        "wrong_input", "stuck_at_switch"};
 inline constexpr int not_run = -1;
 
 /// The number of a status; any unknown name counts as "failed".

@@ -246,7 +246,7 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
     std::vector<std::string> events;
     events.reserve(scenario.plan().events.size());
     for (const EventPlan& event : scenario.plan().events) events.push_back(event.name);
-    const Ending ending = ending_of(report, scenario.subject->coordinates(), events);
+    const Ending ending = ending_of(report, scenario.subject->coordinates(), events, scenario.subject->switches());
     LyapunovSpectrum spectrum;
     if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
     const int status = member_status(ending.status);

@@ -83,7 +83,7 @@ inline void describe(const RunSetup& setup, Summary& summary) {
   summary.every = setup.every;
   summary.at = setup.rows;
   summary.event_names = event_names(setup);
-  summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names);
+  summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names, setup.subject->switches());
 }
 
 /// Adds which inputs have feedback.

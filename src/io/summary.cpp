@@ -220,18 +220,19 @@ std::string end_of_run(const Summary& summary) {
   return text;
 }
 
-Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates) {
+Ending ending_of(const Outcome& outcome, std::span<const std::string_view> coordinates,
+                 std::span<const std::string_view> switches) {
   std::string status(name_of(outcome.status));
   std::ranges::replace(status, ' ', '_');
-  const bool is_named = outcome.part >= 0 && !coordinates.empty();
+  const bool is_named = outcome.part >= 0 && !coordinates.empty() && outcome.status != Status::stuck_at_switch;
   const auto part = static_cast<std::size_t>(outcome.part);
-  return {status, message(outcome, coordinates), outcome, is_named ? std::string(coordinates[part]) : ""};
+  return {status, message(outcome, coordinates, switches), outcome, is_named ? std::string(coordinates[part]) : ""};
 }
 
 }  // namespace
 
 Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates,
-                 std::span<const std::string> events) {
+                 std::span<const std::string> events, std::span<const std::string_view> switches) {
   switch (report.end) {
     case RunEnd::complete:
       return {};
@@ -240,7 +241,7 @@ Ending ending_of(const RunReport& report, std::span<const std::string_view> coor
     case RunEnd::stopped:
       return {"interrupted", "interrupted at t = " + shortest(report.last.time), {}, {}};
     case RunEnd::step_failed:
-      return ending_of(report.step, coordinates);
+      return ending_of(report.step, coordinates, switches);
     case RunEnd::not_finite:
       return {"not_finite", "at t = " + shortest(report.step.time) + ": the energy is not a finite number", {}, {}};
     case RunEnd::observer_failed:
@@ -261,7 +262,7 @@ ModelSummary model_summary(const std::string& scenario, const SystemSubject& sys
   model.links = info.links;
   model.loaded = system.loaded();
   auto next = system.numbers().parameters.begin();
-  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+  for (std::size_t k = 0; k + 2 * info.switches.size() < info.parameters.size(); ++k) {
     const auto end = next + info.parameter_sizes[k];
     model.parameters.emplace_back(info.parameters[k], std::vector<double>(next, end));
     next = end;

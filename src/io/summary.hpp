@@ -89,7 +89,7 @@ inline bool has_stages(const Summary& summary) {
 /// How a run ended. `coordinates` is as for pendula::message, `events` are the names of the events. Throws again what
 /// an observer threw, except OutputError.
 Ending ending_of(const RunReport& report, std::span<const std::string_view> coordinates = {},
-                 std::span<const std::string> events = {});
+                 std::span<const std::string> events = {}, std::span<const std::string_view> switches = {});
 
 template <class Space>
 ModelSummary model_summary(const std::string& scenario, const Chain<Space>& chain,

@@ -98,7 +98,7 @@ Json to_json(const Ending& ending) {
   json["iterations"] = ending.step.iterations;
   json["residual"] = ending.step.residual;
   if (ending.coordinate.empty()) {
-    json["link"] = where(ending.step.part >= 0, ending.step.part + 1);
+    json["link"] = where(ending.step.part >= 0 && ending.step.status != Status::stuck_at_switch, ending.step.part + 1);
   } else {
     json["coordinate"] = ending.coordinate;
   }
@@ -129,7 +129,7 @@ constexpr std::string_view parameters_schema =
 constexpr std::string_view outcome_schema = R"({"type": "object", "required": ["status"],
   "properties": {
     "status": {"enum": ["ok", "stopped_by_event", "not_converged", "wrong_root", "tolerance_not_met", "not_finite",
-                        "singular_mass_matrix", "interrupted", "output_failed"]},
+                        "singular_mass_matrix", "interrupted", "stuck_at_switch", "output_failed"]},
     "event": {"type": "string"}, "message": {"type": "string"},
     "t": {"type": "number"}, "step": {"type": "number"}, "iterations": {"type": "integer"},
     "residual": {"type": ["number", "null"]}, "link": {"type": ["integer", "null"]}, "coordinate": {"type": "string"}},

@@ -1,5 +1,6 @@
 """docs/your-own-model.md from its first block to its last."""
 
+import json
 import re
 import subprocess
 
@@ -15,9 +16,10 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture
 def folder(tmp_path):
-    sprung, lame = blocks("python")
+    sprung, lame, load = blocks("python")
     (tmp_path / "sprung.py").write_text(sprung)
     (tmp_path / "lame.py").write_text(lame)
+    (tmp_path / "load.py").write_text(load)
     (tmp_path / "sprung.toml").write_text(blocks("toml")[0])
     return tmp_path
 
@@ -30,6 +32,17 @@ def test_the_commands_do_what_the_page_says(folder, pendula):
         assert ended.returncode == (2 if "lame" in command else 0), ended.stderr
         assert ended.stdout.endswith(output) or ended.stderr.endswith(output)
     assert pendula("check", "start.py", cwd=folder).returncode == 0
+
+
+def test_a_model_of_several_pieces(folder, pendula):
+    told = json.loads(pendula("describe", "load.py", "--json", cwd=folder).stdout)
+    assert [switch["value"] for switch in told["switches"]] == ["y", "2*y - 1", "y_dot"]
+    (folder / "load.toml").write_text(
+        '[system]\nmodel = "load.py"\n[start]\ny = 2.0\n[run]\nduration = 5.0\n'
+    )
+    ended = pendula("simulate", "load.toml", "--json", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout)["energy_error_max"] < 1
 
 
 def test_the_program_compiles_and_ends_where_the_scenario_does(folder, pendula, environment):

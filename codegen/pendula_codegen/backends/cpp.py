@@ -285,6 +285,7 @@ TYPES = {
     "matrix": "Matrix<Real>",
     "points": "Points<Real>",
     "arguments": "Arguments<Real>",
+    "switches": "Switches<Real>",
     "link_vector": "LinkVector<Real>",
     "link_matrix": "LinkMatrix<Real>",
 }
@@ -380,6 +381,7 @@ def constants(
     constant_masses: bool,
     periodic: Sequence[bool],
     bases: Sequence[bool] = (),
+    switches: Sequence[str] = (),
 ) -> list[str]:
     """Static members by which a kernel says what it is; `bases` of arguments, where there are any."""
     members = [
@@ -398,6 +400,7 @@ def constants(
         ("std::string_view", "point_names", [name for name, _ in points]),
         ("int", "point_sizes", [size for _, size in points]),
         *([("bool", "argument_is_base", list(bases))] if bases else []),
+        *([("std::string_view", "switch_names", list(switches))] if switches else []),
     ]
     lines = []
     for element, name, values in members:

@@ -45,7 +45,8 @@ bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tan
   if (by_series && system->table().of_1.series_next == nullptr) return false;
   if (!is_explicit(options.method) && misses_loads(setup, options)) return false;
   if ((!is_explicit(options.method) || by_series) && system->info().depends_on_time) return false;
-  if (system->may_be_narrow()) return false;  // lanes do not look between their stages
+  if (!system->switches().empty()) return false;  // each member ends its steps elsewhere
+  if (system->may_be_narrow()) return false;      // lanes do not look between their stages
   kind.kernel = &system->table();
   return true;
 }

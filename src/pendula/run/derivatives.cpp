@@ -208,7 +208,7 @@ void require_regular(const Subject& subject, const Motion& motion) {
 }
 
 Eigen::VectorXd field_at(const Subject& subject, const Motion& motion) {
-  const SystemModel model = as_its_kind(subject, [](const auto& kind) { return system_model_of(kind); });
+  const SystemModel model = as_its_kind(subject, [&](const auto& kind) { return system_model_of(kind, motion); });
   SystemAt<1> here(model);
   here.set_time(motion.time);
   Eigen::VectorXd field(2 * motion.q.size());

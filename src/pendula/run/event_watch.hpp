@@ -185,6 +185,14 @@ class EventWatch {
     for (std::size_t k = 0; k < events_.size(); ++k) sides_[k] = side_at(events_[k], motion);
   }
 
+  /// Starts with the motion, and these signs; a value of the other sign is taken for rounding of 0.
+  void start(const Motion& motion, std::span<const int> signs) {
+    start(motion);
+    for (std::size_t k = 0; k < events_.size(); ++k) {
+      if (sides_[k].sign != signs[k]) sides_[k] = {0, signs[k]};
+    }
+  }
+
   /// Starts from an event that has happened, which is not found again.
   void start_after(const Occurrence& happened) {
     start(happened.motion);

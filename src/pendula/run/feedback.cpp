@@ -3,9 +3,9 @@
 #include <optional>
 #include <pendula/run/feedback.hpp>
 #include <pendula/run/inputs.hpp>
+#include <pendula/run/relay.hpp>
 #include <pendula/run/state_columns.hpp>
 #include <pendula/run/subject_kinds.hpp>
-#include <pendula/system/plain_integrator.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -33,82 +33,46 @@ struct Fed {
 };
 
 /// Steps of a subject whose inputs are held from sample to sample: from each sample on by a new integrator.
-class HeldInputs : public PlainIntegrator {
+class HeldInputs : public Relay {
  public:
   HeldInputs(const Fed& fed, const RunOptions& options)
       : fed_(fed), options_(options), held_(fed.laws.size()), since_(fed.laws.size()), made_for_(held_) {
-    now_ = fed_.make(options_, held_);
+    use(fed_.make(options_, held_));
   }
 
   Outcome start(double time, const double* q, const double* v) override {
-    const Eigen::Index size = now_->state().q.size();
-    done_ = all_ = {};
-    before_.reset();
-    const Motion motion(time, Eigen::Map<const Eigen::VectorXd>(q, size), Eigen::Map<const Eigen::VectorXd>(v, size));
+    const Motion motion = motion_of(time, q, v);
     for (std::size_t k = 0; k < held_.size(); ++k) {
       held_[k] = Fed::said(fed_.laws[k], motion);
       since_[k] = std::floor(time / fed_.laws[k].sample * (1 + rounding));
     }
     if (!is_finite(held_)) return not_finite(time);
     if (held_ != made_for_) make();
-    return now_->start(motion);
+    return begin(motion);
   }
 
   Outcome step(double h) override {
-    before_.reset();
+    forget();
     const double next = next_sample(), left = next - time();
     const bool reaches = h >= left * (1 - rounding);
-    const Outcome stepped = now_->step(reaches ? left : h);
-    all_ = done_;
-    all_ += now_->statistics();
+    const Outcome stepped = now().step(reaches ? left : h);
+    count();
     if (!stepped || next - time() > rounding * std::abs(next)) return stepped;
     const Outcome begun = resample(next);
     return begun ? stepped : begun;
   }
 
-  double time() const override { return now_->time(); }
-
-  void read_state(double* q, double* v) const override { write(now_->state(), q, v); }
-
   std::span<const double> held(double time) const override {
     // A row at 0.3 s is at the third sample of 0.1 s, which rounding puts behind it.
-    return before_ && time < now_->time() * (1 - rounding) ? before_held_ : held_;
+    return has_before() && time < now().time() * (1 - rounding) ? before_held_ : held_;
   }
 
-  void remember_steps(bool wanted) override {
-    remembers_ = wanted;
-    now_->remember_steps(wanted);
-  }
-  void glance(double time, double* q, double* v) override { write(of(time).glance(time), q, v); }
-  Outcome look(double time, double* q, double* v, double& work) override {
-    const double done = &of(time) == before_.get() ? before_work_ : done_.load_work;
-    Motion motion;
-    const Outcome looked = of(time).look(time, motion, work);
-    work += done;
-    if (looked) write(motion, q, v);
-    return looked;
-  }
-
-  void heed(StopSign stop) override {
-    stop_ = stop;
-    now_->heed(stop);
-    if (before_) before_->heed(stop);
-  }
-
-  const Statistics& statistics() const override { return all_; }
-
-  Description describe() const override {
-    described_ = now_->describe();
-    return {described_.solver, described_.iteration, described_.kernel};
-  }
+  bool depends_on_end(double h) const override { return h < next_sample() - time() && now().depends_on_end(h); }
 
   void member(MemberNumbers& numbers) override {
     numbers(held_, since_, done_, all_);
     if (held_ != made_for_) make();
-    const Member before = now_->member();
-    Member own = before;
-    numbers(own.numbers);
-    if (own != before) now_->resume(own);
+    own_member(numbers);
   }
 
   int linearize() override { throw std::invalid_argument(sampled_has_no_derivatives); }
@@ -116,25 +80,15 @@ class HeldInputs : public PlainIntegrator {
  private:
   static constexpr double rounding = 1e-12;
 
-  static void write(const Motion& motion, double* q, double* v) {
-    std::ranges::copy(motion.q, q);
-    std::ranges::copy(motion.v, v);
-  }
-
   double next_sample() const {
     double next = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < since_.size(); ++k) next = std::min(next, (since_[k] + 1) * fed_.laws[k].sample);
     return next;
   }
 
-  /// The integrator whose last step a time lies in. Where a sample has just been taken that is the one before.
-  Integrator& of(double time) const { return before_ && time < now_->time() ? *before_ : *now_; }
-
   void make() {
-    now_ = fed_.make(options_, held_);
+    use(fed_.make(options_, held_));
     made_for_ = held_;
-    now_->remember_steps(remembers_);
-    now_->heed(stop_);
   }
 
   static bool is_finite(const std::vector<double>& numbers) {
@@ -143,10 +97,9 @@ class HeldInputs : public PlainIntegrator {
   static Outcome not_finite(double time) { return {.status = Status::not_finite, .time = time}; }
 
   Outcome resample(double at) {
-    Motion motion = now_->state();
+    Motion motion = now().state();
     motion.time = at;
     before_held_ = held_;
-    before_work_ = done_.load_work;
     for (std::size_t k = 0; k < held_.size(); ++k) {
       if ((since_[k] + 1) * fed_.laws[k].sample > at * (1 + rounding)) continue;
       since_[k] += 1;
@@ -157,22 +110,14 @@ class HeldInputs : public PlainIntegrator {
       return not_finite(at);
     }
     if (held_ == before_held_) return {};  // it goes on as it was
-    done_ = all_;
-    if (remembers_) before_ = std::move(now_);
-    make();
-    return now_->start(motion);
+    made_for_ = held_;
+    return hand_over(fed_.make(options_, held_), motion);
   }
 
   const Fed fed_;
   const RunOptions options_;
   std::vector<double> held_, since_;  // of each law: its value, and the number of its last sample
   std::vector<double> made_for_, before_held_;
-  std::unique_ptr<Integrator> now_, before_;
-  Statistics done_, all_;  // of integrators before; of all
-  double before_work_ = 0;
-  bool remembers_ = false;
-  StopSign stop_;
-  mutable pendula::Description described_;
 };
 
 class FedSubject : public Subject {
@@ -238,6 +183,7 @@ class FedSubject : public Subject {
 
   std::vector<Constant> constants() const override { return fed_.subject->constants(); }
   std::span<const std::string_view> coordinates() const override { return fed_.subject->coordinates(); }
+  std::span<const std::string_view> switches() const override { return fed_.subject->switches(); }
   std::pair<std::size_t, std::size_t> shown_columns() const override { return fed_.subject->shown_columns(); }
   using Subject::distance;
   double distance(const Motion& a, const Motion& b, const Motion& size) const override {

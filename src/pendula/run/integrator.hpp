@@ -53,6 +53,10 @@ class Integrator {
 
   double time() const { return integrator_->time(); }
 
+  /// Whether the longest step that `step` is told, or was told before, may affect where it comes by, beside where that
+  /// step ends: a longer run would differ.
+  bool depends_on_end(double h) const { return integrator_->depends_on_end(h); }
+
   Motion state() const {
     Motion motion;
     read_state(motion);

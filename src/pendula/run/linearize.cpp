@@ -69,7 +69,7 @@ void find_b(const SystemModel& model, const Motion& motion, double* b) {
 
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
   require_regular(subject, motion);
-  const SystemModel model = as_its_kind(subject, [](const auto& kind) { return system_model_of(kind); });
+  const SystemModel model = as_its_kind(subject, [&](const auto& kind) { return system_model_of(kind, motion); });
   if (a != nullptr) {
     SystemAt<8> here(model);
     here.set_time(motion.time);

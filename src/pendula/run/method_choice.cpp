@@ -25,6 +25,7 @@ std::string against_series(const Subject& subject, double tolerance) {
     if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
     if (system->info().coordinates.size() > most_coordinates) return "many coordinates";
     if (system->info().depends_on_time) return "time in the equations";
+    if (!system->switches().empty() && !system->info().argument_is_base.empty()) return "roots in functions of pieces";
     return system->may_be_narrow() ? "forces that may be narrow" : "";
   }
   if (dynamic_cast<const ChainSubject<Spatial>*>(&subject) != nullptr) return "a chain in space";

@@ -96,7 +96,8 @@ struct Course {
 
   void step() {
     const double h = next_step(schedule, elapsed());
-    const bool was_near = std::exchange(near_end, may_be_cut(schedule, h, result.outcome.step));
+    const bool may_depend = integrator.depends_on_end(h) || may_be_cut(schedule, h, result.outcome.step);
+    const bool was_near = std::exchange(near_end, may_depend);
     if (near_end && !was_near) on_way(place, true);
     result.outcome = integrator.step(h);
     if (result.outcome.status == Status::interrupted) return cut_off();

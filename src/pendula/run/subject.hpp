@@ -65,6 +65,9 @@ class Subject {
   /// Names of the coordinates; empty for a chain, for which messages name links.
   virtual std::span<const std::string_view> coordinates() const = 0;
 
+  /// Switching functions of a system with functions of several pieces.
+  virtual std::span<const std::string_view> switches() const { return {}; }
+
   /// The columns of a short table: index of the first, and how many.
   virtual std::pair<std::size_t, std::size_t> shown_columns() const = 0;
 

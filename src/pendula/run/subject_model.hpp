@@ -27,4 +27,13 @@ inline SystemModel system_model_of(const SystemSubject& subject) {
   return {subject.table(), subject.numbers().plain()};
 }
 
+/// Of a subject with functions of several pieces by those that a motion takes.
+inline SystemModel system_model_of(const SystemSubject& subject, const Motion& motion) {
+  return {subject.table(), subject.numbers_at(motion).plain()};
+}
+template <class Space>
+SystemModel system_model_of(const ChainSubject<Space>& subject, const Motion& /*motion*/) {
+  return system_model_of(subject);
+}
+
 }  // namespace pendula

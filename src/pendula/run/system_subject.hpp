@@ -7,6 +7,8 @@
 #include <numeric>
 #include <pendula/run/library.hpp>
 #include <pendula/run/subject.hpp>
+#include <pendula/run/switching.hpp>
+#include <pendula/run/switching_integrator.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
@@ -39,6 +41,11 @@ class SystemSubject : public Subject {
                                   ", got " + std::to_string(sine.input));
     }
     loaded_ = !feedback_.empty() || SystemModel(*table_, numbers_.plain()).loaded();
+    if (switches().empty()) return;
+    for (const Sides& sides : switching().all_sides()) {
+      const SystemNumbers there = switching().numbers(sides);
+      loaded_ = loaded_ || SystemModel(*table_, there.plain()).loaded();
+    }
   }
 
   const SystemTable& table() const { return *table_; }
@@ -46,9 +53,20 @@ class SystemSubject : public Subject {
   const SystemNumbers& numbers() const { return numbers_; }
   const std::vector<InputFunction>& feedback() const { return feedback_; }
 
+  std::span<const std::string_view> switches() const override { return info().switches; }
+
+  /// The same numbers with those of the pieces that a motion takes.
+  SystemNumbers numbers_at(const Motion& motion) const {
+    return switches().empty() ? numbers_ : switching().numbers(switching().way(motion).sides);
+  }
+
   std::unique_ptr<Integrator> make_integrator(const RunOptions& options) const override {
     if (options.solver == Solver::chain) {
       throw std::invalid_argument("solver: the chain solver is for chains, got chain; dense is for any system");
+    }
+    if (!switches().empty()) {
+      return std::make_unique<Integrator>(std::make_unique<SwitchingIntegrator>(switching(), options),
+                                          static_cast<Eigen::Index>(info().coordinates.size()), "system");
     }
     return std::make_unique<Integrator>(library().make_system_integrator(*table_, numbers_.plain(), options, 0),
                                         static_cast<Eigen::Index>(info().coordinates.size()), "system");
@@ -57,7 +75,9 @@ class SystemSubject : public Subject {
   Observation observe(const Motion& motion) const override {
     Observation seen;
     seen.points.resize(point_components());
-    const Conditions at = conditions(motion.time);
+    std::optional<SystemNumbers> there;
+    const SystemNumbers& numbers = switches().empty() ? numbers_ : there.emplace(numbers_at(motion));
+    const Conditions at = conditions(motion.time, numbers);
     table_->of_1.energies(at, motion.q.data(), motion.v.data(), &seen.kinetic, &seen.energy);
     if (seen.points.size() > 0) table_->plain.positions(at, motion.q.data(), seen.points.data());
     return seen;
@@ -69,7 +89,8 @@ class SystemSubject : public Subject {
   /// Rates that belong to momenta; not finite if the mass matrix is singular.
   Eigen::VectorXd rates(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& p) const {
     Eigen::VectorXd v(q.size());
-    table_->of_1.velocity_from_momentum(conditions(time), q.data(), p.data(), v.data());
+    const SystemNumbers numbers = numbers_at(Motion(time, q, Eigen::VectorXd::Zero(q.size())));
+    table_->of_1.velocity_from_momentum(conditions(time, numbers), q.data(), p.data(), v.data());
     return v;
   }
 
@@ -136,7 +157,7 @@ class SystemSubject : public Subject {
   std::vector<Constant> constants() const override {
     std::vector<Constant> constants;
     auto next = numbers_.parameters.begin();
-    for (std::size_t k = 0; k < info().parameters.size(); ++k) {
+    for (std::size_t k = 0; k + 2 * switches().size() < info().parameters.size(); ++k) {
       const std::string name(info().parameters[k]);
       const auto end = next + info().parameter_sizes[k];
       constants.push_back(
@@ -183,10 +204,12 @@ class SystemSubject : public Subject {
                                 std::string(info().name) + ", got " + std::to_string(got));
   }
 
-  // For functions that do not depend on inputs; `time` must outlive the result.
-  Conditions conditions(const double& time) const {
-    return {table_->context, numbers_.parameters.data(), &time, numbers_.inputs.data()};
+  // For functions that do not depend on inputs; both must outlive the result.
+  Conditions conditions(const double& time, const SystemNumbers& numbers) const {
+    return {table_->context, numbers.parameters.data(), &time, numbers.inputs.data()};
   }
+
+  SwitchingSystem switching() const { return {*table_, numbers_}; }
 
   void append_inputs(const Motion& motion, std::vector<double>& row) const {
     const std::size_t first = row.size();

@@ -25,6 +25,7 @@ enum class Rows {
   inputs,
   components,
   arguments,
+  switches,
   state,
   order,
   sums,
@@ -81,6 +82,7 @@ constexpr std::array<Signature, Program::many + Program::plain + Program::series
     {"residual", 3, {q, v, a, E}},
     {"positions", 1, {q, {"r", Rows::components}}},
     {"velocities", 2, {q, v, {"r_dot", Rows::components}}},
+    {"switches", 2, {q, v, {"g", Rows::switches}}},
     {"series_start", 2, {{{"unit", Rows::one}, {"state", Rows::state}, {"next", Rows::state}, {"kept", Rows::kept}}}},
     {"series_next",
      4,
@@ -299,6 +301,8 @@ class OwnedKernel {
         return total(info.point_sizes);
       case Rows::arguments:
         return info.argument_is_base.size();
+      case Rows::switches:
+        return info.switches.size();
       case Rows::state:
         return 2 * n;
       case Rows::order:
@@ -325,6 +329,7 @@ class OwnedKernel {
     if (info.argument_is_base.empty()) {
       for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) of->call_arguments = nullptr;
     }
+    if (info.switches.empty()) table_.plain.switches = nullptr;
     if (info.points.empty()) table_.plain.positions = nullptr, table_.plain.velocities = nullptr;
   }
 

@@ -33,7 +33,7 @@ class Interpreter : NumbersOfStates<W> {
   }
   static constexpr PlainFunctions plain_functions() {
     constexpr std::size_t first = Program::many;
-    return {&call<first>, &call<first + 1>, &call<first + 2>};
+    return {&call<first>, &call<first + 1>, &call<first + 2>, &call<first + 3>};
   }
 
  private:

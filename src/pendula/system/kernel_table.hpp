@@ -73,6 +73,13 @@ class KernelFunctions : KernelNumbers<S, W> {
       write_columns(found, velocities);
     }
   }
+  static void switches(const Conditions& at, const double* q, const double* v, double* g) {
+    if constexpr (has_switches<S>) {
+      typename S::template Switches<L> found;
+      S::switches(parameters(at), vector(q), vector(v), inputs(at), found);
+      write(found, g);
+    }
+  }
   static constexpr bool has_points = requires { &S::template positions<double>; };
 
   static constexpr ChainFunctions chain_functions() {
@@ -317,7 +324,7 @@ template <System S>
 constexpr PlainFunctions plain_functions() {
   using Functions = KernelFunctions<S, 1>;
   return {&Functions::residual, Functions::has_points ? &Functions::positions : nullptr,
-          Functions::has_points ? &Functions::velocities : nullptr};
+          Functions::has_points ? &Functions::velocities : nullptr, has_switches<S> ? &Functions::switches : nullptr};
 }
 
 template <System S>

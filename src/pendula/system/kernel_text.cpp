@@ -97,6 +97,8 @@ bool KernelDescription::take(KernelText& text) {
     point_sizes_.push_back(text.whole(2, 3));
   } else if (kind == "argument") {
     argument_is_base_.push_back(text.flag());
+  } else if (kind == "switch") {
+    switches_.push_back(text.word());
   } else if (kind == "series") {
     series_.has_momenta = text.flag();
     series_.sums = text.whole(0, many);
@@ -134,6 +136,7 @@ SystemInfo KernelDescription::info() const {
           depends_on_time_,
           constant_masses_,
           argument_is_base_.all(),
+          switches_,
           series_};
 }
 

@@ -21,6 +21,7 @@ enum class Status {
   not_finite,            ///< a value became infinite or NaN
   singular_mass_matrix,  ///< a coordinate is undefined: φ in (θ, φ) where sin θ = 0
   interrupted,           ///< the caller asked to stop
+  stuck_at_switch,       ///< a function of several pieces holds the motion where it switches, or switches without end
 };
 
 constexpr std::string_view name_of(Status status) {
@@ -39,6 +40,8 @@ constexpr std::string_view name_of(Status status) {
       return "singular mass matrix";
     case Status::interrupted:
       return "interrupted";
+    case Status::stuck_at_switch:
+      return "stuck at switch";
   }
   return "unknown status";
 }
@@ -54,13 +57,16 @@ struct Outcome {
   double step = 0;      ///< step size that was tried  [s]
   int iterations = 0;   ///< Newton (or fixed-point) iterations of the last attempt
   double residual = 0;  ///< last correction relative to the size of the unknowns
-  int part = -1;  ///< 0-based link of a chain, or coordinate of another system, that caused the failure; −1: none
+  /// 0-based link of a chain, or coordinate or switching function of another system, that caused the failure; −1: none.
+  int part = -1;
 
   explicit operator bool() const { return status == Status::ok; }
 };
 
-/// One sentence: what happened, when, and where. For a system that is not a chain, pass the names of its coordinates.
-inline std::string message(const Outcome& outcome, std::span<const std::string_view> coordinates = {}) {
+/// One sentence: what happened, when, and where. For a system that is not a chain, pass the names of its coordinates,
+/// and its switching functions.
+inline std::string message(const Outcome& outcome, std::span<const std::string_view> coordinates = {},
+                           std::span<const std::string_view> switches = {}) {
   if (outcome) return "ok";
   std::ostringstream out;
   const bool is_chain = coordinates.empty();
@@ -100,6 +106,14 @@ inline std::string message(const Outcome& outcome, std::span<const std::string_v
     case Status::interrupted:
       out << "interrupted";
       break;
+    case Status::stuck_at_switch: {
+      const auto part = static_cast<std::size_t>(outcome.part);
+      out << "the motion is held where " << (part < switches.size() ? switches[part] : "a switching function")
+          << " = 0, or switches there without end: both pieces drive it back, as dry friction does at rest, and which "
+             "force holds it the model does not say; an event with stop = true ends the run there, a smooth function "
+             "such as tanh(v/small) in place of sign(v) goes on";
+      break;
+    }
     case Status::ok:
       break;
   }

@@ -28,6 +28,10 @@ class PlainIntegrator {
   /// What is held of inputs at a time in the last step; empty but for sampled feedback.
   virtual std::span<const double> held(double /*time*/) const { return {}; }
 
+  /// Whether the longest step that `step` is told, or was told before, may affect where it comes by, beside where that
+  /// step ends: a longer run would differ.
+  virtual bool depends_on_end(double /*h*/) const { return false; }
+
   /// Whether to remember steps from now on, so that glance and look can go back into the last one; this costs a copy of
   /// the state per step.
   virtual void remember_steps(bool wanted) = 0;

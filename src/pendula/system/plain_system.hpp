@@ -54,6 +54,9 @@ struct SystemInfo {
   /// For each argument of the model's functions that may change fast: whether it is the base of a power
   /// (field_look.hpp).
   std::span<const bool> argument_is_base;
+  /// What decides between pieces of functions (PlainFunctions::switches), as text. Of each, two parameters, the last
+  /// ones, are 1 or 0: whether it is > 0, whether it is < 0.
+  std::span<const std::string_view> switches;
   SeriesInfo series;
 };
 
@@ -80,6 +83,7 @@ constexpr SystemInfo info_of() {
           holds_time<S>,
           S::constant_masses,
           argument_bases<S>(),
+          switch_names<S>(),
           series_of<S>()};
 }
 

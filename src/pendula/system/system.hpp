@@ -63,6 +63,19 @@ constexpr std::span<const bool> argument_bases() {
   return {};
 }
 
+/// Whether a kernel has switching functions (S::switches).
+template <class S>
+inline constexpr bool has_switches = requires {
+  S::switch_names;
+};
+
+/// What they are; empty if there are none.
+template <class S>
+constexpr std::span<const std::string_view> switch_names() {
+  if constexpr (has_switches<S>) return S::switch_names;
+  return {};
+}
+
 /// Whether a kernel provides the Taylor series of its motions.
 template <class S>
 inline constexpr bool has_series = requires {

@@ -85,6 +85,8 @@ struct PlainFunctions {
   /// Positions and velocities of points, point after point; null if the model has no points.
   void (*positions)(const Conditions&, Numbers q, double* points);
   void (*velocities)(const Conditions&, Numbers q, Numbers v, double* velocities);
+  /// Switching functions, between whose zeros a kernel is smooth (SystemInfo::switches); null if there are none.
+  void (*switches)(const Conditions&, Numbers q, Numbers v, double* g);
 };
 
 /// Further functions of chain kernels, used to check them (kernel_check.hpp).
@@ -122,6 +124,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 11;
+inline constexpr int system_interface = 12;
 
 }  // namespace pendula

@@ -1,0 +1,170 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <pendula/system/motion.hpp>
+#include <pendula/system/plain_system.hpp>
+#include <pendula/system/system_table.hpp>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// Which pieces of its functions a system moves by: of each switching function its side, +1 or −1.
+using Sides = std::vector<int>;
+
+/// A system with functions of several pieces: between the zeros of its switching functions g it is smooth, and moves by
+/// the parameters that belong to their sides.
+class SwitchingSystem {
+ public:
+  /// The table must outlive it.
+  SwitchingSystem(const SystemTable& table, SystemNumbers numbers) : table_(&table), numbers_(std::move(numbers)) {}
+
+  const SystemTable& table() const { return *table_; }
+  std::size_t switches() const { return table_->info.switches.size(); }
+
+  /// Its numbers where these pieces are taken.
+  SystemNumbers numbers(const Sides& sides) const;
+
+  /// g by these pieces, on which one may depend itself.
+  std::vector<double> values(const Sides& sides, const Motion& motion) const;
+
+  /// The sides on which a motion goes on, which at zeros of g depends on where it goes. Both may drive it back to one
+  /// of the zeros: it cannot leave it.
+  struct Way {
+    Sides sides;
+    std::optional<std::size_t> stuck_at;
+  };
+  Way way(const Motion& motion) const;
+
+  /// A time in which the motion changes  [s].
+  double pace(const Sides& sides, const Motion& motion) const;
+
+  /// All ways to choose sides, or many of them.
+  std::vector<Sides> all_sides() const;
+
+ private:
+  int drift(std::size_t k, const Sides& sides, const Motion& motion) const;
+  Motion ahead(const Sides& sides, const Motion& motion, double time) const;
+  std::vector<double> accelerations(const Sides& sides, const Motion& motion) const;
+
+  const SystemTable* table_;
+  SystemNumbers numbers_;
+};
+
+inline SystemNumbers SwitchingSystem::numbers(const Sides& sides) const {
+  SystemNumbers numbers = numbers_;
+  double* indicator = numbers.parameters.data() + numbers.parameters.size() - 2 * switches();
+  for (const int side : sides) {
+    *indicator++ = side > 0 ? 1 : 0;
+    *indicator++ = side > 0 ? 0 : 1;
+  }
+  return numbers;
+}
+
+inline std::vector<double> SwitchingSystem::values(const Sides& sides, const Motion& motion) const {
+  SystemNumbers numbers = this->numbers(sides);
+  for (const InputSine& sine : numbers.sines) {
+    numbers.inputs[static_cast<std::size_t>(sine.input)] +=
+        sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
+  }
+  std::vector<double> found(switches());
+  table_->plain.switches({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()},
+                         motion.q.data(), motion.v.data(), found.data());
+  return found;
+}
+
+inline SwitchingSystem::Way SwitchingSystem::way(const Motion& motion) const {
+  constexpr std::size_t most_at_once = 8;
+  const std::size_t count = switches();
+  Sides sides(count, 1);
+  std::vector<double> found;
+  for (std::size_t pass = 0; pass <= count; ++pass) {  // one may depend on another
+    found = values(sides, motion);
+    for (std::size_t k = 0; k < count; ++k) sides[k] = found[k] < 0 ? -1 : 1;
+  }
+  // Those that are zero but for rounding: a moment ago or later they are of another size.
+  constexpr double moment = 1e-10;
+  const double soon = moment * pace(sides, motion);
+  const std::vector<double> later = values(sides, ahead(sides, motion, soon));
+  const std::vector<double> before = values(sides, ahead(sides, motion, -soon));
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double change = std::max(std::abs(later[k] - found[k]), std::abs(before[k] - found[k]));
+    if (std::abs(found[k]) <= change || found[k] == 0) open.push_back(k);
+  }
+  if (open.empty()) return {sides, {}};
+  if (open.size() > most_at_once) open.resize(most_at_once);
+  const Sides first = sides;
+  std::optional<std::size_t> stuck;
+  for (unsigned turned = 0; turned < 1U << open.size(); ++turned) {
+    sides = first;
+    for (std::size_t n = 0; n < open.size(); ++n) {
+      if ((turned >> n & 1U) != 0) sides[open[n]] *= -1;
+    }
+    const auto leaves = [&](std::size_t k) { return drift(k, sides, motion) * sides[k] >= 0; };
+    const auto back = std::ranges::find_if_not(open, leaves);
+    if (back == open.end()) return {sides, {}};
+    if (!stuck) stuck = *back;
+  }
+  return {first, stuck};
+}
+
+/// The sign that g soon changes by; 0 if it does not.
+inline int SwitchingSystem::drift(std::size_t k, const Sides& sides, const Motion& motion) const {
+  constexpr std::array<double, 7> moments{1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4};
+  const double whole = pace(sides, motion), now = values(sides, motion)[k];
+  for (const double moment : moments) {
+    const auto change = [&](double share) {
+      return values(sides, ahead(sides, motion, share * moment * whole))[k] - now;
+    };
+    const double half = change(0.5), all = change(1);
+    // Smooth, and no mere rounding.
+    if (half * all > 0 && std::abs(all) > 1.5 * std::abs(half) && std::abs(all) < 5 * std::abs(half)) {
+      return (all > 0 ? 1 : -1);
+    }
+  }
+  return 0;
+}
+
+inline Motion SwitchingSystem::ahead(const Sides& sides, const Motion& motion, double time) const {
+  const std::vector<double> a = accelerations(sides, motion);
+  const Eigen::Map<const Eigen::VectorXd> rate(a.data(), motion.v.size());
+  return {motion.time + time, motion.q + time * (motion.v + time / 2 * rate), motion.v + time * rate};
+}
+
+inline std::vector<double> SwitchingSystem::accelerations(const Sides& sides, const Motion& motion) const {
+  SystemNumbers numbers = this->numbers(sides);
+  for (const InputSine& sine : numbers.sines) {
+    numbers.inputs[static_cast<std::size_t>(sine.input)] +=
+        sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
+  }
+  std::vector<double> found(static_cast<std::size_t>(motion.v.size()));
+  table_->of_1.acceleration({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()},
+                            motion.q.data(), motion.v.data(), found.data());
+  return found;
+}
+
+inline double SwitchingSystem::pace(const Sides& sides, const Motion& motion) const {
+  const std::vector<double> a = accelerations(sides, motion);
+  double force = 0;
+  for (const double each : a) force = std::max(force, std::abs(each));
+  const double speed = motion.v.size() > 0 ? motion.v.cwiseAbs().maxCoeff() : 0;
+  return speed > 0 && force > 0 && std::isfinite(force) ? std::clamp(speed / force, 1e-3, 1e3) : 1;
+}
+
+inline std::vector<Sides> SwitchingSystem::all_sides() const {
+  constexpr std::size_t most = 6;
+  std::vector<Sides> all;
+  for (unsigned turned = 0; turned < 1U << std::min(switches(), most); ++turned) {
+    Sides sides(switches(), 1);
+    for (std::size_t k = 0; k < sides.size(); ++k) sides[k] = (turned >> (k % most) & 1U) != 0 ? -1 : 1;
+    all.push_back(std::move(sides));
+  }
+  return all;
+}
+
+}  // namespace pendula

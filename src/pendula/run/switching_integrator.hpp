@@ -1,0 +1,241 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <pendula/run/event_watch.hpp>
+#include <pendula/run/library.hpp>
+#include <pendula/run/relay.hpp>
+#include <pendula/run/switching.hpp>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+inline constexpr const char* pieces_have_no_derivatives =
+    "derivatives: expected a model whose functions are of one piece, got one that switches between pieces: derivatives "
+    "of its motion jump there, and are not told";
+
+/// Steps of a system with functions of several pieces: a step ends where one of its switching functions is zero, to
+/// rounding, and from there on a new integrator goes by other pieces. Where the motion cannot leave a zero, the next
+/// step fails.
+class SwitchingIntegrator : public Relay {
+ public:
+  SwitchingIntegrator(SwitchingSystem system, const RunOptions& options)
+      : system_(std::move(system)),
+        options_(options),
+        sides_(system_.switches(), 1),
+        made_for_(sides_),
+        watch_(events(), detail::glance_degree(options)) {
+    use(make());
+  }
+
+  Outcome start(double time, const double* q, const double* v) override {
+    const Motion motion = motion_of(time, q, v);
+    choose(motion);
+    switchings_ = 0;
+    is_of_end_ = false;
+    limit_ = first_limit(motion);
+    if (sides_ != made_for_) use(make());
+    watch_.start(motion, sides_);
+    return begin(motion);
+  }
+
+  Outcome step(double h) override {
+    forget();
+    if (stuck_at_ >= 0) return stuck();
+    now().remember_steps(true);
+    const double begin = time();
+    const Member before = now().member();
+    const Motion there = now().state();
+    for (double most = std::min(h, limit_);; most = (time() - begin) / 2) {
+      if (time() != begin) now().resume(before);
+      const Outcome stepped = now().step(most);
+      if (!stepped) return finish(stepped);
+      const double taken = time() - begin;
+      const bool shortest = taken <= rounding_of(begin, 0) * 1e3;
+      if (!shortest && !is_resolved(begin)) continue;
+      const Member watched = member_of(watch_);
+      const std::optional<Occurrence> first = crossing();
+      if (!shortest && !is_told(begin)) {
+        become(watch_, watched);
+        watch_.resume(there);
+        continue;
+      }
+      limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
+      // Where a function is zero is known to rounding, which is another in another step.
+      if (first && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
+      return finish(first ? cut(before, begin, time(), *first) : stepped);
+    }
+  }
+
+  bool depends_on_end(double h) const override { return is_of_end_ || (is_adaptive(options_) && h <= limit_); }
+
+  void remember_steps(bool wanted) override {
+    Relay::remember_steps(wanted);
+    now().remember_steps(true);
+  }
+
+  void member(MemberNumbers& numbers) override {
+    numbers(sides_, stuck_at_, switchings_, burst_, limit_, is_of_end_, done_, all_, watch_);
+    if (sides_ != made_for_) use(make());
+    own_member(numbers);
+    watch_.resume(now().state());
+  }
+
+  int linearize() override { throw std::invalid_argument(pieces_have_no_derivatives); }
+
+ private:
+  std::vector<Event> events() {
+    std::vector<Event> events(system_.switches());
+    for (std::size_t k = 0; k < events.size(); ++k) {
+      events[k].value = [this, k](const Motion& motion) { return system_.values(sides_, motion)[k]; };
+    }
+    return events;
+  }
+
+  std::unique_ptr<Integrator> make() {
+    made_for_ = sides_;
+    const SystemNumbers numbers = system_.numbers(sides_);
+    return std::make_unique<Integrator>(library().make_system_integrator(system_.table(), numbers.plain(), options_, 0),
+                                        static_cast<Eigen::Index>(system_.table().info.coordinates.size()), "system");
+  }
+
+  void choose(const Motion& motion) {
+    SwitchingSystem::Way way = system_.way(motion);
+    if (!way.stuck_at) sides_ = std::move(way.sides);
+    stuck_at_ = way.stuck_at ? static_cast<int>(*way.stuck_at) : -1;
+  }
+
+  Outcome finish(const Outcome& outcome) {
+    count();
+    return outcome;
+  }
+
+  Outcome stuck() const { return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_}; }
+
+  /// Steps that are chosen grow from there, so that they do not depend on where the run ends.
+  double first_limit(const Motion& motion) const {
+    return is_adaptive(options_) ? 4 * system_.pace(sides_, motion) : unlimited;
+  }
+
+  static double rounding_of(double time, double step) {
+    return std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(step));
+  }
+
+  /// Whether a polynomial follows each switching function through the last step: else it might come by zero unseen, as
+  /// one that holds a fast sine does in the long steps of a slow motion.
+  bool is_resolved(double begin) {
+    constexpr double near = 0.02;                                            // of the variation
+    constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // where nobody looks
+    const auto glance = [&](double u) {
+      return system_.values(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
+    };
+    std::array<std::vector<double>, points> seen;
+    for (std::size_t i = 0; i < points; ++i) seen[i] = glance(place(i));
+    for (const double u : others) {
+      const std::vector<double> found = glance(u);
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        double above = 0, below = 0, least = seen[0][k], most = least;
+        for (std::size_t i = 0; i < points; ++i) {
+          const double end = i == 0 || i + 1 == points ? 0.5 : 1;
+          const double weight = (i % 2 == 0 ? end : -end) / (u - place(i));
+          above += weight * seen[i][k];
+          below += weight;
+          least = std::min(least, seen[i][k]);
+          most = std::max(most, seen[i][k]);
+        }
+        const double rounding = 1e-13 * std::max(std::abs(least), std::abs(most));
+        if (std::abs(above / below - found[k]) > near * (most - least) + rounding) return false;
+      }
+    }
+    return true;
+  }
+  static double place(std::size_t i) {
+    return (1 - std::cos(std::numbers::pi * static_cast<double>(i) / (points - 1))) / 2;
+  }
+
+  /// Whether the search for zeros in the last step has found out all of them.
+  bool is_told(double begin) const {
+    return std::ranges::none_of(watch_.tallies(), [&](const EventTally& tally) { return tally.not_told > begin; });
+  }
+
+  /// The first one in the last step.
+  std::optional<Occurrence> crossing() {
+    const Heeding nothing(now(), {});
+    std::vector<Occurrence> found = watch_.after_step(now());
+    if (found.empty()) return {};
+    return std::move(found.front());
+  }
+
+  /// Takes the step again, to where a switching function is zero, and some roundings on, so that it has its new sign.
+  Outcome cut(const Member& before, double begin, double end, const Occurrence& first) {
+    const double at = first.motion.time;
+    const double rounding = rounding_of(at, end - begin);
+    double more = 0;
+    Outcome stepped;
+    for (int tries = 0; tries < most_tries; ++tries) {
+      now().resume(before);
+      const double h = std::min(at - begin + more, end - begin);
+      stepped = now().step(h > 0 ? h : rounding);
+      if (!stepped) return stepped;
+      if (time() < std::min(at, end) - 4 * rounding) break;  // the method chose a shorter step
+      if (sign_of(system_.values(sides_, now().state())[first.event]) * sides_[first.event] < 0) break;
+      if (h >= end - begin) break;
+      more = more == 0 ? rounding : 2 * more;
+    }
+    count();
+    const Motion motion = now().state();
+    if (time() < std::min(at, end) - 4 * rounding) {
+      watch_.start(motion, sides_);
+      return stepped;
+    }
+    choose(motion);
+    watch_bursts();
+    watch_.start(motion, sides_);
+    if (stuck_at_ >= 0) return stepped;
+    if (sides_ == made_for_) return stepped;
+    limit_ = first_limit(motion);
+    const Outcome begun = hand_over(make(), motion);
+    now().remember_steps(true);
+    return begun ? stepped : begun;
+  }
+
+  /// Switchings that follow one another within no time never end.
+  void watch_bursts() {
+    constexpr int most = 100;
+    constexpr double no_time = 1e-9;
+    if (switchings_ % most == 0) {
+      if (switchings_ > 0 && time() - burst_ <= no_time * (std::abs(time()) + longest_)) {
+        stuck_at_ = std::max(stuck_at_, 0);
+      }
+      burst_ = time();
+    }
+    ++switchings_;
+  }
+
+  static constexpr int most_tries = 40;
+  static constexpr double growth = 8;       // of chosen steps, from one to the next
+  static constexpr double longest_ = 1e-3;  // s
+  static constexpr std::size_t points = 17;
+  static constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+  const SwitchingSystem system_;
+  const RunOptions options_;
+  Sides sides_, made_for_;
+  int stuck_at_ = -1;  // a switching function that the motion cannot leave; −1: none
+  std::int64_t switchings_ = 0;
+  double limit_ = unlimited;  // of the next step  [s]
+  bool is_of_end_ = false;    // whether the end of the run has affected the state
+  double burst_ = 0;          // when the last hundred of them began
+  EventWatch watch_;
+};
+
+}  // namespace pendula
