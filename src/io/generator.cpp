@@ -101,6 +101,12 @@ std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   return names;
 }
 
+std::string model_program(const ModelName& name, const Toolchain& toolchain) {
+  std::vector<std::string> arguments = about("program", name, toolchain);
+  arguments.insert(arguments.end(), {"--as", "bytecode", "--output", "/dev/stdout"});
+  return run_generator(arguments, toolchain);
+}
+
 std::string describe_model(const ModelName& name, const Toolchain& toolchain) {
   read_model(find_model(name, toolchain));
   return last_line(run_generator(about("describe", name, toolchain), toolchain));
