@@ -6,7 +6,7 @@ include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")
 
 # Scripts in the order in which they stand in one module; those of other pages first, which both have.
 set(shared format palette gestures plots)
-set(own spec link history stage hand panels controls main)
+set(own vectors spec link history stage hand panels controls main)
 
 file(WRITE "${OUTPUT}.new" "// Made by cmake/embed_lab.cmake.\n#include \"view/assets.hpp\"\n\nnamespace pendula::view::assets {\n\n")
 embed(lab_page "${FOLDER}/lab.html")
@@ -19,7 +19,7 @@ foreach(name IN LISTS own)
   list(APPEND files "${FOLDER}/${name}.js")
 endforeach()
 embed(lab_script ${files})
-embed(lab_worker "${FOLDER}/engine.js" "${FOLDER}/worker.js")
+embed(lab_worker "${FOLDER}/vectors.js" "${FOLDER}/engine.js" "${FOLDER}/worker.js")
 file(GLOB texts "${FOLDER}/texts/*.json")
 list(SORT texts)
 set(all "")

@@ -111,7 +111,7 @@ ExitStatus lab(const LabOptions& options) {
   io::WholeFile page(options.output);
   io::Toolchain toolchain = io::Toolchain::of_this_program();
   toolchain.kernels_by = "interpreter";  // as in the page
-  json start = {{"title", "Pendulum laboratory"}};
+  json start = json::object();
   if (options.scenario.ends_with(".py")) {
     start = model_start({options.scenario, options.links}, toolchain);
   } else if (!options.scenario.empty()) {

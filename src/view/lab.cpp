@@ -24,7 +24,7 @@ bool has_lab() {
 
 std::string lab_page(const nlohmann::json& start) {
   return filled(assets::lab_page, [&](std::string_view name) -> std::string {
-    if (name == "title") return html_text(start.value("title", "pendula"));
+    if (name == "title") return html_text(start.value("title", "Pendulum laboratory"));
     if (name == "version") return std::string(version);
     if (name == "style") return std::string(assets::lab_style);
     if (name == "script") return std::string(assets::lab_script);

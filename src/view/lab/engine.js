@@ -242,6 +242,16 @@ class Engine {
     this.#require(this.module.pendula_hold(this.simulation, this.held, this.inputs) === 0);
   }
 
+  /// Goes to a time at once.
+  go(time) {
+    this.#advance(this.simulation, time);
+    this.time = time;
+  }
+
+  get steps() {
+    return this.module.pendula_steps(this.simulation);
+  }
+
   /// So many copies, each a little further from the motion in its first coordinate.
   copy(count, apart) {
     for (const copy of this.copies) this.module.pendula_simulation_free(copy);
@@ -292,28 +302,6 @@ class Engine {
 }
 
 const shadowDistance = 1e-7;
-
-/// Vectors of a chain's rods from its angles: θ of all links, then φ.
-function rodsOfAngles(space, lengths, q) {
-  const n = lengths.length;
-  return Array.from(lengths, (length, i) => {
-    const [sin, cos] = [Math.sin(q[i]), Math.cos(q[i])];
-    if (space === 2) return [length * sin, -length * cos];
-    return [length * sin * Math.cos(q[n + i]), length * sin * Math.sin(q[n + i]), -length * cos];
-  });
-}
-
-/// Their velocities.
-function ratesOfRods(space, lengths, q, v) {
-  const n = lengths.length;
-  return Array.from(lengths, (length, i) => {
-    const [sin, cos] = [Math.sin(q[i]), Math.cos(q[i])];
-    if (space === 2) return [length * v[i] * cos, length * v[i] * sin];
-    const [s, c] = [Math.sin(q[n + i]), Math.cos(q[n + i])];
-    const [along, around] = [length * v[i], length * v[n + i] * sin];
-    return [along * cos * c - around * s, along * cos * s + around * c, along * sin];
-  });
-}
 
 function sumOf(vectors, space) {
   return Array.from({ length: space }, (_, axis) => vectors.reduce((sum, vector) => sum + vector[axis], 0));

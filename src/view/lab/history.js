@@ -3,11 +3,14 @@
 const mostBytes = 96e6;
 
 class History {
-  constructor() {
+  /// tipOf(row) is where the last point is, [x, y, z]: kept beside the rows, for its trace.
+  constructor(tipOf) {
+    this.tipOf = tipOf;
     this.clear(1);
   }
 
   clear(rowSize) {
+    this.tips = new Float32Array(3 * 1024);
     this.rowSize = rowSize;
     this.rows = 0;
     this.numbers = new Float64Array(1024 * rowSize);
@@ -32,7 +35,9 @@ class History {
     const needed = this.rows * this.rowSize + rows.length;
     if (needed > this.numbers.length) this.#grow(needed);
     this.numbers.set(rows, this.rows * this.rowSize);
-    this.rows += rows.length / this.rowSize;
+    for (let from = 0; from < rows.length; from += this.rowSize, ++this.rows) {
+      this.tips.set(this.tipOf(rows.subarray(from, from + this.rowSize)), 3 * this.rows);
+    }
   }
 
   /// Forgets what is later than a time.
@@ -46,6 +51,7 @@ class History {
     if (8 * needed > mostBytes) {
       const half = this.rows >> 1;
       this.numbers.copyWithin(0, half * this.rowSize, this.rows * this.rowSize);
+      this.tips.copyWithin(0, 3 * half, 3 * this.rows);
       this.rows -= half;
       ++this.version;
       return;
@@ -53,6 +59,9 @@ class History {
     const larger = new Float64Array(Math.max(2 * this.numbers.length, needed));
     larger.set(this.numbers.subarray(0, this.rows * this.rowSize));
     this.numbers = larger;
+    const tips = new Float32Array(3 * Math.floor(larger.length / this.rowSize));
+    tips.set(this.tips.subarray(0, 3 * this.rows));
+    this.tips = tips;
   }
 
   /// The last row that is not later than a time.

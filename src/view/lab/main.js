@@ -3,7 +3,7 @@
 class Lab {
   constructor() {
     this.state = stateOf(location.hash.slice(1) || beginning.state || "");
-    this.history = new History();
+    this.history = new History((row) => this.#tipOf(row));
     this.stage = new Stage(at("canvas"));
     this.computer = new Computer();
     this.hand = new Hand();
@@ -400,8 +400,7 @@ class Lab {
     this.#writeTime();
   }
 
-  #placePoints(points) {
-    const { places } = this.stage;
+  #placePoints(points, places = this.stage.places) {
     let k = 0;
     model.points.forEach((point, i) => {
       const [x, y, z] = point.columns.map(() => points[k++] ?? 0);
@@ -424,33 +423,25 @@ class Lab {
     return rates;
   }
 
-  // The way of the last point, of 3 seconds at most.
+  // The way of the last point, of 3 seconds at most, to where it is now.
   #trace() {
-    const { history, stage, state, size } = this;
+    const { history, stage } = this;
     if (history.rows < 2) return null;
     const to = history.rowAt(this.shown);
     const from = history.rowAt(Math.max(this.shown - 3, history.start));
-    const stride = Math.max(1, Math.ceil(((to - from) * stage.count) / 6000));
-    const count = Math.floor((to - from) / stride) + 2;
-    const trace = new Float64Array(3 * count);
-    const place = this.spare?.length === 3 * stage.count ? this.spare : (this.spare = new Float64Array(3 * stage.count));
-    const last = 3 * (stage.count - 1);
-    for (let k = 0; k < count - 1; ++k) {
-      const row = Math.ceil(from / stride) * stride + k * stride;
-      const begin = Math.min(row, to) * history.rowSize;
-      if (model) {
-        const points = history.numbers.subarray(begin + 3 + 2 * size, begin + history.rowSize);
-        const held = stage.places;
-        stage.places = place;
-        this.#placePoints(points);
-        stage.places = held;
-      } else {
-        placesOfChain(state, history.numbers.subarray(begin + 1, begin + 1 + size), place);
-      }
-      trace.set(place.subarray(last, last + 3), 3 * k);
-    }
-    trace.set(stage.places.subarray(last, last + 3), 3 * (count - 1));
+    const trace = new Float32Array(3 * (to - from + 2));
+    trace.set(history.tips.subarray(3 * from, 3 * (to + 1)));
+    trace.set(stage.places.subarray(3 * (stage.count - 1), 3 * stage.count), 3 * (to - from + 1));
     return trace;
+  }
+
+  #tipOf(row) {
+    const { stage, state, size } = this;
+    const last = 3 * (stage.count - 1);
+    const spare = this.spare?.length === last + 3 ? this.spare : (this.spare = new Float64Array(last + 3));
+    if (model) this.#placePoints(row.subarray(3 + 2 * size), spare);
+    else placesOfChain(state, row.subarray(1, 1 + size), spare);
+    return spare.subarray(last, last + 3);
   }
 
   #writeTime() {
@@ -495,6 +486,7 @@ class Lab {
     palette.read();
     document.documentElement.dataset.level = state.level;
     if (window.parent !== window) document.documentElement.dataset.embedded = "yes";
+    at("title").dataset.text = beginning.title ? "" : "title";
     writeTexts(state.lang || navigator.languages.map((each) => each.split("-")[0]).find((each) => texts[each]) || "en");
     at("language").replaceChildren(...Object.keys(texts).map((each) => element("option", { value: each, textContent: texts[each]["language.name"], selected: each === language })));
     at("level").value = state.level;

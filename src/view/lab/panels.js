@@ -180,7 +180,7 @@ class PhasePanel extends Panel {
     axes.beginMoving();
     const place = (row) => (wrapped ? wrap(history.get(row, 1 + k)) : history.get(row, 1 + k));
     const rate = (row) => history.get(row, 1 + size + k);
-    axes.x = wrapped ? { low: -Math.PI, high: Math.PI } : this.range([place]);
+    axes.x = wrapped ? turnOfAngles : this.range([place]);
     axes.y = this.range([rate]);
     axes.drawGrid(pen, degreeTicks(axes.x, axes.width / 70, wrapped), linearTicks(axes.y, axes.height / 30, false), "");
     const { from, to, stride } = this.rows(900);
@@ -205,6 +205,9 @@ class PhasePanel extends Panel {
     this.name(["", text("phase.key", { name, unit: wrapped ? "°" : lab.units[k], rate: `${lab.units[k]}/s` })]);
   }
 }
+
+/// A whole turn, and room for its numbers.
+const turnOfAngles = { low: -1.06 * Math.PI, high: 1.06 * Math.PI };
 
 /// Angles in degrees, other numbers as they are.
 function degreeTicks(axis, count, wrapped) {
@@ -254,7 +257,7 @@ class SectionPanel extends Panel {
     const last = lab.size - 1;
     const wrapped = lab.isAngle[last];
     const [xs, ys] = [points.filter((_, k) => k % 2 === 0), points.filter((_, k) => k % 2 === 1)];
-    axes.x = wrapped ? { low: -Math.PI, high: Math.PI } : rangeOf([xs]);
+    axes.x = wrapped ? turnOfAngles : rangeOf([xs]);
     axes.y = rangeOf([ys]);
     axes.drawGrid(pen, degreeTicks(axes.x, axes.width / 70, wrapped), linearTicks(axes.y, axes.height / 30, false), "");
     pen.fillStyle = rgba(palette.curves[2], 0.85);

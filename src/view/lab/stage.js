@@ -153,15 +153,19 @@ class Stage {
     const { pen, reach } = this;
     const floor = -1.12 * reach;
     const rings = niceTicks(0, 1.6 * reach, 4).slice(1);
+    const ground = (x, y) => this.project(x, y, floor);
+    const last = rings.at(-1) ?? reach;
+    pen.fillStyle = palette.css("floor");
+    pen.beginPath();
+    for (let k = 0; k < 64; ++k) pen.lineTo(...ground(last * Math.cos((k * Math.PI) / 32), last * Math.sin((k * Math.PI) / 32)).slice(0, 2));
+    pen.fill();
     pen.strokeStyle = palette.css("line");
     pen.lineWidth = 1;
-    const ground = (x, y) => this.project(x, y, floor);
     for (const radius of rings) {
       pen.beginPath();
       for (let k = 0; k <= 64; ++k) pen.lineTo(...ground(radius * Math.cos((k * Math.PI) / 32), radius * Math.sin((k * Math.PI) / 32)).slice(0, 2));
       pen.stroke();
     }
-    const last = rings.at(-1) ?? reach;
     for (let k = 0; k < 12; ++k) {
       const [c, s] = [last * Math.cos((k * Math.PI) / 6), last * Math.sin((k * Math.PI) / 6)];
       line(pen, ...ground(0, 0).slice(0, 2), ...ground(c, s).slice(0, 2));
@@ -175,9 +179,7 @@ class Stage {
     pen.beginPath();
     for (let i = 0; i < this.count; ++i) {
       const from = this.hangs[i];
-      if (from === -2) continue;
-      const a = from < 0 ? ground(0, 0) : ground(this.places[3 * from], this.places[3 * from + 1]);
-      pen.moveTo(a[0], a[1]);
+      if (from < 0) pen.moveTo(...ground(0, 0).slice(0, 2));
       const b = ground(this.places[3 * i], this.places[3 * i + 1]);
       pen.lineTo(b[0], b[1]);
     }
@@ -247,9 +249,8 @@ class Stage {
     pen.beginPath();
     for (let i = 0; i < count; ++i) {
       const on = this.hangs[i];
-      if (on === -2) continue;
-      const from = on < 0 ? pivot : points[on];
-      pen.moveTo(from[0], from[1]);
+      if (on === -2) pen.moveTo(points[i][0], points[i][1]);
+      else if (on !== i - 1 || i === 0) pen.moveTo(...(on < 0 ? pivot : points[on]).slice(0, 2));
       pen.lineTo(points[i][0], points[i][1]);
     }
     pen.stroke();
@@ -262,9 +263,29 @@ class Stage {
       pen.fill();
       pen.stroke();
     }
+    if (count > balls) {
+      this.#drawManyBalls(points);
+      if (held) this.#drawBall(points[held.bob], held.bob, true);
+      return;
+    }
     const order = points.map((_, i) => i);
     if (this.space === 3) order.sort((a, b) => points[a][3] - points[b][3]);
     for (const i of order) this.#drawBall(points[i], i, i === held?.bob);
+  }
+
+  // All in one colour, but for the last.
+  #drawManyBalls(points) {
+    const { pen } = this;
+    pen.fillStyle = palette.css("bob");
+    pen.beginPath();
+    for (let i = 0; i < points.length - 1; ++i) {
+      const [x, y, near] = points[i];
+      const radius = Math.max(this.radii[i] * this.pixels * near, 1.4);
+      pen.moveTo(x + radius, y);
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+    }
+    pen.fill();
+    this.#drawBall(points.at(-1), points.length - 1, false);
   }
 
   #drawBall([x, y, near], i, isHeld) {

@@ -20,7 +20,7 @@ function text(key, names = {}) {
 function writeTexts(chosen) {
   language = texts[chosen] ? chosen : "en";
   document.documentElement.lang = language;
-  for (const each of document.querySelectorAll("[data-text]")) each.textContent = text(each.dataset.text);
+  for (const each of document.querySelectorAll("[data-text]")) if (each.dataset.text) each.textContent = text(each.dataset.text);
   for (const each of document.querySelectorAll("[data-label]")) each.setAttribute("aria-label", text(each.dataset.label));
   for (const each of document.querySelectorAll("[data-label][type=button]")) each.title = text(each.dataset.label);
 }
