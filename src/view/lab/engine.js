@@ -242,6 +242,25 @@ class Engine {
     this.#require(this.module.pendula_hold(this.simulation, this.held, this.inputs) === 0);
   }
 
+  /// On what each point of a program hangs by something rigid: the point before, the first on the origin (-1), or nothing
+  /// (-2). Seen at several coordinates about q. `components`: of each point.
+  hangs(q, components) {
+    const firsts = components.map((_, k) => components.slice(0, k).reduce((sum, count) => sum + count, 0));
+    const draws = [0, 0.37, -0.81, 1.3].map((by) => this.pointsAt(q.map((x, k) => x + by * (1 + 0.4 * k))));
+    const distance = (points, k) => {
+      let square = 0;
+      for (let axis = 0; axis < components[k]; ++axis) {
+        const before = k > 0 && axis < components[k - 1] ? points[firsts[k - 1] + axis] : 0;
+        square += (points[firsts[k] + axis] - before) ** 2;
+      }
+      return Math.sqrt(square);
+    };
+    return components.map((_, k) => {
+      const all = draws.map((points) => distance(points, k));
+      return all[0] > 0 && all.every((each) => Math.abs(each - all[0]) < 1e-9 * all[0]) ? k - 1 : -2;
+    });
+  }
+
   /// Goes to a time at once.
   go(time) {
     this.#advance(this.simulation, time);

@@ -63,8 +63,8 @@ class Lab {
     if (model) {
       const space = Math.max(2, ...model.points.map((point) => point.columns.length));
       const count = model.points.length;
-      const spread = Math.max(...(this.#points ?? []).map(Math.abs), 0.5);
-      stage.shape({ space, count, hangs: model.points.map((_, k) => k - 1), masses: model.points.map(() => 1), reach: model.reach ?? 1.5 * spread });
+const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
+      stage.shape({ space, count, hangs: this.#hangs ?? model.points.map(() => -2), masses: model.points.map(() => 1), reach: 1.5 * spread });
       this.row = new Float64Array(3 + 2 * this.size);
     } else {
       const reach = state.l.reduce((sum, length) => sum + length, 0);
@@ -75,6 +75,7 @@ class Lab {
     this.row.set(state.v, 1 + this.size);
   }
   #points = null;
+  #hangs = null;
 
   /// Sends what moves to the worker, from the present row or the start.
   async #send() {
@@ -99,6 +100,7 @@ class Lab {
       for (const panel of this.panels) if (panel instanceof CopiesPanel || panel instanceof ExponentPanel) panel.begin();
       if (model && !this.#points) {
         this.#points = answer.rows.subarray(3 + 2 * this.size);
+        this.#hangs = answer.hangs;
         this.#begin();
         this.row = answer.rows.slice();
       }

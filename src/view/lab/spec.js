@@ -114,6 +114,6 @@ function linkOf(state) {
 
 /// What the engine is told of a state.
 function specOf(state) {
-  if (model) return { program: beginning.program, parameters: state.p };
+  if (model) return { program: beginning.program, parameters: state.p, components: model.points.map((each) => each.columns.length) };
   return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d) };
 }

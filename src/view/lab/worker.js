@@ -17,7 +17,7 @@ const orders = {
     engine.begin(spec, start);
     if (copies) engine.copy(copies, apart);
     if (measure) engine.measure(true);
-    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, names: spec.program ? engine.names : [] };
+    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, hangs: spec.program ? engine.hangs(start.q, spec.components) : null };
   },
 
   copy({ copies, apart }) {
