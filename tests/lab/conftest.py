@@ -23,7 +23,12 @@ def program(*arguments: str, text: str = "") -> subprocess.CompletedProcess:
 def ends_in_module(cases: list[dict]) -> list[dict]:
     """Where the module brings motions to."""
     done = subprocess.run(
-        [os.environ["PENDULA_NODE"], Path(__file__).parent / "ends.js", os.environ["PENDULA_LAB_MODULE"], SOURCE],
+        [
+            os.environ["PENDULA_NODE"],
+            Path(__file__).parent / "ends.js",
+            os.environ["PENDULA_LAB_MODULE"],
+            SOURCE,
+        ],
         input=json.dumps(cases),
         capture_output=True,
         text=True,
@@ -67,7 +72,9 @@ def open_lab(lab_file: Path, browser: Browser) -> Iterator[Callable[..., Page]]:
     """open_lab(link, ...) -> a page that has begun; no error, and no request but for itself."""
     contexts, wrong = [], []
 
-    def open_one(link="", size=SMALL, scheme="light", motion="reduce", touch=False, locale="en-GB", file=lab_file) -> Page:
+    def open_one(
+        link="", size=SMALL, scheme="light", motion="reduce", touch=False, locale="en-GB", file=lab_file
+    ) -> Page:
         context = browser.new_context(
             viewport={"width": size[0], "height": size[1]},
             color_scheme=scheme,

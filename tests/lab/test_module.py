@@ -31,7 +31,9 @@ def scenario(case: dict) -> str:
     if spec["space"] == 3:
         lines += [f"phi = {start['q'][n:]}", f"phi_dot = {start['v'][n:]}"]
     steps = f"step = {case['step']}\nstages = 4" if case.get("step") else "tolerance = 1e-10\nstages = 8"
-    return "\n".join([*lines, "[run]", 'solver = "chain"', f"duration = {case['duration']}", "estimate = false", steps])
+    return "\n".join(
+        [*lines, "[run]", 'solver = "chain"', f"duration = {case['duration']}", "estimate = false", steps]
+    )
 
 
 def ends_in_program(cases: list[dict]) -> list[dict]:
@@ -40,7 +42,12 @@ def ends_in_program(cases: list[dict]) -> list[dict]:
         done = program("simulate", "-", "--json", "--quiet", text=scenario(case))
         assert done.returncode == 0, done.stderr
         final = json.loads(done.stdout)["final"]
-        ends.append({key: final[name] + final.get(phi, []) for key, name, phi in (("q", "theta", "phi"), ("v", "theta_dot", "phi_dot"))})
+        ends.append(
+            {
+                key: final[name] + final.get(phi, [])
+                for key, name, phi in (("q", "theta", "phi"), ("v", "theta_dot", "phi_dot"))
+            }
+        )
     return ends
 
 
@@ -66,7 +73,9 @@ def test_ends_are_those_of_the_program(step):
 
 def test_energy_stays_for_ten_minutes():
     spec = {"space": 2, "masses": [1, 1], "lengths": [1, 1], "gravity": 9.81, "damping": [0, 0]}
-    (end,) = ends_in_module([{"spec": spec, "start": {"q": [2.0, 1.5], "v": [0, 0]}, "duration": 600, "rows": 60}])
+    (end,) = ends_in_module(
+        [{"spec": spec, "start": {"q": [2.0, 1.5], "v": [0, 0]}, "duration": 600, "rows": 60}]
+    )
     scale = 3 * 9.81
     off = [abs(energy - end["energies"][0]) / scale for energy in end["energies"]]
     assert len(off) == 1201
