@@ -1,5 +1,5 @@
-// The library of the laboratory: Gauss steps of 4 and 8 stages, for chains and for interpreted models. It has no lanes, no
-// explicit methods, no generated kernels: what is not asked for there does not go into its page.
+// The library of the laboratory: Gauss steps of 4 and 8 stages, for chains and for interpreted models. It has no lanes,
+// no explicit methods, no generated kernels: what is not asked for there does not go into its page.
 #include <array>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/chain/space.hpp>
@@ -17,14 +17,16 @@ namespace pendula {
 
 extern template std::unique_ptr<PlainIntegrator> make_chain_stages<Planar, 4>(const Chain<Planar>&, const RunOptions&);
 extern template std::unique_ptr<PlainIntegrator> make_chain_stages<Planar, 8>(const Chain<Planar>&, const RunOptions&);
-extern template std::unique_ptr<PlainIntegrator> make_chain_stages<Spatial, 4>(const Chain<Spatial>&, const RunOptions&);
-extern template std::unique_ptr<PlainIntegrator> make_chain_stages<Spatial, 8>(const Chain<Spatial>&, const RunOptions&);
+extern template std::unique_ptr<PlainIntegrator> make_chain_stages<Spatial, 4>(const Chain<Spatial>&,
+                                                                               const RunOptions&);
+extern template std::unique_ptr<PlainIntegrator> make_chain_stages<Spatial, 8>(const Chain<Spatial>&,
+                                                                               const RunOptions&);
 
 namespace {
 
 void require_offered(const RunOptions& options) {
-  const bool offered = options.method == Method::gauss && options.form == Form::momentum &&
-                       (options.stages == 4 || options.stages == 8);
+  const bool offered =
+      options.method == Method::gauss && options.form == Form::momentum && (options.stages == 4 || options.stages == 8);
   if (offered) return;
   throw NoKernel("method: the laboratory has gauss with 4 or 8 stages in momentum form, got " +
                  std::string(name_of(options.method)) + " with " + std::to_string(options.stages));
@@ -34,7 +36,8 @@ template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& plain, const RunOptions& options) {
   require_offered(options);
   const Chain<Space> chain = chain_of<Space>(plain);
-  return options.stages == 4 ? make_chain_stages<Space, 4>(chain, options) : make_chain_stages<Space, 8>(chain, options);
+  return options.stages == 4 ? make_chain_stages<Space, 4>(chain, options)
+                             : make_chain_stages<Space, 8>(chain, options);
 }
 
 std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table, const PlainSystem& plain,

@@ -116,11 +116,15 @@ def test_a_bob_follows_the_hand_and_is_thrown(open_lab, link):
         page.wait_for_timeout(16)
     page.wait_for_timeout(700)
     held = on_screen(page)
-    # The hand is a spring: 8 px measured, of those that the others pull.
+    # The hand is a spring, at which the others pull.
     off = page.evaluate(
-        "(() => { const s = pendulaLab.stage, i = 3 * (s.count - 1); return Math.hypot(...[0, 1, 2].map((k) => s.places[i + k] - pendulaLab.hand.place[k])) / s.reach; })()"
+        """(() => {
+          const { stage, hand } = pendulaLab;
+          const i = 3 * (stage.count - 1);
+          return Math.hypot(...[0, 1, 2].map((k) => stage.places[i + k] - hand.place[k])) / stage.reach;
+        })()"""
     )
-    assert off < 0.1, held
+    assert off < 0.05, held  # of the chain's length; measured 0.006 and 0.011
     for step in range(8):
         page.mouse.move(x + 60 - 14 * step, y - 40)
         page.wait_for_timeout(16)
@@ -129,9 +133,12 @@ def test_a_bob_follows_the_hand_and_is_thrown(open_lab, link):
     assert speed > 0.5
     until(page, "pendulaLab.shown > pendulaLab.since + 0.5")
     error = page.evaluate(
-        "(() => { const { row, size, energy, energyScale } = pendulaLab; return Math.abs(row[1 + 2 * size] + row[2 + 2 * size] - energy) / energyScale; })()"
+        """(() => {
+          const { row, size, energy, energyScale } = pendulaLab;
+          return Math.abs(row[1 + 2 * size] + row[2 + 2 * size] - energy) / energyScale;
+        })()"""
     )
-    assert error < 1e-9  # measured 1e-14: what was thrown keeps its energy
+    assert error < 1e-12  # measured 3e-16: what was thrown keeps its energy
 
 
 def test_sliders_change_the_motion(open_lab):
@@ -219,7 +226,7 @@ def test_the_exponent_converges(open_lab):
     page.get_by_role("button", name="Measure").click()
     until(page, "pendulaLab.panels.some((panel) => panel.values?.length > 20)")
     value = page.evaluate("pendulaLab.panels.find((panel) => panel.values).values.at(-1)[1]")
-    assert 0.3 < value < 8  # 1/s; measured 2 to 3 after 10 s
+    assert 0.3 < value < 8  # 1/s; measured 1.6 after 10 s
 
 
 def test_by_keyboard_alone(open_lab):
@@ -289,7 +296,8 @@ def test_own_lagrangian(open_lab, tmp_path):
 def test_scenarios_begin_as_they_say(open_lab, tmp_path):
     scenario = tmp_path / "three.toml"
     scenario.write_text(
-        '[chain]\nspace = "spatial"\nmasses = [1, 2, 3]\nlengths = 0.5\n[start]\ntheta = [1, 0.5, 0.2]\nphi = 0.3\ntheta_dot = 0.1\n[run]\nduration = 1\n'
+        '[chain]\nspace = "spatial"\nmasses = [1, 2, 3]\nlengths = 0.5\n'
+        "[start]\ntheta = [1, 0.5, 0.2]\nphi = 0.3\ntheta_dot = 0.1\n[run]\nduration = 1\n"
     )
     file = tmp_path / "three.html"
     done = program("lab", str(scenario), "-o", str(file))
@@ -303,7 +311,8 @@ def test_scenarios_begin_as_they_say(open_lab, tmp_path):
 def test_in_a_frame_of_another_page(lab_file, open_lab, tmp_path):
     outer = tmp_path / "outer.html"
     outer.write_text(
-        f'<!DOCTYPE html><title>x</title><iframe src="file://{lab_file}#n=3&th=1" width="700" height="500"></iframe><script>window.pendulaLab = {{ history: {{ rows: 1 }} }}</script>'
+        f'<!DOCTYPE html><iframe src="file://{lab_file}#n=3&th=1" width="700" height="500"></iframe>'
+        "<script>window.pendulaLab = { history: { rows: 1 } }</script>"
     )
     page = open_lab(file=outer, motion="no-preference")
     frame = page.frames[1]
@@ -321,7 +330,7 @@ def test_nothing_hangs_over(open_lab, size, scheme):
     page = open_lab("level=all&show=angles+velocities+ruler", size=size, scheme=scheme)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     stage = page.evaluate(
-        "(() => { const { width, height } = document.getElementById('canvas').getBoundingClientRect(); return [width, height]; })()"
+        "[document.getElementById('canvas').clientWidth, document.getElementById('canvas').clientHeight]"
     )
     assert min(stage) > 220
     ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -346,7 +355,10 @@ def test_levels_and_languages(open_lab):
     page.select_option("#language", "en")
     assert page.inner_text("#title") == "Pendulum laboratory"
     english, japanese = page.evaluate(
-        "[Object.keys(JSON.parse(document.getElementById('texts').textContent).en), Object.keys(JSON.parse(document.getElementById('texts').textContent).ja)]"
+        """(() => {
+          const { en, ja } = JSON.parse(document.getElementById('texts').textContent);
+          return [Object.keys(en), Object.keys(ja)];
+        })()"""
     )
     assert english == japanese
 
