@@ -101,7 +101,7 @@ ExitStatus film(const std::string& run, const std::string& output);
 ExitStatus gallery(const std::string& folder);
 
 struct LabOptions {
-  std::string scenario;                ///< the file, or a model file (.py); empty for a double pendulum
+  std::string scenario;                ///< the file, or a model's; or a built-in model; empty for a double pendulum
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::optional<int> links;            ///< of a model file that has links
   std::string output;                  ///< the page

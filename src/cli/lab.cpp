@@ -112,9 +112,10 @@ ExitStatus lab(const LabOptions& options) {
   io::Toolchain toolchain = io::Toolchain::of_this_program();
   toolchain.kernels_by = "interpreter";  // as in the page
   json start = json::object();
-  if (options.scenario.ends_with(".py")) {
+  const bool is_scenario = options.scenario == "-" || options.scenario.ends_with(".toml");
+  if (!is_scenario && !options.scenario.empty()) {
     start = model_start({options.scenario, options.links}, toolchain);
-  } else if (!options.scenario.empty()) {
+  } else if (is_scenario) {
     start = scenario_start(options, toolchain);
   }
   page.write(view::lab_page(start));

@@ -327,11 +327,10 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
 
   drop() {
     if (!this.hand.isHolding) return;
-    const { size, row } = this;
     this.hand.letGo();
     if (this.isPosed) {
       this.isPosed = false;
-      this.#startIsNow(row);
+      this.#startIsNow(this.row);
       this.history.clear(this.history.rowSize);
       this.shown = this.clock = 0;
       this.#later();
@@ -347,8 +346,6 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
     }
     say(text("said.dropped"));
     this.changed();
-
-    void size;
   }
 
   #startIsNow(row) {
@@ -400,6 +397,7 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
     if (this.playing && panel.isSeen) panel.draw();
     if (!this.playing) for (const each of this.panels) if (each.isSeen) each.draw();
     this.#writeTime();
+    if (this.shown > 12) at("hint").classList.add("gone"); // whoever looks on needs it no more
   }
 
   #placePoints(points, places = this.stage.places) {

@@ -14,7 +14,7 @@ const modelParameters = (model?.parameters ?? []).flatMap((each) => {
 
 const freshState = () => ({
   n: 2, space: 2, m: [1, 1], l: [1, 1], g: 9.81, d: 0,
-  q: model ? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1)) : [2.0943951023931953, 1.5707963267948966],
+  q: model ? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1)) : [2.0943951023931953, 2.6179938779914944],
   v: model ? model.coordinates.map(() => 0) : [0, 0],
   p: modelParameters.map((each) => each.default ?? 1),
   speed: 1, level: "student", lang: "", theme: "", copies: 0, apart: 1e-6,
