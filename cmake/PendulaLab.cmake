@@ -78,13 +78,25 @@ endfunction()
 # pages, some of which it shares.
 function(pendula_lab_assets folder pages out_source)
   _pendula_lab_module(module)
+  set(models "")
+  pendula_find_python("${PENDULA_CODEGEN_DIR}/requirements.txt" python problem)
+  if(module AND NOT problem)
+    set(models "${PROJECT_BINARY_DIR}/lab/models.json")
+    file(GLOB_RECURSE generator CONFIGURE_DEPENDS "${PENDULA_CODEGEN_DIR}/pendula_codegen/*.py")
+    add_custom_command(
+      OUTPUT "${models}"
+      COMMAND "${python}" -B "${PROJECT_SOURCE_DIR}/cmake/lab_models.py" "${PENDULA_CODEGEN_DIR}" "${models}"
+      DEPENDS ${generator} "${PROJECT_SOURCE_DIR}/cmake/lab_models.py"
+      COMMENT "Deriving the laboratory's models" VERBATIM)
+  endif()
   set(output "${PROJECT_BINARY_DIR}/view/lab_assets.cpp")
   file(GLOB_RECURSE files CONFIGURE_DEPENDS "${folder}/*" "${pages}/*")
   add_custom_command(
     OUTPUT "${output}"
-    COMMAND "${CMAKE_COMMAND}" -D FOLDER=${folder} -D PAGES=${pages} -D MODULE=${module} -D OUTPUT=${output}
+    COMMAND "${CMAKE_COMMAND}" -D FOLDER=${folder} -D PAGES=${pages} -D MODULE=${module} -D MODELS=${models}
+            -D OUTPUT=${output}
             -P "${PROJECT_SOURCE_DIR}/cmake/embed_lab.cmake"
-    DEPENDS ${files} ${module} "${PROJECT_SOURCE_DIR}/cmake/embed_lab.cmake"
+    DEPENDS ${files} ${module} ${models} "${PROJECT_SOURCE_DIR}/cmake/embed_lab.cmake"
             "${PROJECT_SOURCE_DIR}/cmake/embed_bytes.cmake"
     COMMENT "Embedding the sources of the laboratory" VERBATIM)
   set(${out_source} "${output}" PARENT_SCOPE)

@@ -1,6 +1,7 @@
 # The sources of the laboratory's page as a C++ file:
-#   cmake -D FOLDER=… -D PAGES=… -D MODULE=… -D OUTPUT=… -P embed_lab.cmake
-# MODULE is its WebAssembly, or empty: then the page can't be written, and says why.
+#   cmake -D FOLDER=… -D PAGES=… -D MODULE=… -D MODELS=… -D OUTPUT=… -P embed_lab.cmake
+# MODULE is its WebAssembly, or empty: then the page can't be written, and says why. MODELS are the built-in models as
+# cmake/lab_models.py writes them, or empty: then the page has none.
 cmake_minimum_required(VERSION 3.25)
 include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")
 
@@ -31,6 +32,11 @@ endforeach()
 string(REGEX REPLACE "^," "" all "${all}")
 file(WRITE "${OUTPUT}.texts" "{${all}}")
 embed(lab_texts "${OUTPUT}.texts")
+if(NOT MODELS)
+  set(MODELS "${OUTPUT}.models")
+  file(WRITE "${MODELS}" "{}")
+endif()
+embed(lab_models "${MODELS}")
 file(WRITE "${OUTPUT}.gz" "")
 if(MODULE)
   file(ARCHIVE_CREATE OUTPUT "${OUTPUT}.gz" PATHS "${MODULE}" FORMAT raw COMPRESSION GZip COMPRESSION_LEVEL 9

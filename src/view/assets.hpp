@@ -22,6 +22,7 @@ extern const std::string_view lab_style;   ///< page.css and lab.css
 extern const std::string_view lab_script;  ///< one module
 extern const std::string_view lab_worker;  ///< a classic script, for a worker
 extern const std::string_view lab_texts;   ///< JSON: texts by language
+extern const std::string_view lab_models;  ///< JSON: built-in models by name
 extern const std::string_view lab_module;  ///< WebAssembly, gzip; empty where this build has none
 
 }  // namespace pendula::view::assets

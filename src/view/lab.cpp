@@ -30,6 +30,7 @@ std::string lab_page(const nlohmann::json& start) {
     if (name == "script") return std::string(assets::lab_script);
     if (name == "start") return script_json(start);
     if (name == "texts") return std::string(assets::lab_texts);
+    if (name == "models") return script_json(nlohmann::json::parse(assets::lab_models));
     if (name == "worker") return worker_text();
     std::string module;
     append_base64(module, assets::lab_module);

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Error, Page, sync_playwright
 
 SOURCE = Path(__file__).parents[2] / "src/view/lab"
 SMALL = (1000, 700)
@@ -41,8 +41,16 @@ def ends_in_module(cases: list[dict]) -> list[dict]:
 
 def until(page: Page, condition: str, seconds: float = 20) -> None:
     """Waits for a condition; playwright's own way is what the page's security policy forbids."""
+
+    def holds() -> bool:
+        try:
+            return bool(page.evaluate(condition))
+        except Error as error:  # the page begins again
+            assert "navigation" in str(error), error
+            return False
+
     end = time.monotonic() + seconds
-    while not page.evaluate(condition):
+    while not holds():
         assert time.monotonic() < end, f"expected within {seconds} s: {condition}"
         page.wait_for_timeout(20)
 

@@ -54,6 +54,11 @@ class Slider {
   }
 }
 
+/// kg m^2 as kg m², and nothing for a plain number.
+function unitWords(unit) {
+  return unit === "1" ? "" : unitText(unit).replace("^2", "²").replace("^3", "³");
+}
+
 /// All settings, for as many links as there are now.
 class Controls {
   constructor(lab) {
@@ -69,6 +74,7 @@ class Controls {
   make() {
     this.sliders = [];
     this.host.replaceChildren();
+    this.#makeMenu();
     if (model) this.#makeModel();
     else this.#makeChain();
     this.#makeStart();
@@ -78,6 +84,8 @@ class Controls {
   refresh() {
     for (const slider of this.sliders ?? []) slider.refresh();
     for (const each of this.host.querySelectorAll("[data-text]")) each.textContent = text(each.dataset.text);
+    for (const each of this.menu?.options ?? []) each.textContent = each.value ? text(`model.${each.value}`) : beginning.title;
+    this.menu?.setAttribute("aria-label", text("settings.moves"));
     for (const button of this.host.querySelectorAll("[data-space]")) {
       button.setAttribute("aria-pressed", Number(button.dataset.space) === this.#state.space);
     }
@@ -93,6 +101,20 @@ class Controls {
     const slider = new Slider(what);
     this.sliders.push(slider);
     this.host.append(slider.node);
+  }
+
+  // What moves; another one begins the page again.
+  #makeMenu() {
+    if (Object.keys(models).length === 0) return;
+    const menu = element("select", { id: "model" });
+    menu.dataset.label = "settings.moves";
+    const add = (value) => menu.append(element("option", { value, selected: value === (named ?? (model ? "" : "chain")) }));
+    add("chain");
+    if (beginning.model && moved === beginning) add("");
+    for (const name of Object.keys(models)) add(name);
+    menu.addEventListener("change", () => this.lab.go(menu.value));
+    this.menu = menu;
+    this.host.append(element("div", { className: "menu" }, menu));
   }
 
   #makeChain() {
@@ -142,7 +164,7 @@ class Controls {
     modelParameters.forEach((each, k) => {
       const size = Math.abs(each.default ?? 1) || 1;
       this.#slider({
-        label: each.label, key: "", unit: unitText(each.unit === "1" ? "" : each.unit), logarithmic: each.positive,
+        label: each.label, key: "", unit: unitWords(each.unit), logarithmic: each.positive,
         low: each.positive ? size / 20 : Math.min(0, 2.5 * (each.default ?? 0)), high: each.positive ? size * 20 : Math.max(2.5 * (each.default ?? 1), 1), step: 0.01 * size,
         get: () => this.#state.p[k],
         set: (x) => {
@@ -172,7 +194,7 @@ class Controls {
     if (model) {
       lab.coordinates.forEach((name, k) => {
         if (lab.isAngle[k]) angle(symbol(name), k);
-        else this.#slider({ label: symbol(name), key: "", unit: unitText(lab.units[k]), low: -3, high: 3, step: 0.01, level: "student", get: () => this.#state.q[k], set: (x) => set("q", k, x) });
+        else this.#slider({ label: symbol(name), key: "", unit: unitWords(lab.units[k]), low: -3, high: 3, step: 0.01, level: "student", get: () => this.#state.q[k], set: (x) => set("q", k, x) });
       });
       return;
     }

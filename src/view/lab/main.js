@@ -2,7 +2,7 @@
 
 class Lab {
   constructor() {
-    this.state = stateOf(location.hash.slice(1) || beginning.state || "");
+    this.state = stateOf(location.hash.slice(1) || (moved === beginning && beginning.state) || "");
     this.history = new History((row) => this.#tipOf(row));
     this.stage = new Stage(at("canvas"));
     this.computer = new Computer();
@@ -64,11 +64,12 @@ class Lab {
       const space = Math.max(2, ...model.points.map((point) => point.columns.length));
       const count = model.points.length;
 const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
-      stage.shape({ space, count, hangs: this.#hangs ?? model.points.map(() => -2), masses: model.points.map(() => 1), reach: 1.5 * spread });
+      stage.shape({ space, count, hangs: this.#hangs ?? model.points.map(() => -2), kinds: model.points.map((point) => point.kind ?? "ball"),
+        bonds: bondsOf(model), masses: model.points.map(() => 1), reach: 1.5 * spread });
       this.row = new Float64Array(3 + 2 * this.size);
     } else {
       const reach = state.l.reduce((sum, length) => sum + length, 0);
-      stage.shape({ space: state.space, count: state.n, hangs: state.m.map((_, k) => k - 1), masses: state.m, reach });
+      stage.shape({ space: state.space, count: state.n, hangs: state.m.map((_, k) => k - 1), kinds: [], bonds: [], masses: state.m, reach });
       this.row = new Float64Array(3 + 2 * this.size);
     }
     this.row.set(state.q, 1);
@@ -140,6 +141,14 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
   startFrom(numbers) {
     Object.assign(this.state, numbers);
     this.again();
+  }
+
+  /// Something else moves: the page begins again, with the same looks.
+  go(name) {
+    const { level, lang, theme } = this.state;
+    const looks = Object.entries({ level, lang, theme }).filter(([, value]) => value).map(([key, value]) => `&${key}=${value}`);
+    clearTimeout(this.writing);
+    location.hash = `model=${name || ""}${looks.join("")}`;
   }
 
   /// Begins again where the link begins.
@@ -486,7 +495,7 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
     palette.read();
     document.documentElement.dataset.level = state.level;
     if (window.parent !== window) document.documentElement.dataset.embedded = "yes";
-    at("title").dataset.text = beginning.title ? "" : "title";
+    at("title").dataset.text = models[named] ? `model.${named}` : beginning.title && moved === beginning ? "" : "title";
     writeTexts(state.lang || navigator.languages.map((each) => each.split("-")[0]).find((each) => texts[each]) || "en");
     at("language").replaceChildren(...Object.keys(texts).map((each) => element("option", { value: each, textContent: texts[each]["language.name"], selected: each === language })));
     at("level").value = state.level;
@@ -604,6 +613,10 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
   // Somebody typed another link.
   #follow() {
     if (location.hash.slice(1) === linkOf(this.state)) return;
+    if ((new URLSearchParams(location.hash.slice(1)).get("model") ?? null) !== named) {
+      location.reload(); // something else moves
+      return;
+    }
     this.state = stateOf(location.hash.slice(1));
     this.show = new Set(this.state.show);
     this.#look();

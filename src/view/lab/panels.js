@@ -155,7 +155,7 @@ class ErrorPanel extends Panel {
     this.curve(pen, palette.css("accent"), value);
     pen.restore();
     const off = Math.abs(lab.row[1 + 2 * size] + lab.row[2 + 2 * size] - lab.energy) / scale;
-    this.name(["", lab.state.d > 0 && !model ? text("error.damped") : text("error.now", { error: readable(off, 2) })]);
+    this.name(["", (model ? off > 1e-8 : lab.state.d > 0) ? text("error.damped") : text("error.now", { error: readable(off, 2) })]);
   }
 }
 

@@ -5,8 +5,7 @@ const speedChoices = [1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
 const mostLinks = 300;
 const listed = 4; // links whose numbers have sliders of their own
 
-/// Numbers of a model that is no chain, as describe tells them.
-const model = beginning.model ?? null;
+/// Numbers of a model that is no chain, as describe tells them, link by link.
 const modelParameters = (model?.parameters ?? []).flatMap((each) => {
   const count = each.per_link ? model.links : 1;
   return Array.from({ length: count }, (_, k) => ({ ...each, label: each.per_link ? `${each.name} ${k + 1}` : each.name }));
@@ -14,9 +13,9 @@ const modelParameters = (model?.parameters ?? []).flatMap((each) => {
 
 const freshState = () => ({
   n: 2, space: 2, m: [1, 1], l: [1, 1], g: 9.81, d: 0,
-  q: model ? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1)) : [2.0943951023931953, 2.6179938779914944],
-  v: model ? model.coordinates.map(() => 0) : [0, 0],
-  p: modelParameters.map((each) => each.default ?? 1),
+  q: model ? (moved.start?.q ?? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1))) : [2.0943951023931953, 2.6179938779914944],
+  v: model ? (moved.start?.v ?? model.coordinates.map(() => 0)) : [0, 0],
+  p: modelParameters.map((each) => moved.start?.p?.[each.name] ?? each.default ?? 1),
   speed: 1, level: "student", lang: "", theme: "", copies: 0, apart: 1e-6,
   show: ["trace"],
 });
@@ -97,6 +96,7 @@ function linkOf(state) {
   const fresh = freshState();
   const short = (numbers) => (numbers.every((x) => x === numbers[0]) ? `${numbers[0]}` : numbers.join(","));
   const put = (key, value) => words.push(`${key}=${value}`);
+  if (models[named] || named === "chain") put("model", named);
   if (model) {
     put("p", state.p.join(",")), put("q", state.q.join(",")), put("v", short(state.v));
   } else {
@@ -114,6 +114,6 @@ function linkOf(state) {
 
 /// What the engine is told of a state.
 function specOf(state) {
-  if (model) return { program: beginning.program, parameters: state.p, components: model.points.map((each) => each.columns.length) };
+  if (model) return { program: moved.program, parameters: state.p, components: model.points.map((each) => each.columns.length) };
   return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d) };
 }

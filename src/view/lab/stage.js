@@ -30,8 +30,8 @@ class Stage {
   }
 
   /// What there is to draw: how many points, what each hangs on, masses, and how far it all reaches.
-  shape({ space, count, hangs, masses, reach }) {
-    Object.assign(this, { space, count, hangs, masses, reach });
+  shape({ space, count, hangs, kinds, bonds, masses, reach }) {
+    Object.assign(this, { space, count, hangs, kinds, bonds, masses, reach });
     this.places = new Float64Array(3 * count);
     const largest = Math.max(...masses, 1e-300);
     const size = reach * clamp(0.075 / Math.sqrt(Math.max(count, 1)), 0.006, 0.05);
@@ -244,6 +244,8 @@ class Stage {
     const points = Array.from({ length: count }, (_, i) => this.#shown(places, i));
     const pivot = this.project(0, 0, 0);
     pen.strokeStyle = palette.css("rod");
+    for (const { kind, from, to } of this.bonds) this.#drawBond(kind, from < 0 ? pivot : points[from], points[to]);
+    if (this.kinds.includes("cart")) this.#drawRail();
     const thick = clamp((0.014 * this.reach * this.pixels) / Math.sqrt(count / 3 + 1), 1.3, 5);
     pen.lineWidth = thick;
     pen.beginPath();
@@ -254,14 +256,8 @@ class Stage {
       pen.lineTo(points[i][0], points[i][1]);
     }
     pen.stroke();
-    if (this.hangs.includes(-1)) {
-      pen.beginPath();
-      pen.arc(pivot[0], pivot[1], 4.5, 0, 2 * Math.PI);
-      pen.fillStyle = palette.css("panel");
-      pen.strokeStyle = palette.css("ink");
-      pen.lineWidth = 2;
-      pen.fill();
-      pen.stroke();
+    if (this.hangs.includes(-1) || this.bonds.some(({ from }) => from < 0)) {
+      this.#drawPivot(pivot);
     }
     if (count > balls) {
       this.#drawManyBalls(points);
@@ -270,7 +266,66 @@ class Stage {
     }
     const order = points.map((_, i) => i);
     if (this.space === 3) order.sort((a, b) => points[a][3] - points[b][3]);
-    for (const i of order) this.#drawBall(points[i], i, i === held?.bob);
+    for (const i of order) {
+      if (this.kinds[i] === "cart") this.#drawCart(points[i]);
+      else if (this.kinds[i] === "pivot") this.#drawPivot(points[i]);
+      else this.#drawBall(points[i], i, i === held?.bob);
+    }
+  }
+
+  #drawPivot([x, y]) {
+    const { pen } = this;
+    pen.beginPath();
+    pen.arc(x, y, 4.5, 0, 2 * Math.PI);
+    pen.fillStyle = palette.css("panel");
+    pen.strokeStyle = palette.css("ink");
+    pen.lineWidth = 2;
+    pen.fill();
+    pen.stroke();
+  }
+
+  #drawRail() {
+    const { pen } = this;
+    const y = this.project(0, 0, 0)[1] + 0.07 * this.reach * this.pixels;
+    pen.strokeStyle = palette.css("edge");
+    pen.lineWidth = 2;
+    line(pen, 0, y, this.width, y);
+  }
+
+  #drawCart([x, y]) {
+    const { pen } = this;
+    const size = 0.07 * this.reach * this.pixels;
+    pen.fillStyle = palette.css("bob");
+    pen.strokeStyle = palette.css("panel");
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.rect(x - 1.5 * size, y - 0.6 * size, 3 * size, 1.2 * size);
+    pen.fill();
+    pen.fillStyle = palette.css("rod");
+    for (const side of [-0.9, 0.9]) {
+      pen.beginPath();
+      pen.arc(x + side * size, y + 0.65 * size, 0.35 * size, 0, 2 * Math.PI);
+      pen.fill();
+      pen.stroke();
+    }
+  }
+
+  // A spring with its windings, or a string.
+  #drawBond(kind, from, to) {
+    const { pen } = this;
+    const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+    const length = Math.hypot(dx, dy) || 1;
+    pen.lineWidth = kind === "spring" ? 2 : 1.5;
+    pen.beginPath();
+    pen.moveTo(from[0], from[1]);
+    const turns = kind === "spring" ? 24 : 0;
+    const wide = 0.045 * this.reach * this.pixels;
+    for (let k = 1; k < turns; ++k) {
+      const [along, across] = [0.08 + (0.84 * k) / turns, (k % 2 ? wide : -wide) / length];
+      pen.lineTo(from[0] + along * dx - across * dy, from[1] + along * dy + across * dx);
+    }
+    pen.lineTo(to[0], to[1]);
+    pen.stroke();
   }
 
   // All in one colour, but for the last.
@@ -399,6 +454,13 @@ class Stage {
       return Math.hypot(x - pixelX, y - pixelY) < 18;
     });
   }
+}
+
+/// Springs and strings of a model, between points by number; the origin is -1.
+function bondsOf(model) {
+  const number = (name) => model.points.findIndex((point) => point.name === name);
+  const bond = (kind) => ([from, to]) => ({ kind, from: from === null ? -1 : number(from), to: number(to) });
+  return [...(model.springs ?? []).map(bond("spring")), ...(model.strings ?? []).map(bond("string"))];
 }
 
 function arrow(pen, x0, y0, x, y) {

@@ -2,6 +2,13 @@
 
 const beginning = JSON.parse(document.getElementById("start").textContent);
 const texts = JSON.parse(document.getElementById("texts").textContent);
+
+// A model that the link names, or that the page was written for, in place of a chain.
+const models = JSON.parse(document.getElementById("models").textContent);
+const named = new URLSearchParams(location.hash.slice(1)).get("model");
+const moved = models[named] ?? (named === "chain" ? {} : beginning);
+const model = moved.model ?? null;
+
 const at = (id) => document.getElementById(id);
 
 // Plots and colours of other pages are of runs; here there is one motion, which grows.
