@@ -38,8 +38,7 @@ class RodState : public RodBlocks<Space, N, Num> {
   using Vector = std::array<Num, D>;
 
   /// Number type of directions on their way between angles and rods.
-  using Wide =
-      std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, LongReal, C>;
+  using Wide = std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, LongReal, C>;
 
   /// A state as a value.
   struct Place {
