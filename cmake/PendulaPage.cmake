@@ -18,6 +18,7 @@ function(pendula_page_assets folder out_source)
     COMMAND "${CMAKE_COMMAND}" -D FOLDER=${folder} -D THREE=${PENDULA_THREE_JS} -D OUTPUT=${output}
             -P "${PROJECT_SOURCE_DIR}/cmake/embed.cmake"
     DEPENDS ${files} "${PENDULA_THREE_JS}" "${PROJECT_SOURCE_DIR}/cmake/embed.cmake"
+            "${PROJECT_SOURCE_DIR}/cmake/embed_bytes.cmake"
     COMMENT "Embedding the sources of pages" VERBATIM)
   set(${out_source} "${output}" PARENT_SCOPE)
 endfunction()

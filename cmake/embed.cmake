@@ -6,24 +6,7 @@ set(before format data motion palette player gestures plots)
 set(space three camera bodies impostors trace space)
 set(after pickers panels marks controls main)
 
-# Appends a constant NAME with the bytes of the files that follow: as numbers, which any compiler takes in any amount.
-function(embed name)
-  set(bytes "")
-  foreach(file IN LISTS ARGN)
-    file(READ "${file}" piece HEX)
-    string(APPEND bytes "${piece}")
-  endforeach()
-  string(REGEX REPLACE "(................................)" "\\1\n" bytes "${bytes}")
-  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "'\\\\x\\1'," bytes "${bytes}")
-  file(APPEND "${OUTPUT}.new" "constexpr char ${name}_bytes[] = {\n${bytes}};\n"
-                              "const std::string_view ${name}(${name}_bytes, sizeof(${name}_bytes));\n\n")
-endfunction()
-
-function(scripts out)
-  list(TRANSFORM ARGN PREPEND "${FOLDER}/")
-  list(TRANSFORM ARGN APPEND ".js")
-  set(${out} "${ARGN}" PARENT_SCOPE)
-endfunction()
+include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")
 
 file(READ "${THREE}" three)
 if(NOT three MATCHES "REVISION *= *[\"']([0-9]+)")

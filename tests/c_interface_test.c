@@ -51,6 +51,13 @@ static void a_chain(void) {
   expect(strcmp(pendula_column_name(chain, 3), "theta_2") == 0 && strcmp(pendula_column_unit(chain, 9), "J") == 0 &&
              pendula_column_name(chain, 10) == NULL,
          "its columns");
+  /* U = -m g l (2 cos 2 + cos 1), at rest. */
+  expect(pendula_energies(chain, 0, q, v, held) == PENDULA_OK && held[0] == 0 &&
+             fabs(held[1] + 9.81 * (2 * cos(2.0) + cos(1.0))) < 1e-14, /* measured 0 */
+         "its energies");
+  expect(pendula_energies(chain, 0, NULL, v, held) == PENDULA_INVALID, "energies of nothing");
+  expect(pendula_model_of_program("no program", NULL, 0) == NULL && pendula_error_kind() == PENDULA_INVALID,
+         "a program that is none");
   options.tolerance = 1e-10;
   run = pendula_simulation_new(chain, 0, q, v, &options);
   event.context = &counter;

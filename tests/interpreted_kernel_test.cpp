@@ -1,8 +1,10 @@
 // Kernels that are interpreted: what they compute, and what is said of programs that are damaged.
 
 #include <gtest/gtest.h>
+#include <pendula/pendula.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -242,6 +244,31 @@ TEST(InterpretedKernel, ADamagedProgramDoesNoHarm) {
     }
   }
   EXPECT_GT(refused, trials / 2);  // others are other numbers, names and registers
+}
+
+// x = 0.3 cos 2t, of m = 2 kg and k = 8 N/m.
+TEST(InterpretedKernel, MovesByTheCInterface) {
+  const std::array<double, 2> numbers = {2, 8};
+  const std::array<double, 1> start = {0.3}, rest = {0};
+  std::array<double, 1> q{}, v{};
+  std::array<double, 2> energies{};
+  pendula_model* model = pendula_model_of_program(with_tabs(spring).c_str(), numbers.data(), numbers.size());
+  ASSERT_NE(model, nullptr) << pendula_error();
+  EXPECT_EQ(pendula_energies(model, 0, start.data(), rest.data(), energies.data()), PENDULA_OK);
+  EXPECT_EQ(energies[0], 0);
+  EXPECT_DOUBLE_EQ(energies[1], 0.36);
+  pendula_options options{};
+  options.tolerance = 1e-12;
+  pendula_simulation* simulation = pendula_simulation_new(model, 0, start.data(), rest.data(), &options);
+  pendula_model_free(model);  // a simulation does not need it any more
+  ASSERT_NE(simulation, nullptr) << pendula_error();
+  EXPECT_EQ(pendula_advance_to(simulation, 1), PENDULA_OK);
+  pendula_motion(simulation, q.data(), v.data());
+  EXPECT_NEAR(q[0], 0.3 * std::cos(2.0), 1e-15);   // measured 2.8e-17
+  EXPECT_NEAR(v[0], -0.6 * std::sin(2.0), 1e-15);  // measured 0
+  pendula_simulation_free(simulation);
+  EXPECT_EQ(pendula_model_of_program("no program", nullptr, 0), nullptr);
+  EXPECT_EQ(pendula_error_kind(), PENDULA_INVALID);
 }
 
 }  // namespace

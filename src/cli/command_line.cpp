@@ -265,6 +265,16 @@ void CommandLine::add_pictures() {
 
   gallery = app.add_subcommand("gallery", "Make a page of striking motions, each with its scenario");
   takes_file(gallery->add_option("DIR", gallery_folder, "The folder for it"), {"/"})->required();
+
+  lab = app.add_subcommand("lab", "Make a page to play with a pendulum: it computes the motion itself");
+  takes_file(
+      lab->add_option("SCENARIO", lab_options.scenario,
+                      "What to begin with: a scenario (.toml), a model file (.py) or a built-in model; else a double "
+                      "pendulum"),
+      {".toml", ".py"});
+  add_set(lab, lab_options.overrides);
+  add_links(lab, lab_options.links);
+  takes_file(lab->add_option("-o,--output", lab_options.output, "The page"), {".html"})->required();
 }
 
 void CommandLine::add_models() {

@@ -44,6 +44,7 @@ struct CommandLine {
   CLI::App* plot;
   CLI::App* map;
   CLI::App* gallery;
+  CLI::App* lab;
   CLI::App* models;
   CLI::App* describe;
   CLI::App* new_model;
@@ -59,6 +60,7 @@ struct CommandLine {
   PlotOptions plot_options;
   MapOptions map_options;
   std::string gallery_folder;
+  LabOptions lab_options;
   bool models_as_json = false;
   DescribeOptions describe_options;
   std::string model_name;

@@ -100,6 +100,16 @@ ExitStatus film(const std::string& run, const std::string& output);
 /// Makes a page of striking cases, with films, in a folder.
 ExitStatus gallery(const std::string& folder);
 
+struct LabOptions {
+  std::string scenario;                ///< the file, or a model's; or a built-in model; empty for a double pendulum
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  std::optional<int> links;            ///< of a model file that has links
+  std::string output;                  ///< the page
+};
+
+/// Writes a page in which the motion is computed. Throws io::InputError, too, where this build has none.
+ExitStatus lab(const LabOptions& options);
+
 struct LyapunovOptions {
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`

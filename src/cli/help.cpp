@@ -16,7 +16,7 @@
 namespace pendula::cli {
 namespace {
 
-constexpr std::array<Example, 25> examples = {{
+constexpr std::array<Example, 26> examples = {{
     {"simulate", "pendula simulate examples/double_pendulum.toml -o run.csv", "write a trajectory, print a summary"},
     {"simulate", "pendula simulate examples/double_pendulum.toml --set run.accuracy=1e-12 --json",
      "with another accuracy; the summary as JSON"},
@@ -39,6 +39,7 @@ constexpr std::array<Example, 25> examples = {{
     {"plot", "pendula plot section.csv -o section.svg", "a Poincare section"},
     {"map", "pendula map flips.h5 event_flip -o flips.png", "when an event happened, over the axes"},
     {"gallery", "pendula gallery out/gallery", "twelve striking motions; takes a few minutes"},
+    {"lab", "pendula lab examples/double_pendulum.toml -o lab.html", "a page to take the pendulum in the hand"},
     {"models", "pendula models", "what can stand in [system] model = \"...\""},
     {"describe", "pendula describe furuta", "coordinates, parameters, inputs and points, with units"},
     {"new-model", "pendula new-model spring", "writes spring.py, to be changed"},

@@ -10,6 +10,7 @@
 #include <pendula/run/no_kernel.hpp>
 #include <pendula/run/quantity.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/interpreted_kernel.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/version.hpp>
 #include <span>
@@ -55,12 +56,17 @@ pendula_model* make_chain(const pendula_chain& given) {
   return new pendula_model(std::make_shared<ChainSubject<Space>>(chain_of<Space>(plain)), Space::dof * links);
 }
 
-pendula_model* make_system(const SystemTable& table, std::span<const double> parameters,
+pendula_model* make_system(std::shared_ptr<const SystemTable> table, std::span<const double> parameters,
                            std::span<const double> inputs) {
+  const std::size_t coordinates = table->info.coordinates.size();
   SystemNumbers numbers{{parameters.begin(), parameters.end()}, {inputs.begin(), inputs.end()}, {}};
-  if (inputs.empty()) numbers.inputs.assign(table.info.inputs.size(), 0.0);
-  const std::shared_ptr<const SystemTable> shared(std::shared_ptr<void>(), &table);
-  return new pendula_model(std::make_shared<SystemSubject>(shared, std::move(numbers)), table.info.coordinates.size());
+  if (inputs.empty()) numbers.inputs.assign(table->info.inputs.size(), 0.0);
+  return new pendula_model(std::make_shared<SystemSubject>(std::move(table), std::move(numbers)), coordinates);
+}
+
+/// A table that outlives all models.
+std::shared_ptr<const SystemTable> borrowed(const SystemTable& table) {
+  return {std::shared_ptr<void>(), &table};
 }
 
 /// The numbers that a model has itself. Throws std::invalid_argument where one has none.
@@ -74,6 +80,10 @@ std::vector<double> defaults_of(const SystemInfo& info) {
     numbers.insert(numbers.end(), static_cast<std::size_t>(info.parameter_sizes[k]), info.parameter_defaults[k]);
   }
   return numbers;
+}
+
+std::vector<double> numbers_or_defaults(const SystemInfo& info, const double* given, std::size_t count) {
+  return given == nullptr ? defaults_of(info) : std::vector<double>(given, given + count);
 }
 
 const SystemTable* find_system(const std::string& name, int links) {
@@ -127,17 +137,24 @@ pendula_model* pendula_model_of_chain(const pendula_chain* chain) {
 
 pendula_model* pendula_model_named(const char* name, int links, const double* parameters, size_t count) {
   return made([&] {
-    const SystemTable* table = find_system(name, links);
-    const std::vector<double> numbers =
-        parameters == nullptr ? defaults_of(table->info) : std::vector<double>(parameters, parameters + count);
-    return make_system(*table, numbers, {});
+    const SystemTable& table = *find_system(name, links);
+    return make_system(borrowed(table), numbers_or_defaults(table.info, parameters, count), {});
   });
 }
 
 pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
                                       const double* inputs, size_t input_count) {
   return made([&] {
-    return make_system(*static_cast<const SystemTable*>(table), {parameters, parameter_count}, {inputs, input_count});
+    return make_system(borrowed(*static_cast<const SystemTable*>(table)), {parameters, parameter_count},
+                       {inputs, input_count});
+  });
+}
+
+pendula_model* pendula_model_of_program(const char* text, const double* parameters, size_t count) {
+  return made([&] {
+    std::shared_ptr<const SystemTable> table = table_of(text, *library().interpreter);
+    const std::vector<double> numbers = numbers_or_defaults(table->info, parameters, count);
+    return make_system(std::move(table), numbers, {});
   });
 }
 
@@ -177,6 +194,16 @@ const char* pendula_column_name(const pendula_model* model, size_t column) {
 }
 const char* pendula_column_unit(const pendula_model* model, size_t column) {
   return column < model->units.size() ? model->units[column].c_str() : nullptr;
+}
+
+pendula_status pendula_energies(const pendula_model* model, double time, const double* q, const double* v,
+                                double* energies) {
+  return guarded([&] {
+    const Observation seen = model->subject->observe(motion_of(*model, time, q, v));
+    energies[0] = seen.kinetic;
+    energies[1] = seen.potential();
+    return PENDULA_OK;
+  });
 }
 
 pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row) {

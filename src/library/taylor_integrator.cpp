@@ -7,6 +7,7 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/long_real.hpp>
 #include <pendula/taylor/taylor_steps.hpp>
 #include <stdexcept>
 #include <string>
@@ -160,7 +161,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   auto heading_at(int i, double share) const {
     const auto rod = stepper_.glance(i, share);
-    Heading<Space, long double> heading;
+    Heading<Space, LongReal> heading;
     for (std::size_t k = 0; k < Space::dimension; ++k) {
       heading.u[k] = rod.place[k][lane] / chain_.lengths()[i];
       heading.u_dot[k] = rod.rate[k][lane] / chain_.lengths()[i];
@@ -168,8 +169,8 @@ class TaylorIntegrator : public PlainIntegrator {
     return heading;
   }
 
-  void write(int i, const Heading<Space, long double>& heading, const Anchor& followed, double* q, double* v) const {
-    std::array<long double, Space::dof> near;
+  void write(int i, const Heading<Space, LongReal>& heading, const Anchor& followed, double* q, double* v) const {
+    std::array<LongReal, Space::dof> near;
     for (std::size_t a = 0; a < near.size(); ++a) near[a] = followed.angles()[a];
     const auto angles = user_angles(heading, near);
     for (std::size_t a = 0; a < near.size(); ++a) {

@@ -70,6 +70,10 @@ pendula_model* pendula_model_named(const char* name, int links, const double* pa
 pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
                                       const double* inputs, size_t input_count);
 
+/* A model of a program: the text that `python -m pendula_codegen program --as bytecode` writes, which is interpreted.
+ * `parameters`: (count) numbers, concatenated; NULL: the defaults of the model. */
+pendula_model* pendula_model_of_program(const char* text, const double* parameters, size_t count);
+
 /* The same model with amplitude sin(frequency t + phase) added to an input, counted from 0; `model` may be freed. The
  * drives of a chain are in pendula_chain. */
 pendula_model* pendula_model_driven(const pendula_model* model, size_t input, double amplitude, double frequency,
@@ -89,6 +93,11 @@ const char* pendula_column_name(const pendula_model* model, size_t column);
 const char* pendula_column_unit(const pendula_model* model, size_t column);
 /* Writes the numbers of one row, (pendula_columns()). */
 pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row);
+
+/* Writes the kinetic and the potential energy of a motion, (2)  [J]; of a system whose energy is h = v.dL/dv - L the
+ * second number is what is left of h. */
+pendula_status pendula_energies(const pendula_model* model, double time, const double* q, const double* v,
+                                double* energies);
 
 /* --- One simulation --- */
 

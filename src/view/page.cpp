@@ -12,6 +12,7 @@
 
 #include "view/assets.hpp"
 #include "view/encode.hpp"
+#include "view/template.hpp"
 
 namespace pendula::view {
 namespace {
@@ -302,16 +303,7 @@ std::string Page::part(const std::string& name) const {
 }
 
 std::string Page::text() const {
-  std::string text;
-  std::string_view rest = assets::page;
-  for (std::size_t begin = rest.find("{{"); begin != std::string_view::npos; begin = rest.find("{{")) {
-    const std::size_t end = rest.find("}}", begin);
-    text += rest.substr(0, begin);
-    text += part(std::string(rest.substr(begin + 2, end - begin - 2)));
-    rest.remove_prefix(end + 2);
-  }
-  text += rest;
-  return text;
+  return filled(assets::page, [this](const std::string& name) { return part(name); });
 }
 
 }  // namespace pendula::view

@@ -22,7 +22,7 @@ def examples(text: str) -> list[str]:
 
 
 def test_every_command_has_help_and_examples(pendula):
-    assert len(commands(pendula)) == 15
+    assert len(commands(pendula)) == 16
     for command in commands(pendula):
         text = pendula("help", command).out
         assert f"\nUsage: pendula {command}" in text
@@ -50,6 +50,8 @@ def test_the_examples_run(pendula, tmp_path):
                 text=True,
                 check=False,
             )
+            if call.startswith("pendula lab ") and "this build has no laboratory" in done.stderr:
+                continue
             unfinished = 3 if "--shard" in call else 0
             assert done.returncode == unfinished, f"{call}\n{done.stderr}"
             tried.append(call)

@@ -51,6 +51,7 @@ KNOWS = {
         "pendula/system",
         "pendula/numeric",
     },
+    "lab": {"library", "pendula/run", "pendula/chain", "pendula/gauss"},
     "view": {"io", "pendula/run", "pendula/chain", "pendula/system"},
     "cli": {
         "view",
@@ -68,7 +69,7 @@ GENERATED = {"pendula/kernels"}
 def included(file: Path) -> set[str]:
     """Folders of this project's headers that a file includes."""
     names = re.findall(
-        r'#include [<"]((?:pendula|io|view|cli|front|library)/[\w/]+\.hpp)[>"]', file.read_text()
+        r'#include [<"]((?:pendula|io|view|cli|front|library|lab)/[\w/]+\.hpp)[>"]', file.read_text()
     )
     return {name.rsplit("/", 1)[0] for name in names}
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <pendula/chain/heading.hpp>
+#include <pendula/numeric/long_real.hpp>
 #include <vector>
 
 namespace pendula {
@@ -103,7 +104,7 @@ class ChainAngles {
   template <class Vector>
   void write(std::size_t i, const std::array<double, dof>& known, const Vector& rod, const Vector& rate, double* q,
              double* v) const {
-    using Wide = long double;
+    using Wide = LongReal;
     Wide squared = 0;
     for (const Wide x : rod) squared += x * x;
     const Wide inverse = 1 / std::sqrt(squared);

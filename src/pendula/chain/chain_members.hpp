@@ -10,6 +10,7 @@
 #include <pendula/chain/rod_tangent.hpp>
 #include <pendula/gauss/member_layout.hpp>
 #include <pendula/numeric/lane_pack.hpp>
+#include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <type_traits>
@@ -211,7 +212,7 @@ class ChainMembers
  private:
   using Motion::constants_, Motion::rods_;
   using typename Motion::Point;
-  using Wide = long double;
+  using Wide = LongReal;
 
   const auto& past(int i) const { return this->pasts_[i][this->newest_]; }
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }

@@ -11,6 +11,7 @@
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/dual.hpp>
 #include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/ordered_sum.hpp>
 #include <pendula/numeric/written_out.hpp>
@@ -37,8 +38,7 @@ class RodState : public RodBlocks<Space, N, Num> {
   using Vector = std::array<Num, D>;
 
   /// Number type of directions on their way between angles and rods.
-  using Wide =
-      std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, long double, C>;
+  using Wide = std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, LongReal, C>;
 
   /// A state as a value.
   struct Place {

@@ -10,6 +10,7 @@
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/chain/rod_tangent.hpp>
 #include <pendula/numeric/lane_pack.hpp>
+#include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/moving_part.hpp>
@@ -89,7 +90,7 @@ class ChainAccelerations {
   template <class... Low>
   void start(int lane, double /*time*/, const Chain<Space, N>& given, const ChainLinks<Space, N, double>& chain,
              const double* q, const double* v, Parts& rods, Low&... low) {
-    using Wide = std::conditional_t<sizeof...(low) == 0, double, long double>;
+    using Wide = std::conditional_t<sizeof...(low) == 0, double, LongReal>;
     const double gravity = given.gravity();
     set(gravity_, lane, gravity);
     loads_.take(lane, given, chain);
@@ -115,7 +116,7 @@ class ChainAccelerations {
 
   /// Direction of a member's link, and its rate.
   auto heading(int lane, int i, const Parts& rods) const {
-    Heading<Space, long double> heading;
+    Heading<Space, LongReal> heading;
     for (std::size_t k = 0; k < D; ++k) {
       heading.u[k] = get(detail::value_of(rods[i].place[k]), lane) / get(constants_[i].length, lane);
       heading.u_dot[k] = get(detail::value_of(rods[i].rate[k]), lane) / get(constants_[i].length, lane);
@@ -283,7 +284,7 @@ class ChainAccelerations {
   }
 
   static void put(int lane, double number, Number& value) { detail::set_value(lane, number, value); }
-  static void put(int lane, long double number, Number& value, Number& low) {
+  static void put(int lane, LongReal number, Number& value, Number& low) {
     const auto rounded = static_cast<double>(number);
     detail::set_value(lane, rounded, value);
     detail::set_value(lane, static_cast<double>(number - rounded), low);

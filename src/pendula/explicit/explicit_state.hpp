@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <type_traits>
@@ -117,8 +118,8 @@ class ExplicitState {
 
  private:
   static auto exact(const Vector& value, const Vector& low) {
-    std::array<long double, D> sum;
-    for (std::size_t k = 0; k < D; ++k) sum[k] = static_cast<long double>(value[k]) + low[k];
+    std::array<LongReal, D> sum;
+    for (std::size_t k = 0; k < D; ++k) sum[k] = static_cast<LongReal>(value[k]) + low[k];
     return sum;
   }
 };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <span>
 #include <vector>
@@ -94,7 +95,7 @@ class FieldLook {
       const double from = static_cast<double>(part) / parts_, to = static_cast<double>(part + 1) / parts_;
       const auto first = std::upper_bound(borders_.begin(), borders_.end(), from);
       const auto last = std::lower_bound(first, borders_.end(), to);
-      sum_part(from, to, {first, last}, numbers, into);
+      sum_part(from, to, {std::to_address(first), static_cast<std::size_t>(last - first)}, numbers, into);
     }
   }
 

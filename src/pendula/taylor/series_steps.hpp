@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/width.hpp>
@@ -128,8 +129,8 @@ class SeriesSteps {
     is_expanded_ = false;
   }
 
-  std::array<long double, 1> exact_place(int i) const requires(!is_batch<L>) { return {sum_of(i)}; }
-  std::array<long double, 1> exact_rate(int i) const requires(!is_batch<L>) {
+  std::array<LongReal, 1> exact_place(int i) const requires(!is_batch<L>) { return {sum_of(i)}; }
+  std::array<LongReal, 1> exact_rate(int i) const requires(!is_batch<L>) {
     if (!info_.has_momenta) return {sum_of(links() + i)};
     return {now_.parts[i].rate[0]};
   }
@@ -285,7 +286,7 @@ class SeriesSteps {
     return unit > 0 && std::isfinite(unit) ? unit : 1;
   }
 
-  long double sum_of(int k) const { return static_cast<long double>(*now_.state[k]) + *now_.low[k]; }
+  LongReal sum_of(int k) const { return static_cast<LongReal>(*now_.state[k]) + *now_.low[k]; }
 
   L coefficient(std::size_t order, std::size_t k) const { return from_row<L>(state_[order * row_ + k]); }
 

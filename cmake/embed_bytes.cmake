@@ -1,0 +1,20 @@
+# Files as constants of a C++ file, ${OUTPUT}.new.
+
+# Appends a constant NAME with the bytes of the files that follow: as numbers, which any compiler takes in any amount.
+function(embed name)
+  set(bytes "")
+  foreach(file IN LISTS ARGN)
+    file(READ "${file}" piece HEX)
+    string(APPEND bytes "${piece}")
+  endforeach()
+  string(REGEX REPLACE "(................................)" "\\1\n" bytes "${bytes}")
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "'\\\\x\\1'," bytes "${bytes}")
+  file(APPEND "${OUTPUT}.new" "constexpr char ${name}_bytes[] = {\n${bytes}};\n"
+                              "const std::string_view ${name}(${name}_bytes, sizeof(${name}_bytes));\n\n")
+endfunction()
+
+function(scripts out)
+  list(TRANSFORM ARGN PREPEND "${FOLDER}/")
+  list(TRANSFORM ARGN APPEND ".js")
+  set(${out} "${ARGN}" PARENT_SCOPE)
+endfunction()

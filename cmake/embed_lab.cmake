@@ -1,0 +1,47 @@
+# The sources of the laboratory's page as a C++ file:
+#   cmake -D FOLDER=… -D PAGES=… -D MODULE=… -D MODELS=… -D OUTPUT=… -P embed_lab.cmake
+# MODULE is its WebAssembly, or empty: then the page can't be written, and says why. MODELS are the built-in models as
+# cmake/lab_models.py writes them, or empty: then the page has none.
+cmake_minimum_required(VERSION 3.25)
+include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")
+
+# Scripts in the order in which they stand in one module; those of other pages first, which both have.
+set(shared format palette gestures plots)
+set(own vectors spec link history stage hand panels controls main)
+
+file(WRITE "${OUTPUT}.new" "// Made by cmake/embed_lab.cmake.\n#include \"view/assets.hpp\"\n\nnamespace pendula::view::assets {\n\n")
+embed(lab_page "${FOLDER}/lab.html")
+embed(lab_style "${PAGES}/page.css" "${FOLDER}/lab.css")
+set(files "${FOLDER}/start.js")
+foreach(name IN LISTS shared)
+  list(APPEND files "${PAGES}/${name}.js")
+endforeach()
+foreach(name IN LISTS own)
+  list(APPEND files "${FOLDER}/${name}.js")
+endforeach()
+embed(lab_script ${files})
+embed(lab_worker "${FOLDER}/vectors.js" "${FOLDER}/engine.js" "${FOLDER}/worker.js")
+file(GLOB texts "${FOLDER}/texts/*.json")
+list(SORT texts)
+set(all "")
+foreach(file IN LISTS texts)
+  get_filename_component(language "${file}" NAME_WE)
+  file(READ "${file}" text)
+  string(APPEND all ",\"${language}\":${text}")
+endforeach()
+string(REGEX REPLACE "^," "" all "${all}")
+file(WRITE "${OUTPUT}.texts" "{${all}}")
+embed(lab_texts "${OUTPUT}.texts")
+if(NOT MODELS)
+  set(MODELS "${OUTPUT}.models")
+  file(WRITE "${MODELS}" "{}")
+endif()
+embed(lab_models "${MODELS}")
+file(WRITE "${OUTPUT}.gz" "")
+if(MODULE)
+  file(ARCHIVE_CREATE OUTPUT "${OUTPUT}.gz" PATHS "${MODULE}" FORMAT raw COMPRESSION GZip COMPRESSION_LEVEL 9
+       MTIME "1970-01-01 00:00:00 UTC")
+endif()
+embed(lab_module "${OUTPUT}.gz")
+file(APPEND "${OUTPUT}.new" "}  // namespace pendula::view::assets\n")
+file(RENAME "${OUTPUT}.new" "${OUTPUT}")

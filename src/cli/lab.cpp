@@ -1,0 +1,125 @@
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <pendula/numeric/number_text.hpp>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "io/generator.hpp"
+#include "io/input_error.hpp"
+#include "io/kernel_cache.hpp"
+#include "io/scenario.hpp"
+#include "io/toolchain.hpp"
+#include "io/whole_file.hpp"
+#include "view/lab.hpp"
+
+namespace pendula::cli {
+namespace {
+
+using nlohmann::json;
+
+/// `key=1,2,3` of a link to a laboratory, after what is there.
+template <class Numbers>
+void put(std::string& link, const char* key, const Numbers& numbers) {
+  link += (link.empty() ? "" : "&") + std::string(key) + '=';
+  const char* comma = "";
+  for (const double number : numbers) {
+    link += comma + shortest(number);
+    comma = ",";
+  }
+}
+
+void put_one(std::string& link, const char* key, double number) {
+  put(link, key, std::vector<double>{number});
+}
+
+void warn(const std::string& what) {
+  std::cerr << "pendula: warning: the laboratory leaves out " << what << '\n';
+}
+
+/// A chain and its start as a link.
+template <class Space>
+std::string link_of(const io::Scenario<Space>& scenario) {
+  const Chain<Space>& chain = scenario.chain;
+  if (!scenario.feedback.empty() || chain.constant_torque().any() || !chain.drives().empty()) {
+    warn("torques, drives and feedback");
+  }
+  const auto damping = chain.damping();
+  if ((damping.array() != damping[0]).any()) warn("that damping is not the same for all links");
+  std::string link;
+  put_one(link, "n", chain.links());
+  put_one(link, "space", Space::dimension);
+  put(link, "m", chain.masses());
+  put(link, "l", chain.lengths());
+  put_one(link, "g", chain.gravity());
+  put_one(link, "d", damping[0]);
+  const auto& start = scenario.start;
+  put(link, "th", start.theta());
+  put(link, "w", start.theta_dot());
+  if constexpr (Space::dof == 2) {
+    put(link, "ph", start.q.tail(chain.links()));
+    put(link, "wp", start.v.tail(chain.links()));
+  }
+  return link;
+}
+
+/// What a page is told of a model: its program, and what describe tells.
+json model_start(const io::ModelName& name, const io::Toolchain& toolchain) {
+  const json described = json::parse(io::describe_model(name, toolchain));
+  return {{"title", described["model"]}, {"model", described}, {"program", io::model_program(name, toolchain)}};
+}
+
+json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
+  std::optional<io::ModelName> model;
+  const io::FindSystem find = [&](const io::ModelName& name) {
+    model = name;
+    return io::find_kernel(name, toolchain, [](const std::string&) {}).table;
+  };
+  const io::ScenarioText text = io::read_scenario_text(options.scenario);
+  const io::AnyScenario scenario = io::parse_scenario(text.text, text.name, options.overrides, find);
+  const std::string title = std::filesystem::path(text.name).stem().string();
+  return std::visit(
+      [&](const auto& found) -> json {
+        if constexpr (requires { found.chain; }) {
+          return {{"title", title}, {"state", link_of(found)}};
+        } else {
+          model->laws.clear();
+          if (!found.feedback.empty() || !found.system->numbers().sines.empty()) warn("drives and feedback");
+          json start = model_start(*model, toolchain);
+          std::string link;
+          put(link, "p", found.system->numbers().parameters);
+          put(link, "q", found.start.q);
+          put(link, "v", found.start.v);
+          start["title"] = title;
+          start["state"] = link;
+          return start;
+        }
+      },
+      scenario);
+}
+
+}  // namespace
+
+ExitStatus lab(const LabOptions& options) {
+  if (!view::has_lab()) {
+    throw io::InputError(
+        "this build has no laboratory: it takes emscripten, which scripts/setup --web installs; then configure again");
+  }
+  io::WholeFile page(options.output);
+  io::Toolchain toolchain = io::Toolchain::of_this_program();
+  toolchain.kernels_by = "interpreter";  // as in the page
+  json start = json::object();
+  const bool is_scenario = options.scenario == "-" || options.scenario.ends_with(".toml");
+  if (!is_scenario && !options.scenario.empty()) {
+    start = model_start({options.scenario, options.links}, toolchain);
+  } else if (is_scenario) {
+    start = scenario_start(options, toolchain);
+  }
+  page.write(view::lab_page(start));
+  return done;
+}
+
+}  // namespace pendula::cli

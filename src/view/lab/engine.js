@@ -1,0 +1,361 @@
+// The motion, computed by the module: what moves, rows of its motion, and copies that start beside it. Runs in a worker, and
+// in the tests.
+
+/// Rows of a motion stand so far apart [s]; steps are of the module's own choice, and end where rows are.
+const rowInterval = 1 / 120;
+
+/// The tolerance of all steps: energies stay at rounding (docs/laboratory.md).
+const tolerance = 1e-10;
+
+/// Starts the module, a WebAssembly.Module. It asks for nothing but the time.
+async function startModule(module) {
+  let memory = null;
+  const nothing = () => 0;
+  const noEnvironment = (count, size) => {
+    const view = new DataView(memory.buffer);
+    view.setUint32(count, 0, true);
+    view.setUint32(size, 0, true);
+    return 0;
+  };
+  const imports = {};
+  for (const { module: from, name } of WebAssembly.Module.imports(module)) {
+    imports[from] ??= {};
+    imports[from][name] = name === "environ_sizes_get" ? noEnvironment : nothing;
+  }
+  const { exports } = await WebAssembly.instantiate(module, imports);
+  memory = exports.memory;
+  exports._initialize?.();
+  return exports;
+}
+
+class Engine {
+  #at;
+  #kept = []; // pieces of memory that are freed with the model
+
+  constructor(exports) {
+    this.module = exports;
+    this.model = this.simulation = 0;
+    this.copies = [];
+    this.shadow = null;
+    this.forces = null;
+  }
+
+  // Numbers may have moved whenever memory grew.
+  get #numbers() {
+    if (this.#at?.buffer !== this.module.memory.buffer) this.#at = new Float64Array(this.module.memory.buffer);
+    return this.#at;
+  }
+
+  #take(count) {
+    const place = this.module.malloc(8 * Math.max(count, 1));
+    this.#kept.push(place);
+    return place;
+  }
+  #put(numbers) {
+    const place = this.#take(numbers.length);
+    this.#numbers.set(numbers, place / 8);
+    return place;
+  }
+  #read(place, count) {
+    return this.#numbers.slice(place / 8, place / 8 + count);
+  }
+  #text(place) {
+    const bytes = new Uint8Array(this.module.memory.buffer);
+    let end = place;
+    while (bytes[end]) ++end;
+    return new TextDecoder().decode(bytes.slice(place, end));
+  }
+  #putText(text) {
+    const bytes = new TextEncoder().encode(text);
+    const place = this.module.malloc(bytes.length + 1);
+    this.#kept.push(place);
+    new Uint8Array(this.module.memory.buffer).set([...bytes, 0], place);
+    return place;
+  }
+
+  /// Throws what the module says of its last failure.
+  #fail() {
+    throw new Error(this.#text(this.module.pendula_error()));
+  }
+  #require(good) {
+    if (!good) this.#fail();
+    return good;
+  }
+
+  free() {
+    const { module } = this;
+    for (const copy of [this.simulation, this.shadow, ...this.copies]) if (copy) module.pendula_simulation_free(copy);
+    if (this.model) module.pendula_model_free(this.model);
+    for (const place of this.#kept) module.free(place);
+    this.#kept = [];
+    this.model = this.simulation = 0;
+    this.shadow = null;
+    this.copies = [];
+  }
+
+  /// What moves: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters}. `start`: {time, q, v}.
+  /// `step`: constant steps of 4 stages, in place of the tolerance. Throws where it makes no sense.
+  begin(spec, start, step = 0) {
+    this.free();
+    const { module } = this;
+    this.spec = spec;
+    this.step = step;
+    this.model = this.#require(spec.program ? this.#program(spec) : this.#chain(spec));
+    this.size = module.pendula_coordinates(this.model);
+    this.columns = module.pendula_columns(this.model);
+    this.inputs = module.pendula_inputs(this.model);
+    this.q = this.#take(this.size);
+    this.v = this.#take(this.size);
+    this.energies = this.#take(2);
+    this.row = this.#take(this.columns);
+    this.held = this.#take(this.inputs);
+    this.#write(start);
+    this.simulation = this.#simulation(start.time);
+    this.time = start.time;
+    this.isHeld = false;
+    this.exponent = null;
+  }
+
+  #chain({ space, masses, lengths, gravity, damping }) {
+    return this.module.lab_chain(space, masses.length, this.#put(masses), this.#put(lengths), gravity, this.#put(damping));
+  }
+  #program({ program, parameters }) {
+    return this.module.pendula_model_of_program(this.#putText(program), this.#put(parameters), parameters.length);
+  }
+
+  #write({ q, v }) {
+    this.#numbers.set(q, this.q / 8);
+    this.#numbers.set(v, this.v / 8);
+  }
+  #simulation(time) {
+    return this.#require(this.module.lab_simulation(this.model, time, this.q, this.v, this.step, tolerance, this.step ? 4 : 8));
+  }
+
+  /// Names of the columns of a row of the model.
+  get names() {
+    return Array.from({ length: this.columns }, (_, k) => this.#text(this.module.pendula_column_name(this.model, k)));
+  }
+
+  motion(simulation = this.simulation) {
+    this.module.pendula_motion(simulation, this.q, this.v);
+    return { time: this.time, q: this.#read(this.q, this.size), v: this.#read(this.v, this.size) };
+  }
+
+  /// Numbers of a row: t, q, v, kinetic and potential energy, and of programs the components of points.
+  get rowSize() {
+    return 3 + 2 * this.size + this.pointCount;
+  }
+  get pointCount() {
+    return this.spec.program ? this.columns - 2 - 2 * this.size - this.inputs : 0;
+  }
+
+  /// The row of the present motion.
+  present() {
+    const { module, size } = this;
+    const row = new Float64Array(this.rowSize);
+    module.pendula_motion(this.simulation, this.q, this.v);
+    module.pendula_energies(this.model, this.time, this.q, this.v, this.energies);
+    row[0] = this.time;
+    row.set(this.#read(this.q, size), 1);
+    row.set(this.#read(this.v, size), 1 + size);
+    row.set(this.#read(this.energies, 2), 1 + 2 * size);
+    if (this.pointCount) {
+      module.pendula_row(this.model, this.time, this.q, this.v, this.row);
+      row.set(this.#read(this.row + 8 * (this.columns - 1 - this.pointCount), this.pointCount), 3 + 2 * size);
+    }
+    return row;
+  }
+
+  /// Points of any coordinates, of a program: for a hand that places it.
+  pointsAt(q) {
+    const v = new Float64Array(this.size);
+    this.#write({ q, v });
+    this.#require(this.module.pendula_row(this.model, this.time, this.q, this.v, this.row) === 0);
+    return this.#read(this.row + 8 * (this.columns - 1 - this.pointCount), this.pointCount);
+  }
+
+  /// Coordinates near to q at which components of a point, from `first` on, are as near as can be to a place: damped least
+  /// squares, by differences.
+  pose(q, first, place) {
+    const wanted = Array.from(place);
+    let now = Float64Array.from(q);
+    const reach = Math.hypot(...wanted) + 1;
+    for (let round = 0; round < 12; ++round) {
+      const here = this.pointsAt(now);
+      const off = wanted.map((x, k) => x - here[first + k]);
+      if (Math.hypot(...off) < 1e-9 * reach) break;
+      const slopes = Array.from(now, (x, k) => {
+        const moved = now.slice();
+        const by = 1e-6 * (1 + Math.abs(x));
+        moved[k] += by;
+        const there = this.pointsAt(moved);
+        return wanted.map((_, axis) => (there[first + axis] - here[first + axis]) / by);
+      });
+      const step = leastChange(slopes, off);
+      now = now.map((x, k) => x + step[k]);
+    }
+    return now;
+  }
+
+  /// Goes to the next row. `hand`: what pulls at a chain, {bob, place, speed}, or null.
+  next(hand) {
+    const target = Math.round((this.time + rowInterval) / rowInterval) * rowInterval;
+    if (hand || this.isHeld) {
+      const middle = (this.time + target) / 2;
+      for (const time of [middle, target]) {
+        this.#hold(hand);
+        this.#advance(this.simulation, time);
+        this.time = time;
+      }
+    } else {
+      this.#advance(this.simulation, target);
+    }
+    this.time = target;
+    for (const copy of this.copies) this.#advance(copy, target);
+    if (this.shadow) this.#follow();
+  }
+
+  #advance(simulation, time) {
+    this.#require(this.module.pendula_advance_to(simulation, time) === 0);
+  }
+
+  /// A damped spring between a bob and the hand, as torques on the links that carry it, held for half a row.
+  #hold(hand) {
+    const { space, lengths, masses, gravity } = this.spec;
+    const torques = new Float64Array(this.inputs);
+    this.isHeld = hand !== null;
+    if (hand) {
+      const { q, v } = this.motion();
+      const rods = rodsOfAngles(space, lengths, q);
+      const rates = ratesOfRods(space, lengths, q, v);
+      const [place, speed] = [rods, rates].map((all) => sumOf(all.slice(0, hand.bob + 1), space));
+      const stiff = masses[hand.bob] * 40 ** 2;
+      const weight = gravity * masses.slice(hand.bob).reduce((sum, mass) => sum + mass, 0);
+      const most = 0.25 * lengths.reduce((sum, length) => sum + length, 0);
+      const off = place.map((x, axis) => hand.place[axis] - x);
+      const far = Math.max(1, Math.hypot(...off) / most);
+      const force = off.map((d, axis) => (stiff * d) / far + 2 * masses[hand.bob] * 40 * (hand.speed[axis] - speed[axis]));
+      force[space - 1] += weight;
+      for (let link = 0; link <= hand.bob; ++link) putTorque(torques, space, link, rods[link], force);
+    }
+    this.#numbers.set(torques, this.held / 8);
+    this.#require(this.module.pendula_hold(this.simulation, this.held, this.inputs) === 0);
+  }
+
+  /// On what each point of a program hangs by something rigid: the point before, the first on the origin (-1), or nothing
+  /// (-2). Seen at several coordinates about q. `components`: of each point.
+  hangs(q, components) {
+    const firsts = components.map((_, k) => components.slice(0, k).reduce((sum, count) => sum + count, 0));
+    const draws = [0, 0.37, -0.81, 1.3].map((by) => this.pointsAt(q.map((x, k) => x + by * (1 + 0.4 * k))));
+    const distance = (points, k) => {
+      let square = 0;
+      for (let axis = 0; axis < components[k]; ++axis) {
+        const before = k > 0 && axis < components[k - 1] ? points[firsts[k - 1] + axis] : 0;
+        square += (points[firsts[k] + axis] - before) ** 2;
+      }
+      return Math.sqrt(square);
+    };
+    return components.map((_, k) => {
+      const all = draws.map((points) => distance(points, k));
+      return all[0] > 0 && all.every((each) => Math.abs(each - all[0]) < 1e-9 * all[0]) ? k - 1 : -2;
+    });
+  }
+
+  /// Goes to a time at once.
+  go(time) {
+    this.#advance(this.simulation, time);
+    this.time = time;
+  }
+
+  get steps() {
+    return this.module.pendula_steps(this.simulation);
+  }
+
+  /// So many copies, each a little further from the motion in its first coordinate.
+  copy(count, apart) {
+    for (const copy of this.copies) this.module.pendula_simulation_free(copy);
+    const { q, v } = this.motion();
+    this.copies = Array.from({ length: count }, (_, k) => {
+      const moved = q.slice();
+      moved[0] += apart * (k + 1);
+      this.#write({ q: moved, v });
+      return this.#simulation(this.time);
+    });
+  }
+
+  /// Coordinates of the copies, one after the other.
+  copiesNow() {
+    const all = new Float64Array(this.copies.length * this.size);
+    this.copies.forEach((copy, k) => all.set(this.motion(copy).q, k * this.size));
+    return all;
+  }
+
+  /// Begins to measure the leading exponent: by a copy beside the motion that is brought back every half second.
+  measure(on) {
+    if (this.shadow) this.module.pendula_simulation_free(this.shadow);
+    this.shadow = null;
+    this.exponent = null;
+    if (!on) return;
+    const { q, v } = this.motion();
+    q[0] += shadowDistance;
+    this.#write({ q, v });
+    this.shadow = this.#simulation(this.time);
+    this.exponent = { since: this.time, last: this.time, sum: 0, value: NaN };
+  }
+
+  #follow() {
+    const { exponent } = this;
+    this.#advance(this.shadow, this.time);
+    if (this.time - exponent.last < 0.5 - 1e-9) return;
+    const here = this.motion();
+    const there = this.motion(this.shadow);
+    const [dq, dv] = ["q", "v"].map((part) => there[part].map((x, k) => x - here[part][k]));
+    const distance = Math.sqrt(dq.reduce((s, d) => s + d * d, 0) + dv.reduce((s, d) => s + d * d, 0));
+    exponent.sum += Math.log(distance / shadowDistance);
+    exponent.last = this.time;
+    exponent.value = exponent.sum / (this.time - exponent.since);
+    const factor = shadowDistance / distance;
+    this.#write({ q: here.q.map((x, k) => x + factor * dq[k]), v: here.v.map((x, k) => x + factor * dv[k]) });
+    this.#require(this.module.pendula_restart(this.shadow, this.time, this.q, this.v) === 0);
+  }
+}
+
+const shadowDistance = 1e-7;
+
+function sumOf(vectors, space) {
+  return Array.from({ length: space }, (_, axis) => vectors.reduce((sum, vector) => sum + vector[axis], 0));
+}
+
+/// Writes rod × force: of a link in the plane one number, in space three.
+function putTorque(torques, space, link, rod, force) {
+  if (space === 2) {
+    torques[link] = rod[0] * force[1] - rod[1] * force[0];
+    return;
+  }
+  for (let axis = 0; axis < 3; ++axis) {
+    const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+    torques[3 * link + axis] = rod[a] * force[b] - rod[b] * force[a];
+  }
+}
+
+/// The least change of coordinates that moves a point by `off`, where slopes[k] is how it moves with coordinate k:
+/// x = Jᵀ (J Jᵀ + ε)⁻¹ off.
+function leastChange(slopes, off) {
+  const n = off.length;
+  const square = off.map((_, a) => off.map((__, b) => slopes.reduce((sum, slope) => sum + slope[a] * slope[b], 0)));
+  const trace = square.reduce((sum, row, a) => sum + row[a], 0);
+  square.forEach((row, a) => (row[a] += 1e-3 * trace + 1e-12));
+  const y = off.slice();
+  for (let a = 0; a < n; ++a) {
+    for (let b = a + 1; b < n; ++b) {
+      const factor = square[b][a] / square[a][a];
+      for (let c = a; c < n; ++c) square[b][c] -= factor * square[a][c];
+      y[b] -= factor * y[a];
+    }
+  }
+  for (let a = n - 1; a >= 0; --a) {
+    for (let b = a + 1; b < n; ++b) y[a] -= square[a][b] * y[b];
+    y[a] /= square[a][a];
+  }
+  return slopes.map((slope) => slope.reduce((sum, s, a) => sum + s * y[a], 0));
+}

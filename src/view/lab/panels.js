@@ -1,0 +1,369 @@
+// The panels beside the stage. Each is drawn some times a second, one after the other, so that no frame draws all.
+
+const windowOfTime = 20; // s that panels over time show
+
+/// A titled box: options, a place for a plot, a key to its curves.
+function labPanel(key, level, options = [], kind = "") {
+  const plot = element("div", { className: "plot" });
+  const keys = element("div", { className: "keys" });
+  const heading = element("h2");
+  heading.dataset.text = key;
+  const head = element("header", {}, heading, element("div", { className: "options" }, ...options));
+  const section = element("section", { className: `panel ${level} ${kind}` }, head, plot, keys);
+  at("panels").append(section);
+  return { section, plot, keys, axes: new Axes(plot, text(key)) };
+}
+
+/// A list of names to choose from.
+function picker(label, change) {
+  const select = element("select");
+  select.dataset.label = label;
+  select.addEventListener("change", change);
+  return select;
+}
+
+function fillPicker(select, names) {
+  const before = Number(select.value) || 0;
+  const shown = Math.min(names.length, 60);
+  select.replaceChildren(...Array.from({ length: shown }, (_, k) => element("option", { value: k, textContent: names[k] })));
+  select.value = before < shown ? before : shown - 1;
+}
+
+class Panel {
+  constructor(lab, box) {
+    this.lab = lab;
+    this.box = box;
+    this.axes = box.axes;
+  }
+
+  get isSeen() {
+    const { section } = this.box;
+    if (section.offsetParent === null) return false;
+    const { top, bottom } = section.getBoundingClientRect();
+    return bottom > 0 && top < innerHeight;
+  }
+
+  describe(words) {
+    if (words !== this.said) this.axes.describe((this.said = words));
+  }
+
+  /// Keys to curves: [colour, words].
+  name(...curves) {
+    const all = curves.map(([colour, words]) => `${colour}${words}`).join();
+    if (all === this.named) return;
+    this.named = all;
+    this.box.keys.replaceChildren(...curves.map(([colour, words]) => {
+      const mark = element("i");
+      if (colour) mark.style.background = colour;
+      return element("span", {}, ...(colour ? [mark] : []), words);
+    }));
+  }
+
+  /// Rows of the window up to the time that is shown: from, to, and the stride that leaves few enough.
+  rows(most = 600) {
+    const { history, shown } = this.lab;
+    const to = history.rowAt(shown);
+    const from = history.rowAt(Math.max(shown - windowOfTime, history.start));
+    const stride = Math.max(1, Math.floor((to - from) / most));
+    return { from: Math.ceil(from / stride) * stride, to, stride };
+  }
+
+  timeAxis() {
+    const { shown, history } = this.lab;
+    const high = Math.max(shown, history.start + windowOfTime);
+    this.axes.x = { low: high - windowOfTime, high };
+    return niceTicks(this.axes.x.low, high, this.axes.width / 80).map((t) => ({ at: t, text: readable(t, 6) }));
+  }
+
+  curve(pen, colour, value, width = 1.5) {
+    const { from, to, stride } = this.rows();
+    pen.strokeStyle = colour;
+    pen.lineWidth = width;
+    pen.beginPath();
+    let open = false;
+    for (let row = from; row <= to; row += stride) {
+      const y = value(row);
+      if (Number.isFinite(y)) pen[open ? "lineTo" : "moveTo"](this.axes.atX(this.lab.history.time(row)), this.axes.atY(y));
+      open = Number.isFinite(y);
+    }
+    pen.stroke();
+  }
+
+  range(values) {
+    let [low, high] = [Infinity, -Infinity];
+    const { from, to, stride } = this.rows(200);
+    for (let row = from; row <= to; row += stride) {
+      for (const value of values) {
+        const y = value(row);
+        if (y < low) low = y;
+        if (y > high) high = y;
+      }
+    }
+    return low <= high ? rangeOf([[low, high]]) : { low: 0, high: 1 };
+  }
+}
+
+/// Kinetic, potential and total energy.
+class EnergyPanel extends Panel {
+  constructor(lab) {
+    super(lab, labPanel("panel.energy", ""));
+  }
+
+  draw() {
+    const { lab, axes } = this;
+    const { history, size } = lab;
+    const [kinetic, potential] = [1 + 2 * size, 2 + 2 * size];
+    const values = [(row) => history.get(row, kinetic), (row) => history.get(row, potential),
+      (row) => history.get(row, kinetic) + history.get(row, potential)];
+    const pen = axes.begin();
+    axes.beginMoving();
+    axes.y = this.range(values);
+    axes.drawGrid(pen, this.timeAxis(), linearTicks(axes.y, axes.height / 30, false), "s");
+    const colours = [1, 0, 5].map((k) => rgba(palette.curves[k]));
+    values.forEach((value, k) => this.curve(pen, colours[k], value, k === 2 ? 2.2 : 1.6));
+    pen.restore();
+    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${x.toFixed(2).replace("-", "−")} J`);
+    const names = ["kinetic", "potential", "total"].map((key, k) => `${text(key)} ${now[k]}`);
+    this.name(...names.map((name, k) => [colours[k], name]));
+    this.describe(`${text("panel.energy")}: ${names.join(", ")}`);
+  }
+}
+
+/// How far the energy is from where it was when last something was changed.
+class ErrorPanel extends Panel {
+  constructor(lab) {
+    super(lab, labPanel("panel.error", "all"));
+  }
+
+  draw() {
+    const { lab, axes } = this;
+    const { history, size } = lab;
+    const scale = lab.energyScale;
+    const value = (row) => {
+      if (history.time(row) < lab.since) return NaN;
+      const off = Math.abs(history.get(row, 1 + 2 * size) + history.get(row, 2 + 2 * size) - lab.energy) / scale;
+      return Math.log10(Math.max(off, 1e-17));
+    };
+    const pen = axes.begin();
+    axes.beginMoving();
+    const { low, high } = this.range([value]);
+    axes.y = { low: Math.min(Math.floor(low), -16), high: Math.max(Math.ceil(high), -12) };
+    const ticks = [];
+    const step = Math.max(1, Math.ceil((axes.y.high - axes.y.low) / 5));
+    for (let k = axes.y.low; k <= axes.y.high; k += step) ticks.push({ at: k, text: powerOfTen(k) });
+    axes.drawGrid(pen, this.timeAxis(), ticks, "s");
+    this.curve(pen, palette.css("accent"), value);
+    pen.restore();
+    const off = Math.abs(lab.row[1 + 2 * size] + lab.row[2 + 2 * size] - lab.energy) / scale;
+    this.name(["", (model ? off > 1e-8 : lab.state.d > 0) ? text("error.damped") : text("error.now", { error: readable(off, 2) })]);
+  }
+}
+
+/// The rate of a coordinate against it.
+class PhasePanel extends Panel {
+  constructor(lab) {
+    const select = picker("coordinate", () => lab.changed());
+    super(lab, labPanel("panel.phase", "student", [select], "square"));
+    this.select = select;
+  }
+
+  begin() {
+    fillPicker(this.select, this.lab.coordinates.map(symbol));
+  }
+
+  draw() {
+    const { lab, axes } = this;
+    const { history, size } = lab;
+    const k = Number(this.select.value) || 0;
+    const wrapped = lab.isAngle[k];
+    const pen = axes.begin();
+    axes.beginMoving();
+    const place = (row) => (wrapped ? wrap(history.get(row, 1 + k)) : history.get(row, 1 + k));
+    const rate = (row) => history.get(row, 1 + size + k);
+    axes.x = wrapped ? turnOfAngles : this.range([place]);
+    axes.y = this.range([rate]);
+    axes.drawGrid(pen, degreeTicks(axes.x, axes.width / 70, wrapped), linearTicks(axes.y, axes.height / 30, false), "");
+    const { from, to, stride } = this.rows(900);
+    const pieces = 6;
+    for (let piece = 0; piece < pieces; ++piece) {
+      const [begin, end] = [piece, piece + 1].map((p) => from + stride * Math.floor(((to - from) / stride) * (p / pieces)));
+      pen.strokeStyle = rgba(palette.curves[0], 0.15 + (0.85 * (piece + 1)) / pieces);
+      pen.lineWidth = 1.3;
+      pen.beginPath();
+      let before = NaN;
+      for (let row = begin; row <= Math.min(end, to); row += stride) {
+        const x = place(row);
+        pen[Number.isNaN(before) || (wrapped && Math.abs(x - before) > Math.PI) ? "moveTo" : "lineTo"](axes.atX(x), axes.atY(rate(row)));
+        before = x;
+      }
+      pen.stroke();
+    }
+    const now = lab.row[1 + k];
+    dot(pen, axes.atX(wrapped ? wrap(now) : now), axes.atY(lab.row[1 + size + k]), palette.rgb.trace, 4);
+    pen.restore();
+    const name = symbol(lab.coordinates[k]);
+    this.name(["", text("phase.key", { name, unit: wrapped ? "°" : lab.units[k], rate: `${lab.units[k]}/s` })]);
+  }
+}
+
+/// A whole turn, and room for its numbers.
+const turnOfAngles = { low: -1.06 * Math.PI, high: 1.06 * Math.PI };
+
+/// Angles in degrees, other numbers as they are.
+function degreeTicks(axis, count, wrapped) {
+  if (!wrapped) return linearTicks(axis, count, false);
+  return [-180, -90, 0, 90, 180].map((k) => ({ at: (k * Math.PI) / 180, text: `${k}°`.replace("-", "−") }));
+}
+
+/// Where the first coordinate goes through zero upwards: the last one and its rate.
+class SectionPanel extends Panel {
+  constructor(lab) {
+    super(lab, labPanel("panel.section", "all", [], "square"));
+    this.begin();
+  }
+
+  begin() {
+    this.points = [];
+    this.seen = 0;
+    this.version = -1;
+  }
+
+  /// Rows that came since.
+  collect() {
+    const { history, size } = this.lab;
+    if (this.version !== history.version) {
+      this.version = history.version;
+      this.seen = 0;
+      this.points = [];
+    }
+    const last = size - 1;
+    const of = (row, k) => (this.lab.isAngle[k] ? wrap(history.get(row, 1 + k)) : history.get(row, 1 + k));
+    for (let row = Math.max(this.seen, 1); row < history.rows; ++row) {
+      const [a, b] = [of(row - 1, 0), of(row, 0)];
+      if (!(a < 0 && b >= 0 && b - a < 2)) continue;
+      const s = a / (a - b);
+      const q = of(row - 1, last) + s * (history.get(row, 1 + last) - history.get(row - 1, 1 + last));
+      const v = history.get(row - 1, 1 + size + last) * (1 - s) + s * history.get(row, 1 + size + last);
+      this.points.push(this.lab.isAngle[last] ? wrap(q) : q, v);
+    }
+    this.seen = history.rows;
+  }
+
+  draw() {
+    this.collect();
+    const { axes, points, lab } = this;
+    const pen = axes.begin();
+    axes.beginMoving();
+    const last = lab.size - 1;
+    const wrapped = lab.isAngle[last];
+    const [xs, ys] = [points.filter((_, k) => k % 2 === 0), points.filter((_, k) => k % 2 === 1)];
+    axes.x = wrapped ? turnOfAngles : rangeOf([xs]);
+    axes.y = rangeOf([ys]);
+    axes.drawGrid(pen, degreeTicks(axes.x, axes.width / 70, wrapped), linearTicks(axes.y, axes.height / 30, false), "");
+    pen.fillStyle = rgba(palette.curves[2], 0.85);
+    for (let k = 0; k < points.length; k += 2) pen.fillRect(axes.atX(points[k]) - 1.2, axes.atY(points[k + 1]) - 1.2, 2.4, 2.4);
+    pen.restore();
+    const names = [lab.coordinates[0], lab.coordinates[last]].map(symbol);
+    this.name(["", text("section.key", { first: names[0], last: names[1], count: points.length / 2 })]);
+    this.describe(text("section.key", { first: names[0], last: names[1], count: points.length / 2 }));
+  }
+}
+
+/// Copies that start beside the motion, and how far they get from it.
+class CopiesPanel extends Panel {
+  constructor(lab) {
+    const button = element("button", { type: "button", id: "copies" });
+    button.dataset.text = "copies.start";
+    const apart = picker("copies.apart", () => lab.setCopies(lab.state.copies, 10 ** -Number(apart.value)));
+    for (const power of [3, 6, 9, 12]) apart.append(element("option", { value: power, textContent: `${powerOfTen(-power)} rad`, selected: power === 6 }));
+    super(lab, labPanel("panel.copies", "student", [apart, button]));
+    button.addEventListener("click", () => lab.setCopies(lab.state.copies ? 0 : 50, 10 ** -Number(apart.value)));
+    this.button = button;
+    this.distances = [];
+  }
+
+  begin() {
+    this.distances = [];
+  }
+
+  add(time, distance) {
+    if (!this.distances.length || time > this.distances.at(-1)[0] + 0.05) this.distances.push([time, distance]);
+    if (this.distances.length > 4000) this.distances = this.distances.filter((_, k) => k % 2 === 0);
+  }
+
+  draw() {
+    const { lab, axes, distances } = this;
+    this.box.section.classList.toggle("off", lab.state.copies === 0);
+    this.box.plot.hidden = lab.state.copies === 0;
+    this.button.textContent = text(lab.state.copies ? "copies.end" : "copies.start");
+    this.button.setAttribute("aria-pressed", lab.state.copies > 0);
+    if (lab.state.copies === 0) {
+      this.name(["", text("copies.key")]);
+      return;
+    }
+    const pen = axes.begin();
+    axes.beginMoving();
+    const times = distances.map(([time]) => time);
+    axes.x = { low: times[0] ?? 0, high: Math.max(times.at(-1) ?? 0, (times[0] ?? 0) + 10) };
+    const logs = distances.map(([, distance]) => Math.log10(Math.max(distance, 1e-16)));
+    axes.y = { low: Math.min(-6, Math.floor(Math.min(...logs, 0))), high: 1 };
+    const ticks = [];
+    const step = Math.max(1, Math.ceil((axes.y.high - axes.y.low) / 5));
+    for (let k = axes.y.low; k <= axes.y.high; k += step) ticks.push({ at: k, text: powerOfTen(k) });
+    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.width / 80).map((t) => ({ at: t, text: readable(t, 6) })), ticks, "s");
+    pen.strokeStyle = palette.css("trace");
+    pen.lineWidth = 1.6;
+    pen.beginPath();
+    distances.forEach(([time], k) => pen.lineTo(axes.atX(time), axes.atY(logs[k])));
+    pen.stroke();
+    pen.restore();
+    this.name(["", text("copies.distance", { count: lab.state.copies })]);
+  }
+}
+
+/// The leading Lyapunov exponent, as it converges.
+class ExponentPanel extends Panel {
+  constructor(lab) {
+    const button = element("button", { type: "button", id: "measure" });
+    button.dataset.text = "exponent.start";
+    super(lab, labPanel("panel.exponent", "all", [button]));
+    this.button = button;
+    button.addEventListener("click", () => lab.measure(!lab.isMeasuring));
+    this.values = [];
+  }
+
+  begin() {
+    this.values = [];
+  }
+
+  add(time, value) {
+    if (this.values.at(-1)?.[0] === time) return;
+    this.values.push([time, value]);
+    if (this.values.length > 4000) this.values = this.values.filter((_, k) => k % 2 === 0);
+  }
+
+  draw() {
+    const { lab, axes, values } = this;
+    this.box.section.classList.toggle("off", !lab.isMeasuring);
+    this.box.plot.hidden = !lab.isMeasuring;
+    this.button.textContent = text(lab.isMeasuring ? "exponent.end" : "exponent.start");
+    this.button.setAttribute("aria-pressed", lab.isMeasuring);
+    if (!lab.isMeasuring) {
+      this.name(["", text("exponent.key")]);
+      return;
+    }
+    const pen = axes.begin();
+    axes.beginMoving();
+    axes.x = { low: values[0]?.[0] ?? 0, high: Math.max(values.at(-1)?.[0] ?? 0, (values[0]?.[0] ?? 0) + 10) };
+    const range = rangeOf([values.map(([, value]) => value)]);
+    axes.y = { low: Math.min(0, range.low), high: range.high };
+    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.width / 80).map((t) => ({ at: t, text: readable(t, 6) })), linearTicks(axes.y, axes.height / 30, false), "s");
+    pen.strokeStyle = rgba(palette.curves[3]);
+    pen.lineWidth = 1.8;
+    pen.beginPath();
+    values.forEach(([time, value]) => pen.lineTo(axes.atX(time), axes.atY(value)));
+    pen.stroke();
+    pen.restore();
+    this.name(["", text("exponent.now", { value: values.length ? readable(values.at(-1)[1], 3) : "–" })]);
+  }
+}

@@ -1,0 +1,119 @@
+// The state of the laboratory, and how it stands in a link.
+
+const levels = ["first", "student", "all"];
+const speedChoices = [1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
+const mostLinks = 300;
+const listed = 4; // links whose numbers have sliders of their own
+
+/// Numbers of a model that is no chain, as describe tells them, link by link.
+const modelParameters = (model?.parameters ?? []).flatMap((each) => {
+  const count = each.per_link ? model.links : 1;
+  return Array.from({ length: count }, (_, k) => ({ ...each, label: each.per_link ? `${each.name} ${k + 1}` : each.name }));
+});
+
+const freshState = () => ({
+  n: 2, space: 2, m: [1, 1], l: [1, 1], g: 9.81, d: 0,
+  q: model ? (moved.start?.q ?? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1))) : [2.0943951023931953, 2.6179938779914944],
+  v: model ? (moved.start?.v ?? model.coordinates.map(() => 0)) : [0, 0],
+  p: modelParameters.map((each) => moved.start?.p?.[each.name] ?? each.default ?? 1),
+  speed: 1, level: "student", lang: "", theme: "", copies: 0, apart: 1e-6,
+  show: ["trace"],
+});
+
+/// A number, or the same for each of n, from "1,2,3"; "30deg" is an angle.
+function numbersOf(words, n) {
+  const numbers = words.split(",").map((word) => (word.endsWith("deg") ? (parseFloat(word) * Math.PI) / 180 : Number(word)));
+  if (!numbers.every(Number.isFinite)) return null;
+  return Array.from({ length: n }, (_, k) => numbers[Math.min(k, numbers.length - 1)]);
+}
+
+function clamp(x, low, high) {
+  return Math.min(Math.max(x, low), high);
+}
+
+/// The state that a link tells; what it does not tell, or tells wrongly, is as at first.
+function stateOf(words) {
+  const state = freshState();
+  const told = new URLSearchParams(words);
+  const number = (key, low, high) => {
+    const x = Number(told.get(key) ?? NaN);
+    if (told.has(key) && Number.isFinite(x)) state[key] = clamp(x, low, high);
+  };
+  number("n", 1, mostLinks), number("space", 2, 3), number("g", -100, 100), number("d", 0, 1000);
+  number("speed", 1 / 128, 8), number("copies", 0, 200), number("apart", 1e-14, 0.1);
+  state.n = Math.round(state.n), state.space = Math.round(state.space), state.copies = Math.round(state.copies);
+  const size = model ? model.coordinates.length : state.n;
+  resize(state);
+  const list = (key, n, good = () => true) => {
+    const found = told.has(key) ? numbersOf(told.get(key), n) : null;
+    return found && found.every(good) ? found : null;
+  };
+  const positive = (x) => x > 0 && x < 1e6;
+  state.m = list("m", state.n, positive) ?? state.m;
+  state.l = list("l", state.n, positive) ?? state.l;
+  if (model) {
+    state.p = list("p", modelParameters.length) ?? state.p;
+    state.q = list("q", size) ?? state.q, state.v = list("v", size) ?? state.v;
+  } else {
+    const part = (key, others) => list(key, state.n) ?? others;
+    const [q, v] = [state.q, state.v];
+    state.q = part("th", q.slice(0, state.n)), state.v = part("w", v.slice(0, state.n));
+    if (state.space === 3) {
+      state.q = state.q.concat(part("ph", q.slice(state.n))), state.v = state.v.concat(part("wp", v.slice(state.n)));
+    }
+  }
+  if (levels.includes(told.get("level"))) state.level = told.get("level");
+  if (texts[told.get("lang")]) state.lang = told.get("lang");
+  if (["light", "dark"].includes(told.get("theme"))) state.theme = told.get("theme");
+  if (told.has("show")) state.show = told.get("show").split(" ").filter(Boolean);
+  return state;
+}
+
+/// Makes all lists of a chain as long as it has links; angles stay with their links.
+function resize(state) {
+  if (model) return;
+  const { n, space } = state;
+  const grown = (list, count, fresh) => Array.from({ length: count }, (_, k) => list[k] ?? fresh(k));
+  const before = state.m.length;
+  const [theta, phi] = [state.q.slice(0, before), state.q.slice(before)];
+  const [turn, around] = [state.v.slice(0, before), state.v.slice(before)];
+  state.m = grown(state.m, n, () => state.m.at(-1));
+  // Long chains are as long as short ones: what hangs stays on the stage.
+  const length = state.l.reduce((sum, each) => sum + each, 0);
+  if (n !== before && (n > listed || before > listed)) state.l = Array.from({ length: n }, () => Number((length / n).toPrecision(4)));
+  else state.l = grown(state.l, n, () => state.l.at(-1));
+  state.q = grown(theta, n, () => theta.at(-1));
+  state.v = grown(turn, n, () => 0);
+  if (space === 3) {
+    state.q = state.q.concat(grown(phi, n, (k) => 0.3 * Math.min(k, 5)));
+    state.v = state.v.concat(grown(around, n, () => (phi.length ? 0 : 0.6)));
+  }
+}
+
+/// The words of a link that leads to a state.
+function linkOf(state) {
+  const words = [];
+  const fresh = freshState();
+  const short = (numbers) => (numbers.every((x) => x === numbers[0]) ? `${numbers[0]}` : numbers.join(","));
+  const put = (key, value) => words.push(`${key}=${value}`);
+  if (models[named] || named === "chain") put("model", named);
+  if (model) {
+    put("p", state.p.join(",")), put("q", state.q.join(",")), put("v", short(state.v));
+  } else {
+    const { n } = state;
+    put("n", n), put("space", state.space), put("m", short(state.m)), put("l", short(state.l)), put("g", state.g), put("d", state.d);
+    put("th", short(state.q.slice(0, n))), put("w", short(state.v.slice(0, n)));
+    if (state.space === 3) put("ph", short(state.q.slice(n))), put("wp", short(state.v.slice(n)));
+  }
+  for (const key of ["speed", "level", "lang", "theme", "copies", "apart"]) {
+    if (state[key] !== fresh[key]) put(key, state[key]);
+  }
+  if (state.show.join() !== fresh.show.join()) put("show", state.show.join("+"));
+  return words.join("&");
+}
+
+/// What the engine is told of a state.
+function specOf(state) {
+  if (model) return { program: moved.program, parameters: state.p, components: model.points.map((each) => each.columns.length) };
+  return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d) };
+}

@@ -1,0 +1,476 @@
+// The stage: a chain or a model's points, in the plane or in space, on a canvas. In space the eye turns about the pivot.
+
+const balls = 60; // that are shaded; of more each is one colour
+
+/// Places of a chain's bobs, one after the other, three numbers each.
+function placesOfChain(state, q, places) {
+  const { n, space, l } = state;
+  let [x, y, z] = [0, 0, 0];
+  for (let i = 0; i < n; ++i) {
+    const [sin, cos] = [Math.sin(q[i]), Math.cos(q[i])];
+    if (space === 2) {
+      x += l[i] * sin;
+    } else {
+      x += l[i] * sin * Math.cos(q[n + i]);
+      y += l[i] * sin * Math.sin(q[n + i]);
+    }
+    z -= l[i] * cos;
+    places[3 * i] = x, places[3 * i + 1] = y, places[3 * i + 2] = z;
+  }
+  return places;
+}
+
+class Stage {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.pen = canvas.getContext("2d");
+    this.view = { zoom: 1, x: 0, y: 0, azimuth: -0.9, elevation: 0.22 };
+    this.ruler = { from: [-0.5, -0.4], to: [0.5, -0.4] };
+    this.ruler.from.push(0), this.ruler.to.push(0);
+  }
+
+  /// What there is to draw: how many points, what each hangs on, masses, and how far it all reaches.
+  shape({ space, count, hangs, kinds, bonds, masses, reach }) {
+    Object.assign(this, { space, count, hangs, kinds, bonds, masses, reach });
+    this.places = new Float64Array(3 * count);
+    const largest = Math.max(...masses, 1e-300);
+    const size = reach * clamp(0.075 / Math.sqrt(Math.max(count, 1)), 0.006, 0.05);
+    this.radii = Array.from(masses, (mass) => size * clamp(Math.cbrt(mass / largest), 0.3, 1));
+  }
+
+  reset() {
+    this.view = { zoom: 1, x: 0, y: 0, azimuth: -0.9, elevation: 0.22 };
+  }
+
+  resize() {
+    fitStage(this);
+    this.turned = null;
+  }
+
+  /// Pixels to a metre.
+  get scale() {
+    const room = Math.min(this.width - 24, this.height - 64);
+    return (Math.max(room, 60) / (2.16 * this.reach)) * this.view.zoom;
+  }
+
+  #aim() {
+    const { azimuth, elevation } = this.view;
+    const [sa, ca, se, ce] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
+    // Axes of the screen: to the right, up, and to the eye.
+    this.axes = this.space === 2
+      ? [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+      : [[-sa, ca, 0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]];
+    this.pixels = this.scale;
+    this.far = 7 * this.reach;
+    this.left = this.width / 2 + this.view.x * this.pixels;
+    this.top = (this.height + 10) / 2 - this.view.y * this.pixels;
+  }
+
+  /// [x, y, nearness] of a place on the screen; in space what is nearer is larger.
+  project(x, y, z) {
+    const [right, up, eye] = this.axes;
+    const depth = x * eye[0] + y * eye[1] + z * eye[2];
+    const near = this.space === 2 ? 1 : this.far / (this.far - depth);
+    const k = this.pixels * near;
+    return [this.left + k * (x * right[0] + y * right[1] + z * right[2]), this.top - k * (x * up[0] + y * up[1] + z * up[2]), near, depth];
+  }
+
+  /// The place under a pixel, as deep as another place.
+  placeAt(pixelX, pixelY, like = [0, 0, 0]) {
+    this.#aim();
+    const [right, up, eye] = this.axes;
+    const depth = like[0] * eye[0] + like[1] * eye[1] + like[2] * eye[2];
+    const near = this.space === 2 ? 1 : this.far / (this.far - depth);
+    const [a, b] = [(pixelX - this.left) / (this.pixels * near), (this.top - pixelY) / (this.pixels * near)];
+    return [0, 1, 2].map((axis) => a * right[axis] + b * up[axis] + (this.space === 2 ? 0 : depth * eye[axis]));
+  }
+
+  /// The point that is nearest to a pixel, -1 where none is near.
+  pointAt(pixelX, pixelY, most = 26) {
+    let [found, nearest] = [-1, most];
+    for (let i = 0; i < this.count; ++i) {
+      const [x, y] = this.#shown(this.places, i);
+      const distance = Math.hypot(x - pixelX, y - pixelY) - 0.6 * this.radii[i] * this.pixels;
+      if (distance < nearest) [found, nearest] = [i, distance];
+    }
+    return found;
+  }
+
+  #shown(places, i) {
+    return i < 0 ? this.project(0, 0, 0) : this.project(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
+  }
+
+  zoom(factor) {
+    this.view.zoom = clamp(this.view.zoom * factor, 0.2, 50);
+  }
+  turn(dx, dy) {
+    this.view.azimuth -= dx * 0.008;
+    this.view.elevation = clamp(this.view.elevation + dy * 0.008, -1.5, 1.5);
+  }
+  move(dx, dy) {
+    this.view.x += dx / this.pixels;
+    this.view.y -= dy / this.pixels;
+  }
+
+  /// Draws all. `what`: {places, rates, trace, copies, held, show: Set, angles}.
+  draw(what) {
+    const { pen } = this;
+    this.#aim();
+    pen.setTransform(this.fine, 0, 0, this.fine, 0, 0);
+    pen.fillStyle = palette.css("ground");
+    pen.fillRect(0, 0, this.width, this.height);
+    pen.lineJoin = pen.lineCap = "round";
+    this.space === 2 ? this.#drawGrid() : this.#drawFloor();
+    if (what.trace) this.#drawTrace(what.trace);
+    if (what.copies) this.#drawCopies(what.copies);
+    if (what.show.has("angles")) this.#drawAngles(what);
+    this.#drawBodies(what);
+    if (what.show.has("velocities")) this.#drawVelocities(what);
+    if (what.held) this.#drawHand(what.held);
+    if (what.show.has("ruler")) this.#drawRuler();
+  }
+
+  #drawGrid() {
+    const { pen, width, height, pixels } = this;
+    const ticks = niceTicks(0, width / pixels, width / 110);
+    const step = ticks.length > 1 ? ticks[1] - ticks[0] : width / pixels;
+    pen.strokeStyle = palette.css("line");
+    pen.lineWidth = 1;
+    pen.beginPath();
+    for (let x = this.left % (step * pixels); x < width; x += step * pixels) pen.moveTo(Math.round(x) + 0.5, 0), pen.lineTo(Math.round(x) + 0.5, height);
+    for (let y = this.top % (step * pixels); y < height; y += step * pixels) pen.moveTo(0, Math.round(y) + 0.5), pen.lineTo(width, Math.round(y) + 0.5);
+    pen.stroke();
+    pen.strokeStyle = pen.fillStyle = palette.css("quiet");
+    pen.lineWidth = 1.5;
+    const [x1, y] = [width - 14, height - 14];
+    line(pen, x1 - step * pixels, y, x1, y);
+    pen.font = "11px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.fillText(`${readable(step)} m`, x1 - (step * pixels) / 2, y - 6);
+  }
+
+  #drawFloor() {
+    const { pen, reach } = this;
+    const floor = -1.12 * reach;
+    const rings = niceTicks(0, 1.6 * reach, 4).slice(1);
+    const ground = (x, y) => this.project(x, y, floor);
+    const last = rings.at(-1) ?? reach;
+    pen.fillStyle = palette.css("floor");
+    pen.beginPath();
+    for (let k = 0; k < 64; ++k) pen.lineTo(...ground(last * Math.cos((k * Math.PI) / 32), last * Math.sin((k * Math.PI) / 32)).slice(0, 2));
+    pen.fill();
+    pen.strokeStyle = palette.css("line");
+    pen.lineWidth = 1;
+    for (const radius of rings) {
+      pen.beginPath();
+      for (let k = 0; k <= 64; ++k) pen.lineTo(...ground(radius * Math.cos((k * Math.PI) / 32), radius * Math.sin((k * Math.PI) / 32)).slice(0, 2));
+      pen.stroke();
+    }
+    for (let k = 0; k < 12; ++k) {
+      const [c, s] = [last * Math.cos((k * Math.PI) / 6), last * Math.sin((k * Math.PI) / 6)];
+      line(pen, ...ground(0, 0).slice(0, 2), ...ground(c, s).slice(0, 2));
+    }
+    pen.strokeStyle = palette.css("edge", 0.5);
+    line(pen, ...this.project(0, 0, 0).slice(0, 2), ...ground(0, 0).slice(0, 2));
+    // Shadows.
+    pen.fillStyle = palette.css("shade", 0.8);
+    pen.strokeStyle = palette.css("shade", 0.8);
+    pen.lineWidth = 3;
+    pen.beginPath();
+    for (let i = 0; i < this.count; ++i) {
+      const from = this.hangs[i];
+      if (from < 0) pen.moveTo(...ground(0, 0).slice(0, 2));
+      const b = ground(this.places[3 * i], this.places[3 * i + 1]);
+      pen.lineTo(b[0], b[1]);
+    }
+    pen.stroke();
+    if (this.count > balls) return;
+    for (let i = 0; i < this.count; ++i) {
+      const [x, y, near] = ground(this.places[3 * i], this.places[3 * i + 1]);
+      const radius = this.radii[i] * this.pixels * near;
+      pen.beginPath();
+      pen.ellipse(x, y, radius, radius * Math.max(Math.abs(this.axes[2][2]), 0.12), 0, 0, 2 * Math.PI);
+      pen.fill();
+    }
+  }
+
+  // In pieces of one brightness each. `trace`: places of the last point, one after the other, oldest first.
+  #drawTrace(trace) {
+    const { pen } = this;
+    const samples = trace.length / 3;
+    const pieces = 16;
+    pen.lineWidth = 2;
+    pen.lineCap = "butt";
+    for (let piece = 0; piece < pieces; ++piece) {
+      const [from, to] = [piece, piece + 1].map((k) => Math.floor(((samples - 1) * k) / pieces));
+      if (to <= from) continue;
+      pen.strokeStyle = palette.css("trace", 0.85 * ((piece + 1) / pieces) ** 1.5);
+      pen.beginPath();
+      for (let k = from; k <= to; ++k) {
+        const [x, y] = this.project(trace[3 * k], trace[3 * k + 1], trace[3 * k + 2]);
+        pen.lineTo(x, y);
+      }
+      pen.stroke();
+    }
+    pen.lineCap = "round";
+  }
+
+  #drawCopies({ places, count }) {
+    const { pen } = this;
+    const each = 3 * this.count;
+    pen.lineWidth = 1.2;
+    for (let k = 0; k < count; ++k) {
+      const colour = palette.ramp(count > 1 ? k / (count - 1) : 0);
+      pen.strokeStyle = rgba(colour, 0.5);
+      pen.beginPath();
+      const [x0, y0] = this.project(0, 0, 0);
+      pen.moveTo(x0, y0);
+      const part = places.subarray(k * each, (k + 1) * each);
+      for (let i = 0; i < this.count; ++i) {
+        const [x, y] = this.#shown(part, i);
+        pen.lineTo(x, y);
+      }
+      pen.stroke();
+      const [x, y, near] = this.#shown(part, this.count - 1);
+      pen.fillStyle = rgba(colour, 0.9);
+      pen.beginPath();
+      pen.arc(x, y, Math.max(0.5 * this.radii[this.count - 1] * this.pixels * near, 2), 0, 2 * Math.PI);
+      pen.fill();
+    }
+  }
+
+  #drawBodies({ places, held }) {
+    const { pen, count } = this;
+    const points = Array.from({ length: count }, (_, i) => this.#shown(places, i));
+    const pivot = this.project(0, 0, 0);
+    pen.strokeStyle = palette.css("rod");
+    for (const { kind, from, to } of this.bonds) this.#drawBond(kind, from < 0 ? pivot : points[from], points[to]);
+    if (this.kinds.includes("cart")) this.#drawRail();
+    const thick = clamp((0.014 * this.reach * this.pixels) / Math.sqrt(count / 3 + 1), 1.3, 5);
+    pen.lineWidth = thick;
+    pen.beginPath();
+    for (let i = 0; i < count; ++i) {
+      const on = this.hangs[i];
+      if (on === -2) pen.moveTo(points[i][0], points[i][1]);
+      else if (on !== i - 1 || i === 0) pen.moveTo(...(on < 0 ? pivot : points[on]).slice(0, 2));
+      pen.lineTo(points[i][0], points[i][1]);
+    }
+    pen.stroke();
+    if (this.hangs.includes(-1) || this.bonds.some(({ from }) => from < 0)) {
+      this.#drawPivot(pivot);
+    }
+    if (count > balls) {
+      this.#drawManyBalls(points);
+      if (held) this.#drawBall(points[held.bob], held.bob, true);
+      return;
+    }
+    const order = points.map((_, i) => i);
+    if (this.space === 3) order.sort((a, b) => points[a][3] - points[b][3]);
+    for (const i of order) {
+      if (this.kinds[i] === "cart") this.#drawCart(points[i]);
+      else if (this.kinds[i] === "pivot") this.#drawPivot(points[i]);
+      else this.#drawBall(points[i], i, i === held?.bob);
+    }
+  }
+
+  #drawPivot([x, y]) {
+    const { pen } = this;
+    pen.beginPath();
+    pen.arc(x, y, 4.5, 0, 2 * Math.PI);
+    pen.fillStyle = palette.css("panel");
+    pen.strokeStyle = palette.css("ink");
+    pen.lineWidth = 2;
+    pen.fill();
+    pen.stroke();
+  }
+
+  #drawRail() {
+    const { pen } = this;
+    const y = this.project(0, 0, 0)[1] + 0.07 * this.reach * this.pixels;
+    pen.strokeStyle = palette.css("edge");
+    pen.lineWidth = 2;
+    line(pen, 0, y, this.width, y);
+  }
+
+  #drawCart([x, y]) {
+    const { pen } = this;
+    const size = 0.07 * this.reach * this.pixels;
+    pen.fillStyle = palette.css("bob");
+    pen.strokeStyle = palette.css("panel");
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.rect(x - 1.5 * size, y - 0.6 * size, 3 * size, 1.2 * size);
+    pen.fill();
+    pen.fillStyle = palette.css("rod");
+    for (const side of [-0.9, 0.9]) {
+      pen.beginPath();
+      pen.arc(x + side * size, y + 0.65 * size, 0.35 * size, 0, 2 * Math.PI);
+      pen.fill();
+      pen.stroke();
+    }
+  }
+
+  // A spring with its windings, or a string.
+  #drawBond(kind, from, to) {
+    const { pen } = this;
+    const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+    const length = Math.hypot(dx, dy) || 1;
+    pen.lineWidth = kind === "spring" ? 2 : 1.5;
+    pen.beginPath();
+    pen.moveTo(from[0], from[1]);
+    const turns = kind === "spring" ? 24 : 0;
+    const wide = 0.045 * this.reach * this.pixels;
+    for (let k = 1; k < turns; ++k) {
+      const [along, across] = [0.08 + (0.84 * k) / turns, (k % 2 ? wide : -wide) / length];
+      pen.lineTo(from[0] + along * dx - across * dy, from[1] + along * dy + across * dx);
+    }
+    pen.lineTo(to[0], to[1]);
+    pen.stroke();
+  }
+
+  // All in one colour, but for the last.
+  #drawManyBalls(points) {
+    const { pen } = this;
+    pen.fillStyle = palette.css("bob");
+    pen.beginPath();
+    for (let i = 0; i < points.length - 1; ++i) {
+      const [x, y, near] = points[i];
+      const radius = Math.max(this.radii[i] * this.pixels * near, 1.4);
+      pen.moveTo(x + radius, y);
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+    }
+    pen.fill();
+    this.#drawBall(points.at(-1), points.length - 1, false);
+  }
+
+  #drawBall([x, y, near], i, isHeld) {
+    const { pen } = this;
+    const radius = Math.max(this.radii[i] * this.pixels * near, 1.4);
+    const rgb = i === this.count - 1 ? palette.rgb.trace : palette.rgb.bob;
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 2 * Math.PI);
+    if (this.count <= balls && radius > 4) {
+      const light = pen.createRadialGradient(x - 0.35 * radius, y - 0.4 * radius, 0.1 * radius, x, y, radius);
+      light.addColorStop(0, rgba(rgb.map((c) => Math.round(c + (255 - c) * 0.45))));
+      light.addColorStop(0.55, rgba(rgb));
+      light.addColorStop(1, rgba(rgb.map((c) => Math.round(c * 0.78))));
+      pen.fillStyle = light;
+    } else {
+      pen.fillStyle = rgba(rgb);
+    }
+    pen.fill();
+    if (!isHeld) return;
+    pen.beginPath();
+    pen.arc(x, y, radius + 5, 0, 2 * Math.PI);
+    pen.strokeStyle = palette.css("accent");
+    pen.lineWidth = 2;
+    pen.stroke();
+  }
+
+  #drawHand({ bob, place }) {
+    const { pen } = this;
+    const [x0, y0] = this.#shown(this.places, bob);
+    const [x, y] = this.project(...place);
+    pen.strokeStyle = palette.css("accent", 0.8);
+    pen.lineWidth = 1.5;
+    pen.setLineDash([4, 4]);
+    line(pen, x0, y0, x, y);
+    pen.setLineDash([]);
+  }
+
+  #drawVelocities({ places, rates }) {
+    if (!rates) return;
+    const { pen } = this;
+    pen.strokeStyle = pen.fillStyle = rgba(palette.curves[2]);
+    pen.lineWidth = 2;
+    const most = this.count > 12 ? Math.ceil(this.count / 12) : 1;
+    for (let i = this.count - 1; i >= 0; i -= most) {
+      const [x0, y0] = this.#shown(places, i);
+      const k = 0.12; // s: an arrow is the way in that time
+      const [x, y] = this.project(...[0, 1, 2].map((axis) => places[3 * i + axis] + k * rates[3 * i + axis]));
+      arrow(pen, x0, y0, x, y);
+    }
+  }
+
+  // From the vertical to the rod, in the plane of both.
+  #drawAngles({ places, angles }) {
+    if (!angles) return;
+    const { pen } = this;
+    const radius = Math.min(0.16 * this.reach, 0.5 * this.reach / Math.sqrt(this.count));
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "center";
+    for (let i = 0; i < Math.min(this.count, 8); ++i) {
+      const on = i - 1;
+      const from = on < 0 ? [0, 0, 0] : [0, 1, 2].map((axis) => places[3 * on + axis]);
+      const theta = wrap(angles.theta[i]);
+      const phi = angles.phi ? angles.phi[i] : 0;
+      const place = (angle, r) => this.project(
+        from[0] + r * Math.sin(angle) * Math.cos(phi), from[1] + r * Math.sin(angle) * Math.sin(phi), from[2] - r * Math.cos(angle));
+      pen.strokeStyle = palette.css("quiet", 0.7);
+      pen.lineWidth = 1;
+      pen.setLineDash([3, 4]);
+      line(pen, ...place(0, 0).slice(0, 2), ...place(0, 1.5 * radius).slice(0, 2));
+      pen.setLineDash([]);
+      pen.strokeStyle = pen.fillStyle = rgba(palette.curves[i % 6]);
+      pen.lineWidth = 2;
+      pen.beginPath();
+      for (let k = 0; k <= 32; ++k) pen.lineTo(...place((theta * k) / 32, radius).slice(0, 2));
+      pen.stroke();
+      const [x, y] = place(theta / 2, 1.35 * radius);
+      pen.fillText(`${((theta * 180) / Math.PI).toFixed(0).replace("-", "−")}°`, x, y + 4);
+    }
+  }
+
+  #drawRuler() {
+    const { pen, ruler } = this;
+    const [a, b] = [this.project(...this.rulerEnd("from")), this.project(...this.rulerEnd("to"))];
+    pen.strokeStyle = pen.fillStyle = rgba(palette.curves[4]);
+    pen.lineWidth = 2;
+    line(pen, a[0], a[1], b[0], b[1]);
+    for (const [x, y] of [a, b]) {
+      pen.beginPath();
+      pen.arc(x, y, 6, 0, 2 * Math.PI);
+      pen.fill();
+    }
+    const length = Math.hypot(...ruler.from.map((x, k) => x - ruler.to[k])) * this.reach;
+    pen.font = "13px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.fillStyle = palette.css("ink");
+    pen.fillText(`${readable(length, 3)} m`, (a[0] + b[0]) / 2, (a[1] + b[1]) / 2 - 9);
+  }
+
+  // In parts of the reach, on the screen.
+  rulerEnd(end) {
+    const [right, up] = this.axes;
+    const [a, b] = this.ruler[end];
+    return [0, 1, 2].map((axis) => this.reach * (a * right[axis] + b * up[axis]));
+  }
+  moveRuler(end, pixelX, pixelY) {
+    this.ruler[end] = [(pixelX - this.left) / this.pixels / this.reach, (this.top - pixelY) / this.pixels / this.reach, 0];
+  }
+  rulerAt(pixelX, pixelY) {
+    return ["from", "to"].find((end) => {
+      const [x, y] = this.project(...this.rulerEnd(end));
+      return Math.hypot(x - pixelX, y - pixelY) < 18;
+    });
+  }
+}
+
+/// Springs and strings of a model, between points by number; the origin is -1.
+function bondsOf(model) {
+  const number = (name) => model.points.findIndex((point) => point.name === name);
+  const bond = (kind) => ([from, to]) => ({ kind, from: from === null ? -1 : number(from), to: number(to) });
+  return [...(model.springs ?? []).map(bond("spring")), ...(model.strings ?? []).map(bond("string"))];
+}
+
+function arrow(pen, x0, y0, x, y) {
+  const length = Math.hypot(x - x0, y - y0);
+  if (length < 3) return;
+  const [dx, dy] = [(x - x0) / length, (y - y0) / length];
+  line(pen, x0, y0, x - 5 * dx, y - 5 * dy);
+  pen.beginPath();
+  pen.moveTo(x, y);
+  pen.lineTo(x - 9 * dx - 4 * dy, y - 9 * dy + 4 * dx);
+  pen.lineTo(x - 9 * dx + 4 * dy, y - 9 * dy - 4 * dx);
+  pen.fill();
+}

@@ -1,0 +1,46 @@
+// What the page begins with, its texts, and what the scripts of other pages expect to find.
+
+const beginning = JSON.parse(document.getElementById("start").textContent);
+const texts = JSON.parse(document.getElementById("texts").textContent);
+
+// A model that the link names, or that the page was written for, in place of a chain.
+const models = JSON.parse(document.getElementById("models").textContent);
+const named = new URLSearchParams(location.hash.slice(1)).get("model");
+const moved = models[named] ?? (named === "chain" ? {} : beginning);
+const model = moved.model ?? null;
+
+const at = (id) => document.getElementById(id);
+
+// Plots and colours of other pages are of runs; here there is one motion, which grows.
+const scene = { timeUnit: "s", lengthUnit: "m" };
+const runs = [null];
+
+let language = "en";
+
+/// The text of a key in the language that is chosen; {names} are replaced.
+function text(key, names = {}) {
+  const found = texts[language][key] ?? texts.en[key] ?? key;
+  return found.replace(/\{(\w+)\}/g, (_, name) => names[name] ?? "");
+}
+
+/// Writes all texts of the page again.
+function writeTexts(chosen) {
+  language = texts[chosen] ? chosen : "en";
+  document.documentElement.lang = language;
+  for (const each of document.querySelectorAll("[data-text]")) if (each.dataset.text) each.textContent = text(each.dataset.text);
+  for (const each of document.querySelectorAll("[data-label]")) each.setAttribute("aria-label", text(each.dataset.label));
+  for (const each of document.querySelectorAll("[data-label][type=button]")) each.title = text(each.dataset.label);
+}
+
+/// Tells those who hear the page.
+function say(words) {
+  at("said").textContent = words;
+}
+
+function bytesOfBase64(base64) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64);
+  const binary = atob(base64);
+  const bytes = new Uint8Array(binary.length);
+  for (let k = 0; k < binary.length; ++k) bytes[k] = binary.charCodeAt(k);
+  return bytes;
+}

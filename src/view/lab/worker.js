@@ -1,0 +1,68 @@
+// What the worker is told, and what it answers.
+
+/// So long may rows take before the page is answered [ms].
+const mostWork = 25;
+
+let engine = null;
+
+const orders = {
+  async start({ module }) {
+    const stream = new Blob([module]).stream().pipeThrough(new DecompressionStream("gzip"));
+    engine = new Engine(await startModule(await WebAssembly.compile(await new Response(stream).arrayBuffer())));
+    return { ready: true };
+  },
+
+  /// Something else moves, or from elsewhere.
+  begin({ spec, start, copies, apart, measure }) {
+    engine.begin(spec, start);
+    if (copies) engine.copy(copies, apart);
+    if (measure) engine.measure(true);
+    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, hangs: spec.program ? engine.hangs(start.q, spec.components) : null };
+  },
+
+  copy({ copies, apart }) {
+    engine.copy(copies, apart);
+    return {};
+  },
+
+  measure({ on }) {
+    engine.measure(on);
+    return {};
+  },
+
+  pose({ q, first, place }) {
+    const posed = engine.pose(q, first, place);
+    return { q: posed, points: engine.pointsAt(posed) };
+  },
+
+  /// Rows up to a time.
+  advance({ until, hand }) {
+    const began = performance.now();
+    const rows = [];
+    while (engine.time < until - 1e-9 && performance.now() - began < mostWork) {
+      engine.next(hand ?? null);
+      rows.push(engine.present());
+    }
+    const all = new Float64Array(rows.length * engine.rowSize);
+    rows.forEach((row, k) => all.set(row, k * engine.rowSize));
+    const { exponent } = engine;
+    return {
+      rows: all, rowSize: engine.rowSize, copies: engine.copies.length ? engine.copiesNow() : null,
+      exponent: exponent && Number.isFinite(exponent.value) ? [exponent.last, exponent.value] : null,
+      isLate: engine.time < until - 1e-9, milliseconds: performance.now() - began,
+    };
+  },
+};
+
+// One after the other: the first one takes a while.
+let before = Promise.resolve();
+self.onmessage = ({ data }) => {
+  before = before.then(async () => {
+    try {
+      const answer = await orders[data.order](data);
+      self.postMessage({ ...answer, number: data.number, order: data.order });
+    } catch (error) {
+      self.postMessage({ error: error.message, number: data.number, order: data.order });
+    }
+  });
+};

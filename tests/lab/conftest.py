@@ -1,0 +1,109 @@
+"""The laboratory: its module in node, its page in Chromium."""
+
+import json
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Error, Page, sync_playwright
+
+SOURCE = Path(__file__).parents[2] / "src/view/lab"
+SMALL = (1000, 700)
+
+
+def program(*arguments: str, text: str = "") -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [os.environ["PENDULA_PROGRAM"], *arguments], input=text, capture_output=True, text=True, timeout=120
+    )
+
+
+def ends_in_module(cases: list[dict]) -> list[dict]:
+    """Where the module brings motions to."""
+    done = subprocess.run(
+        [
+            os.environ["PENDULA_NODE"],
+            Path(__file__).parent / "ends.js",
+            os.environ["PENDULA_LAB_MODULE"],
+            SOURCE,
+        ],
+        input=json.dumps(cases),
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+    )
+    assert not done.stderr
+    return json.loads(done.stdout)
+
+
+def until(page: Page, condition: str, seconds: float = 20) -> None:
+    """Waits for a condition; playwright's own way is what the page's security policy forbids."""
+
+    def holds() -> bool:
+        try:
+            return bool(page.evaluate(condition))
+        except Error as error:  # the page begins again
+            assert "navigation" in str(error), error
+            return False
+
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, f"expected within {seconds} s: {condition}"
+        page.wait_for_timeout(20)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=os.environ["PENDULA_CHROMIUM"], args=["--disable-gpu"], chromium_sandbox=False
+        )
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="session")
+def lab_file(tmp_path_factory) -> Path:
+    """The page that `pendula lab -o` writes."""
+    file = tmp_path_factory.mktemp("lab") / "lab.html"
+    done = program("lab", "-o", str(file))
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr
+    return file
+
+
+@pytest.fixture
+def open_lab(lab_file: Path, browser: Browser) -> Iterator[Callable[..., Page]]:
+    """open_lab(link, ...) -> a page that has begun; no error, and no request but for itself."""
+    contexts, wrong = [], []
+
+    def open_one(
+        link="", size=SMALL, scheme="light", motion="reduce", touch=False, locale="en-GB", file=lab_file
+    ) -> Page:
+        context = browser.new_context(
+            viewport={"width": size[0], "height": size[1]},
+            color_scheme=scheme,
+            reduced_motion=motion,
+            has_touch=touch,
+            locale=locale,
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("console", lambda said: said.type == "error" and wrong.append(said.text))
+        page.on("request", lambda request: _only(request))
+        page.goto(f"file://{file}" + (f"#{link}" if link else ""))
+        until(page, "window.pendulaLab?.history.rows > 0")
+        return page
+
+    def _only(request) -> None:
+        if request.url.startswith(("http", "ftp")):
+            wrong.append(f"asks for {request.url}")
+
+    yield open_one
+    for context in contexts:
+        context.close()
+    assert not wrong
