@@ -92,9 +92,12 @@ def set_path(commands: list[str]) -> list[str]:
 
 
 def count_tests(_: list[str]) -> list[str]:
-    """The line that ctest ends with when every test of the build passes: this runs inside one of them."""
+    """The line that ctest ends with when every test of the build passes: this runs inside one of them.
+
+    Without that of the laboratory, which takes a compiler that scripts/test does not install.
+    """
     listed = subprocess.run(
-        ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N"],
+        ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N", "-E", "^lab$"],
         stdout=subprocess.PIPE,
         text=True,
         check=True,
