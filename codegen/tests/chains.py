@@ -2,11 +2,12 @@
 
 from functools import cache
 
+from sympy import Expr, Matrix
+
 from pendula_codegen.blocks import Blocks, collect_blocks
 from pendula_codegen.chain import Chain
 from pendula_codegen.links import LINKS
 from pendula_codegen.mechanics import euler_lagrange
-from sympy import Expr, Matrix
 
 
 @cache

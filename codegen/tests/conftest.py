@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from pendula_codegen.__main__ import committed_headers
 from pendula_codegen.render import Header
 

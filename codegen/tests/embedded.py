@@ -11,8 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pendula_codegen.chain import Chain
 from sympy import Add, Expr, Integer, Matrix, Rational, Symbol
+
+from pendula_codegen.chain import Chain
 
 
 def named(stem: str, links: int) -> list[Symbol]:

@@ -3,8 +3,9 @@
 import math
 import random
 
-from loaded import LoadedKernel
 from mpmath import mp, mpf
+
+from loaded import LoadedKernel
 from pendula_codegen.written import DIGITS
 from series_truth import Decimals, by_tapes
 

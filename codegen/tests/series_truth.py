@@ -15,10 +15,11 @@ from math import isqrt
 
 import mpmath
 from mpmath import mpf
+from sympy import Add, Expr, Rational, Symbol
+
 from pendula_codegen.polynomial import Call
 from pendula_codegen.series_tape import SeriesTapes
 from pendula_codegen.tape import Tape, triangle
-from sympy import Add, Expr, Rational, Symbol
 
 # Sines and cosines of angles that are told apart by nothing else.
 CIRCLE = [(3, 4, 5), (5, 12, 13), (8, 15, 17), (7, 24, 25), (20, 21, 29), (12, 35, 37), (9, 40, 41)]

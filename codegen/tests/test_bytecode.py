@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from mpmath import mp, mpf
+
 from pendula_codegen.backends.c import INTERFACE
 from pendula_codegen.kernel_program import render_bytecode
 from pendula_codegen.model import Model

@@ -6,9 +6,11 @@ import re
 
 import mpmath
 import pytest
+from mpmath import mp, mpf
+from sympy import Symbol, lambdify
+
 from conftest import REPOSITORY
 from loaded import COMPILERS, FEATURES, WIDTHS, LoadedKernel
-from mpmath import mp, mpf
 from pendula_codegen.backends.c import INTERFACE, quoted
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
@@ -16,7 +18,6 @@ from pendula_codegen.models import model_names
 from pendula_codegen.table import OF_MANY, PLAIN
 from pendula_codegen.written import DIGITS, written
 from series_error import series_error
-from sympy import Symbol, lambdify
 from test_model_kernels import LINKED, read
 
 CASES = [(name, 2 if name in LINKED else None) for name in model_names()]

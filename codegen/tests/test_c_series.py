@@ -1,6 +1,7 @@
 """Taylor series of kernels in C whose sums are few, or none; of others see test_c_kernels.py."""
 
 import pytest
+
 from loaded import COMPILERS, WIDTHS, LoadedKernel
 from series_error import series_error
 from test_c_kernels import INSTRUCTIONS, Truth, error, own

@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from sympy import Symbol
+
 from conftest import REPOSITORY
 from pendula_codegen.__main__ import main
 from pendula_codegen.links import LINKS
-from sympy import Symbol
 
 
 def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess:

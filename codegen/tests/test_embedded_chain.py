@@ -6,12 +6,13 @@ of H), and a system has one solution where its quadratic form is a sum of square
 """
 
 import pytest
+from sympy import Add, Matrix, expand
+
 from chains import chain, in_masses
 from embedded import EmbeddedChain, at, named, vectors
 from paper import normal_form
 from pendula_codegen.chain import on_link
 from pendula_codegen.mechanics import euler_lagrange, gradient, momenta
-from sympy import Add, Matrix, expand
 
 CHAINS = pytest.mark.parametrize(
     ("space", "n"), [(space, n) for space in ("planar", "spatial") for n in (1, 2, 3)]

@@ -7,13 +7,14 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import paper
 import pytest
+from sympy import Expr, Symbol, cos, sin, symbols
+
+import paper
 from chains import blocks, chain, equations, written_out
 from conftest import REPOSITORY
 from paper import normal_form
 from pendula_codegen.mechanics import gradient
-from sympy import Expr, Symbol, cos, sin, symbols
 
 
 @dataclass(frozen=True)

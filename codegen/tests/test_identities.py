@@ -1,12 +1,13 @@
 """The derived mechanics against formulas typed by hand and against definitions."""
 
-import paper
 import pytest
+from sympy import Matrix, Rational, Symbol, expand, zeros
+
+import paper
 from chains import blocks, chain, equations, in_masses, written_out
 from paper import normal_form
 from pendula_codegen.blocks import recompose
 from pendula_codegen.mechanics import euler_lagrange, gradient, momenta
-from sympy import Matrix, Rational, Symbol, expand, zeros
 
 LINKS = [1, 2, 3]
 CHAINS = [(space, n) for space in ("planar", "spatial") for n in LINKS]

@@ -4,6 +4,7 @@ import random
 import re
 
 import pytest
+
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 
 

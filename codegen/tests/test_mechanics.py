@@ -1,9 +1,10 @@
 """mechanics.py knows no chains: any Lagrangian goes through it."""
 
 import pytest
+from sympy import Symbol, cos, exp, simplify, sin, sqrt, symbols
+
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.mechanics import LagrangianSystem, euler_lagrange, gradient, jacobian, momenta
-from sympy import Symbol, cos, exp, simplify, sin, sqrt, symbols
 
 r, phi, r_dot, phi_dot, r_ddot, phi_ddot, m, k = symbols("r phi r_dot phi_dot r_ddot phi_ddot m k")
 

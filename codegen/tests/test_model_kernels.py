@@ -4,13 +4,14 @@ import math
 import random
 
 import pytest
+from sympy import Rational, Symbol, atan, cos, diff, exp, lambdify, log, simplify, sin, sqrt, symbols, tan
+from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.models import find_model, model_names
 from pendula_codegen.render import render_model
 from pendula_codegen.simplify import shortest
-from sympy import Rational, Symbol, atan, cos, diff, exp, lambdify, log, simplify, sin, sqrt, symbols, tan
-from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from test_straight_line import evaluate
 
 LINKED = {"cart_chain", "driven_chain", "joint_springs", "rods"}

@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
+from sympy import Rational, sqrt
+
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.render import render_model
-from sympy import Rational, sqrt
 
 HEAD = """from sympy import *
 

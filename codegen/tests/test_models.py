@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import pytest
+from sympy import Matrix, Rational, Symbol, cos, simplify, sin
+
 from pendula_codegen.blocks import collect_blocks
 from pendula_codegen.chain import Chain
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.links import LINKS, find_link
-from sympy import Matrix, Rational, Symbol, cos, simplify, sin
 
 PLANAR, SPATIAL = LINKS["planar"], LINKS["spatial"]
 

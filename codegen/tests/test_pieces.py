@@ -3,9 +3,6 @@
 import random
 
 import pytest
-from pendula_codegen.errors import GenerationError
-from pendula_codegen.model import Model
-from pendula_codegen.system_info import depends_on_time, held_expressions, is_periodic
 from sympy import (
     Abs,
     Eq,
@@ -27,6 +24,10 @@ from sympy import (
     sqrt,
     tan,
 )
+
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.model import Model
+from pendula_codegen.system_info import depends_on_time, held_expressions, is_periodic
 
 
 def plain(unit: str = "m") -> tuple[Model, Expr, Expr]:

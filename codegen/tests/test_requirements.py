@@ -7,6 +7,7 @@ import sys
 import jinja2
 import pytest
 import sympy
+
 from conftest import REPOSITORY
 
 CHECK = REPOSITORY / "cmake/check_requirements.py"

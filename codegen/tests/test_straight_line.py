@@ -5,17 +5,6 @@ import random
 import re
 
 import pytest
-from chains import chain
-from pendula_codegen.backends.cpp import print_body
-from pendula_codegen.chain_kernel import ChainKernel
-from pendula_codegen.errors import GenerationError
-from pendula_codegen.language import refusal
-from pendula_codegen.link import LinkKernel
-from pendula_codegen.links import LINKS
-from pendula_codegen.places import Place
-from pendula_codegen.program import shortest_program
-from pendula_codegen.straight_line import UNIT
-from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 from sympy import (
     Abs,
     Integer,
@@ -33,6 +22,18 @@ from sympy import (
     symbols,
     tan,
 )
+
+from chains import chain
+from pendula_codegen.backends.cpp import print_body
+from pendula_codegen.chain_kernel import ChainKernel
+from pendula_codegen.errors import GenerationError
+from pendula_codegen.language import refusal
+from pendula_codegen.link import LinkKernel
+from pendula_codegen.links import LINKS
+from pendula_codegen.places import Place
+from pendula_codegen.program import shortest_program
+from pendula_codegen.straight_line import UNIT
+from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
 
 x, y, theta = symbols("x_1 y_1 theta_1")
 SMALL = [("planar", 1), ("planar", 3), ("spatial", 1), ("spatial", 2)]

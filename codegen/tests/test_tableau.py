@@ -4,6 +4,7 @@ import re
 
 import pytest
 from mpmath import mpf, sqrt, workdps
+
 from pendula_codegen.tableau import DIGITS, MAX_STAGES, RADAU_STAGES, gauss, radau
 
 STAGES = range(1, MAX_STAGES + 1)

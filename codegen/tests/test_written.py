@@ -8,15 +8,6 @@ import random
 
 import pytest
 from mpmath import mp, mpf
-from pendula_codegen.comparison import Start, points
-from pendula_codegen.exact import exact
-from pendula_codegen.language import refusal
-from pendula_codegen.model import Model
-from pendula_codegen.model_kernel import ModelKernel
-from pendula_codegen.places import Place
-from pendula_codegen.program import Program, shortest_program
-from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
-from pendula_codegen.written import DIGITS, Evaluator, Measured, NotInRangeError, written
 from sympy import (
     Add,
     Expr,
@@ -44,6 +35,16 @@ from sympy import (
     tanh,
     zoo,
 )
+
+from pendula_codegen.comparison import Start, points
+from pendula_codegen.exact import exact
+from pendula_codegen.language import refusal
+from pendula_codegen.model import Model
+from pendula_codegen.model_kernel import ModelKernel
+from pendula_codegen.places import Place
+from pendula_codegen.program import Program, shortest_program
+from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
+from pendula_codegen.written import DIGITS, Evaluator, Measured, NotInRangeError, written
 from test_model_kernels import CASES, random_model, read
 from test_straight_line import evaluate
 

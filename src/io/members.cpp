@@ -214,8 +214,8 @@ MemberRuns::Member MemberRuns::member_of(MemberScenario scenario, std::int64_t n
   return member;
 }
 
-// Exponents of the members that run in lanes with a tangent. Not for Gauss methods without ensemble.method = "auto": the exponents
-// are those of `pendula lyapunov` then, whose tangents begin otherwise than those in lanes.
+// Exponents of the members that run in lanes with a tangent. Not for Gauss methods without ensemble.method = "auto":
+// the exponents are those of `pendula lyapunov` then, whose tangents begin otherwise than those in lanes.
 void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<RunSetup> setups;
   std::vector<Member*> members;

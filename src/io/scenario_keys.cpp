@@ -133,9 +133,10 @@ constexpr auto methods = [] {
 }();
 
 constexpr std::array<ScenarioKey, 10> run = {
-    one_of("method", methods, methods.back(),
-           "Gauss-Legendre, Radau IIA where damping is stiff, or an explicit method; auto: Taylor series or Gauss, which "
-           "it is where step, stages, form, solver or iteration is given"),
+    one_of(
+        "method", methods, methods.back(),
+        "Gauss-Legendre, Radau IIA where damping is stiff, or an explicit method; auto: Taylor series or Gauss, which "
+        "it is where step, stages, form, solver or iteration is given"),
     an_integer("stages", 1, 8, InWords{"2 with a step, else as many as the tolerance wants"},
                "of gauss; of radau 2 or 3"),
     one_of("form", names_of<Form>, name_of(options.form), "of gauss: symplectic in momenta, or in velocities"),

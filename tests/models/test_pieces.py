@@ -275,7 +275,8 @@ def test_all_ways_to_run_a_kernel(by, move, pendula, tmp_path):
     )
     ended = pendula("simulate", tmp_path / "by.toml", "--json", PENDULA_KERNELS_BY=by)
     assert ended.returncode == 0, ended.stderr
-    assert off(json.loads(ended.stdout), *ball(3)) < 1e-13  # measured 6.8e-15
+    # Measured 6.8e-15 and, by Clang, 1.1e-13.
+    assert off(json.loads(ended.stdout), *ball(3)) < 1e-12
 
 
 @pytest.mark.parametrize("method", ["gauss", "taylor", "dopri5"])

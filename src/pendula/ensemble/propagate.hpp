@@ -33,7 +33,7 @@ struct EnsembleSchedule {
   /// Looked for in each member.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   bool estimate = false;           ///< whether to look at members again, and warn in their reports
-  bool chooses_method = false;  ///< as RunSetup's
+  bool chooses_method = false;     ///< as RunSetup's
   int threads = 1;
   std::int64_t chunk = 64;  ///< members that a thread takes at once
   /// Called on the way by several threads at once; if it returns true, all members stop and report that.

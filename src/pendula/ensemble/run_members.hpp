@@ -25,9 +25,8 @@ RunOptions quickest_with_tangents(const RunSetup& setup);
 RunOptions lane_options(const RunSetup& setup);
 
 /// Runs without observers, each as `Run` does one: in lanes where they can go there, else one by one. Runs that are to
-/// be estimated get second looks, those in lanes in lanes. Where a chosen method fails, the options that were asked for are
-/// used. A report depends on its setup alone, to the last bit; of a
-/// stopped run it tells only that. Throws as Run.
+/// be estimated get second looks, those in lanes in lanes. Where a chosen method fails, the options that were asked for
+/// are used. A report depends on its setup alone, to the last bit; of a stopped run it tells only that. Throws as Run.
 std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; });
 
