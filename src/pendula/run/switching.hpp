@@ -106,7 +106,7 @@ inline SwitchingSystem::Way SwitchingSystem::way(const Motion& motion) const {
       if ((turned >> n & 1U) != 0) sides[open[n]] *= -1;
     }
     const auto leaves = [&](std::size_t k) { return drift(k, sides, motion) * sides[k] >= 0; };
-    const auto back = std::ranges::find_if_not(open, leaves);
+    const auto back = std::ranges::find(open, false, leaves);
     if (back == open.end()) return {sides, {}};
     if (!stuck) stuck = *back;
   }
