@@ -60,7 +60,7 @@ ModelInfo describe_model(const std::string& model, std::optional<int> links, con
                  .kernel_by = std::string(kernel.by()),
                  .kernel_file = kernel.file.string()};
   for (const auto& [name, unit] : told.coordinates) told.rates.emplace_back(rate_name(name), rate_unit(unit));
-  for (std::size_t k = 0; k + 2 * info.switches.size() < info.parameters.size(); ++k) {
+  for (std::size_t k = 0; k < info.own_parameters(); ++k) {
     told.parameters.emplace_back(info.parameters[k], info.parameter_units[k], info.parameter_defaults[k]);
   }
   return told;

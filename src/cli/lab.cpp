@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -48,7 +49,7 @@ std::string link_of(const io::Scenario<Space>& scenario) {
     warn("torques, drives and feedback");
   }
   const auto damping = chain.damping();
-  if ((damping.array() != damping[0]).any()) warn("that damping is not the same for all links");
+  if ((damping.array() != damping[0]).any()) warn("damping of single links: all have that of the first");
   std::string link;
   put_one(link, "n", chain.links());
   put_one(link, "space", Space::dimension);
@@ -90,7 +91,8 @@ json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
           if (!found.feedback.empty() || !found.system->numbers().sines.empty()) warn("drives and feedback");
           json start = model_start(*model, toolchain);
           std::string link;
-          put(link, "p", found.system->numbers().parameters);
+          const std::vector<double>& all = found.system->numbers().parameters;
+          put(link, "p", std::span(all).first(all.size() - 2 * found.system->info().switches.size()));
           put(link, "q", found.start.q);
           put(link, "v", found.start.v);
           start["title"] = title;

@@ -72,7 +72,7 @@ std::shared_ptr<const SystemTable> borrowed(const SystemTable& table) {
 /// The numbers that a model has itself. Throws std::invalid_argument where one has none.
 std::vector<double> defaults_of(const SystemInfo& info) {
   std::vector<double> numbers;
-  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+  for (std::size_t k = 0; k < info.own_parameters(); ++k) {
     if (std::isnan(info.parameter_defaults[k])) {
       throw std::invalid_argument("parameters: expected a number for " + std::string(info.parameters[k]) +
                                   ", which the model has no default for");

@@ -133,10 +133,9 @@ constexpr auto methods = [] {
 }();
 
 constexpr std::array<ScenarioKey, 10> run = {
-    one_of(
-        "method", methods, methods.back(),
-        "Gauss-Legendre, Radau IIA where damping is stiff, or an explicit method; auto: Taylor series or Gauss, which "
-        "it is where step, stages, form, solver or iteration is given"),
+    one_of("method", methods, methods.back(),
+           "Gauss-Legendre, Radau IIA where damping is stiff, or an explicit method; auto: Taylor series or Gauss "
+           "steps, with step, stages, form, solver or iteration always Gauss"),
     an_integer("stages", 1, 8, InWords{"2 with a step, else as many as the tolerance wants"},
                "of gauss; of radau 2 or 3"),
     one_of("form", names_of<Form>, name_of(options.form), "of gauss: symplectic in momenta, or in velocities"),
@@ -182,7 +181,7 @@ constexpr std::array<ScenarioKey, 7> ensemble = {
                "how many members, an integer >= 1"),
     an_integer("seed", 0, any_most, std::int64_t{1}, "of what is drawn"),
     one_of("method", member_methods, member_methods[0],
-           "that of [run]; auto: the quickest in lanes, exponents by it, too, whatever [run] says"),
+           "that of [run]; auto: what is quickest in lanes, for motions and exponents, whatever [run] says"),
     another("keep", texts, InWords{"final, energy_error, steps and all events"},
             "a list of what to keep, such as [\"final\", \"energy_error\"]"),
 };

@@ -262,7 +262,7 @@ ModelSummary model_summary(const std::string& scenario, const SystemSubject& sys
   model.links = info.links;
   model.loaded = system.loaded();
   auto next = system.numbers().parameters.begin();
-  for (std::size_t k = 0; k + 2 * info.switches.size() < info.parameters.size(); ++k) {
+  for (std::size_t k = 0; k < info.own_parameters(); ++k) {
     const auto end = next + info.parameter_sizes[k];
     model.parameters.emplace_back(info.parameters[k], std::vector<double>(next, end));
     next = end;

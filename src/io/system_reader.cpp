@@ -23,7 +23,7 @@ std::string listed(std::span<const std::string_view> names) {
 
 /// The keys of system.parameters; not of those that tell pieces of functions, which the run gives.
 std::vector<ScenarioKey> parameter_keys(const SystemInfo& info) {
-  std::vector<ScenarioKey> keys(info.parameters.size() - 2 * info.switches.size());
+  std::vector<ScenarioKey> keys(info.own_parameters());
   for (std::size_t k = 0; k < keys.size(); ++k) {
     keys[k].name = info.parameters[k];
     keys[k].unit = info.parameter_units[k];
@@ -47,7 +47,6 @@ std::vector<double> read_parameters(const Section& system, const SystemInfo& inf
                                                      : Eigen::VectorXd::Constant(size, given.number(keys[k].name));
     numbers.insert(numbers.end(), each.begin(), each.end());
   }
-  for (std::size_t k = keys.size(); k < info.parameters.size(); ++k) numbers.push_back(info.parameter_defaults[k]);
   return numbers;
 }
 

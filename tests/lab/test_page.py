@@ -1,5 +1,6 @@
 """What a person does with a laboratory, in Chromium, from a file:// address."""
 
+import json
 import math
 import statistics
 
@@ -20,6 +21,16 @@ def define(model, links):
     rate = model.rate(theta)
     model.lagrangian = length**2 * rate**2 / 2 + g * length * cos(theta)
     model.point("bob", (length * sin(theta), -length * cos(theta)))
+"""
+
+# A ball on a spring that only pushes.
+PIECES = """from sympy import Max
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    k = model.parameter("stiffness", "N/m", default=100.0)
+    model.lagrangian = model.rate(x)**2 / 2 - 9.81*x - k * Max(0, -x)**2 / 2
+    model.point("ball", (0, x))
 """
 
 
@@ -291,6 +302,21 @@ def test_own_lagrangian(open_lab, tmp_path):
     page.keyboard.press("Space")
     set_slider(page, "length", "2")
     until(page, "pendulaLab.state.p[0] === 2")
+
+
+def test_own_functions_of_several_pieces(open_lab, tmp_path):
+    (tmp_path / "ball.py").write_text(PIECES)
+    (tmp_path / "ball.toml").write_text(
+        '[system]\nmodel = "ball.py"\nparameters = {stiffness = 200.0}\n[start]\nx = 0.5\n[run]\nduration = 2\n'
+    )
+    told = program("simulate", str(tmp_path / "ball.toml"), "--json")
+    assert told.returncode == 0, told.stderr
+    done = program("lab", str(tmp_path / "ball.toml"), "-o", str(tmp_path / "ball.html"))
+    assert done.returncode == 0, done.stderr
+    page = open_lab("q=0.5&p=200", motion="no-preference", file=tmp_path / "ball.html")
+    until(page, "pendulaLab.history.end > 2.1")
+    height = page.evaluate("pendulaLab.history.at(2, 1, new Float64Array(5))[1]")
+    assert height == pytest.approx(json.loads(told.stdout)["final"]["q"]["x"], abs=1e-7)
 
 
 def test_scenarios_begin_as_they_say(open_lab, tmp_path):

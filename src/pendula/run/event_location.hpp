@@ -146,6 +146,7 @@ class SignSearch {
   static constexpr std::size_t points = BernsteinPolynomial::size;
   static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30;
   static constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  static constexpr double safety = 4;  // of errors that last coefficients tell: off by up to 1.3 were seen
   using Samples = BernsteinPolynomial::Numbers;
 
   /// A part of the step, and the values at its ends; `sign` is the certain sign of the last one.
@@ -203,15 +204,15 @@ class SignSearch {
     const double width = interval.to - interval.from;
     const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from this part to the step
     const double last_two = degree_ == 1 ? variation : std::max(sizes[degree_], sizes[degree_ - 1]);
-    const double missed = by == By::polynomial ? 2 * missed_ + last_two * whole : 0;
-    if (sizes[0] > variation + tail + missed) return node(interval.to, interval.sign);
+    const double missed = by == By::polynomial ? missed_ + last_two * whole : 0;
+    if (sizes[0] > variation + safety * (tail + missed)) return node(interval.to, interval.sign);
     const double largest = std::abs(*std::ranges::max_element(values, {}, [](double v) { return std::abs(v); }));
     const double noise = 4 * epsilon * largest;
     if (tail > 1e-3 * variation + noise) return unresolved(interval, values, halvings, by);
     // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
     const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
     const auto band = [&](double miss) {
-      return Band{tail + noise + miss,
+      return Band{safety * (tail + miss) + noise,
                   steepest(tail + noise, points - 1) + width * steepest(miss, static_cast<double>(degree_ + 1))};
     };
     if (by == By::full_order) return resolved(interval, polynomial, by, band(0));

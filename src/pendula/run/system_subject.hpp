@@ -27,13 +27,19 @@ struct InputFunction {
 class SystemSubject : public Subject {
  public:
   /// Shares ownership of `table` and of what it was loaded from. Throws std::invalid_argument for a wrong number of
-  /// parameters or inputs, and for sines on inputs that do not exist. `feedback` is what the kernel adds to its inputs.
+  /// parameters or inputs, and for sines on inputs that do not exist. Parameters that tell pieces may be left out.
+  /// `feedback` is what the kernel adds to its inputs.
   SystemSubject(std::shared_ptr<const SystemTable> table, SystemNumbers numbers,
                 std::vector<InputFunction> feedback = {})
       : table_(std::move(table)), numbers_(std::move(numbers)), feedback_(std::move(feedback)) {
     const auto& sizes = info().parameter_sizes;
-    require_size("parameters", numbers_.parameters.size(),
-                 static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0)));
+    const auto all = static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0));
+    if (numbers_.parameters.size() == all - 2 * switches().size()) {
+      for (std::size_t k = 0; k < switches().size(); ++k) {
+        for (const double indicator : {1.0, 0.0}) numbers_.parameters.push_back(indicator);
+      }
+    }
+    require_size("parameters", numbers_.parameters.size(), all);
     require_size("inputs", numbers_.inputs.size(), info().inputs.size());
     for (const InputSine& sine : numbers_.sines) {
       if (sine.input >= 0 && static_cast<std::size_t>(sine.input) < info().inputs.size()) continue;
@@ -157,7 +163,7 @@ class SystemSubject : public Subject {
   std::vector<Constant> constants() const override {
     std::vector<Constant> constants;
     auto next = numbers_.parameters.begin();
-    for (std::size_t k = 0; k + 2 * switches().size() < info().parameters.size(); ++k) {
+    for (std::size_t k = 0; k < info().own_parameters(); ++k) {
       const std::string name(info().parameters[k]);
       const auto end = next + info().parameter_sizes[k];
       constants.push_back(

@@ -58,6 +58,9 @@ struct SystemInfo {
   /// ones, are 1 or 0: whether it is > 0, whether it is < 0.
   std::span<const std::string_view> switches;
   SeriesInfo series;
+
+  /// How many parameters are those of the model itself, without the last ones that tell pieces.
+  std::size_t own_parameters() const { return parameters.size() - 2 * switches.size(); }
 };
 
 /// The description of the generated kernel S.
