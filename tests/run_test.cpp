@@ -374,6 +374,20 @@ TEST(Run, TellsUpToWhenRowsByConstantStepsAreRight) {
   }
 }
 
+// Nothing is longer: it is compared with shorter steps.
+TEST(Run, TellsHowWellOneStepMovesAWholeRun) {
+  for (const double step : {0.1, 0.2, 7.0}) {
+    RunSetup setup = double_pendulum(0.1);
+    setup.options = {.stages = 2, .step = step};
+    const Compared found = compared(setup, 0.1);
+    EXPECT_EQ(found.report.statistics.steps, 1);
+    const double told = found.report.trust.expected_error;
+    EXPECT_GT(found.largest, 1e-6) << step;      // measured 4.5e-6
+    EXPECT_LT(found.largest, 2 * told) << step;  // measured 0.81
+    EXPECT_GT(found.largest, 0.2 * told) << step;
+  }
+}
+
 // Damping takes a chain to rest, which says nothing of how it came there.
 TEST(Run, TellsUpToWhenRowsAreRightOfAMotionThatComesToRest) {
   ChainParameters<Planar> parameters;

@@ -268,6 +268,10 @@ class Model:
         self._check_kinetic(system, self._lagrangian.where)
         return system
 
+    def held_expressions(self) -> list[Expr]:
+        """What moves it."""
+        return [self.system.lagrangian, *self.system.forces, *(switch.value for switch in self.switches)]
+
     def force_along(self, q: Symbol) -> Expr:
         """Generalised force along a coordinate that L does not give, as the file says it."""
         given = [said.value for along, said in self._forces if along == q]

@@ -55,14 +55,14 @@ class ModelKernel(SystemKernel):
 
     @cached_property
     def call_arguments(self) -> list[tuple[Expr, bool]]:
-        """What functions of the Lagrangian and of forces are taken of, while it moves, and whether it is a base.
+        """What functions in it are taken of, while it moves, and whether it is a base.
 
         Those change where their argument comes by zero or by its largest or smallest value: exp, tanh, … by steps of
         1, powers and logarithms by its own size. Sines of what moves slowly move slowly; so do whole powers.
         """
         system = self.system
         moving = {*system.coordinates, *system.velocities, *system.inputs, self.model.time}
-        held = {call for said in (system.lagrangian, *system.forces) for call in said.atoms(Function, Pow)}
+        held = {call for said in self.model.held_expressions() for call in said.atoms(Function, Pow)}
         found = {pair: None for call in sorted(held, key=str) for pair in _arguments(call)}
         return [(value, is_base) for value, is_base in found if value.free_symbols & moving]
 

@@ -26,7 +26,7 @@ from pendula_codegen.link import LinkKernel
 from pendula_codegen.links import find_link
 from pendula_codegen.model import Coordinate, Input, Model, Parameter
 from pendula_codegen.model_kernel import ModelKernel
-from pendula_codegen.system_info import depends_on_time, has_constant_masses, held_expressions, is_periodic
+from pendula_codegen.system_info import depends_on_time, has_constant_masses, is_periodic
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
 
 PACKAGE = Path(__file__).parent
@@ -279,7 +279,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
         number="_real",
         bases=bases,
         switches=switches,
-        held=held_expressions(model),
+        held=model.held_expressions(),
         alias=alias,
         own=[parameter.name for parameter in ordered] + [alias] * bool(alias),
     )

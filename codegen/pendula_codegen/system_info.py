@@ -24,7 +24,7 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
         ("constant_masses", has_constant_masses(kernel)),
     ]
     for c in model.coordinates:
-        periodic = c.is_angle and is_periodic(held_expressions(model), c.symbol)
+        periodic = c.is_angle and is_periodic(model.held_expressions(), c.symbol)
         rows.append(("coordinate", c.symbol.name, c.unit, c.is_angle, periodic))
     for p in model.ordered_parameters:
         standard = "nan" if p.default is None else repr(p.default)
@@ -46,11 +46,6 @@ def is_periodic(held: Sequence[Expr], coordinate: Symbol) -> bool:
     return all(expression.subs(turned) == expression for expression in held)
 
 
-def held_expressions(model: Model) -> list[Expr]:
-    """What moves it."""
-    return [model.system.lagrangian, *model.system.forces, *(switch.value for switch in model.switches)]
-
-
 def has_constant_masses(kernel: SystemKernel) -> bool:
     """Whether no entry on the diagonal of the mass matrix depends on the coordinates."""
     changing = {*kernel.system.coordinates}
@@ -59,5 +54,5 @@ def has_constant_masses(kernel: SystemKernel) -> bool:
 
 
 def depends_on_time(model: Model) -> bool:
-    held = [*held_expressions(model), *(c for p in model.points for c in p.components)]
+    held = [*model.held_expressions(), *(c for p in model.points for c in p.components)]
     return any(expression.has(model.time) for expression in held)

@@ -27,7 +27,7 @@ from sympy import (
 
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.model import Model
-from pendula_codegen.system_info import depends_on_time, held_expressions, is_periodic
+from pendula_codegen.system_info import depends_on_time, is_periodic
 
 
 def plain(unit: str = "m") -> tuple[Model, Expr, Expr]:
@@ -180,7 +180,7 @@ def test_feedback_goes_into_switching_functions():
 def test_time_and_turns_in_switching_functions():
     model, x, _v = plain("rad")
     model.force(x, sign(sin(x)))
-    assert is_periodic(held_expressions(model), x) and not depends_on_time(model)
+    assert is_periodic(model.held_expressions(), x) and not depends_on_time(model)
     model.force(x, sign(x - 1) + sign(cos(model.time)))
     vars(model).pop("system", None)
-    assert not is_periodic(held_expressions(model), x) and depends_on_time(model)
+    assert not is_periodic(model.held_expressions(), x) and depends_on_time(model)

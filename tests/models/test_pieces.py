@@ -242,6 +242,58 @@ def test_what_is_crossed_twice_in_a_step_is_seen(method, depth, move):
     assert off(summary, x, v) < 1e-10  # measured 8.6e-12; where it is missed 8e-4
 
 
+PULSE = '''"""A mass on a spring, pushed for a moment."""
+from sympy import Heaviside, Max, cosh, exp, tanh
+
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    w = model.parameter("w", "1/s", default=1000.0)
+    u = w * (model.time - 1.2345)
+    model.lagrangian = model.rate(x) ** 2 / 2 - x**2 / 2
+    model.force(x, 100 * Heaviside(SHAPE - 0.5))
+'''
+# Where they are 1/2, times w.
+SHAPES = {
+    "exp(-u**2)": math.sqrt(math.log(2)),
+    "1 - tanh(u)**2": math.atanh(math.sqrt(0.5)),
+    "1/cosh(u)": math.acosh(2),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("method", CHOSEN)
+def test_a_short_pulse_is_not_stepped_over(method, shape, move):
+    for w in (30.0, 1000.0, 1e5):
+        half = SHAPES[shape] / w
+        first, last = 3 - 1.2345 + half, 3 - 1.2345 - half
+        x = math.cos(3) + 100 * (math.cos(last) - math.cos(first))
+        v = -math.sin(3) + 100 * (math.sin(first) - math.sin(last))
+        summary = move(
+            PULSE.replace("SHAPE", shape), {"x": 1.0}, 3, system__parameters__w=w, run__method=f'"{method}"'
+        )
+        assert off(summary, x, v) < 1e-10, w  # measured 7.9e-12
+
+
+@pytest.mark.parametrize("method", CHOSEN)
+def test_a_first_step_may_end_where_it_switches(method, move):
+    """The first step of series ends after four times speed over force, which is where the ball meets the spring."""
+    fall, k = 2.0, 1000.0  # s; height 1, speed upwards 0.5, gravity 1
+    start = {"x": 1.0, "x_dot": 0.5}
+    summary = move(BALL, start, fall + 0.01, system__parameters__gravity=1.0, run__method=f'"{method}"')
+    w, fast = math.sqrt(k), 1.5
+    c, s = math.cos(w * 0.01), math.sin(w * 0.01)
+    assert off(summary, -(1 - c) / k - fast / w * s, -w / k * s - fast * c) < 1e-10  # measured 1.9e-13
+
+
+def test_constant_steps_that_are_longer_than_a_contact_are_doubted(move):
+    summary = move(BALL, {"x": 1.0}, 10, system__parameters__k=1e6, run__step=0.01)
+    assert summary["energy_error_max"] < 1e-12  # measured 3.3e-15: energy shows nothing
+    x, v = ball(10, k=1e6)
+    assert off(summary, x, v) > 1e-3  # measured 0.035
+    assert summary["trusted_until"] < 10 and "with other stages" in summary["warnings"][0]
+
+
 HERTZ = '''"""A ball on an elastic floor."""
 from sympy import Max, Rational
 

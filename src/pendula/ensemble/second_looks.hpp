@@ -88,7 +88,7 @@ inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& st
   return of_events(setup, {setup.options, "alone, not in lanes,", 1, 1}, member.report, alone);
 }
 
-/// Looks at members again, each by the run that choose(report) gives; if it gives none, the doubt stays as it is.
+/// Looks at members again, each by the run that choose(member) gives; if it gives none, the doubt stays as it is.
 template <class Choose>
 void look_by(std::span<Doubted* const> members, Choose choose, const std::function<bool()>& stop) {
   std::vector<Doubted*> looked;
@@ -99,7 +99,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
   std::vector<std::size_t> others;  // that do not go in lanes
   for (Doubted* const member : members) {
     const RunOptions& run = member->report.options;
-    std::optional<SecondLook> look = choose(member->report);
+    std::optional<SecondLook> look = choose(*member);
     if (!look) continue;
     const double share = is_adaptive(run) ? 0.01 * run.tolerance : 0;
     RunSetup setup = member->setup;
@@ -142,10 +142,15 @@ inline void look_again(std::vector<Doubted>& members, const std::function<bool()
   left.reserve(members.size());
   for (Doubted& member : members) left.push_back(&member);
   look_by(
-      left, [](const RunReport& run) { return std::optional(coarser(run.options, run.statistics)); }, stop);
+      left,
+      [](const Doubted& member) {
+        const RunReport& run = member.report;
+        return std::optional(coarser(run.options, run.statistics, member.setup.duration));
+      },
+      stop);
   std::erase_if(left, [](const Doubted* member) { return !member->doubt || member->report.end == RunEnd::stopped; });
   look_by(
-      left, [](const RunReport& run) { return finer(run.options); }, stop);
+      left, [](const Doubted& member) { return finer(member.report.options, member.setup.duration); }, stop);
   for (Doubted& member : members) {
     if (member.doubt) member.report.warnings.push_back(*std::move(member.doubt));
   }

@@ -109,16 +109,37 @@ struct SecondLook {
   double trusted = 1;  ///< upper bound of that factor, since errors scatter
 };
 
+/// A comparison run that errs less, for when the coarser one disagrees, which may be the fault of the coarser one
+/// alone. Nothing if no run errs less.
+inline std::optional<SecondLook> finer(const RunOptions& run, double duration) {
+  SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
+  if (is_adaptive(run)) {
+    look.options.tolerance /= 100;
+    const bool is_added_up = is_explicit(run.method) && run.method != Method::taylor;  // rounding, step by step
+    if (look.options.tolerance < (is_added_up ? 1e-14 : 1e-16)) return {};
+    if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
+    return look;
+  }
+  constexpr double shorter = 0.8;
+  look.options.step = shorter * std::min(run.step, duration);
+  look.how = "with four fifths of the step";
+  look.factor = 1 / (1 - std::pow(shorter, run.method == Method::rk4 ? 4 : order_of(run)));
+  look.trusted = 1.5 * look.factor;
+  return look;
+}
+
 /// A comparison run that errs more and takes less time: with a hundred times the tolerance, or longer steps. If some
 /// steps were divided, doubled steps would be divided into the same parts, so the step is tripled. Fewer stages are
-/// used with a tolerance because steps as long as the method allows would be the same with both tolerances.
-inline SecondLook coarser(const RunOptions& run, const Statistics& statistics) {
+/// used with a tolerance because steps as long as the method allows would be the same with both tolerances. One step
+/// that is the whole run cannot be longer: then it is the finer run.
+inline SecondLook coarser(const RunOptions& run, const Statistics& statistics, double duration) {
   SecondLook look{run, "with a hundred times the tolerance", 0.2, 0.2};
   if (is_adaptive(run)) {
     look.options.tolerance *= 100;
     if (run.method == Method::gauss && run.stages > 2) look.options.stages -= run.stages >= 6 ? 2 : 1;
     return look;
   }
+  if (run.step >= duration) return *finer(run, duration);
   const bool in_parts = statistics.rejected_steps > 0;
   const double longer = in_parts ? 3 : 2;
   look.options.step *= longer;
@@ -129,22 +150,11 @@ inline SecondLook coarser(const RunOptions& run, const Statistics& statistics) {
   return look;
 }
 
-/// A comparison run that errs less, for when the coarser one disagrees, which may be the fault of the coarser one
-/// alone. Nothing if no run errs less.
-inline std::optional<SecondLook> finer(const RunOptions& run) {
-  SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
-  if (is_adaptive(run)) {
-    look.options.tolerance /= 100;
-    const bool is_added_up = is_explicit(run.method) && run.method != Method::taylor;  // rounding, step by step
-    if (look.options.tolerance < (is_added_up ? 1e-14 : 1e-16)) return {};
-    if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
-    return look;
-  }
-  constexpr double shorter = 0.8;
-  look.options.step *= shorter;
-  look.how = "with four fifths of the step";
-  look.factor = 1 / (1 - std::pow(shorter, run.method == Method::rk4 ? 4 : order_of(run)));
-  look.trusted = 1.5 * look.factor;
+/// A comparison run by other stages, of constant steps that end where functions switch from piece to piece: from one
+/// such place to the next there may be a single step, which is the same whatever the size of steps.
+inline SecondLook by_other_stages(const RunOptions& run) {
+  SecondLook look{run, "with other stages", 1, 1.5};
+  look.options.stages += run.stages < (run.method == Method::radau ? 3 : 8) ? 1 : -1;
   return look;
 }
 

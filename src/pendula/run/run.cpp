@@ -330,15 +330,18 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
     return Separation(*setup_.subject, *track_, other);
   };
   std::string unknown = "it was interrupted while it ran again to see how far it can be trusted: that is not known";
-  const detail::SecondLook coarser = detail::coarser(setup_.options, report.statistics);
+  const bool ends_between =
+      !setup_.subject->switches().empty() && !is_adaptive(setup_.options) && !is_explicit(setup_.options.method);
+  const detail::SecondLook coarser = ends_between ? detail::by_other_stages(setup_.options)
+                                                  : detail::coarser(setup_.options, report.statistics, setup_.duration);
   const Separation first = compare(coarser);
   if (stopped) return unknown;
   detail::Doubt doubt = detail::of_second_look(setup_, coarser, first, report.trust);
   if (!doubt) return doubt;
   const double begin = setup_.start.time, end = report.last.time;
   const bool is_soon = first.within(detail::visible / coarser.trusted, begin) < begin + (end - begin) / 2;
-  const std::optional<detail::SecondLook> finer = detail::finer(setup_.options);
-  if (!finer || !(is_adaptive(setup_.options) || is_soon)) return doubt;
+  const std::optional<detail::SecondLook> finer = detail::finer(setup_.options, setup_.duration);
+  if (!finer || ends_between || !(is_adaptive(setup_.options) || is_soon)) return doubt;
   const Separation second = compare(*finer);
   return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);
 }

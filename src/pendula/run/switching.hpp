@@ -8,6 +8,7 @@
 #include <pendula/system/motion.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_table.hpp>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -32,6 +33,9 @@ class SwitchingSystem {
   /// g by these pieces, on which one may depend itself.
   std::vector<double> values(const Sides& sides, const Motion& motion) const;
 
+  /// What its functions that may change fast are taken of, but for bases of powers (field_look.hpp).
+  std::vector<double> fast_arguments(const Sides& sides, const Motion& motion) const;
+
   /// The sides on which a motion goes on, which at zeros of g depends on where it goes. Both may drive it back to one
   /// of the zeros: it cannot leave it.
   struct Way {
@@ -47,6 +51,8 @@ class SwitchingSystem {
   std::vector<Sides> all_sides() const;
 
  private:
+  template <class Function>
+  std::vector<double> at(Function function, std::size_t count, const Sides& sides, const Motion& motion) const;
   int drift(std::size_t k, const Sides& sides, const Motion& motion) const;
   Motion ahead(const Sides& sides, const Motion& motion, double time) const;
   std::vector<double> accelerations(const Sides& sides, const Motion& motion) const;
@@ -65,15 +71,33 @@ inline SystemNumbers SwitchingSystem::numbers(const Sides& sides) const {
   return numbers;
 }
 
-inline std::vector<double> SwitchingSystem::values(const Sides& sides, const Motion& motion) const {
+/// What a function of the kernel writes at a motion, `count` numbers.
+template <class Function>
+std::vector<double> SwitchingSystem::at(Function function, std::size_t count, const Sides& sides,
+                                        const Motion& motion) const {
   SystemNumbers numbers = this->numbers(sides);
   for (const InputSine& sine : numbers.sines) {
     numbers.inputs[static_cast<std::size_t>(sine.input)] +=
         sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
   }
-  std::vector<double> found(switches());
-  table_->plain.switches({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()},
-                         motion.q.data(), motion.v.data(), found.data());
+  std::vector<double> found(count);
+  function({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()}, motion.q.data(),
+           motion.v.data(), found.data());
+  return found;
+}
+
+inline std::vector<double> SwitchingSystem::values(const Sides& sides, const Motion& motion) const {
+  return at(table_->plain.switches, switches(), sides, motion);
+}
+
+inline std::vector<double> SwitchingSystem::fast_arguments(const Sides& sides, const Motion& motion) const {
+  const std::span<const bool> is_base = table_->info.argument_is_base;
+  if (is_base.empty()) return {};
+  const std::vector<double> all = at(table_->of_1.call_arguments, is_base.size(), sides, motion);
+  std::vector<double> found;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (!is_base[k]) found.push_back(all[k]);
+  }
   return found;
 }
 
@@ -137,15 +161,7 @@ inline Motion SwitchingSystem::ahead(const Sides& sides, const Motion& motion, d
 }
 
 inline std::vector<double> SwitchingSystem::accelerations(const Sides& sides, const Motion& motion) const {
-  SystemNumbers numbers = this->numbers(sides);
-  for (const InputSine& sine : numbers.sines) {
-    numbers.inputs[static_cast<std::size_t>(sine.input)] +=
-        sine.amplitude * std::sin(sine.frequency * motion.time + sine.phase);
-  }
-  std::vector<double> found(static_cast<std::size_t>(motion.v.size()));
-  table_->of_1.acceleration({table_->context, numbers.parameters.data(), &motion.time, numbers.inputs.data()},
-                            motion.q.data(), motion.v.data(), found.data());
-  return found;
+  return at(table_->of_1.acceleration, static_cast<std::size_t>(motion.v.size()), sides, motion);
 }
 
 inline double SwitchingSystem::pace(const Sides& sides, const Motion& motion) const {

@@ -9,6 +9,8 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <pendula/numeric/interval.hpp>
+#include <pendula/numeric/sampled_polynomial.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/relay.hpp>
@@ -55,13 +57,13 @@ class SwitchingIntegrator : public Relay {
     const double begin = time();
     const Member before = now().member();
     const Motion there = now().state();
-    for (double most = std::min(h, limit_);; most = (time() - begin) / 2) {
+    for (double most = std::min(h, limit_);; most = shorter * (time() - begin)) {
       if (time() != begin) now().resume(before);
       const Outcome stepped = now().step(most);
       if (!stepped) return finish(stepped);
       const double taken = time() - begin;
       const bool shortest = taken <= rounding_of(begin, 0) * 1e3;
-      if (!shortest && !is_resolved(begin)) continue;
+      if (!shortest && !(is_resolved(begin) && is_slow(begin))) continue;
       const Member watched = member_of(watch_);
       const std::optional<Occurrence> first = crossing();
       if (!shortest && !is_told(begin)) {
@@ -71,7 +73,9 @@ class SwitchingIntegrator : public Relay {
       }
       limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
       // Where a function is zero is known to rounding, which is another in another step.
-      if (first && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
+      const bool is_on_zero = !first && ends_on_zero();
+      if ((first || is_on_zero) && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
+      if (is_on_zero) return go_on(stepped);
       return finish(first ? cut(before, begin, time(), *first) : stepped);
     }
   }
@@ -158,6 +162,25 @@ class SwitchingIntegrator : public Relay {
     }
     return true;
   }
+
+  /// Whether functions such as exp and tanh, which the switching functions may hold, change little in the last step:
+  /// what is narrow might lie between all places that are looked at.
+  bool is_slow(double begin) {
+    constexpr double gone = 60;  // exp(−gone) is negligible
+    constexpr double little = 8;
+    std::array<std::vector<double>, BernsteinPolynomial::size> seen;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const double u = sample_place(i);
+      seen[i] = system_.fast_arguments(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
+    }
+    for (std::size_t k = 0; k < seen[0].size(); ++k) {
+      BernsteinPolynomial::Numbers values;
+      for (std::size_t i = 0; i < seen.size(); ++i) values[i] = seen[i][k];
+      const Interval range = BernsteinPolynomial::through(values).range();
+      if (range.low < gone && range.high > -gone && range.high - range.low > little) return false;
+    }
+    return true;
+  }
   static double place(std::size_t i) {
     return (1 - std::cos(std::numbers::pi * static_cast<double>(i) / (points - 1))) / 2;
   }
@@ -173,6 +196,11 @@ class SwitchingIntegrator : public Relay {
     std::vector<Occurrence> found = watch_.after_step(now());
     if (found.empty()) return {};
     return std::move(found.front());
+  }
+
+  /// Whether a switching function is zero where the last step ended.
+  bool ends_on_zero() const {
+    return std::ranges::any_of(system_.values(sides_, now().state()), [](double g) { return g == 0; });
   }
 
   /// Takes the step again, to where a switching function is zero, and some roundings on, so that it has its new sign.
@@ -191,12 +219,15 @@ class SwitchingIntegrator : public Relay {
       if (h >= end - begin) break;
       more = more == 0 ? rounding : 2 * more;
     }
+    if (time() >= std::min(at, end) - 4 * rounding) return go_on(stepped);
+    watch_.start(now().state(), sides_);
+    return stepped;
+  }
+
+  /// By the pieces that the motion goes on by, after a step to a zero.
+  Outcome go_on(const Outcome& stepped) {
     count();
     const Motion motion = now().state();
-    if (time() < std::min(at, end) - 4 * rounding) {
-      watch_.start(motion, sides_);
-      return stepped;
-    }
     choose(motion);
     watch_bursts();
     watch_.start(motion, sides_);
@@ -223,6 +254,7 @@ class SwitchingIntegrator : public Relay {
 
   static constexpr int most_tries = 40;
   static constexpr double growth = 8;       // of chosen steps, from one to the next
+  static constexpr double shorter = 0.4;    // no half: runs by steps twice as long would come to the same ones
   static constexpr double longest_ = 1e-3;  // s
   static constexpr std::size_t points = 17;
   static constexpr double unlimited = std::numeric_limits<double>::infinity();

@@ -387,7 +387,8 @@ class SeriesSteps {
   }
 
   /// Terms are relative to each coordinate itself, plus 1 rad or the size of the whole motion if that is smaller, so
-  /// that oscillations of 1e-9 rad are resolved like any other; rates, times the unit of time, likewise.
+  /// that oscillations of 1e-9 rad are resolved like any other; rates, times the unit of time, likewise. Full turns
+  /// that an angle has made count for nothing.
   void find_scales() {
     L q(0.0), v(0.0), a(0.0);
     for (std::size_t i = 0; i < n_; ++i) {
@@ -398,7 +399,8 @@ class SeriesSteps {
     const auto within = [](const L& x) { return min(max(x, L(nothing)), L(1.0)); };
     const L places = within(max(q, v)), speeds = within(max(max(v, a), L(rounded) * q));
     for (std::size_t i = 0; i < n_; ++i) {
-      to_row(L(1.0) / (places + abs(coefficient(0, i))), scales_[i]);
+      const L place = abs(coefficient(0, i)), size = systems_.info().is_angle[i] ? min(place, L(1.0)) : place;
+      to_row(L(1.0) / (places + size), scales_[i]);
       to_row(L(1.0) / (speeds + abs(rate(0, i))), scales_[n_ + i]);
     }
   }
