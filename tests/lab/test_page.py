@@ -315,7 +315,7 @@ def test_own_functions_of_several_pieces(open_lab, tmp_path):
     assert done.returncode == 0, done.stderr
     page = open_lab("q=0.5&p=200", motion="no-preference", file=tmp_path / "ball.html")
     until(page, "pendulaLab.history.end > 2.1")
-    height = page.evaluate("pendulaLab.history.at(2, 1, new Float64Array(5))[1]")
+    height = page.evaluate("pendulaLab.history.at(2, 1, new Float64Array(16))[1]")
     assert height == pytest.approx(json.loads(told.stdout)["final"]["q"]["x"], abs=1e-7)
 
 

@@ -36,11 +36,3 @@ function writeTexts(chosen) {
 function say(words) {
   at("said").textContent = words;
 }
-
-function bytesOfBase64(base64) {
-  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64);
-  const binary = atob(base64);
-  const bytes = new Uint8Array(binary.length);
-  for (let k = 0; k < binary.length; ++k) bytes[k] = binary.charCodeAt(k);
-  return bytes;
-}

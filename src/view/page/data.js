@@ -3,14 +3,6 @@
 const scene = JSON.parse(document.getElementById("scene").textContent);
 for (const unit of ["timeUnit", "lengthUnit"]) scene[unit] = unitText(scene[unit]);
 
-function bytesOfBase64(text) {
-  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-  const binary = atob(text);
-  const bytes = new Uint8Array(binary.length);
-  for (let k = 0; k < binary.length; ++k) bytes[k] = binary.charCodeAt(k);
-  return bytes;
-}
-
 /// The rows of one run, column by column.
 class Run {
   #columns = new Map();

@@ -1,4 +1,4 @@
-// Numbers and small pieces of text.
+// Numbers and small pieces of text, as people and as programs read them.
 
 /// A number with 17 significant digits, from which the same double is read back: written as C's %.17g writes it.
 function exactNumber(x) {
@@ -76,4 +76,12 @@ function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
   made.append(...children);
   return made;
+}
+
+function bytesOfBase64(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  const binary = atob(text);
+  const bytes = new Uint8Array(binary.length);
+  for (let k = 0; k < binary.length; ++k) bytes[k] = binary.charCodeAt(k);
+  return bytes;
 }
