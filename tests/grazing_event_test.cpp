@@ -126,7 +126,9 @@ TEST_P(GrazingEvents, HappenTwiceOrNever) {
     setup.doubted = false;
     std::vector<Event> turning, events;
     for (Eigen::Index k = 0; k < links; ++k) {
-      turning.push_back({.value = [k](const Motion& motion) { return motion.v[k]; }});
+      turning.push_back(
+          {.value = [k](const Motion& motion) { return motion.v[k]; },
+           .enclose = [k](const MotionRange& range) { return Interval(range.least.v[k], range.most.v[k]); }});
     }
     std::vector<Threshold> thresholds;
     for (const Occurred& turn : events_of(setup, turning)) {
@@ -137,7 +139,11 @@ TEST_P(GrazingEvents, HappenTwiceOrNever) {
         for (const bool is_passed : {true, false}) {
           const double level = reached + (is_passed ? -off : off);
           thresholds.push_back({turn.motion.time, std::min(1e-3, 100 * std::sqrt(std::abs(off))), is_passed});
-          events.push_back({.value = [k, level](const Motion& motion) { return motion.q[k] - level; }});
+          events.push_back({.value = [k, level](const Motion& motion) { return motion.q[k] - level; },
+                            .enclose =
+                                [k, level](const MotionRange& range) {
+                                  return Interval(range.least.q[k], range.most.q[k]) - Interval(level);
+                                }});
         }
       }
     }

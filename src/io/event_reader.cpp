@@ -78,6 +78,9 @@ std::vector<Event> events_of(const std::vector<EventPlan>& plans, const std::sha
       events.push_back(
           {plan.name, [function](const Motion& motion) { return (*function)(motion); }, plan.direction, plan.stop});
       if (!expression->is_plain()) events.back().formula = function;
+      if (function->can_enclose()) {
+        events.back().enclose = [function](const MotionRange& range) { return function->enclose(range); };
+      }
     } catch (const ExpressionError& error) {
       throw InputError(plan.place + ": expected " + error.expected + ", got " + error.got);
     }

@@ -1,9 +1,14 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <memory>
+#include <pendula/numeric/interval.hpp>
+#include <pendula/numeric/reach.hpp>
 #include <pendula/run/event.hpp>
+#include <pendula/run/quantity.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <span>
@@ -25,12 +30,27 @@ class RowFunction : public Formula {
     observes_ = std::ranges::any_of(columns(), is_observed);
     has_time_ = std::ranges::find(columns(), time_column) != columns().end();
     reaches_.resize(columns().size());
+    find_places(start);
   }
 
   double operator()(const Motion& motion) {
-    take_row(motion);
-    for (std::size_t k = 0; k < numbers_.size(); ++k) numbers_[k] = row_[columns()[k]];
+    if (can_enclose()) {
+      for (std::size_t k = 0; k < numbers_.size(); ++k) numbers_[k] = at(places_[k], motion);
+    } else {
+      take_row(motion);
+      for (std::size_t k = 0; k < numbers_.size(); ++k) numbers_[k] = row_[columns()[k]];
+    }
     return (*expression_)(numbers_);
+  }
+
+  /// Whether `enclose` may be asked: it needs nothing but time, coordinates and rates.
+  bool can_enclose() const { return places_.size() == columns().size(); }
+  Interval enclose(const MotionRange& range) {
+    for (std::size_t k = 0; k < reaches_.size(); ++k) {
+      reaches_[k] = Reach({at(places_[k], range.least), at(places_[k], range.most)}, Interval::all());
+    }
+    const Reach found = (*expression_)(std::span<const Reach>(reaches_));
+    return found.defined == Reach::Defined::everywhere ? found.value : Interval::all();
   }
 
   std::size_t size() const override { return columns().size() - (has_time_ ? 1 : 0); }
@@ -55,6 +75,35 @@ class RowFunction : public Formula {
 
   const std::vector<std::size_t>& columns() const { return expression_->columns(); }
 
+  /// Where a number of a row stands in a motion.
+  struct Place {
+    enum class Of { time, coordinates, rates } of = Of::time;
+    Eigen::Index index = 0;
+  };
+  static double at(const Place& place, const Motion& motion) {
+    if (place.of == Place::Of::time) return motion.time;
+    return (place.of == Place::Of::coordinates ? motion.q : motion.v)[place.index];
+  }
+
+  /// Of all numbers of the expression; of none where one of them is not in a motion. A row of a motion whose numbers
+  /// are their own places tells them.
+  void find_places(Motion motion) {
+    const auto count = static_cast<double>(motion.q.size());
+    motion.q.setLinSpaced(1, count);
+    motion.v = -motion.q;
+    row_.clear();
+    subject_->append_row(motion, {}, row_);
+    const std::vector<Quantity> quantities = subject_->quantities();
+    for (const std::size_t column : columns()) {
+      const auto quantity = std::ranges::find_if(quantities, [&](const Quantity& one) { return one.holds(column); });
+      if (quantity->role > Role::rate) return places_.clear();
+      const auto index = static_cast<Eigen::Index>(std::abs(row_[column])) - 1;
+      places_.push_back(quantity->role == Role::time         ? Place{}
+                        : quantity->role == Role::coordinate ? Place{Place::Of::coordinates, index}
+                                                             : Place{Place::Of::rates, index});
+    }
+  }
+
   void take_row(const Motion& motion) {
     row_.clear();
     subject_->append_row(motion, observes_ ? subject_->observe(motion) : Observation(), row_);
@@ -74,6 +123,7 @@ class RowFunction : public Formula {
   std::vector<Reach> reaches_;
   bool observes_ = false;  // whether the expression needs energy or points, which cost more
   bool has_time_ = false;
+  std::vector<Place> places_;  // of the columns; empty if a motion has not all of them
 };
 
 }  // namespace pendula::io

@@ -69,6 +69,20 @@ class SingleIntegrator final : public PlainIntegrator {
     subject_.read_within(steps_, (time - begin_) / step_, q, v);
   }
 
+  bool bound_excursions(double* q, double* v) const override {
+    if constexpr (requires { steps_.excursion(0); }) {
+      if (step_ == 0 || parts_of_last_ != 1) return false;
+      for (int i = 0; i < steps_.links(); ++i) {
+        const auto farthest = steps_.excursion(i);
+        q[i] = farthest.place[0];
+        v[i] = farthest.rate[0];
+      }
+      return true;
+    } else {
+      return false;
+    }
+  }
+
   Outcome look(double time, double* q, double* v, double& work) override {
     work = statistics_.load_work;
     if (step_ == 0 || time == this->time()) {

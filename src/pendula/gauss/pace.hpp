@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/numeric.hpp>
@@ -23,25 +24,14 @@ class Pace {
   /// Of a system at q and v  (coordinates).
   void start(const SystemAt<1>& here, const double* q, const double* v) requires(!is_batch<Num>) {
     const std::size_t count = is_angle_.size();
-    std::vector<double> p(count), f(count), p_D_q(count * count), p_D_v(p_D_q), f_D_q(p_D_q), f_D_v(p_D_q);
-    here(&SystemFunctions::momentum_form_with_jacobians, q, v, p.data(), f.data(), p_D_q.data(), p_D_v.data(),
-         f_D_q.data(), f_D_v.data());
-    const auto diagonal = [&](const std::vector<double>& matrix, std::size_t k) { return matrix[k * count + k]; };
-    slowest_squared_ = natural_speed_squared_ = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double swing = std::abs(diagonal(f_D_q, k)), push = is_angle_[k] ? std::abs(f[k]) : 0;
-      const double squared = std::max(swing, push) / diagonal(p_D_v, k);
-      if (std::isfinite(squared)) slowest_squared_ = std::max(slowest_squared_, squared);
-    }
-    for (std::size_t k = 0; k < count && slowest_squared_ > 0; ++k) {
-      const double squared = f[k] * f[k] / diagonal(p_D_v, k) / slowest_squared_;
-      if (std::isfinite(squared)) natural_speed_squared_ += squared;
-    }
+    const Forces first(here, q, v, is_angle_);
+    slowest_squared_ = stiffness(here, q, v, first, is_angle_);
+    natural_speed_squared_ = slowest_squared_ > 0 ? first.speed_squared() / slowest_squared_ : 0;
     // Where nothing turns or pushes yet, 1/s is as good as any; where nothing moves, one unit of length a second.
     if (slowest_squared_ > 0 || at(v, v).pace > 0) return;
     slowest_squared_ = 1;
     if (!std::all_of(v, v + count, [](double rate) { return rate == 0; })) return;
-    for (std::size_t k = 0; k < count; ++k) natural_speed_squared_ += diagonal(p_D_v, k);
+    for (std::size_t k = 0; k < count; ++k) natural_speed_squared_ += first.mass(k);
   }
   /// A member comes, with the pace that it has.
   void start(int member, const Pace<double>& own) {
@@ -79,6 +69,71 @@ class Pace {
 
  private:
   static constexpr std::size_t width = width_of<Num>;
+
+  /// Forces and their slopes at a state.
+  class Forces {
+   public:
+    Forces(const SystemAt<1>& here, const double* q, const double* v, std::span<const bool> is_angle)
+        : is_angle_(is_angle), f_(is_angle.size()), p_D_v_(f_.size() * f_.size()), f_D_q_(p_D_v_) {
+      std::vector<double> p(f_.size()), p_D_q(p_D_v_.size()), f_D_v(p_D_v_.size());
+      here(&SystemFunctions::momentum_form_with_jacobians, q, v, p.data(), f_.data(), p_D_q.data(), p_D_v_.data(),
+           f_D_q_.data(), f_D_v.data());
+    }
+
+    double mass(std::size_t k) const { return p_D_v_[k * f_.size() + k]; }
+    double acceleration(std::size_t k) const { return f_[k] / mass(k); }
+
+    /// κ here.
+    double stiffness() const {
+      double most = 0;
+      for (std::size_t k = 0; k < f_.size(); ++k) {
+        const double swing = std::abs(f_D_q_[k * f_.size() + k]), push = is_angle_[k] ? std::abs(f_[k]) : 0;
+        const double squared = std::max(swing, push) / mass(k);
+        if (std::isfinite(squared)) most = std::max(most, squared);
+      }
+      return most;
+    }
+
+    /// Σ M_kk v_k² that forces give in 1 s.
+    double speed_squared() const {
+      double sum = 0;
+      for (std::size_t k = 0; k < f_.size(); ++k) {
+        const double squared = f_[k] * acceleration(k);
+        if (std::isfinite(squared)) sum += squared;
+      }
+      return sum;
+    }
+
+    /// Σ M_kk v_k² of rates as they are, and what forces would give on the way from 0.
+    double scale(const double* q, const double* v) const {
+      double sum = 0;
+      for (std::size_t k = 0; k < f_.size(); ++k) sum += mass(k) * v[k] * v[k] + std::abs(f_[k] * q[k]);
+      return sum;
+    }
+
+   private:
+    std::span<const bool> is_angle_;
+    std::vector<double> f_, p_D_v_, f_D_q_;
+  };
+
+  /// κ of a motion that starts with `first`. Where forces hardly change with the place, as at the inflection of a
+  /// potential, what the motion meets a time t later counts, too, but as 1/t² at most. Until then forces are constant.
+  static double stiffness(const SystemAt<1>& here, const double* q, const double* v, const Forces& first,
+                          std::span<const bool> is_angle) {
+    constexpr double longest = 0x1p20, shortest = 0x1p-30;  // s
+    const double at_start = first.stiffness();
+    const double gained = first.speed_squared(), slow = 4 * first.scale(q, v);
+    if (gained == 0 || (at_start > 0 && gained / at_start <= slow)) return at_start;
+    std::vector<double> there(is_angle.size());
+    double most = at_start;
+    for (double time = std::min(longest, 1 / std::sqrt(at_start)); time > shortest; time /= 2) {
+      for (std::size_t k = 0; k < there.size(); ++k) there[k] = q[k] + time * (v[k] + time / 2 * first.acceleration(k));
+      const double met = Forces(here, there.data(), v, is_angle).stiffness();
+      if (most == at_start && met > at_start / 2 && met < 2 * at_start) return at_start;  // as of a spring
+      most = std::max(most, std::min(met, 1 / (time * time)));
+    }
+    return most;
+  }
 
   std::span<const bool> is_angle_;
   Num slowest_squared_{is_batch<Num> ? 1.0 : 0.0}, natural_speed_squared_{0.0};

@@ -48,6 +48,11 @@ inline int order_of(const RunOptions& options) {
   }
 }
 
+/// Whether rounding adds up from step to step: the state has no more digits than a double.
+inline bool adds_up_rounding(Method method) {
+  return is_explicit(method) && method != Method::taylor;
+}
+
 /// The smallest tolerances that trials use.
 struct FinestTolerance {
   double good;      ///< where the accuracy may still be reached
@@ -58,7 +63,7 @@ struct FinestTolerance {
 /// as a tolerance would take, unless more steps reach the accuracy.
 inline FinestTolerance finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
   constexpr double most_steps = 4;
-  const double rounding = is_explicit(options.method) ? 1e-14 : 1e-16;
+  const double rounding = adds_up_rounding(options.method) ? 1e-14 : 1e-16;
   const double few_steps = std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
   const bool chooses_order = options.method == Method::bulirsch_stoer || options.method == Method::taylor;
   if (chooses_order) return {rounding, rounding};

@@ -115,8 +115,7 @@ inline std::optional<SecondLook> finer(const RunOptions& run, double duration) {
   SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
   if (is_adaptive(run)) {
     look.options.tolerance /= 100;
-    const bool is_added_up = is_explicit(run.method) && run.method != Method::taylor;  // rounding, step by step
-    if (look.options.tolerance < (is_added_up ? 1e-14 : 1e-16)) return {};
+    if (look.options.tolerance < (adds_up_rounding(run.method) ? 1e-14 : 1e-16)) return {};
     if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
     return look;
   }

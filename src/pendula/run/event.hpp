@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <pendula/numeric/interval.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/numeric/reach.hpp>
 #include <pendula/system/motion.hpp>
@@ -35,6 +36,11 @@ class Formula {
   virtual Reach reach(const Reach& time, std::span<const Reach> numbers) = 0;
 };
 
+/// Bounds of the states of a motion over an interval of time: each number lies between those of both.
+struct MotionRange {
+  Motion least, most;
+};
+
 /// Something that happens where a function of the motion changes sign.
 ///
 /// A root that is only touched does not count, nor does one where the motion starts or ends; a jump across zero does.
@@ -46,6 +52,8 @@ struct Event {
   bool stop = false;  ///< whether the run ends there
   /// The same function as a formula, needed if it may vary faster than the motion; null otherwise.
   std::shared_ptr<Formula> formula = nullptr;
+  /// Encloses the values of the same function over a range; empty where that is not known.
+  std::function<Interval(const MotionRange&)> enclose = {};  // NOLINT(readability-redundant-member-init)
 };
 
 /// One occurrence of an event.

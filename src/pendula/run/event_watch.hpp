@@ -33,6 +33,10 @@ class LastStep {
 
   void state(Motion& motion) const { integrator_.read_state(motion); }
   void glance(double /*share*/, double time, Motion& motion) { integrator_.glance(time, motion); }
+  /// Bounds of how far coordinates and rates get from where the step began; whether they are known.
+  bool bound_excursions(Motion& farthest) const {
+    return integrator_.bound_excursions(farthest.q.data(), farthest.v.data());
+  }
   /// `begin` is the state at the start of the step.
   bool look(const Motion& /*begin*/, double time, Motion& motion) { return bool(integrator_.look(time, motion)); }
 
@@ -40,17 +44,21 @@ class LastStep {
   Integrator& integrator_;
 };
 
-/// Cached states of a step: those that the search for every event begins with, and the last one.
+/// Cached states of a step: those that the search for every event begins with, and the last one; and bounds of all.
 struct StepViews {
   struct View {
     double share = -1;
     Motion motion;
   };
+  enum class Known { not_asked, yes, no };
   std::array<View, 10> kept;
   Motion passing;
+  MotionRange range;
+  Known range_known = Known::not_asked;
 
   void forget() {
     for (View& view : kept) view.share = -1;
+    range_known = Known::not_asked;
   }
 };
 
@@ -70,6 +78,18 @@ class StepStates {
   double resolution() const {
     const double latest = std::max(std::abs(begin_.time), std::abs(end_.time));
     return 2 * std::numeric_limits<double>::epsilon() * (latest / length() + 1);
+  }
+
+  /// Bounds of all states of the step; null where they are not known.
+  const MotionRange* range() {
+    if constexpr (requires(Motion & motion) { step_.bound_excursions(motion); }) {
+      if (views_.range_known == StepViews::Known::not_asked) {
+        views_.range_known = find_range(views_.range) ? StepViews::Known::yes : StepViews::Known::no;
+      }
+      return views_.range_known == StepViews::Known::yes ? &views_.range : nullptr;
+    } else {
+      return nullptr;
+    }
   }
 
   /// By dense output.
@@ -94,6 +114,17 @@ class StepStates {
   }
 
  private:
+  bool find_range(MotionRange& range) const {
+    range.least = begin_;
+    range.most = end_;
+    if (!step_.bound_excursions(range.most)) return false;
+    range.least.q -= range.most.q;
+    range.least.v -= range.most.v;
+    range.most.q += begin_.q;
+    range.most.v += begin_.v;
+    return true;
+  }
+
   const Motion& new_glance(double u, Motion& motion) {
     ++cost_.glances;
     step_.glance(u, time(u), motion);
@@ -242,8 +273,8 @@ class EventWatch {
  private:
   /// State of an event's function at the end of the last step.
   struct Side {
-    double value = 0;
-    int sign = 0;  // the last nonzero sign; 0 if unknown
+    double value = 0;  // NaN where it was not asked for
+    int sign = 0;      // the last nonzero sign; 0 if unknown
   };
 
   static Side side_at(const Event& event, const Motion& motion) {
@@ -253,6 +284,7 @@ class EventWatch {
 
   template <class Step>
   void look_for(std::size_t k, detail::StepStates<Step>& states, std::vector<Occurrence>& found) {
+    if (is_excluded(k, states)) return;
     if (events_[k].formula == nullptr) {
       detail::StepValues<Step> values(states, events_[k].value);
       look_for(k, SignSearch(values, degree_), values, states.resolution(), found);
@@ -262,9 +294,20 @@ class EventWatch {
     }
   }
 
+  /// Whether bounds of the states show that the function keeps its sign in the step.
+  template <class Step>
+  bool is_excluded(std::size_t k, detail::StepStates<Step>& states) {
+    if (!events_[k].enclose || sides_[k].sign == 0) return false;
+    const MotionRange* const range = states.range();
+    if (range == nullptr || events_[k].enclose(*range).side() != sides_[k].sign) return false;
+    sides_[k].value = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  }
+
   template <class Search, class Values>
   void look_for(std::size_t k, Search search, Values& values, double resolution, std::vector<Occurrence>& found) {
-    const Side before = sides_[k];
+    Side before = sides_[k];
+    if (std::isnan(before.value)) before.value = events_[k].value(before_);
     const double last = events_[k].value(motion_);
     const int sign = std::isfinite(last) ? sign_of(last) : 0;
     const auto search_by = [&](SeenBy by) {

@@ -83,6 +83,10 @@ class Integrator {
     integrator_->glance(time, motion.q.data(), motion.v.data());
   }
 
+  /// Bounds of how far coordinates and rates get, anywhere in the last step, from where they were when it began:
+  /// cheaper than a glance. Returns whether they are known.
+  bool bound_excursions(double* q, double* v) const { return integrator_->bound_excursions(q, v); }
+
   /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
   /// began. The integrator is unchanged; `motion` is set if the outcome is ok.
   Outcome look(double time, Motion& motion) {

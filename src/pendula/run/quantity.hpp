@@ -7,7 +7,7 @@
 
 namespace pendula {
 
-/// Kinds of quantities of a trajectory.
+/// Kinds of quantities of a trajectory; those up to rates are its time and state.
 enum class Role { time, coordinate, rate, input, point, energy };
 
 /// A quantity of a trajectory: one number per row, or one for each link.
@@ -22,6 +22,9 @@ struct Quantity {
 
   std::size_t size() const { return links == 0 ? 1 : links; }
   std::size_t column(std::size_t k) const { return first + k * stride; }
+  bool holds(std::size_t at) const {
+    return at >= first && (at - first) % stride == 0 && (at - first) / stride < size();
+  }
 };
 
 /// A constant of a system: one number, or one for each link.

@@ -21,6 +21,9 @@ class Relay : public PlainIntegrator {
     now_->remember_steps(wanted);
   }
   void glance(double time, double* q, double* v) override { write(of(time).glance(time), q, v); }
+  bool bound_excursions(double* q, double* v) const override {
+    return (before_ ? *before_ : *now_).bound_excursions(q, v);
+  }
   Outcome look(double time, double* q, double* v, double& work) override {
     const double done = &of(time) == before_.get() ? before_work_ : done_.load_work;
     Motion motion;

@@ -38,6 +38,9 @@ class PlainIntegrator {
   /// The state at `time` within the last step by dense output, polynomials through what the step has computed: cheap,
   /// but less accurate.
   virtual void glance(double time, double* q, double* v) = 0;
+  /// Bounds of how far each coordinate and rate gets, anywhere in the last step, from where it was when the step began:
+  /// cheaper than a glance. Whether they are known.
+  virtual bool bound_excursions(double* /*q*/, double* /*v*/) const { return false; }
   /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
   /// began. The integrator is left unchanged. `work` is set to the work of loads until then  [J].
   virtual Outcome look(double time, double* q, double* v, double& work) = 0;

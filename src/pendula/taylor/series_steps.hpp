@@ -240,6 +240,20 @@ class SeriesSteps {
     }
   }
 
+  /// Bounds of how far a coordinate and its rate get within the last step from where they begin.
+  Part excursion(int i) const requires(!is_batch<L>) {
+    constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
+    constexpr double beyond = 4;  // last terms: what rates by momenta may differ by from those of the series
+    const auto k = static_cast<std::size_t>(i);
+    const auto last = static_cast<std::size_t>(order_) - (info_.has_momenta ? 1 : 0);
+    const L tau = step_ / unit_;
+    const L place = tau * sum(tau, [&](std::size_t order) { return abs(coefficient(order, k)); });
+    const L turned = tau * sum(tau, [&](std::size_t order) { return abs(rate(order, k)); }) +
+                     beyond * abs(rate(last, k)) * std::pow(tau, static_cast<double>(last));
+    return {{place + rounding * (place + abs(coefficient(0, k)))},
+            {(turned + rounding * (turned + abs(rate(0, k)))) / unit_}};
+  }
+
   /// The same where rates are those of the momenta there.
   template <class Visit>
   void for_each_look(double share, Visit visit) {
