@@ -1,7 +1,9 @@
 # What an install holds: the library, its headers with the kernels of this build, the generator for more of them, the
 # program with its pictures, scenarios, manual page and completion for shells, the script that installs what these take,
-# and the CMake package.
+# and the CMake package. Its components: `program`, what the wheel of the Python package holds, too; `system`, the rest of
+# what the program takes; `devel`, all else.
 include(CMakePackageConfigHelpers)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME devel)
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pendula")
 set(codegen_dir "${CMAKE_INSTALL_DATADIR}/pendula/codegen")
@@ -10,11 +12,10 @@ install(TARGETS pendula_kernels pendula EXPORT pendulaTargets FILE_SET HEADERS)
 install(EXPORT pendulaTargets NAMESPACE pendula:: DESTINATION "${package_dir}")
 if(PENDULA_BUILD_PROGRAM)
   set(data_dir "${CMAKE_INSTALL_DATADIR}/pendula")
-  # Of the component `program`: what the wheel of the Python package holds, too.
   install(TARGETS pendula_cli COMPONENT program)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/plotting" DESTINATION "${data_dir}" COMPONENT program
           PATTERN "__pycache__" EXCLUDE)
-  install(PROGRAMS "${PROJECT_SOURCE_DIR}/cmake/installed_setup" DESTINATION "${data_dir}" RENAME setup)
+  install(PROGRAMS "${PROJECT_SOURCE_DIR}/cmake/installed_setup" DESTINATION "${data_dir}" RENAME setup COMPONENT system)
   install(DIRECTORY "${PROJECT_BINARY_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}" COMPONENT program)  # by describe_program.cmake
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/examples" DESTINATION "${data_dir}" COMPONENT program FILES_MATCHING PATTERN "*.toml")
 endif()
@@ -22,7 +23,6 @@ endif()
 install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codegen_dir}" COMPONENT program
         FILES_MATCHING PATTERN "*.py" PATTERN "*.j2" PATTERN "__pycache__" EXCLUDE)
 install(FILES "${PENDULA_CODEGEN_DIR}/requirements.txt" DESTINATION "${codegen_dir}" COMPONENT program)
-install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/pendula")
 
 configure_package_config_file(
   "${PROJECT_SOURCE_DIR}/cmake/pendulaConfig.cmake.in" "${PROJECT_BINARY_DIR}/pendulaConfig.cmake"

@@ -22,21 +22,6 @@ namespace {
 
 using nlohmann::json;
 
-/// `key=1,2,3` of a link to a laboratory, after what is there.
-template <class Numbers>
-void put(std::string& link, const char* key, const Numbers& numbers) {
-  link += (link.empty() ? "" : "&") + std::string(key) + '=';
-  const char* comma = "";
-  for (const double number : numbers) {
-    link += comma + shortest(number);
-    comma = ",";
-  }
-}
-
-void put_one(std::string& link, const char* key, double number) {
-  put(link, key, std::vector<double>{number});
-}
-
 void warn(const std::string& what) {
   std::cerr << "pendula: warning: the laboratory leaves out " << what << '\n';
 }
@@ -45,26 +30,17 @@ void warn(const std::string& what) {
 template <class Space>
 std::string link_of(const io::Scenario<Space>& scenario) {
   const Chain<Space>& chain = scenario.chain;
-  if (!scenario.feedback.empty() || chain.constant_torque().any() || !chain.drives().empty()) {
-    warn("torques, drives and feedback");
-  }
-  const auto damping = chain.damping();
-  if ((damping.array() != damping[0]).any()) warn("damping of single links: all have that of the first");
-  std::string link;
-  put_one(link, "n", chain.links());
-  put_one(link, "space", Space::dimension);
-  put(link, "m", chain.masses());
-  put(link, "l", chain.lengths());
-  put_one(link, "g", chain.gravity());
-  put_one(link, "d", damping[0]);
+  if (!scenario.feedback.empty() || view::lab_leaves_out_loads(chain)) warn("torques, drives and feedback");
+  if (view::lab_leaves_out_damping(chain)) warn("damping of single links: all have that of the first");
+  view::LabLink link = view::lab_link(chain);
   const auto& start = scenario.start;
-  put(link, "th", start.theta());
-  put(link, "w", start.theta_dot());
+  link.put("th", start.theta());
+  link.put("w", start.theta_dot());
   if constexpr (Space::dof == 2) {
-    put(link, "ph", start.q.tail(chain.links()));
-    put(link, "wp", start.v.tail(chain.links()));
+    link.put("ph", start.q.tail(chain.links()));
+    link.put("wp", start.v.tail(chain.links()));
   }
-  return link;
+  return link.text();
 }
 
 /// What a page is told of a model: its program, and what describe tells.
@@ -90,13 +66,13 @@ json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
           model->laws.clear();
           if (!found.feedback.empty() || !found.system->numbers().sines.empty()) warn("drives and feedback");
           json start = model_start(*model, toolchain);
-          std::string link;
+          view::LabLink link;
           const std::vector<double>& all = found.system->numbers().parameters;
-          put(link, "p", std::span(all).first(all.size() - 2 * found.system->info().switches.size()));
-          put(link, "q", found.start.q);
-          put(link, "v", found.start.v);
+          link.put("p", std::span(all).first(all.size() - 2 * found.system->info().switches.size()));
+          link.put("q", found.start.q);
+          link.put("v", found.start.v);
           start["title"] = title;
-          start["state"] = link;
+          start["state"] = link.text();
           return start;
         }
       },

@@ -243,7 +243,9 @@ ExitStatus simulate(const SimulateOptions& options) {
       [&](const auto& scenario) {
         const RunSetup setup = io::setup_of(scenario);
         check_events(options, setup);
-        RunSession session(setup, view::scene_of(scenario, source), scenario, source, model, options);
+        view::Scene scene = view::scene_of(scenario, source);
+        scene.laboratory = view::laboratory_of(scenario);
+        RunSession session(setup, scene, scenario, source, model, options);
         io::Summary summary = session.run();
         summary.kernel_by = kernel_by;
         io::describe(scenario, options.resume ? source.text.name : options.scenario, summary);

@@ -1,6 +1,7 @@
 #include "view/lab.hpp"
 
 #include <nlohmann/json.hpp>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/version.hpp>
 #include <string_view>
 
@@ -17,6 +18,15 @@ std::string worker_text() {
 }
 
 }  // namespace
+
+void LabLink::begin(std::string_view key) {
+  if (!text_.empty()) text_ += '&';
+  text_.append(key) += '=';
+}
+void LabLink::add(double number) {
+  if (text_.back() != '=') text_ += ',';
+  text_ += shortest(number);
+}
 
 bool has_lab() {
   return !assets::lab_module.empty();

@@ -12,6 +12,7 @@
 
 #include "view/assets.hpp"
 #include "view/encode.hpp"
+#include "view/lab.hpp"
 #include "view/template.hpp"
 
 namespace pendula::view {
@@ -260,21 +261,14 @@ json Page::described() const {
   }
   for (const Point& each : scene_.points) points.push_back({each.name, each.column, each.components, each.mass});
   for (const Run& run : runs_) runs.push_back(described(run));
-  return {{"title", scene_.title},
-          {"subject", scene_.subject},
-          {"scenario", scene_.scenario},
-          {"version", scene_.version},
-          {"columns", scene_.columns},
-          {"dimension", scene_.dimension()},
-          {"coordinates", coordinates},
-          {"points", points},
-          {"rods", name_of(scene_.rods)},
-          {"lengths", scene_.lengths},
-          {"timeUnit", scene_.time_unit},
-          {"lengthUnit", scene_.length_unit},
-          {"loaded", scene_.loaded},
-          {"three", assets::three_version},
-          {"runs", runs}};
+  return {{"title", scene_.title},          {"subject", scene_.subject},
+          {"scenario", scene_.scenario},    {"version", scene_.version},
+          {"columns", scene_.columns},      {"dimension", scene_.dimension()},
+          {"coordinates", coordinates},     {"points", points},
+          {"rods", name_of(scene_.rods)},   {"lengths", scene_.lengths},
+          {"timeUnit", scene_.time_unit},   {"lengthUnit", scene_.length_unit},
+          {"loaded", scene_.loaded},        {"laboratory", scene_.laboratory},
+          {"three", assets::three_version}, {"runs", runs}};
 }
 
 /// What stands for {{name}}.
@@ -293,6 +287,9 @@ std::string Page::part(const std::string& name) const {
   std::string text;
   if (name == "runs") {
     for (const Run& run : runs_) text += "<script type=\"text/plain\" class=\"run\">" + encoded(run) + "</script>\n";
+  } else if (name == "laboratory" && !scene_.laboratory.empty()) {
+    const json start = {{"title", scene_.title}};
+    text = "<script type=\"application/json\" id=\"laboratory\">" + script_json(lab_page(start)) + "</script>";
   } else if (name == "three" && in_space) {
     text += "<!-- three.js r" + std::string(assets::three_version) + "\n\n" + std::string(assets::three_licence) +
             "-->\n<script type=\"text/plain\" id=\"three\">";

@@ -19,7 +19,7 @@ namespace pendula::view {
 
 /// How large a page may become: bytes of the rows in it, as text.
 struct PageLimits {
-  std::size_t rows = 1'100'000;  ///< of all runs; the rest of a page is 75 kB, in space 320
+  std::size_t rows = 1'100'000;  ///< of all runs; the rest of a page is 75 kB, in space 320, and 900 of a laboratory
   /// Where a row is so long that `rows` leaves less than 512 of them to a run, up to so many.
   std::size_t long_rows = 6'000'000;
 };

@@ -9,6 +9,7 @@
 #include "io/run_source.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
+#include "view/lab.hpp"
 #include "view/scene.hpp"
 
 namespace pendula::view {
@@ -35,6 +36,17 @@ Scene subject_scene(const Scenario& scenario) {
   scene.columns = subject->columns();
   scene.loaded = subject->loaded();
   return scene;
+}
+
+/// The laboratory's link of a chain in SI that it has all of; empty for all else, and where this build has none.
+template <class Scenario>
+std::string laboratory_of(const Scenario& scenario) {
+  if constexpr (requires { scenario.chain; }) {
+    const auto& chain = scenario.chain;
+    const bool is_whole = scenario.feedback.empty() && !lab_leaves_out_loads(chain) && !lab_leaves_out_damping(chain);
+    if (has_lab() && is_whole && !scenario.natural) return lab_link(chain).text();
+  }
+  return {};
 }
 
 /// What a page is told of a run besides its rows.

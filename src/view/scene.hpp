@@ -44,6 +44,7 @@ struct Scene {
   std::vector<double> lengths;  ///< of a chain's rods [m]: its points need not be stored, its angles tell them
   bool loaded = false;          ///< whether energy may come from outside, or go there
   std::string time_unit = "s", length_unit = "m";
+  std::string laboratory;  ///< the link of a laboratory to go on in, without a state; empty: the page offers none
 
   /// Of the space that the points are in: 2 or 3, 0 without points.
   int dimension() const;

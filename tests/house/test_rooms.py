@@ -52,7 +52,7 @@ KNOWS = {
         "pendula/numeric",
     },
     "lab": {"library", "pendula/run", "pendula/chain", "pendula/gauss"},
-    "view": {"io", "pendula/run", "pendula/chain", "pendula/system"},
+    "view": {"io", "pendula/run", "pendula/chain", "pendula/system", "pendula/numeric"},
     "cli": {
         "view",
         "io",

@@ -298,7 +298,9 @@ def define(model, links):
 '''
     summary = move(inflection, {"x": 2, "x_dot": 1}, 10, run__method='"gauss"', run__tolerance=1e-12)
     x, _ = at_end(summary)
-    assert abs(x - 2.21443228464290971646749947245) < 1e-11  # measured 1.6e-12; 4e-9 where it was not looked ahead
+    assert (
+        abs(x - 2.21443228464290971646749947245) < 1e-11
+    )  # measured 1.6e-12; 4e-9 where it was not looked ahead
 
 
 def test_constant_steps_that_are_longer_than_a_contact_are_doubted(move):

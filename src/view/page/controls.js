@@ -89,6 +89,8 @@ class Controls {
 
   #wireDialogs() {
     at("open-help").addEventListener("click", () => at("help").showModal());
+    at("go-on").hidden = !scene.laboratory;
+    at("go-on").addEventListener("click", () => openLaboratory(this.player.time));
     at("open-data").addEventListener("click", () => at("data").showModal());
     at("scenario").textContent = scene.scenario || "(none)";
     at("run").append(...runs.map((run, k) => option(k, run.label || `run ${k + 1}`)));

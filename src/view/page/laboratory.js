@@ -1,0 +1,23 @@
+// Goes on from what is shown in a laboratory: another page, which this one carries.
+
+/// The state of the first run at a time, as the words of a laboratory's link.
+function laboratoryLink(time) {
+  const [run] = runs;
+  const row = run.rowAt(time);
+  const keys = { theta: ["th", "w"], phi: ["ph", "wp"] };
+  const words = new Map();
+  for (const [name, , , column, rate] of scene.coordinates) {
+    keys[name.split("_")[0]].forEach((key, k) => {
+      if (!words.has(key)) words.set(key, []);
+      words.get(key).push(run.column(k === 0 ? column : rate)[row]);
+    });
+  }
+  return [scene.laboratory, ...[...words].map(([key, numbers]) => `${key}=${numbers.join(",")}`)].join("&");
+}
+
+/// Opens it in a window of its own, paused at the state of a time.
+function openLaboratory(time) {
+  const page = JSON.parse(document.getElementById("laboratory").textContent);
+  const address = URL.createObjectURL(new Blob([page], { type: "text/html" }));
+  window.open(`${address}#${laboratoryLink(time)}`);
+}
