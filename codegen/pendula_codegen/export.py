@@ -13,6 +13,7 @@ from math import isfinite
 from pathlib import Path
 
 from pendula_codegen.backends.c99 import NUMBERS, C99Printer
+from pendula_codegen.casadi_face import Side, quoted, shapes, slopes_of
 from pendula_codegen.entry_points import Declared, SystemKernel
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.forward import slopes
@@ -23,7 +24,7 @@ from pendula_codegen.render import ENVIRONMENT, banner
 from pendula_codegen.tableau import MAX_STAGES, gauss
 from pendula_codegen.tape import Row, Tape, Value
 
-LANGUAGES = ("c",)
+LANGUAGES = {"c": ("h", "c"), "casadi": ("h", "c", "casadi.c")}  # and their files, after the name
 MOST_COORDINATES = 16  # everything is written out, and matrices are dense
 
 # What a function is made of: entry points of the kernel, and what it calls what they give.
@@ -240,11 +241,13 @@ class Request:
     """What is asked for.
 
     name     what all names of the C begin with
+    language one of LANGUAGES
     number   double or float
     stages   of the Gauss step
     """
 
     name: str
+    language: str = "c"
     number: str = "double"
     stages: int = 2
     values: Values = field(default_factory=Values)
@@ -256,8 +259,18 @@ class Request:
             )
         if self.number not in NUMBERS:
             raise GenerationError(f"export: number: expected double or float, got {self.number!r}")
+        if self.language == "casadi" and self.number != "double":
+            raise GenerationError("export: number: expected double, which is what CasADi has, got float")
         if not 1 <= self.stages <= MAX_STAGES:
             raise GenerationError(f"export: stages: expected 1 to {MAX_STAGES}, got {self.stages}")
+
+
+def require_size(coordinates: int) -> None:
+    """Raises GenerationError where there are too many."""
+    if coordinates > MOST_COORDINATES:
+        raise GenerationError(
+            f"export: expected at most {MOST_COORDINATES} coordinates, got {coordinates}: everything is written out"
+        )
 
 
 def render_export(
@@ -268,11 +281,7 @@ def render_export(
     Raises GenerationError.
     """
     request.check()
-    count = len(kernel.declared.coordinates)
-    if count > MOST_COORDINATES:
-        raise GenerationError(
-            f"export: expected at most {MOST_COORDINATES} coordinates, got {count}: everything is written out"
-        )
+    require_size(len(kernel.declared.coordinates))
     if any(function.name == "switches" for function in kernel.functions()):
         raise GenerationError(
             "export: expected a smooth model, got one with functions of several pieces (Piecewise, Abs, sign, ...): "
@@ -304,6 +313,10 @@ def render_export(
             step.operation == "solve" and step.count > UNROLLED for f in exported for step in f.tape.steps
         ),
         "head": lambda function: _head(request, function),
+        "side": Side,
+        "quoted": quoted,
+        "shapes": shapes,
+        "slopes_of": slopes_of,
         "limits": "FLT" if request.number == "float" else "DBL",
         "rows": {
             "parameters": _listed((name, p.unit) for p in declared.parameters for name in _names(p)),
@@ -314,9 +327,12 @@ def render_export(
         "step": request.values.step,
         "time": request.values.time,
     }
+    endings = LANGUAGES[request.language]
     return {
-        f"{request.name}.{suffix}": ENVIRONMENT.get_template(f"export.{suffix}.j2").render(context)
-        for suffix in ("h", "c")
+        f"{request.name}{'_' if '.' in ending else '.'}{ending}": ENVIRONMENT.get_template(
+            f"export{'_' if '.' in ending else '.'}{ending}.j2"
+        ).render(context)
+        for ending in endings
     }
 
 

@@ -60,6 +60,7 @@ KINDS = {
     "backends/c_series.py": {"program"},
     "backends/cpp_series.py": {"kernel", "model"},
     "blocks.py": {"export", "kernel"},
+    "casadi_face.py": {"export"},
     "chain.py": {"export", "kernel"},
     "chain_kernel.py": {"export", "kernel"},
     "entry_points.py": {"export", "kernel", "model", "program"},
@@ -88,7 +89,7 @@ KINDS = {
     "tableau.py": {"export", "tableaux"},
     "written.py": set(),
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
-    **{f"templates/export{name}.j2": {"export"} for name in (".c", ".h", "_solve.c")},
+    **{f"templates/export{name}.j2": {"export"} for name in (".c", ".h", "_solve.c", "_casadi.c")},
     **{
         f"templates/{name}.c.j2": {"program"}
         for name in ("kernel", "sincos", "exp", "log", "solve", "iterate", "series")

@@ -317,7 +317,9 @@ void CommandLine::add_export() {
                                  "whose numbers are then those to begin with"),
              {".py", ".toml"})
       ->required();
-  takes_words(exports->add_option("--as", options.language, "c: C99, NAME.h and NAME.c"), "LANGUAGE", {"c"})
+  takes_words(exports->add_option("--as", options.language,
+                                  "c: C99, NAME.h and NAME.c; casadi: functions for CasADi and acados besides"),
+              "LANGUAGE", {"c", "casadi"})
       ->required();
   takes_file(exports->add_option("-o,--output", options.folder, "The folder for the files"), {"/"})->required();
   exports->add_option("--name", options.name, "What names in it begin with; else that of the model")->type_name("NAME");

@@ -161,8 +161,10 @@ std::string usage(const CLI::App& command) {
     text += option->get_required() ? ' ' + name : " [" + name + ']';
   }
   for (const CLI::Option* option : options_of(command)) {
-    if (option->get_required())
-      text += " -" + option->get_snames().front() + typed(*option).substr(typed(*option).rfind(' '));
+    if (!option->get_required()) continue;
+    const std::vector<std::string>& letters = option->get_snames();
+    const std::string name = letters.empty() ? " --" + option->get_lnames().front() : " -" + letters.front();
+    text += name + typed(*option).substr(typed(*option).rfind(' '));
   }
   return text;
 }
