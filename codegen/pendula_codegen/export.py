@@ -16,6 +16,7 @@ from pendula_codegen.backends.c99 import NUMBERS, C99Printer
 from pendula_codegen.casadi_face import Side, quoted, shapes, slopes_of
 from pendula_codegen.entry_points import Declared, SystemKernel
 from pendula_codegen.errors import GenerationError
+from pendula_codegen.fmu import DEFAULT_STEP, UNSUPPORTED, token_of, variables_of
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import CPP_KEYWORDS, Parameter
@@ -24,7 +25,13 @@ from pendula_codegen.render import ENVIRONMENT, banner
 from pendula_codegen.tableau import MAX_STAGES, gauss
 from pendula_codegen.tape import Row, Tape, Value
 
-LANGUAGES = {"c": ("h", "c"), "casadi": ("h", "c", "casadi.c")}  # and their files, after the name
+# Templates of a language, and what files are called after the name.
+_C = {"export.h.j2": ".h", "export.c.j2": ".c"}
+LANGUAGES = {
+    "c": _C,
+    "casadi": {**_C, "export_casadi.c.j2": "_casadi.c"},
+    "fmu": {**_C, "export_fmu.c.j2": "_fmu.c", "export_fmu.xml.j2": "_fmu.xml"},
+}
 MOST_COORDINATES = 16  # everything is written out, and matrices are dense
 
 # What a function is made of: entry points of the kernel, and what it calls what they give.
@@ -259,8 +266,8 @@ class Request:
             )
         if self.number not in NUMBERS:
             raise GenerationError(f"export: number: expected double or float, got {self.number!r}")
-        if self.language == "casadi" and self.number != "double":
-            raise GenerationError("export: number: expected double, which is what CasADi has, got float")
+        if self.language != "c" and self.number != "double":
+            raise GenerationError(f"export: number: expected double as {self.language} has it, got float")
         if not 1 <= self.stages <= MAX_STAGES:
             raise GenerationError(f"export: stages: expected 1 to {MAX_STAGES}, got {self.stages}")
 
@@ -327,12 +334,25 @@ def render_export(
         "step": request.values.step,
         "time": request.values.time,
     }
-    endings = LANGUAGES[request.language]
+    if request.language == "fmu":
+        context |= _fmu_context(declared, context["values"], request, context["banner"])
     return {
-        f"{request.name}{'_' if '.' in ending else '.'}{ending}": ENVIRONMENT.get_template(
-            f"export{'_' if '.' in ending else '.'}{ending}.j2"
-        ).render(context)
-        for ending in endings
+        f"{request.name}{ending}": ENVIRONMENT.get_template(template).render(context)
+        for template, ending in LANGUAGES[request.language].items()
+    }
+
+
+def _fmu_context(
+    declared: Declared, values: dict[str, list[float | None]], request: Request, text: str
+) -> dict[str, object]:
+    step = request.values.step or DEFAULT_STEP
+    variables = variables_of(declared, values, step)
+    return {
+        "variables": variables,
+        "units": sorted({variable.unit for variable in variables} - {""}),
+        "internal_step": step,
+        "token": token_of([text, repr(request), repr(variables)]),
+        "unsupported_functions": UNSUPPORTED,
     }
 
 

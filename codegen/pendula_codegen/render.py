@@ -64,6 +64,7 @@ KINDS = {
     "chain.py": {"export", "kernel"},
     "chain_kernel.py": {"export", "kernel"},
     "entry_points.py": {"export", "kernel", "model", "program"},
+    "fmu.py": {"export"},
     "forward.py": {"export", "program"},
     "kernel_program.py": {"program"},
     "linear_solve.py": {"export", "kernel", "model", "program"},
@@ -89,7 +90,10 @@ KINDS = {
     "tableau.py": {"export", "tableaux"},
     "written.py": set(),
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
-    **{f"templates/export{name}.j2": {"export"} for name in (".c", ".h", "_solve.c", "_casadi.c")},
+    **{
+        f"templates/export{name}.j2": {"export"}
+        for name in (".c", ".h", "_solve.c", "_casadi.c", "_fmu.c", "_fmu.xml")
+    },
     **{
         f"templates/{name}.c.j2": {"program"}
         for name in ("kernel", "sincos", "exp", "log", "solve", "iterate", "series")
@@ -364,7 +368,7 @@ def render_tableaux() -> Header:
     )
 
 
-def write_atomically(path: Path, text: str) -> None:
+def write_atomically(path: Path, text: str | bytes) -> None:
     """Writes the whole file or leaves what was there; raises GenerationError where it cannot write."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -374,8 +378,8 @@ def write_atomically(path: Path, text: str) -> None:
     except OSError as error:
         raise GenerationError(f"cannot write {path}: {error.strerror}") from error
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(text if isinstance(text, bytes) else text.encode())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     except OSError as error:

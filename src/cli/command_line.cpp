@@ -318,8 +318,9 @@ void CommandLine::add_export() {
              {".py", ".toml"})
       ->required();
   takes_words(exports->add_option("--as", options.language,
-                                  "c: C99, NAME.h and NAME.c; casadi: functions for CasADi and acados besides"),
-              "LANGUAGE", {"c", "casadi"})
+                                  "c: C99, NAME.h and NAME.c; casadi: functions for CasADi and acados besides; fmu: "
+                                  "NAME.fmu, for simulators that know FMI 3.0"),
+              "LANGUAGE", {"c", "casadi", "fmu"})
       ->required();
   takes_file(exports->add_option("-o,--output", options.folder, "The folder for the files"), {"/"})->required();
   exports->add_option("--name", options.name, "What names in it begin with; else that of the model")->type_name("NAME");

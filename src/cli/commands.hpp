@@ -114,7 +114,7 @@ struct ExportOptions {
   std::string what;                    ///< a model file, a built-in model, a chain as planar:3, or a scenario
   std::vector<std::string> overrides;  ///< `key.path=value`, of a scenario
   std::optional<int> links;            ///< of a model that has links
-  std::string language;                ///< "c" or "casadi"
+  std::string language;                ///< "c", "casadi" or "fmu"
   std::string folder;                  ///< where files go
   std::string name;                    ///< what names begin with; empty for that of the model
   std::optional<int> stages;           ///< of the Gauss step; else those of the scenario, or 2

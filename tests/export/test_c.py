@@ -131,7 +131,7 @@ def test_float_is_the_same_to_its_rounding(export, tmp_path, system):
 @pytest.mark.parametrize(
     ("what", "words"),
     [
-        (("planar:2", "--as", "rust"), "--as: rust not in {c,casadi}"),
+        (("planar:2", "--as", "rust"), "--as: rust not in {c,casadi,fmu}"),
         (("planar", "--as", "c"), "export: expected a chain as planar:3, got planar"),
         (("planar:two", "--as", "c"), "export: expected a chain as planar:3, got planar:two"),
         (("planar:0", "--as", "c"), "a chain has at least one link: got --links 0"),
@@ -140,7 +140,7 @@ def test_float_is_the_same_to_its_rounding(export, tmp_path, system):
         (("furuta", "--as", "c", "--name", "1st"), "export: name: expected a name of letters"),
         (
             ("furuta", "--as", "casadi", "--float"),
-            "export: number: expected double, which is what CasADi has",
+            "export: number: expected double as casadi has it",
         ),
         (("pieces.py", "--as", "c"), "export: expected a smooth model"),
         (
