@@ -1,6 +1,7 @@
 """Systems exported as C99: no warnings by any compiler, and every function and derivative as models say."""
 
 import ctypes
+import math
 import re
 import shutil
 import subprocess
@@ -191,6 +192,55 @@ def test_compilers_say_nothing_and_nothing_is_needed_but_libm(compiler, sources)
         assert needed and not [name for name in needed if not ALLOWED.fullmatch(name)]
         if number == "float":
             assert not [name for name in needed if not name.endswith("f") and not name.startswith("mem")]
+
+
+class Work(ctypes.Structure):
+    """The beginning of a step's work memory."""
+
+    _fields_ = [
+        ("iterations", ctypes.c_int),
+        ("correction", ctypes.c_double),
+        ("more", ctypes.c_double * 1000),
+    ]
+
+
+def test_a_step_says_how_it_ended_and_fails_without_a_trace(tmp_path):
+    source, shared = write(chain("planar", 2), tmp_path), tmp_path / "system.so"
+    subprocess.run(["gcc", *FLAGS, "-O1", "-fPIC", "-shared", source, "-o", shared, "-lm"], check=True)
+    library = ctypes.CDLL(str(shared))
+    parameters, inputs = (ctypes.c_double * 7)(), (ctypes.c_double * 2)(0.1, 0.2)
+    library.system_default_parameters(parameters)
+    assert [*parameters] == [1, 1, 1, 1, 0, 0, 9.81]
+
+    def step(start, h, iterations, tolerance):
+        state, work = (ctypes.c_double * 4)(*start), Work()
+        conditions = parameters, ctypes.c_double(0), ctypes.c_double(h), inputs
+        status = library.system_step(
+            *conditions, iterations, ctypes.c_double(tolerance), state, state, ctypes.byref(work)
+        )
+        return status, [*state], work
+
+    start = [1.0, 2.0, 3.0, -4.0]
+    status, there, work = step(start, 0.02, 20, 1e-14)
+    assert status == 0 and there != start and work.correction < 1e-6
+    needed = work.iterations
+    assert step(start, 0.02, needed - 1, 1e-14)[:2] == (1, start)  # not converged
+    assert step(start, 0.02, 0, 1e-14)[:2] == (1, start)
+    for count in (1, needed, 9):  # of a loop that must not take longer
+        status, found, work = step(start, 0.02, count, 0.0)
+        assert status == 0 and work.iterations == count
+        error = max(abs(x - y) for x, y in zip(found, there, strict=True))
+        assert error < (1e-15 if count >= needed else 1e-7)  # measured 0, 9.4e-9
+    assert step([1.0, 2.0, math.inf, 0.0], 0.02, 20, 1e-14)[:2] == (2, [1.0, 2.0, math.inf, 0.0])
+    at_rest = [0.0, 0.0, 0.0, 0.0]
+    inputs[0] = inputs[1] = 0.0
+    assert step(at_rest, 0.02, 20, 1e-14)[:2] == (0, at_rest)
+    assert step(start, 0.0, 20, 1e-14)[:2] == (0, start)
+    upright = [math.pi, math.pi, 0.0, 0.0]  # where sines are rounding
+    status, found, work = step(upright, 0.02, 20, 1e-14)
+    assert (
+        status == 0 and max(abs(x - y) for x, y in zip(found, upright, strict=True)) < 1e-15
+    )  # measured 2.4e-17
 
 
 def test_a_compiler_of_cpp_takes_the_header(tmp_path):
