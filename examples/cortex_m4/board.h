@@ -7,8 +7,9 @@
 // Of the clock, while QEMU counts an instruction as a nanosecond (-icount shift=0) and the clock has 25 MHz.
 #define board_instructions_a_tick 40
 
-// Prints words, and numbers up to 400,000 with four digits after the point: printf would take more room than the pendulum.
-void board_print(const char *words, const float *numbers, int count);
+// Prints words, and numbers up to 400,000 with four digits after the point: printf would take more room than the
+// pendulum.
+void board_print(const char* words, const float* numbers, int count);
 
 // Counts up, wraps after 24 bits: 0.67 s.
 uint32_t board_ticks(void);

@@ -19,7 +19,7 @@ static cart_sensitivity_work work;
 static float parameters[cart_parameters];
 
 // A and B of the discrete system about `state`.
-static int linearize(const float *state) {
+static int linearize(const float* state) {
   const float no_force[] = {0.0F};
   float next[n];
   return cart_step_with_sensitivities(parameters, 0.0F, step_size, no_force, 20, tolerance, state, next, a, b, 0, 0,

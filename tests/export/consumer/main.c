@@ -16,13 +16,13 @@
 
 enum { states = NAME(states), inputs = NAME(inputs), parameters = NAME(parameters) };
 
-static void print(const char *what, const NUMBER *numbers, int count) {
+static void print(const char* what, const NUMBER* numbers, int count) {
   printf("%s", what);
   for (int k = 0; k < count; ++k) printf(" %.17g", (double)numbers[k]);
   printf("\n");
 }
 
-int main(int count, char **words) {
+int main(int count, char** words) {
   static NUMBER by_state[states * states], by_inputs[ROOM(states * inputs)], by_parameters[ROOM(states * parameters)];
   static NAME(sensitivity_work) work;
   NUMBER of_parameters[ROOM(parameters)], of_inputs[ROOM(inputs)], state[states], by_times[2 * states];
@@ -34,12 +34,12 @@ int main(int count, char **words) {
   NAME(default_inputs)(of_inputs);
   NAME(start)(&t, state);
   if (count == 6) {
-    NUMBER *const moved = strcmp(words[3], "t") == 0 ? &t : strcmp(words[3], "h") == 0 ? &h : of_parameters;
+    NUMBER* const moved = strcmp(words[3], "t") == 0 ? &t : strcmp(words[3], "h") == 0 ? &h : of_parameters;
     moved[atoi(words[4])] += (NUMBER)atof(words[5]);
   }
   for (int k = 0; k < steps; ++k) {
-    const int status = NAME(step_with_sensitivities)(of_parameters, t, h, of_inputs, 20, tolerance, state, state, by_state,
-                                                     by_inputs, by_parameters, by_times, &work);
+    const int status = NAME(step_with_sensitivities)(of_parameters, t, h, of_inputs, 20, tolerance, state, state,
+                                                     by_state, by_inputs, by_parameters, by_times, &work);
     if (status != NAME(done)) {
       fprintf(stderr, "step %d ends with %d after %d iterations\n", k, status, work.step.iterations);
       return 1;
