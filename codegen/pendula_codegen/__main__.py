@@ -15,7 +15,7 @@ from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.export import LANGUAGES, Request, Values, render_export, require_size
-from pendula_codegen.feedback import close_loops
+from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws
 from pendula_codegen.fmu import MARK, packed_fmu
 from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
 from pendula_codegen.links import LINKS, find_link
@@ -118,6 +118,12 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--space", help="of a chain, in place of a model")
     export.add_argument("--links", type=int, help="as of the command model; of a chain, its number")
     _add_feedback(export)
+    export.add_argument(
+        "--sampled",
+        action="append",
+        default=[],
+        help="LIMIT=INPUT=WORDS, a law of a controller: see feedback.py",
+    )
     export.add_argument("--as", dest="language", choices=[*LANGUAGES], default="c")
     export.add_argument("--name", required=True, help="what its names begin with")
     export.add_argument("--number", default="double", help="double or float")
@@ -203,6 +209,7 @@ def _fed_model(options: argparse.Namespace) -> Model:
 
 
 def _run_export(options: argparse.Namespace) -> None:
+    laws: list[SampledLaw] = []
     if options.space is not None:
         chain = Chain(find_link(options.space), 1 if options.links is None else options.links)
         require_size(len(chain.coordinates))
@@ -210,10 +217,11 @@ def _run_export(options: argparse.Namespace) -> None:
         what = f"--space {options.space} --links {chain.links}"
     else:
         model = _fed_model(options)
+        laws = sampled_laws(model, options.sampled)
         kernel, file = ModelKernel(model), Path(model.file)
         what = f"--model {Path(options.model).name}{links_argument(model)}"
     values = Values(options.parameters, options.inputs, options.q, options.v, options.time, options.step)
-    request = Request(options.name, options.language, options.number, options.stages, values)
+    request = Request(options.name, options.language, options.number, options.stages, values, laws)
     command = f"{what} --as {options.language} --name {options.name} --output ."
     texts = render_export(kernel, request, command, options.space, file)
     files: dict[str, str | bytes] = {**texts}

@@ -9,17 +9,20 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 
 from pendula_codegen.backends.c99 import NUMBERS, C99Printer
 from pendula_codegen.casadi_face import Side, quoted, shapes, slopes_of
 from pendula_codegen.entry_points import Declared, SystemKernel
 from pendula_codegen.errors import GenerationError
+from pendula_codegen.feedback import SampledLaw
 from pendula_codegen.fmu import DEFAULT_STEP, UNSUPPORTED, token_of, variables_of
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import CPP_KEYWORDS, Parameter
+from pendula_codegen.places import Place
+from pendula_codegen.program import shortest_program
 from pendula_codegen.recording import Recorder
 from pendula_codegen.render import ENVIRONMENT, banner
 from pendula_codegen.tableau import MAX_STAGES, gauss
@@ -145,6 +148,17 @@ class ExportedFunctions:
             for function in self._of(name, said)
         ]
 
+    def laws(self, laws: Sequence[SampledLaw]) -> ExportedFunction:
+        """Values of control laws, without their limits."""
+        tape = Tape()
+        assignments = [(Place("law", index=(k,)), law.value) for k, law in enumerate(laws)]
+        program = shortest_program([assignments], self._recorder.kernel.shared_vocabularies)
+        found = tape.record(program, self._recorder.row)
+        gives = (Array("law", "one for each law, in the unit of its input", len(laws)),)
+        return ExportedFunction(
+            "laws", "Control laws, without their limits", ("q", "v"), gives, tape.give(found)
+        )
+
     def _of(self, name: str, said: _Said) -> list[ExportedFunction]:
         found = [self._value(name, said), self._with_jacobians(name, said)]
         if self.sizes["inputs"] and said.has_inputs:
@@ -251,6 +265,7 @@ class Request:
     language one of LANGUAGES
     number   double or float
     stages   of the Gauss step
+    laws     of a controller that samples
     """
 
     name: str
@@ -258,6 +273,7 @@ class Request:
     number: str = "double"
     stages: int = 2
     values: Values = field(default_factory=Values)
+    laws: Sequence[SampledLaw] = ()
 
     def check(self) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) or self.name in CPP_KEYWORDS:
@@ -297,7 +313,7 @@ def render_export(
     functions = ExportedFunctions(kernel)
     sizes = functions.sizes
     printer = C99Printer(request.number, f"{request.name}_", functions.names)
-    exported = functions.all()
+    exported = functions.all() + ([functions.laws(request.laws)] if request.laws else [])
     declared = kernel.declared
     tableau = gauss(request.stages)
     context = {
@@ -305,6 +321,7 @@ def render_export(
         "name": request.name,
         "number": request.number,
         "literal": printer.literal,
+        "infinity": inf,
         "call": printer.function,
         "n": sizes["q"],
         "inputs": sizes["inputs"],
@@ -330,6 +347,10 @@ def render_export(
             "inputs": _listed((each.symbol.name, each.unit) for each in declared.inputs),
             "coordinates": _listed((each.symbol.name, each.unit) for each in declared.coordinates),
         },
+        "laws": [
+            ([each.symbol.name for each in declared.inputs].index(law.input), law.limit)
+            for law in request.laws
+        ],
         "values": _numbers(declared, request.values),
         "step": request.values.step,
         "time": request.values.time,

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <iostream>
@@ -84,18 +85,44 @@ Words scenario_words(const io::Scenario<Space>& scenario, const std::string& fil
   return words;
 }
 
-Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, const io::Toolchain& toolchain) {
+/// The laws of a controller, which has one time from one sample to the next.
+std::vector<io::FeedbackPlan> sampled_plans(const io::SystemScenario& scenario) {
+  std::vector<io::FeedbackPlan> plans;
   for (const io::FeedbackPlan& plan : scenario.feedback) {
-    if (plan.sample > 0) refuse(plan.place, "feedback that is sampled stands in the loop that calls the step");
+    if (plan.sample == 0) continue;
+    if (!plans.empty() && plan.sample != plans.front().sample) {
+      refuse(plan.place, "expected one sample time of all feedback, got another one");
+    }
+    plans.push_back(plan);
   }
+  return plans;
+}
+
+Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, const io::Toolchain& toolchain) {
+  const std::vector<io::FeedbackPlan> sampled = sampled_plans(scenario);
   const SystemNumbers& numbers = scenario.system->numbers();
   for (const InputSine& sine : numbers.sines) model.laws.push_back(law_of(sine, scenario.system->info()));
   Words words = io::about("export", model, toolchain);
   words.erase(words.begin());
+  for (const io::FeedbackPlan& plan : sampled) {
+    io::FeedbackPlan law = plan;
+    law.sample = 0;
+    const io::InputLaw read = io::continuous_laws({law}, *scenario.system).front();
+    words.push_back("--sampled=" + (std::isfinite(plan.limit) ? shortest(plan.limit) : "inf") + '=' + read.input + '=' +
+                    read.value);
+  }
   add_numbers(words, "parameters", numbers.parameters);
   add_numbers(words, "inputs", numbers.inputs);
   add_start(words, scenario.start);
   return words;
+}
+
+/// The time from one sample to the next; else the constant step; nothing if there is neither.
+std::optional<double> step_of(const io::RunPlan& plan) {
+  for (const io::FeedbackPlan& feedback : plan.feedback) {
+    if (feedback.sample > 0) return feedback.sample;
+  }
+  return plan.run.method == Method::gauss && plan.run.step > 0 ? std::optional(plan.run.step) : std::nullopt;
 }
 
 /// What the generator is told of a scenario.
@@ -116,8 +143,9 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
         } else {
           words = scenario_words(found, *model, toolchain);
         }
+        if (!found.events.empty()) std::cerr << "pendula: warning: events are not exported\n";
+        if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
         if (found.run.method == Method::gauss && found.run.step > 0) {
-          add_number(words, "step", found.run.step);
           if (!options.stages) add_number(words, "stages", found.run.stages);
         }
         return words;
@@ -134,9 +162,21 @@ std::string default_name(const ExportOptions& options) {
   return options.links ? stem + '_' + std::to_string(*options.links) : stem;
 }
 
+/// Refuses options of another kind of system.
+void require_fitting(const ExportOptions& options) {
+  const bool is_scenario = options.what.ends_with(".toml");
+  if (!is_scenario && !options.overrides.empty()) {
+    throw io::InputError("export: --set: expected a scenario (.toml), got " + options.what);
+  }
+  if (options.links && (is_scenario || options.what.find(':') != std::string::npos)) {
+    throw io::InputError("export: --links: expected a model or the name of a space, got " + options.what);
+  }
+}
+
 }  // namespace
 
 ExitStatus export_system(const ExportOptions& options) {
+  require_fitting(options);
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
   try {
     Words words;

@@ -50,13 +50,15 @@ def export(pendula):
     return run
 
 
-def consumer(folder: Path, number: str = "double") -> Path:
+def consumer(folder: Path, number: str = "double", *flags: str) -> Path:
     """A program that stands on the exported sources alone, in a folder of its own."""
     program = folder / "consumer"
     assert COMPILER, "expected gcc or clang"
     names = [f"-D{name}" for name in ("SYSTEM=system", 'HEADER="system.h"', f"NUMBER={number}")]
     files = [CONSUMER / "main.c", folder / "system.c"]
-    subprocess.run([COMPILER, *FLAGS, "-O1", *names, f"-I{folder}", *files, "-o", program, "-lm"], check=True)
+    subprocess.run(
+        [COMPILER, *FLAGS, "-O1", *flags, *names, f"-I{folder}", *files, "-o", program, "-lm"], check=True
+    )
     return program
 
 

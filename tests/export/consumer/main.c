@@ -1,6 +1,7 @@
 /* Somebody else's program: it has what was exported, and nothing else of pendula. Built with -DSYSTEM=cart
  * -DHEADER='"cart.h"' (and -DNUMBER=float), called with a number of steps and their size, it prints where they lead,
- * and the derivatives of the last one. Three more words change a number: parameters 2 0.001, t 0 0.001 or h 0 0.001. */
+ * and the derivatives of the last one. -DCONTROLLED lets the exported controller act. Three more words change a number:
+ * parameters 2 0.001, t 0 0.001 or h 0 0.001. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +26,8 @@ static void print(const char* what, const NUMBER* numbers, int count) {
 int main(int count, char** words) {
   static NUMBER by_state[states * states], by_inputs[ROOM(states * inputs)], by_parameters[ROOM(states * parameters)];
   static NAME(sensitivity_work) work;
-  NUMBER of_parameters[ROOM(parameters)], of_inputs[ROOM(inputs)], state[states], by_times[2 * states];
+  NUMBER held[ROOM(inputs)], of_parameters[ROOM(parameters)], of_inputs[ROOM(inputs)], state[states],
+      by_times[2 * states];
   NUMBER points[ROOM(NAME(point_numbers))], t, kinetic, energy;
   const int steps = count > 2 ? atoi(words[1]) : 0;
   NUMBER h = count > 2 ? (NUMBER)atof(words[2]) : 0;
@@ -38,8 +40,12 @@ int main(int count, char** words) {
     moved[atoi(words[4])] += (NUMBER)atof(words[5]);
   }
   for (int k = 0; k < steps; ++k) {
-    const int status = NAME(step_with_sensitivities)(of_parameters, t, h, of_inputs, 20, tolerance, state, state,
-                                                     by_state, by_inputs, by_parameters, by_times, &work);
+    for (int j = 0; j < inputs; ++j) held[j] = of_inputs[j];
+#ifdef CONTROLLED
+    NAME(control)(of_parameters, t, of_inputs, state, held);
+#endif
+    const int status = NAME(step_with_sensitivities)(of_parameters, t, h, held, 20, tolerance, state, state, by_state,
+                                                     by_inputs, by_parameters, by_times, &work);
     if (status != NAME(done)) {
       fprintf(stderr, "step %d ends with %d after %d iterations\n", k, status, work.step.iterations);
       return 1;
