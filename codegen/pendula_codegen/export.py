@@ -284,6 +284,11 @@ class Request:
             raise GenerationError(f"export: number: expected double or float, got {self.number!r}")
         if self.language != "c" and self.number != "double":
             raise GenerationError(f"export: number: expected double as {self.language} has it, got float")
+        if self.language == "fmu" and self.laws:
+            raise GenerationError(
+                "export: an FMU has no feedback that is sampled: take it out (--set system.feedback=) and let the "
+                "importer close the loop"
+            )
         if not 1 <= self.stages <= MAX_STAGES:
             raise GenerationError(f"export: stages: expected 1 to {MAX_STAGES}, got {self.stages}")
 

@@ -156,6 +156,7 @@ def test_float_is_the_same_to_its_rounding(export, tmp_path, system):
             "export: expected a new file, or one that was exported before, got out/mine.c",
         ),
         ((EXAMPLES / "driven_damped.toml", "--as", "c"), "chain.drive: a chain's drives cannot be exported"),
+        ((EXAMPLES / "balance.toml", "--as", "fmu"), "export: an FMU has no feedback that is sampled"),
         ((EXAMPLES / "natural_units.toml", "--as", "c"), 'export: chain.units: expected "SI", got "natural"'),
     ],
 )
