@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 from pathlib import Path
 
@@ -222,7 +223,7 @@ def _run_export(options: argparse.Namespace) -> None:
         what = f"--model {Path(options.model).name}{links_argument(model)}"
     values = Values(options.parameters, options.inputs, options.q, options.v, options.time, options.step)
     request = Request(options.name, options.language, options.number, options.stages, values, laws)
-    command = f"{what} --as {options.language} --name {options.name} --output ."
+    command = f"{what} {_export_words(options)} --output ."
     texts = render_export(kernel, request, command, options.space, file)
     files: dict[str, str | bytes] = {**texts}
     if options.language == "fmu":
@@ -232,6 +233,22 @@ def _run_export(options: argparse.Namespace) -> None:
         _require_own(path)
         write_atomically(path, content)
         print(path)
+
+
+def _export_words(options: argparse.Namespace) -> str:
+    """What an export was asked for, besides of what and where."""
+    words = [
+        f"--as {options.language} --name {options.name} --stages {options.stages} --number {options.number}"
+    ]
+    words += [
+        f"--{key}={shlex.quote(law)}" for key in ("feedback", "sampled") for law in getattr(options, key)
+    ]
+    for key in ("parameters", "inputs", "q", "v"):
+        numbers = getattr(options, key)
+        words += [f"--{key}={','.join(map(repr, numbers))}"] if numbers else []
+    words += [f"--time {options.time!r}"] if options.time else []
+    words += [f"--step {options.step!r}"] if options.step else []
+    return " ".join(words)
 
 
 def _require_own(path: Path) -> None:
