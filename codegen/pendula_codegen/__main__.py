@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 from pathlib import Path
 
 from pendula_codegen.backends.llvm import INSTRUCTION_SETS
+from pendula_codegen.chain import Chain
+from pendula_codegen.chain_kernel import ChainKernel
 from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.feedback import close_loops
+from pendula_codegen.export import LANGUAGES, Request, Values, render_export, require_size
+from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws
+from pendula_codegen.fmu import MARK, packed_fmu
 from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
-from pendula_codegen.links import LINKS
+from pendula_codegen.links import LINKS, find_link
 from pendula_codegen.model import Model, read_model
+from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.models import find_model
 from pendula_codegen.render import (
     Header,
     kernel_name,
+    links_argument,
     render_kernel,
     render_link,
     render_model,
@@ -107,6 +114,28 @@ def _parser() -> argparse.ArgumentParser:
     written.add_argument("--seed", required=True, type=int, help="of the points")
     written.set_defaults(run=_run_written)
 
+    export = commands.add_parser("export", help="a system in another program's language: NAME.h and NAME.c")
+    export.add_argument("--model", help="as of the command model")
+    export.add_argument("--space", help="of a chain, in place of a model")
+    export.add_argument("--links", type=int, help="as of the command model; of a chain, its number")
+    _add_feedback(export)
+    export.add_argument(
+        "--sampled",
+        action="append",
+        default=[],
+        help="LIMIT=INPUT=WORDS, a law of a controller: see feedback.py",
+    )
+    export.add_argument("--as", dest="language", choices=[*LANGUAGES], default="c")
+    export.add_argument("--name", required=True, help="what its names begin with")
+    export.add_argument("--number", default="double", help="double or float")
+    export.add_argument("--stages", type=int, default=2, help="of the Gauss step")
+    for name in ("parameters", "inputs", "q", "v"):
+        export.add_argument(f"--{name}", type=_numbers, help="numbers to begin with, with commas")
+    export.add_argument("--time", type=float, default=0.0, help="to begin with")
+    export.add_argument("--step", type=float, help="to begin with")
+    export.add_argument("--output", required=True, type=Path, help="a folder")
+    export.set_defaults(run=_run_export)
+
     what = commands.add_parser("describe", help="what a model has, as JSON")
     what.add_argument("--model", required=True, help="as of model")
     what.add_argument("--links", type=int, help="as of model")
@@ -178,6 +207,54 @@ def _fed_model(options: argparse.Namespace) -> Model:
         close_loops(model, options.feedback)
         model.system  # noqa: B018  the checks of the whole
     return model
+
+
+def _run_export(options: argparse.Namespace) -> None:
+    laws: list[SampledLaw] = []
+    if options.space is not None:
+        chain = Chain(find_link(options.space), 1 if options.links is None else options.links)
+        require_size(len(chain.coordinates))
+        kernel, file = ChainKernel(chain), None
+        what = f"--space {options.space} --links {chain.links}"
+    else:
+        model = _fed_model(options)
+        laws = sampled_laws(model, options.sampled)
+        kernel, file = ModelKernel(model), Path(model.file)
+        what = f"--model {Path(options.model).name}{links_argument(model)}"
+    values = Values(options.parameters, options.inputs, options.q, options.v, options.time, options.step)
+    request = Request(options.name, options.language, options.number, options.stages, values, laws)
+    command = f"{what} {_export_words(options)} --output ."
+    texts = render_export(kernel, request, command, options.space, file)
+    files: dict[str, str | bytes] = {**texts}
+    if options.language == "fmu":
+        files = {f"{options.name}.fmu": packed_fmu(options.name, texts)}
+    for name, content in files.items():
+        path = options.output / name
+        _require_own(path)
+        write_atomically(path, content)
+        print(path)
+
+
+def _export_words(options: argparse.Namespace) -> str:
+    """What an export was asked for, besides of what and where."""
+    words = [
+        f"--as {options.language} --name {options.name} --stages {options.stages} --number {options.number}"
+    ]
+    words += [
+        f"--{key}={shlex.quote(law)}" for key in ("feedback", "sampled") for law in getattr(options, key)
+    ]
+    for key in ("parameters", "inputs", "q", "v"):
+        numbers = getattr(options, key)
+        words += [f"--{key}={','.join(map(repr, numbers))}"] if numbers else []
+    words += [f"--time {options.time!r}"] if options.time else []
+    words += [f"--step {options.step!r}"] if options.step else []
+    return " ".join(words)
+
+
+def _require_own(path: Path) -> None:
+    """Only what was generated is written over."""
+    if path.exists() and MARK not in path.read_bytes():
+        raise GenerationError(f"export: expected a new file, or one that was exported before, got {path}")
 
 
 def _run_written(options: argparse.Namespace) -> None:

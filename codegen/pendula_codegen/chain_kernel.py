@@ -10,7 +10,8 @@ from sympy import Expr, Matrix, Rational, Symbol
 
 from pendula_codegen.blocks import Blocks, collect_blocks, recompose
 from pendula_codegen.chain import Chain
-from pendula_codegen.entry_points import Argument, Function, Output, Q, SystemKernel, V
+from pendula_codegen.entry_points import Argument, Declared, Function, Output, Q, SystemKernel, V
+from pendula_codegen.model import Coordinate, Input, Parameter
 from pendula_codegen.places import Place
 from pendula_codegen.vocabulary import Form, Leaf, Vocabulary
 
@@ -51,6 +52,31 @@ class ChainKernel(SystemKernel):
     @property
     def accelerations(self) -> tuple[Symbol, ...]:
         return self.chain.accelerations
+
+    @property
+    def declared(self) -> Declared:
+        chain, links = self.chain, self.chain.numbers
+        axes = [""] if self.input_rows == 1 else [f"_{axis}" for axis in "xyz"]
+        of_links = {
+            "masses": ("kg", chain.mass, None, True),
+            "lengths": ("m", chain.length, None, True),
+            "damping": ("N m s", chain.damping, 0.0, False),
+        }
+        parameters = [
+            Parameter(field, unit, tuple(map(of, links)), default, positive, per_link=True)
+            for field, (unit, of, default, positive) in of_links.items()
+        ]
+        gravity = Parameter("gravity", "m/s^2", (chain.model.gravity,), 9.81, positive=False, per_link=False)
+        return Declared(
+            coordinates=[Coordinate(q, "rad") for q in chain.coordinates],
+            parameters=[*parameters, gravity],
+            inputs=[Input(Symbol(f"torque_{i}{axis}"), "N m") for i in links for axis in axes],
+            points=[(f"bob_{i}", chain.model.dimension) for i in links],
+        )
+
+    @property
+    def input_rows(self) -> int:
+        return len(self.chain.model.torque)
 
     @property
     def points(self) -> tuple[Matrix, Matrix]:

@@ -20,6 +20,7 @@ from pendula_codegen.mechanics import (
     jacobian,
     time_slope,
 )
+from pendula_codegen.model import Coordinate, Input, Parameter
 from pendula_codegen.places import Place
 from pendula_codegen.program import Assignment, Program, shortest_program
 from pendula_codegen.vocabulary import Angle, Form, Leaf, Vocabulary
@@ -117,6 +118,16 @@ class Function:
         ]
 
 
+@dataclass(frozen=True)
+class Declared:
+    """What a system has: `points` by name and number of components."""
+
+    coordinates: list[Coordinate]
+    parameters: list[Parameter]
+    inputs: list[Input]
+    points: list[tuple[str, int]]
+
+
 V, Q, P, A = (Argument(name, "vector") for name in "vqpa")
 
 
@@ -144,6 +155,16 @@ class SystemKernel(ABC):
     @abstractmethod
     def leaves(self) -> list[Leaf]:
         """Parameters and inputs, and where they stand."""
+
+    @property
+    @abstractmethod
+    def declared(self) -> Declared:
+        """Names, units and defaults, in the order in which numbers stand."""
+
+    @property
+    def input_rows(self) -> int:
+        """Rows of the array of inputs, whose columns stand one after the other."""
+        return len(self.system.inputs)
 
     @property
     @abstractmethod

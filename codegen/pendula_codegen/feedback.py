@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import sympy
 from sympy import Expr
 
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.exact import MOST_DENOMINATOR
+from pendula_codegen.exact import MOST_DENOMINATOR, exact
 from pendula_codegen.model import Model, rate_name
 
 _SIGNS: dict[str, Callable[[Expr, Expr], Expr]] = {
@@ -39,6 +40,26 @@ def close_loops(model: Model, laws: Iterable[str]) -> None:
         if name not in inputs:
             raise GenerationError(f"feedback: expected an input of the model, got {name}")
         model.feed(inputs[name], _value(words, names))
+
+
+@dataclass(frozen=True)
+class SampledLaw:
+    """What a controller adds to an input, kept within ± limit."""
+
+    input: str
+    value: Expr
+    limit: float
+
+
+def sampled_laws(model: Model, laws: Iterable[str]) -> list[SampledLaw]:
+    """Of LIMIT=INPUT=WORDS each, words as close_loops takes them."""
+    names, found = _columns(model), []
+    for law in laws:
+        limit, name, words = law.split("=", 2)
+        if name not in {each.symbol.name for each in model.inputs}:
+            raise GenerationError(f"feedback: expected an input of the model, got {name}")
+        found.append(SampledLaw(name, exact(_value(words, names)), float(limit)))
+    return found
 
 
 def _exponent(value: Expr) -> Expr:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from pendula_codegen.tape import Row, Step, Tape, Value, triangle
 
 
-def slopes(tape: Tape, direction: Callable[[Row], Row | None]) -> dict[Value, Value]:
-    """The derivative of each value that changes where rows that are read do; direction(row) says how fast, in a row."""
+def slopes(
+    tape: Tape, direction: Callable[[Row], Value | None], steps: Sequence[Step] | None = None
+) -> dict[Value, Value]:
+    """The derivative of each value that changes where rows that are read do; direction(row) says how fast.
+
+    steps   of these alone; else of all that the tape has
+    """
     found = _Slopes(tape, direction)
-    for step in [*tape.steps]:
+    for step in [*tape.steps] if steps is None else steps:
         found.follow(step)
     return found.of
 
 
 class _Slopes:
-    def __init__(self, tape: Tape, direction: Callable[[Row], Row | None]):
+    def __init__(self, tape: Tape, direction: Callable[[Row], Value | None]):
         self.tape = tape
         self.direction = direction
         self.of: dict[Value, Value] = {}
@@ -26,7 +31,7 @@ class _Slopes:
         if step.operation == "read":
             along = self.direction(step.row)
             if along is not None:
-                self.of[step.first] = self.tape.read(along)
+                self.of[step.first] = along
         elif step.operation == "factor":
             self._matrices[step.first] = step.operands
         elif step.operation == "solve":
@@ -49,7 +54,9 @@ class _Slopes:
         return x if y is None else self.tape.subtract(x, y)
 
     def _times(self, factor: Value, slope: Value | None) -> Value | None:
-        return None if slope is None else self.tape.multiply(factor, slope)
+        if slope is None or self.tape.number_of(slope) == 1:
+            return None if slope is None else factor
+        return self.tape.multiply(factor, slope)
 
     # --- operations
 
@@ -70,13 +77,13 @@ class _Slopes:
 
     def _inverse(self, step: Step) -> None:
         square = self.tape.multiply(step.first, step.first)
-        self._set(step.first, self.tape.negative(self.tape.multiply(square, self.of[step.operands[0]])))
+        self._set(step.first, self.tape.negative(self._times(square, self.of[step.operands[0]])))
 
     def _sincos(self, step: Step) -> None:
         slope = self.of[step.operands[0]]
         sine, cosine = step.results
-        self._set(sine, self.tape.multiply(cosine, slope))
-        self._set(cosine, self.tape.negative(self.tape.multiply(sine, slope)))
+        self._set(sine, self._times(cosine, slope))
+        self._set(cosine, self.tape.negative(self._times(sine, slope)))
 
     def _solve(self, step: Step) -> None:
         """M x = b: the slope of x is that of what solves M x' = b' − M' x, with the same factors."""
@@ -97,7 +104,7 @@ class _Slopes:
 
     def _call(self, step: Step) -> None:
         (x,) = step.operands
-        self._set(step.first, self.tape.multiply(self._slope(step, x, step.first), self.of[x]))
+        self._set(step.first, self._times(self._slope(step, x, step.first), self.of[x]))
 
     def _slope(self, step: Step, x: Value, f: Value) -> Value:
         """f'(x) of a function of one argument."""

@@ -7,8 +7,8 @@ from functools import cached_property
 
 from sympy import Expr, Function, Matrix, Pow, acos, asin, cos, log, sin, tan
 
+from pendula_codegen.entry_points import Declared, Output, Q, SystemKernel, V
 from pendula_codegen.entry_points import Function as EntryPoint
-from pendula_codegen.entry_points import Output, Q, SystemKernel, V
 from pendula_codegen.mechanics import jacobian, time_slope
 from pendula_codegen.model import Model
 from pendula_codegen.places import Place
@@ -23,6 +23,12 @@ class ModelKernel(SystemKernel):
     def __init__(self, model: Model):
         super().__init__(model.system)
         self.model = model
+
+    @property
+    def declared(self) -> Declared:
+        model = self.model
+        points = [(point.name, len(point.components)) for point in model.points]
+        return Declared(model.coordinates, model.ordered_parameters, model.inputs, points)
 
     @cached_property
     def points(self) -> tuple[Matrix | None, Matrix | None]:

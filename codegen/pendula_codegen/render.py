@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import jinja2
-from sympy import Expr, Symbol
+from sympy import Expr
 
 from pendula_codegen import __version__
 from pendula_codegen.backends import cpp
@@ -56,35 +56,44 @@ KINDS = {
     "backends/bytecode.py": {"program"},
     "backends/c.py": {"program"},
     **{f"backends/{name}.py": {"program"} for name in ("llvm", "llvm_functions", "llvm_loops", "llvm_text")},
+    "backends/c99.py": {"export"},
     "backends/c_series.py": {"program"},
     "backends/cpp_series.py": {"kernel", "model"},
-    "blocks.py": {"kernel"},
-    "chain.py": {"kernel"},
-    "chain_kernel.py": {"kernel"},
-    "entry_points.py": {"kernel", "model", "program"},
-    "forward.py": {"program"},
+    "blocks.py": {"export", "kernel"},
+    "casadi_face.py": {"export"},
+    "chain.py": {"export", "kernel"},
+    "chain_kernel.py": {"export", "kernel"},
+    "entry_points.py": {"export", "kernel", "model", "program"},
+    "fmu.py": {"export"},
+    "forward.py": {"export", "program"},
     "kernel_program.py": {"program"},
-    "linear_solve.py": {"kernel", "model", "program"},
-    "mechanics.py": {"kernel", "model", "program"},
+    "linear_solve.py": {"export", "kernel", "model", "program"},
+    "mechanics.py": {"export", "kernel", "model", "program"},
+    "recording.py": {"export", "program"},
     "series.py": {"kernel", "model", "program"},
     "series_graph.py": {"kernel", "model", "program"},
     "series_next.py": {"kernel", "model", "program"},
     "series_start.py": {"kernel", "model", "program"},
     "series_tape.py": {"kernel", "model", "program"},
-    "simplify.py": {"kernel", "model", "program"},
+    "simplify.py": {"export", "kernel", "model", "program"},
     "system_info.py": {"kernel", "model", "program"},
     "table.py": {"program"},
-    "tape.py": {"kernel", "model", "program"},
+    "tape.py": {"export", "kernel", "model", "program"},
     "templates/kernel.hpp.j2": {"kernel", "model"},
     "comparison.py": set(),
-    "exact.py": {"model", "program"},
-    "model.py": {"model", "program"},
-    "model_kernel.py": {"model", "program"},
+    "export.py": {"export"},
+    "exact.py": {"export", "model", "program"},
+    "model.py": {"export", "model", "program"},
+    "model_kernel.py": {"export", "model", "program"},
     "link.py": {"link"},
     "templates/link.hpp.j2": {"link"},
-    "tableau.py": {"tableaux"},
+    "tableau.py": {"export", "tableaux"},
     "written.py": set(),
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
+    **{
+        f"templates/export{name}.j2": {"export"}
+        for name in (".c", ".h", "_solve.c", "_casadi.c", "_fmu.c", "_fmu.xml")
+    },
     **{
         f"templates/{name}.c.j2": {"program"}
         for name in ("kernel", "sincos", "exp", "log", "solve", "iterate", "series")
@@ -174,13 +183,8 @@ def render_chain(kernel: ChainKernel) -> Header:
     chain, model, n = kernel.chain, kernel.chain.model, kernel.chain.links
     name = kernel_name(model.name, n)
     plural = "" if n == 1 else "s"
-    axes = [""] if len(model.torque) == 1 else [f"_{axis}" for axis in "xyz"]
+    declared = kernel.declared
     number = len(chain.coordinates)
-    of_links = {
-        "masses": ("kg", chain.mass, None, True),
-        "lengths": ("m", chain.length, None, True),
-        "damping": ("N m s", chain.damping, 0.0, False),
-    }
     words = Words(
         name=name,
         model=model.name,
@@ -209,16 +213,10 @@ def render_chain(kernel: ChainKernel) -> Header:
             "coordinates": number,
             "torque_components": len(model.torque),
         },
-        coordinates=[Coordinate(q, "rad") for q in chain.coordinates],
-        parameters=[
-            *(
-                Parameter(field, unit, tuple(map(of, chain.numbers)), default, positive, per_link=True)
-                for field, (unit, of, default, positive) in of_links.items()
-            ),
-            Parameter("gravity", "m/s^2", (model.gravity,), 9.81, positive=False, per_link=False),
-        ],
-        inputs=[Input(Symbol(f"torque_{i}{axis}"), "N m") for i in chain.numbers for axis in axes],
-        points=[(f"bob_{i}", model.dimension) for i in chain.numbers],
+        coordinates=declared.coordinates,
+        parameters=declared.parameters,
+        inputs=declared.inputs,
+        points=declared.points,
         types={
             "LinkVector": cpp.matrix("links", 1),
             "LinkMatrix": cpp.matrix("links", "links"),
@@ -236,8 +234,9 @@ def render_chain(kernel: ChainKernel) -> Header:
 def render_model(model: Model, source: str, alias: str = "") -> Header:
     """The header of a model; `source` is how the banner names its file, `alias` a further name of its structure."""
     kernel = ModelKernel(model)
-    ordered = model.ordered_parameters
-    inputs, points = len(model.inputs), sum(len(p.components) for p in model.points)
+    declared = kernel.declared
+    ordered = declared.parameters
+    inputs, points = len(model.inputs), sum(count for _, count in declared.points)
     names = [c.symbol.name for c in model.coordinates]
     holds_time = depends_on_time(model)
     bases = [is_base for _, is_base in kernel.call_arguments]
@@ -267,7 +266,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
         coordinates=model.coordinates,
         parameters=ordered,
         inputs=model.inputs,
-        points=[(p.name, len(p.components)) for p in model.points],
+        points=declared.points,
         types={
             "Points": cpp.matrix("point_components", 1),
             "Inputs": cpp.matrix(inputs, 1),
@@ -369,7 +368,7 @@ def render_tableaux() -> Header:
     )
 
 
-def write_atomically(path: Path, text: str) -> None:
+def write_atomically(path: Path, text: str | bytes) -> None:
     """Writes the whole file or leaves what was there; raises GenerationError where it cannot write."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -379,8 +378,8 @@ def write_atomically(path: Path, text: str) -> None:
     except OSError as error:
         raise GenerationError(f"cannot write {path}: {error.strerror}") from error
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(text if isinstance(text, bytes) else text.encode())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     except OSError as error:

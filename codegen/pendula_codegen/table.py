@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import accumulate
-
-from sympy import Matrix
 
 from pendula_codegen.entry_points import Function
 from pendula_codegen.forward import slopes
 from pendula_codegen.model_kernel import ModelKernel
-from pendula_codegen.places import Place
-from pendula_codegen.program import Program
+from pendula_codegen.recording import Recorder
 from pendula_codegen.series_tape import SeriesTapes, series_tapes
-from pendula_codegen.tape import Row, Solved, Tape, Value
+from pendula_codegen.tape import Row, Tape
 
 CONDITIONS = ("parameters", "times", "inputs")  # what functions are taken at, whatever they are taken of
 
@@ -78,10 +74,8 @@ def kernel_table(kernel: ModelKernel) -> KernelTable:
 class _Tables:
     def __init__(self, kernel: ModelKernel):
         self._kernel = kernel
-        self._functions = {function.name: function for function in kernel.functions()}
-        sizes = {parameter.name: len(parameter.symbols) for parameter in kernel.model.ordered_parameters}
-        self._programs: dict[str, Program] = {}
-        self._parameters = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
+        self._recorder = Recorder(kernel)
+        self._functions = self._recorder.functions
 
     def table(self) -> KernelTable:
         composed = {
@@ -95,10 +89,8 @@ class _Tables:
                 return composed[name]()
             return self._one(self._functions[name]) if name in self._functions else None
 
-        leaves = (*self._kernel.leaves(), *self._kernel.motion())
-        names = {self._row(leaf.place): leaf.symbol.name for leaf in leaves}
-        series = series_tapes(self._kernel, self._row)
-        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, names, self._rows())
+        series = series_tapes(self._kernel, self._recorder.row)
+        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, self._recorder.names, self._rows())
 
     def _rows(self) -> dict[str, int]:
         system = self._kernel.system
@@ -110,14 +102,14 @@ class _Tables:
 
     def _one(self, function: Function) -> TableFunction:
         tape = Tape()
-        found = self._record(tape, function)
+        found = self._recorder.record(tape, function)
         gives = tuple(output.name for output in function.written)
         return TableFunction(function.name, _taken(function), gives, tape.give(found))
 
     def _energies(self) -> TableFunction:
         tape, found = Tape(), {}
         for name, given in (("kinetic_energy", "kinetic"), ("energy", "total")):
-            (value,) = self._record(tape, self._functions[name]).values()
+            (value,) = self._recorder.record(tape, self._functions[name]).values()
             found[given, 0] = value
         return TableFunction("energies", ("q", "v"), ("kinetic", "total"), tape.give(found))
 
@@ -131,9 +123,11 @@ class _Tables:
     def _along(self, name: str, moved: tuple[str, ...], by: tuple[str, ...], keep: bool) -> TableFunction:
         """A function's derivative where some arrays change by others; `keep`: with what it gives itself."""
         function, tape = self._functions[name], Tape()
-        found = self._record(tape, function)
+        found = self._recorder.record(tape, function)
         directions = dict(zip(moved, by, strict=True))
-        slope = slopes(tape, lambda row: (directions[row[0]], row[1]) if row[0] in directions else None)
+        slope = slopes(
+            tape, lambda row: tape.read((directions[row[0]], row[1])) if row[0] in directions else None
+        )
         changes = {
             (f"d{array}", k): slope[value] if value in slope else tape.number(0.0)
             for (array, k), value in found.items()
@@ -148,27 +142,6 @@ class _Tables:
             (*gives, *slopes_given) if keep else tuple(slopes_given),
             tape.give(found | changes if keep else changes),
         )
-
-    def _record(self, tape: Tape, function: Function) -> dict[Row, Value]:
-        solve = function.solve
-        solved = None if solve is None else Solved(solve.solution.name, len(solve.unknowns))
-        columns = {
-            output.name: output.value.cols
-            for output in function.written
-            if isinstance(output.value, Matrix) and output.type == "matrix"
-        }
-        if function.name not in self._programs:
-            self._programs[function.name] = self._kernel.program(function)
-        return tape.record(self._programs[function.name], lambda place: self._row(place, columns), solved)
-
-    def _row(self, place: Place, columns: Mapping[str, int] | None = None) -> Row:
-        """Where the number of a place stands."""
-        if place.field == "time":
-            return "times", 0
-        if place.field:
-            return place.argument, self._parameters[place.field] + sum(place.index)
-        width = (columns or {}).get(place.argument, 1)
-        return place.argument, sum(k * size for k, size in zip(place.index, (width, 1), strict=False))
 
 
 def _taken(function: Function) -> tuple[str, ...]:

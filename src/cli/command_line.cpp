@@ -97,6 +97,7 @@ CommandLine::CommandLine()
   add_linearize();
   add_pictures();
   add_models();
+  add_export();
   add_help();
 }
 
@@ -306,6 +307,31 @@ void CommandLine::add_models() {
   add_links(build, build_options.links);
 
   kernels = app.add_subcommand("kernels", "List the kernels of this build");
+}
+
+void CommandLine::add_export() {
+  ExportOptions& options = export_options;
+  exports = app.add_subcommand("export", "Write a system, and its Gauss step, as source for other people's programs");
+  takes_file(exports->add_option("WHAT", options.what,
+                                 "A model file (.py), a built-in model, a chain as planar:3, or a scenario (.toml), "
+                                 "whose numbers are then those to begin with"),
+             {".py", ".toml"})
+      ->required();
+  takes_words(exports->add_option("--as", options.language,
+                                  "c: C99, NAME.h and NAME.c; casadi: functions for CasADi and acados besides; fmu: "
+                                  "NAME.fmu, for simulators that know FMI 3.0"),
+              "LANGUAGE", {"c", "casadi", "fmu"})
+      ->required();
+  takes_file(exports->add_option("-o,--output", options.folder, "The folder for the files"), {"/"})->required();
+  exports->add_option("--name", options.name, "What names in it begin with; else that of the model")->type_name("NAME");
+  exports
+      ->add_option("--stages", options.stages,
+                   "Of the Gauss step, whose order is twice that; else the scenario's where it says its step, or 2")
+      ->type_name("S")
+      ->check(CLI::Range(1, 8));
+  exports->add_flag("--float", options.is_float, "Numbers are float, not double");
+  add_set(exports, options.overrides);
+  add_links(exports, options.links);
 }
 
 void CommandLine::add_help() {

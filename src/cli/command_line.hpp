@@ -45,6 +45,7 @@ struct CommandLine {
   CLI::App* map;
   CLI::App* gallery;
   CLI::App* lab;
+  CLI::App* exports;
   CLI::App* models;
   CLI::App* describe;
   CLI::App* new_model;
@@ -61,6 +62,7 @@ struct CommandLine {
   MapOptions map_options;
   std::string gallery_folder;
   LabOptions lab_options;
+  ExportOptions export_options;
   bool models_as_json = false;
   DescribeOptions describe_options;
   std::string model_name;
@@ -77,6 +79,7 @@ struct CommandLine {
   void add_linearize();
   void add_pictures();
   void add_models();
+  void add_export();
   void add_help();
   CLI::Option* takes(CLI::Option* option, const char* type, Expected what);
   CLI::Option* takes_file(CLI::Option* option, std::vector<std::string_view> endings);

@@ -110,6 +110,20 @@ struct LabOptions {
 /// Writes a page in which the motion is computed. Throws io::InputError, too, where this build has none.
 ExitStatus lab(const LabOptions& options);
 
+struct ExportOptions {
+  std::string what;                    ///< a model file, a built-in model, a chain as planar:3, or a scenario
+  std::vector<std::string> overrides;  ///< `key.path=value`, of a scenario
+  std::optional<int> links;            ///< of a model that has links
+  std::string language;                ///< "c", "casadi" or "fmu"
+  std::string folder;                  ///< where files go
+  std::string name;                    ///< what names begin with; empty for that of the model
+  std::optional<int> stages;           ///< of the Gauss step; else those of the scenario, or 2
+  bool is_float = false;               ///< numbers are float
+};
+
+/// Writes a system as the source of another program; prints the names of the files. Throws io::InputError.
+ExitStatus export_system(const ExportOptions& options);
+
 struct LyapunovOptions {
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`

@@ -16,7 +16,7 @@
 namespace pendula::cli {
 namespace {
 
-constexpr std::array<Example, 26> examples = {{
+constexpr std::array<Example, 28> examples = {{
     {"simulate", "pendula simulate examples/double_pendulum.toml -o run.csv", "write a trajectory, print a summary"},
     {"simulate", "pendula simulate examples/double_pendulum.toml --set run.accuracy=1e-12 --json",
      "with another accuracy; the summary as JSON"},
@@ -40,6 +40,9 @@ constexpr std::array<Example, 26> examples = {{
     {"map", "pendula map flips.h5 event_flip -o flips.png", "when an event happened, over the axes"},
     {"gallery", "pendula gallery out/gallery", "twelve striking motions; takes a few minutes"},
     {"lab", "pendula lab examples/double_pendulum.toml -o lab.html", "a page to take the pendulum in the hand"},
+    {"export", "pendula export planar:2 --as c -o out/c", "a chain of two links as C99"},
+    {"export", "pendula export examples/cart_chain.toml --as c --float -o out/c",
+     "a scenario, for a processor that has no double"},
     {"models", "pendula models", "what can stand in [system] model = \"...\""},
     {"describe", "pendula describe furuta", "coordinates, parameters, inputs and points, with units"},
     {"new-model", "pendula new-model spring", "writes spring.py, to be changed"},
@@ -158,8 +161,10 @@ std::string usage(const CLI::App& command) {
     text += option->get_required() ? ' ' + name : " [" + name + ']';
   }
   for (const CLI::Option* option : options_of(command)) {
-    if (option->get_required())
-      text += " -" + option->get_snames().front() + typed(*option).substr(typed(*option).rfind(' '));
+    if (!option->get_required()) continue;
+    const std::vector<std::string>& letters = option->get_snames();
+    const std::string name = letters.empty() ? " --" + option->get_lnames().front() : " -" + letters.front();
+    text += name + typed(*option).substr(typed(*option).rfind(' '));
   }
   return text;
 }

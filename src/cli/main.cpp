@@ -79,6 +79,7 @@ ExitStatus dispatch(CommandLine& line, const std::string& command) {
   if (*line.map) return map(line.map_options);
   if (*line.gallery) return gallery(line.gallery_folder);
   if (*line.lab) return lab(line.lab_options);
+  if (*line.exports) return export_system(line.export_options);
   if (*line.models) return models(line.models_as_json);
   if (*line.describe) return describe(line.describe_options);
   std::string commands;

@@ -187,7 +187,7 @@ def test_an_option_that_the_runtime_turns_away_is_told_at_its_place(pendula, dou
             [],
             "",
             "expected a command: simulate, ensemble, lyapunov, linearize, plot, map, gallery, lab, models, describe, "
-            "new-model, check, build, kernels, help, completion",
+            "new-model, check, build, kernels, export, help, completion",
         ),
         (["simlate"], "", "unknown command simlate (did you mean simulate?)"),
         (["--versoin"], "", "unknown option --versoin (did you mean --version?)"),

@@ -22,7 +22,7 @@ def examples(text: str) -> list[str]:
 
 
 def test_every_command_has_help_and_examples(pendula):
-    assert len(commands(pendula)) == 16
+    assert len(commands(pendula)) == 17
     for command in commands(pendula):
         text = pendula("help", command).out
         assert f"\nUsage: pendula {command}" in text

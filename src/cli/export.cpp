@@ -1,0 +1,203 @@
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <pendula/numeric/number_text.hpp>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "io/generator.hpp"
+#include "io/input_error.hpp"
+#include "io/kernel_cache.hpp"
+#include "io/scenario.hpp"
+#include "io/toolchain.hpp"
+
+namespace pendula::cli {
+namespace {
+
+using Words = std::vector<std::string>;
+
+/// `--key=1,2,3`.
+template <class Numbers>
+void add_numbers(Words& words, const std::string& key, const Numbers& numbers) {
+  std::string text = "--" + key + '=';
+  const char* comma = "";
+  for (const double number : numbers) {
+    text += comma + shortest(number);
+    comma = ",";
+  }
+  words.push_back(text);
+}
+
+void add_number(Words& words, const std::string& key, double number) {
+  words.push_back("--" + key + '=' + shortest(number));
+}
+
+[[noreturn]] void refuse(const std::string& scenario, const std::string& what) {
+  throw io::InputError(scenario + ": export: " + what);
+}
+
+/// `space:links` as arguments of the generator; nothing if it is no chain.
+std::optional<Words> chain_words(const std::string& what, const std::optional<int>& links) {
+  const std::size_t colon = what.find(':');
+  const std::string space = what.substr(0, colon);
+  if (space != "planar" && space != "spatial") return std::nullopt;
+  const std::string number = colon != std::string::npos ? what.substr(colon + 1) : links ? std::to_string(*links) : "";
+  if (number.empty() || number.size() > 4 || number.find_first_not_of("0123456789") != std::string::npos) {
+    throw io::InputError("export: expected a chain as " + space + ":3, got " + what);
+  }
+  return Words{"--space", space, "--links", number};
+}
+
+/// A sine that is added to an input, in the words of the generator's feedback.py.
+io::InputLaw law_of(const InputSine& sine, const SystemInfo& info) {
+  const std::string of_time = shortest(sine.frequency) + " t * " + shortest(sine.phase) + " + sin()";
+  return {std::string(info.inputs[static_cast<std::size_t>(sine.input)]),
+          of_time + ' ' + shortest(sine.amplitude) + " *"};
+}
+
+void add_start(Words& words, const Motion& start) {
+  add_numbers(words, "q", start.q);
+  add_numbers(words, "v", start.v);
+  add_number(words, "time", start.time);
+}
+
+template <class Space>
+Words scenario_words(const io::Scenario<Space>& scenario, const std::string& file) {
+  const Chain<Space>& chain = scenario.chain;
+  if (scenario.natural) refuse(file, "chain.units: expected \"SI\", got \"natural\"");
+  if (!scenario.feedback.empty()) refuse(scenario.feedback.front().place, "a chain's feedback cannot be exported");
+  if (!chain.drives().empty()) refuse(file, "chain.drive: a chain's drives cannot be exported");
+  Words words = {"--space", Space::dof == 1 ? "planar" : "spatial", "--links", std::to_string(chain.links())};
+  std::vector<double> parameters(chain.masses().begin(), chain.masses().end());
+  parameters.insert(parameters.end(), chain.lengths().begin(), chain.lengths().end());
+  parameters.insert(parameters.end(), chain.damping().begin(), chain.damping().end());
+  parameters.push_back(chain.gravity());
+  const auto& torque = chain.constant_torque();
+  add_numbers(words, "parameters", parameters);
+  add_numbers(words, "inputs", std::span(torque.data(), static_cast<std::size_t>(torque.size())));
+  add_start(words, scenario.start);
+  return words;
+}
+
+/// The laws of a controller, which has one time from one sample to the next.
+std::vector<io::FeedbackPlan> sampled_plans(const io::SystemScenario& scenario) {
+  std::vector<io::FeedbackPlan> plans;
+  for (const io::FeedbackPlan& plan : scenario.feedback) {
+    if (plan.sample == 0) continue;
+    if (!plans.empty() && plan.sample != plans.front().sample) {
+      refuse(plan.place, "expected one sample time of all feedback, got another one");
+    }
+    plans.push_back(plan);
+  }
+  return plans;
+}
+
+Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, const io::Toolchain& toolchain) {
+  const std::vector<io::FeedbackPlan> sampled = sampled_plans(scenario);
+  const SystemNumbers& numbers = scenario.system->numbers();
+  for (const InputSine& sine : numbers.sines) model.laws.push_back(law_of(sine, scenario.system->info()));
+  Words words = io::about("export", model, toolchain);
+  words.erase(words.begin());
+  for (const io::FeedbackPlan& plan : sampled) {
+    io::FeedbackPlan law = plan;
+    law.sample = 0;
+    const io::InputLaw read = io::continuous_laws({law}, *scenario.system).front();
+    words.push_back("--sampled=" + (std::isfinite(plan.limit) ? shortest(plan.limit) : "inf") + '=' + read.input + '=' +
+                    read.value);
+  }
+  add_numbers(words, "parameters", numbers.parameters);
+  add_numbers(words, "inputs", numbers.inputs);
+  add_start(words, scenario.start);
+  return words;
+}
+
+/// The time from one sample to the next; else the constant step; nothing if there is neither.
+std::optional<double> step_of(const io::RunPlan& plan) {
+  for (const io::FeedbackPlan& feedback : plan.feedback) {
+    if (feedback.sample > 0) return feedback.sample;
+  }
+  return plan.run.method == Method::gauss && plan.run.step > 0 ? std::optional(plan.run.step) : std::nullopt;
+}
+
+/// What the generator is told of a scenario.
+Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
+  toolchain.kernels_by = "interpreter";  // nothing runs
+  std::optional<io::ModelName> model;
+  const io::FindSystem find = [&](const io::ModelName& name) {
+    model = name;
+    return io::find_kernel(name, toolchain, [](const std::string&) {}).table;
+  };
+  const io::ScenarioText text = io::read_scenario_text(options.what);
+  const io::AnyScenario scenario = io::parse_scenario(text.text, text.name, options.overrides, find);
+  return std::visit(
+      [&](const auto& found) {
+        Words words;
+        if constexpr (requires { found.chain; }) {
+          words = scenario_words(found, text.name);
+        } else {
+          words = scenario_words(found, *model, toolchain);
+        }
+        if (!found.events.empty()) std::cerr << "pendula: warning: events are not exported\n";
+        if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
+        if (found.run.method == Method::gauss && found.run.step > 0) {
+          if (!options.stages) add_number(words, "stages", found.run.stages);
+        }
+        return words;
+      },
+      scenario);
+}
+
+/// What names begin with where nothing says so.
+std::string default_name(const ExportOptions& options) {
+  if (options.what.ends_with(".toml")) return std::filesystem::path(options.what).stem().string();
+  const std::string stem = std::filesystem::path(options.what).stem().string();
+  const std::size_t colon = stem.find(':');
+  if (colon != std::string::npos) return stem.substr(0, colon) + '_' + stem.substr(colon + 1);
+  return options.links ? stem + '_' + std::to_string(*options.links) : stem;
+}
+
+/// Refuses options of another kind of system.
+void require_fitting(const ExportOptions& options) {
+  const bool is_scenario = options.what.ends_with(".toml");
+  if (!is_scenario && !options.overrides.empty()) {
+    throw io::InputError("export: --set: expected a scenario (.toml), got " + options.what);
+  }
+  if (options.links && (is_scenario || options.what.find(':') != std::string::npos)) {
+    throw io::InputError("export: --links: expected a model or the name of a space, got " + options.what);
+  }
+}
+
+}  // namespace
+
+ExitStatus export_system(const ExportOptions& options) {
+  require_fitting(options);
+  const io::Toolchain toolchain = io::Toolchain::of_this_program();
+  try {
+    Words words;
+    if (options.what.ends_with(".toml")) {
+      words = scenario_words(options, toolchain);
+    } else if (std::optional<Words> chain = chain_words(options.what, options.links)) {
+      words = *chain;
+    } else {
+      words = io::about("export", {options.what, options.links}, toolchain);
+      words.erase(words.begin());
+    }
+    words.insert(words.begin(), "export");
+    words.insert(words.end(), {"--as", options.language, "--output", options.folder, "--name",
+                               options.name.empty() ? default_name(options) : options.name});
+    if (options.stages) words.insert(words.end(), {"--stages", std::to_string(*options.stages)});
+    if (options.is_float) words.insert(words.end(), {"--number", "float"});
+    std::cout << io::run_generator(words, toolchain);
+  } catch (const io::ModelError& error) {
+    throw io::InputError(error.what());
+  }
+  return done;
+}
+
+}  // namespace pendula::cli
