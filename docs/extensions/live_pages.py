@@ -9,12 +9,14 @@ from typing import ClassVar
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "plotting"))
-from pendula_plot.gallery import CASES, Case  # noqa: E402
+from pendula_plot.film import Film  # noqa: E402
+from pendula_plot.gallery import CASES, FPS, SIZE, Case, runs_of  # noqa: E402
 
 
 def pendula(*arguments: str) -> subprocess.CompletedProcess:
@@ -38,13 +40,16 @@ def write_lab(folder: Path) -> bool:
 
 def require(done: subprocess.CompletedProcess) -> None:
     if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(done.args)}: {done.stderr.strip()}")
+        raise ExtensionError(f"{' '.join(done.args)}: {done.stderr.strip()}")
 
 
 def write_case(folder: Path, case: Case) -> None:
+    """The page of one motion of the gallery, and a picture that leads there."""
     copies = ["--copies", str(case.copies)] if case.copies else []
     scenario = f"examples/{case.scenario}.toml"
     require(pendula("simulate", scenario, "--quiet", "--view", str(folder / f"{case.name}.html"), *copies))
+    runs = runs_of(os.environ["PENDULA_PROGRAM"], ROOT / scenario, case)
+    Film(runs, FPS, SIZE).still().save(folder / f"{case.name}.png", optimize=True)
 
 
 def write_pages(app: Sphinx) -> None:
@@ -82,7 +87,9 @@ class Gallery(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         up = "../" * self.env.docname.count("/")
         cards = "".join(
-            f'<li><a href="{up}live/{case.name}.html">{case.title}</a><p>{case.text}</p></li>'
+            f'<li><a href="{up}live/{case.name}.html">'
+            f'<img src="{up}live/{case.name}.png" width="{SIZE}" height="{SIZE}" loading="lazy" alt="">'
+            f"{case.title}</a><p>{case.text}</p></li>"
             for case in CASES
         )
         return [nodes.raw("", f'<ul class="motions">{cards}</ul>', format="html")]

@@ -33,7 +33,7 @@ def commands() -> list[str]:
 
 def text(words: str, classes: Sequence[str] = ()) -> nodes.paragraph:
     """A paragraph; what stands in backquotes is code."""
-    paragraph = nodes.paragraph(classes=list(classes))
+    paragraph = nodes.paragraph(classes=list(classes), support_smartquotes=False)
     for k, part in enumerate(words.split("`")):
         if part:
             paragraph += nodes.literal(part, part) if k % 2 else nodes.Text(part)
@@ -112,6 +112,8 @@ class ScenarioKeys(Told):
         name = self.arguments[0]
         schema = told("help", "scenario")
         for part in name.split("."):
+            if part not in schema["properties"]:
+                raise self.error(f"scenario-keys: expected a table of scenarios, got {name}")
             schema = schema["properties"][part]
             schema = schema.get("items", schema)
         rows = [
