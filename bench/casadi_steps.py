@@ -1,4 +1,4 @@
-"""Exported steps against the same Gauss method as CasADi generates it: the table of docs/export.md.
+"""Exported steps against the same Gauss method as CasADi generates it: the table of docs/reference/export.md.
 
 usage: python bench/casadi_steps.py PENDULA [FLAGS...]
 

@@ -498,14 +498,14 @@ def simplified(figures: Figures) -> str:
 def work_precision(figures: Figures) -> str:
     """The picture of the races, once there is one."""
     text = "Time against error of the final state: the double pendulum, ten links, a hundred"
-    return f"![{text}](images/work_precision.svg)" if figures.races else ""
+    return f"![{text}](../images/work_precision.svg)" if figures.races else ""
 
 
 def scaling(figures: Figures) -> str:
     """The picture of the chain solver's costs, once there is one."""
     measured = any(name.startswith("chain/") for name in figures.benchmarks)
     text = "Cost of a link and iteration against the number of links"
-    return f"![{text}](images/scaling.svg)" if measured else ""
+    return f"![{text}](../images/scaling.svg)" if measured else ""
 
 
 TABLES: dict[str, Callable[[Figures], str]] = {

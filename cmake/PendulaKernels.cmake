@@ -5,7 +5,7 @@
 include_guard(GLOBAL)
 include("${CMAKE_CURRENT_LIST_DIR}/PendulaPython.cmake")
 
-# The committed kernels are derived in seconds, spatial:8 in 18 (docs/generation.md); time and code grow faster than the
+# The committed kernels are derived in seconds, spatial:8 in 18 (docs/reference/generation.md); time and code grow faster than the
 # square of the links, and long chains need no kernel. So a slip of the keyboard is told, not generated for ever.
 set(PENDULA_MAX_KERNEL_LINKS 32 CACHE STRING "Most links that a fixed-n kernel is made for")
 mark_as_advanced(PENDULA_MAX_KERNEL_LINKS)

@@ -8,7 +8,7 @@ foreach(file IN LISTS candidates)
     list(APPEND scripts "${file}")
   endif()
 endforeach()
-set(elsewhere --config codegen/pyproject.toml plotting python tests cmake ${scripts})
+set(elsewhere --config codegen/pyproject.toml plotting python tests cmake docs ${scripts})
 
 # The generator is a package of its own: its imports are sorted as seen from its folder.
 set(status 0)

@@ -1,6 +1,6 @@
 """Each line of the paper that is wrong: the printed formula fails, the true one holds.
 
-docs/errata.md shows ERRATA; a test keeps the two the same.
+docs/explanation/errata.md shows ERRATA; a test keeps the two the same.
 """
 
 import re
@@ -163,7 +163,7 @@ def test_printed_formula_fails_and_true_one_holds(erratum):
 
 
 def test_document_shows_every_erratum_and_no_other():
-    text = (REPOSITORY / "docs" / "errata.md").read_text(encoding="utf-8")
+    text = (REPOSITORY / "docs/explanation/errata.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if re.match(r"\| \(|\| §", line)]
-    link = "[{0}](../codegen/tests/test_errata.py)"
+    link = "[{0}](../../codegen/tests/test_errata.py)"
     assert rows == [f"| {e.where} | {e.printed} | {e.true} | {link.format(e.name)} |" for e in ERRATA]

@@ -62,7 +62,13 @@ def lines(file: str) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "file", ["codegen/requirements.txt", "codegen/requirements-dev.txt", "bench/requirements.txt"]
+    "file",
+    [
+        "codegen/requirements.txt",
+        "codegen/requirements-dev.txt",
+        "bench/requirements.txt",
+        "docs/requirements.txt",
+    ],
 )
 def test_setup_installs_known_versions_of_all_that_is_needed(file):
     installed, needed = lines("scripts/constraints.txt"), lines(file)

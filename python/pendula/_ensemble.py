@@ -92,7 +92,7 @@ def ensemble(
     Returns
     -------
     xarray.Dataset
-        Over the axes, or over ``member``; names, units and attributes as in the file (docs/ensembles.md):
+        Over the axes, or over ``member``; names, units and attributes as in the file (docs/reference/ensembles.md):
         ``status`` is 0 of members that came to their end, ``trusted`` 1 or 0 of those that were looked at again, else
         -1. With ``shard`` members that are not done have status -1, and the attribute ``complete`` is 0 until all are.
 

@@ -67,13 +67,16 @@ def map(
     errors = importlib.import_module("pendula_plot.errors")
     try:
         shown = _of(drawing, data, key, line)
+        # Before the style is in force: the first figure chooses a backend, and what that sets has to stay, or else a
+        # notebook shows no figure after this one.
+        figure = plt.figure(layout="constrained") if axes is None else axes.figure
         with drawing.style(), errors.told_of_numbers("data"):
             if axes is None:
-                axes = plt.figure(layout="constrained").add_subplot()
+                axes = figure.add_subplot()
             if len(shown.axes) == 1:
                 drawing.draw_curve(axes, shown, choice)
             else:
-                drawing.draw_map(axes.figure, axes, shown, choice)
+                drawing.draw_map(figure, axes, shown, choice)
     except errors.PlotError as error:
         raise InputError(str(error)) from None
     return axes

@@ -38,7 +38,7 @@ def test_examples_of_docstrings(module):
     assert doctest.testmod(module).failed == 0
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/ensembles.md"])
+@pytest.mark.parametrize("name", ["README.md", "docs/index.md", "docs/reference/ensembles.md"])
 def test_the_pages_show_what_happens(name):
     page = (Path(__file__).parents[2] / name).read_text()
     [session] = re.findall(r"^```pycon\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
@@ -47,7 +47,7 @@ def test_the_pages_show_what_happens(name):
 
 
 def test_the_page_about_python_is_a_script(tmp_path):
-    page = (Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    page = (Path(__file__).parents[2] / "docs/how-to/python.md").read_text()
     script = tmp_path / "page.py"
     script.write_text("\n".join(re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)))
     found = {**os.environ, "PYTHONPATH": str(Path(pendula.__file__).parents[1])}

@@ -116,3 +116,22 @@ def test_a_run_of_some_seconds_has_a_bar(monkeypatch):
         ImportError, match=r"progress: expected tqdm, got none \(pip install pendula\[progress\]\)"
     ):
         pendula.Chain(links=2).simulate(0.1, theta=1.0, progress=True)
+
+
+def test_a_map_leaves_the_backend_as_it_is(tmp_path):
+    """That of notebooks turns interaction on when the first figure chooses it; off, no later figure is shown."""
+    (tmp_path / "of_notebooks.py").write_text(
+        "import matplotlib\nfrom matplotlib.backends.backend_agg import *\nmatplotlib.interactive(True)\n"
+    )
+    script = (
+        "import matplotlib, pendula\n"
+        "data = pendula.ensemble(pendula.Chain(links=1), 0.1, {'theta': ([0.1, 0.2],)})\n"
+        "pendula.map(data, 'theta_1')\n"
+        "assert matplotlib.get_backend() == 'module://of_notebooks' and matplotlib.is_interactive()\n"
+    )
+    paths = [str(tmp_path), str(Path(pendula.__file__).parents[1])]
+    subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(paths), "MPLBACKEND": "module://of_notebooks"},
+        check=True,
+    )

@@ -26,7 +26,7 @@ namespace pendula::io {
 void write_saved_run(const std::string& file, const RunOrigin& origin, const Checkpoint& checkpoint);
 
 /// A run as an HDF5 file: quantities with units, the scenario, and a checkpoint. It can be read at any time; a killed
-/// program loses at most the rows of the last two seconds. docs/run-file.md.
+/// program loses at most the rows of the last two seconds. docs/reference/run-file.md.
 class RunFile : public RowsFile {
  public:
   /// Begins a file beside `name`, which replaces it once it can be read. Throws InputError if `name` cannot be written,

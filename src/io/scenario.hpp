@@ -75,7 +75,8 @@ using FindSystem = std::function<std::shared_ptr<const SystemTable>(const ModelN
 std::shared_ptr<const SystemTable> built_in_system(const ModelName& model);
 
 /// Reads a scenario from TOML text; `name` stands for the file in messages. Each override is `key.path=value`, the
-/// value in TOML, or a bare word for a string; it replaces what the text says. Keys and defaults: docs/scenario.md.
+/// value in TOML, or a bare word for a string; it replaces what the text says. Keys and defaults:
+/// docs/reference/scenario.md.
 /// Throws InputError with a message `name:line: key: expected …, got …`, or `--set key.path=value: key: …`.
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
                            const FindSystem& find = built_in_system);

@@ -61,6 +61,8 @@ Json key_schema(const ScenarioKey& key, const std::string& name) {
   Json schema = value_schema(key, name);
   schema["description"] = key.hint;
   if (!key.unit.empty()) schema["x-unit"] = key.unit;
+  schema["x-type"] = type_text(key);
+  schema["x-default"] = default_text(key);
   std::visit(
       [&](const auto& value) {
         using Value = std::decay_t<decltype(value)>;

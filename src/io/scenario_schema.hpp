@@ -4,7 +4,7 @@
 
 namespace pendula::io {
 
-/// The JSON Schema of scenarios, for editors and for the tests of docs/scenario.md.
+/// The JSON Schema of scenarios, for editors and for the tests of docs/reference/scenario.md.
 std::string scenario_schema();
 
 }  // namespace pendula::io

@@ -5,7 +5,8 @@
 namespace pendula {
 
 /// The solver that `solver = "auto"` selects. Only the dense solver has the velocity form. For few links in the plane
-/// it is the faster one with fixed-point iteration, on every instruction set (table "few links" in docs/benchmarks.md).
+/// it is the faster one with fixed-point iteration, on every instruction set (table "few links" in
+/// docs/reference/benchmarks.md).
 /// In space a generated kernel cannot pass a pole, so the chain solver is selected.
 template <class Space>
 Solver solver_for(int links, const RunOptions& options, bool has_kernel) {

@@ -56,8 +56,8 @@ bool lab_leaves_out_damping(const Chain<Space>& chain) {
 bool has_lab();
 
 /// The page of a laboratory, in which motion is computed: one HTML file that needs nothing else. `start` is what it
-/// begins with (docs/laboratory.md): "title", and "state", the words of a link; of a model besides "program" and
-/// "model".
+/// begins with (docs/reference/laboratory.md): "title", and "state", the words of a link; of a model besides
+/// "program" and "model".
 std::string lab_page(const nlohmann::json& start);
 
 }  // namespace pendula::view

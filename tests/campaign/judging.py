@@ -97,7 +97,8 @@ def limits(run: dict, growth: np.ndarray, ensemble: bool = False) -> np.ndarray:
         return np.full(len(growth), asked)
     if kind == "accuracy":
         return np.full(len(growth), min(ROOM_FOR_ACCURACY * asked, NOTHING_ASKED))
-    # A run tells what error it expects. Members do not: of those by explicit methods docs/ensembles.md promises this.
+    # A run tells what error it expects. Members do not: of those by explicit methods docs/reference/ensembles.md
+    # promises this.
     if ensemble and run.get("method") in ADAPTIVE:
         return np.full(len(growth), NOTHING_ASKED)
     method = run.get("method", "auto")

@@ -64,7 +64,7 @@ class Moment:
 
 
 def read(scenario: dict) -> Chain:
-    """A scenario as docs/scenario.md describes it."""
+    """A scenario as docs/reference/scenario.md describes it."""
     chain, start = scenario["chain"], scenario["start"]
     spatial = chain["space"] == "spatial"
     arrays = [*chain.values(), *start.values()]

@@ -441,7 +441,7 @@ def test_a_run_that_goes_on_is_looked_at_anew(pendula, scenario, tmp_path):
 
 
 def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monkeypatch):
-    page = Path(__file__).parents[2] / "docs/run-file.md"
+    page = Path(__file__).parents[2] / "docs/reference/run-file.md"
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     assert len(blocks) == 2
     assert pendula("simulate", scenario(DOUBLE), "-o", "run.h5").status == 0

@@ -1,4 +1,4 @@
-"""docs/export.md, block by block. `python tests/export/test_documentation.py` writes what its commands print now."""
+"""docs/reference/export.md, block by block. `python tests/export/test_documentation.py` writes what its commands print now."""
 
 import os
 import re
@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT / "tests/readme"))
 
 import readme  # noqa: E402
 
-PAGE = ROOT / "docs/export.md"
+PAGE = ROOT / "docs/reference/export.md"
 BLOCK = re.compile(r"```(console|c)\n(.*?)```", re.DOTALL)
 SECTION = re.compile(r"^## (.*?)\n.*?(?=^## |\Z)", re.DOTALL | re.MULTILINE)
 # What a section takes besides a C compiler.

@@ -1,4 +1,4 @@
-"""docs/your-own-model.md from its first block to its last."""
+"""docs/reference/model-file.md from its first block to its last."""
 
 import json
 import re
@@ -7,7 +7,7 @@ import subprocess
 import pytest
 from conftest import ROOT
 
-PAGE = (ROOT / "docs" / "your-own-model.md").read_text()
+PAGE = (ROOT / "docs/reference/model-file.md").read_text()
 
 
 def blocks(language: str) -> list[str]:

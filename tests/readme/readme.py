@@ -1,6 +1,8 @@
-"""The README's commands, typed into a shell: what they print now, and whether that is what the README shows.
+"""Commands of the README and of docs/, typed into a shell: what they print now, and whether that is what a page shows.
 
-`python tests/readme/readme.py` writes the present output into the README; test_readme.py compares.
+`python tests/readme/readme.py` writes the present output into the pages; test_readme.py compares. A block of the
+language `console` has commands after `$ ` and their output. The calls of `pendula` in blocks of the language `sh` are
+run as well, those of a page one after the other; what they print is not shown.
 Environment: PENDULA_PROGRAM, the program to run; PENDULA_BUILD, the build folder whose tests are counted.
 """
 
@@ -16,6 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
+PAGES = [README, *sorted((ROOT / "docs").rglob("*.md"))]
 ELLIPSIS = "…"  # on a line of its own: lines left out
 CONSOLE = re.compile(r"```console\n(.*?)```", re.DOTALL)
 
@@ -38,7 +41,19 @@ class Session:
 
 
 def sessions() -> list[Session]:
-    return [Session.parse(block) for block in CONSOLE.findall(README.read_text())]
+    return [Session.parse(block) for page in PAGES for block in CONSOLE.findall(page.read_text())]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    fences = re.finditer(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
+    return [fence[2] for fence in fences if fence[1] == language]
+
+
+def calls(page: Path) -> list[str]:
+    """Those of the program whose output is not shown."""
+    return [
+        line for block in blocks(page, "sh") for line in block.splitlines() if line.startswith("pendula ")
+    ]
 
 
 def program() -> str:
@@ -77,11 +92,12 @@ def run_pendula(commands: list[str], check: bool = False) -> list[str]:
 
 
 def run_demo(commands: list[str]) -> list[str]:
-    """What the demo says from the program's call on; what comes before that differs by machine."""
+    """The program's call and what it ends with; what comes before the call differs by machine."""
     done = subprocess.run(shlex.split(commands[0]), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     lines = done.stdout.rstrip("\n").split("\n")
-    start = next(i for i, line in enumerate(lines) if line.startswith("+ build/release/bin/pendula"))
-    return [ELLIPSIS, *lines[start:]]
+    [call] = [line for line in lines if line.startswith("+ build/release/bin/pendula")]
+    end = next(i for i, line in enumerate(lines) if line.startswith("energy at start"))
+    return [ELLIPSIS, call, ELLIPSIS, *lines[end:]]
 
 
 def set_path(commands: list[str]) -> list[str]:
@@ -94,10 +110,10 @@ def set_path(commands: list[str]) -> list[str]:
 def count_tests(_: list[str]) -> list[str]:
     """The line that ctest ends with when every test of the build passes: this runs inside one of them.
 
-    Without that of the laboratory, which takes a compiler that scripts/test does not install.
+    Without those of the laboratory and of the site, which take what scripts/test does not install.
     """
     listed = subprocess.run(
-        ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N", "-E", "^lab$"],
+        ["ctest", "--test-dir", os.environ["PENDULA_BUILD"], "-N", "-E", "^(lab|site)$"],
         stdout=subprocess.PIPE,
         text=True,
         check=True,
@@ -161,7 +177,8 @@ def write() -> None:
         session = Session.parse(match[1])
         return f"```console\n{session.text(output(session))}```"
 
-    README.write_text(CONSOLE.sub(refreshed, README.read_text()))
+    for page in PAGES:
+        page.write_text(CONSOLE.sub(refreshed, page.read_text()))
 
 
 if __name__ == "__main__":

@@ -1,39 +1,42 @@
-"""What the README shows is what its commands print, and its code is code that is compiled and run."""
+"""What the README and docs/ show is what their commands print; what they do not show runs."""
 
 import json
 import re
 import struct
 import subprocess
 from base64 import b64decode
+from pathlib import Path
 
 import pytest
 
 import readme
 
-
-def blocks(language: str) -> list[str]:
-    fences = re.finditer(r"^```(\w*)\n(.*?)^```$", readme.README.read_text(), re.DOTALL | re.MULTILINE)
-    return [fence[2] for fence in fences if fence[1] == language]
+TOUR = readme.ROOT / "docs/how-to/command-line.md"
+WITH_CALLS = [page for page in readme.PAGES if readme.calls(page)]
 
 
 def test_the_scenario_runs(tmp_path) -> None:
-    [scenario] = blocks("toml")
+    [scenario] = readme.blocks(TOUR, "toml")
     file = tmp_path / "scenario.toml"
     file.write_text(scenario)
     subprocess.run([readme.program(), "simulate", file, "--quiet"], check=True)
 
 
-def test_commands_without_their_output_run() -> None:
-    commands = [line for block in blocks("") for line in block.splitlines() if line.startswith("pendula ")]
-    assert len(commands) > 3
-    readme.run_pendula(commands, check=True)
+def test_there_are_pages_with_calls() -> None:
+    assert TOUR in WITH_CALLS and len(WITH_CALLS) > 10
+
+
+@pytest.mark.parametrize("page", WITH_CALLS, ids=lambda page: page.stem)
+def test_calls_without_their_output_run(page: Path) -> None:
+    readme.run_pendula(readme.calls(page), check=True)
 
 
 def test_the_copies_part() -> None:
-    """What the README says of them is to be seen in their page."""
-    [command] = re.findall(r"^pendula .* --copies \d+$", readme.README.read_text(), re.MULTILINE)
-    [page] = re.findall(r"--view (\S+)", command)
-    text = "\n".join(readme.run_pendula([command, f"cat {page}"], check=True))
+    """What is said of them is to be seen in their page."""
+    page = readme.ROOT / "docs/how-to/share.md"
+    [command] = re.findall(r"^pendula .* --copies \d+$", page.read_text(), re.MULTILINE)
+    [view] = re.findall(r"--view (\S+)", command)
+    text = "\n".join(readme.run_pendula([command, f"cat {view}"], check=True))
     [scene] = re.findall(r'<script type="application/json" id="scene">(.*?)</script>', text)
     run = json.loads(scene)["runs"][-1]
     assert run["separation"] and not run["steps"]  # which would stand behind it
@@ -41,16 +44,6 @@ def test_the_copies_part() -> None:
     apart = struct.unpack(f"<{run['rows']}f", rows[-4 * run["rows"] :])
     assert apart[0] < 1e-6
     assert max(apart[: 2 * len(apart) // 3]) < 1 < max(apart)  # m; measured 0.32 by 8 of 12 s, and 4.4
-
-
-def test_the_program_is_the_example_that_is_compiled() -> None:
-    [program] = blocks("cpp")
-    assert program in (readme.ROOT / "examples/double_pendulum.cpp").read_text()
-
-
-def test_the_cmake_lines_are_the_consumers() -> None:
-    [lines] = blocks("cmake")
-    assert lines in (readme.ROOT / "tests/consumers/installed/CMakeLists.txt").read_text()
 
 
 def test_every_link_leads_somewhere() -> None:

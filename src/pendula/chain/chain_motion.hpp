@@ -26,7 +26,7 @@ namespace pendula {
 ///   ξ̇_i = z_i + e_i − e_{i−1},           e_i = (τ_i ξ_i − τ_{i+1} ξ_{i+1})/m_i,      e_0 = 0,
 ///   ż_i = d_i − d_{i−1} − δ_{i1} g up,    d_i = −(τ_i ξ̇_i − τ_{i+1} ξ̇_{i+1})/m_i,    d_0 = 0,
 /// and what ChainForces adds. Every Gauss method keeps |ξ_i|² and the vertical angular momentum, which are quadratic,
-/// and is symplectic: there is no pole and no drift (docs/method.md).
+/// and is symplectic: there is no pole and no drift (docs/explanation/method.md).
 ///
 /// Stages are held as increments U = h b (ξ̇ − z) and W = h b (ż + δ_{i1} g up), so that what is large enters exactly:
 ///   X = ξ + h c z + m U,  Z = z − δ_{i1} h c g up + m W,  m_ij = a_ij/b_j.

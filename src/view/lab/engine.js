@@ -4,7 +4,7 @@
 /// Rows of a motion stand so far apart [s]; steps are of the module's own choice, and end where rows are.
 const rowInterval = 1 / 120;
 
-/// The tolerance of all steps: energies stay at rounding (docs/laboratory.md).
+/// The tolerance of all steps: energies stay at rounding (docs/reference/laboratory.md).
 const tolerance = 1e-10;
 
 /// Starts the module, a WebAssembly.Module. It asks for nothing but the time.
