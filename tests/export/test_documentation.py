@@ -1,4 +1,4 @@
-"""docs/reference/export.md, block by block. `python tests/export/test_documentation.py` writes what its commands print now."""
+"""The page of exports, block by block. As a program this writes what its commands print now."""
 
 import os
 import re
