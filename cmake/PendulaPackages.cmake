@@ -18,15 +18,14 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME pendula)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "python3-venv, g++, libeigen3-dev, libxsimd-dev")  # for models: share/pendula/setup
-set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "${PROJECT_DESCRIPTION}\n\
-The program: pendulums of few and of many links, in the plane and in space, and any mechanical system with a Lagrangian;\n\
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The program: pendulums of few and of many links, in the plane and in space, and any mechanical system with a Lagrangian;\n\
 events, exponents, derivatives, ensembles, pages. Models of one's own and pictures take what\n\
 /usr/share/pendula/setup installs.")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_NAME libpendula-dev)
 set(CPACK_DEBIAN_DEVEL_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS "pendula (= ${PROJECT_VERSION}), libeigen3-dev, libxsimd-dev")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_SUGGESTS "cmake, g++")
-set(CPACK_COMPONENT_DEVEL_DESCRIPTION "Multiple pendulums in C++ and C: library, headers and CMake package\n\
+set(CPACK_COMPONENT_DEVEL_DESCRIPTION "For C++ and C: library, headers and CMake package.\n\
 Kernels that SymPy derives, and the integrators that move them.")
 
 # What models were installed with is no package's: it goes with the program.
