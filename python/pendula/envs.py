@@ -23,8 +23,8 @@ task
     "swing_up": it starts hanging. "balance": it starts upright, and the episode ends where h is below 0.8. Each
     coordinate and rate is off by up to 0.05 in m, rad, m/s, rad/s: uniform numbers of the seed, the same to the bit.
 start
-    ``reset(options={"start": {"theta": [0.1, "5 deg"]}})`` starts exactly there, as :meth:`pendula.Chain.simulate`;
-    what is left out is 0.
+    ``reset(options={"start": {"theta": [0.1, "5 deg"]}})`` starts exactly there, with what
+    :meth:`pendula.Chain.simulate` takes; what is left out is 0.
 time
     Environments that ``gymnasium.make`` and ``make_vec`` make are truncated after 500 steps.
 """
@@ -61,7 +61,7 @@ FALLEN = 0.8  # of the height where it stands
 
 
 class Pendulum(gymnasium.Env[Any, Any]):
-    """What the environments have in common. What it is made of: :class:`CartPendulum`, :class:`Acrobot`."""
+    """What the environments have in common: :class:`CartPendulum`, :class:`Acrobot`. It is not made by itself."""
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium has it)
     observation_space: gymnasium.Space[NDArray[Any]]
@@ -108,7 +108,7 @@ class Pendulum(gymnasium.Env[Any, Any]):
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """Coordinates, then their rates: (x,) theta_1, ..., (x_dot,) theta_dot_1, ..., in 64 bits."""
+        """What moves, in 64 bits, as x, theta_1, ..., x_dot, theta_dot_1, ...; an acrobot has no x."""
         return self._now().state
 
     def reset(
@@ -149,23 +149,41 @@ class Pendulum(gymnasium.Env[Any, Any]):
         over = self._over(states, heights)
         return self._seen(states)[0], float((1 + heights[0]) / 2), bool(over[0]), False, {"state": state}
 
-    def linearize(self, action: ArrayLike | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A and B of the next step, x_next = A x + B a beside where it is, of deviations of :attr:`state` and action.
+    def linearize(
+        self, action: ArrayLike | None = None, state: ArrayLike | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A and B of a step, x_next = A x + B a for deviations x of the state and a of the action, which is held.
 
-        They are exact for steps from here as a new :class:`pendula.Simulation` chooses them, a zero-order hold of the
-        action, which is 0 if left out. Nothing moves.
+        They are exact for steps inside that one as a new :class:`pendula.Simulation` chooses them. Nothing moves.
+
+        Parameters
+        ----------
+        action : (motors,) array_like, optional
+            0 if left out.
+        state : (2n,) array_like, optional
+            As :attr:`state`, where it is if left out.
 
         Returns
         -------
         A : (2n, 2n) array
         B : (2n, motors) array
+
+        Raises
+        ------
+        InputError
+            An argument is wrong.
+        RunFailed
+            The computation failed.
         """
+        place = self.state if state is None else numbers("state", state)
+        if place.shape != self._limits.shape or not np.isfinite(place).all():
+            raise InputError(f"state: expected finite numbers of shape {self._limits.shape}, got {state!r}")
         wanted = np.zeros(self._motors) if action is None else action
         inputs = self._inputs(self._acted(wanted, (self._motors,)))
         found = differentiate(
             self._system.replaced({}, self._held(inputs)),
             self._step,
-            start=self._named(self.state),
+            start=self._named(place),
             tolerance=self._tolerance,
         )
         by_inputs = np.hstack([found.by_inputs[name][0] for name in self._held(inputs)])

@@ -2,7 +2,9 @@
 
 import copy
 import doctest
+import runpy
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -103,6 +105,8 @@ def test_derivatives_of_a_step_are_those_of_differences(env: Any) -> None:
     assert np.abs(A - by_state).max() < 1e-10  # measured 4e-12; A is up to 1
     assert np.abs(B - by_action).max() < 1e-10  # measured 3e-12; B is up to 0.4
     assert np.array_equal(env.state, here)
+    env.reset(seed=2)
+    assert np.array_equal(A, env.linearize(action, here)[0])
 
 
 def test_the_motors_of_an_acrobot_turn_nothing_about_its_pivot() -> None:
@@ -163,6 +167,7 @@ def test_what_is_seen_and_earned_is_what_the_page_says() -> None:
         (lambda: begun().step([1, 2]), r"action: expected finite numbers of shape \(1,\), got \[1, 2\]"),
         (lambda: begun().step([np.nan]), "action: expected finite numbers"),
         (lambda: begun().linearize([1, 2]), "action: expected finite numbers"),
+        (lambda: begun().linearize(state=[1, 2]), r"state: expected finite numbers of shape \(4,\)"),
         (lambda: CartPendulumVectorEnv(0), "num_envs: expected a whole number >= 1, got 0"),
         (lambda: CartPendulumVectorEnv(2, autoreset_mode="now"), 'one of "NextStep", "SameStep", "Disabled"'),
         (lambda: CartPendulumVectorEnv(2).reset(seed=[1]), "seed: expected 2 seeds, got 1"),
@@ -191,3 +196,11 @@ def test_a_step_before_reset_is_refused() -> None:
 def test_examples_of_docstrings() -> None:
     tried = doctest.testmod(pendula.envs)
     assert tried.attempted and not tried.failed
+
+
+def test_the_example_swings_up() -> None:
+    """Its first iterations: all of them take 14 s."""
+    example = runpy.run_path(str(Path(__file__).parents[2] / "examples/swing_up_ilqr.py"))
+    env = CartPendulum(2, force=example["FORCE"], track=10.0, step=example["STEP"])
+    costs = [example["cost"](*example["swung_up"](env, most)[:2]) for most in (0, 5)]
+    assert costs[1] < 0.6 * costs[0]  # measured 0.40
