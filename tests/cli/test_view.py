@@ -14,7 +14,7 @@ from conftest import program, settings
 def about(page: Path) -> dict:
     """What a page says of itself."""
     text = page.read_text()
-    [data] = re.findall(r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', text, re.DOTALL)
+    [data] = re.findall(r'<script type="application/json" id="scene">(.*?)</script>', text, re.DOTALL)
     return json.loads(data)
 
 
