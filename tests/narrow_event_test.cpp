@@ -226,6 +226,45 @@ TEST(NarrowEventsInLanes, AreAllFound) {
   }
 }
 
+// Bounds of a step's states exclude what does not happen, and nothing else.
+TEST(EventsWithinBounds, AreThoseThatAreFoundWithout) {
+  Random random(7);
+  std::int64_t found = 0, with = 0, without = 0;
+  for (int chain = 0; chain < 20; ++chain) {
+    const int links = 1 + chain % 3;
+    const RunOptions options{.method = Method::taylor, .tolerance = 1e-9};
+    RunSetup setup{std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, links, chain % 2 == 1)),
+                   random_state<Planar>(random, links), options, 10};
+    setup.doubted = false;
+    const std::string last = std::to_string(links);
+    const auto level = [&] { return shortest(random.uniform(-2, 2)); };
+    const std::vector<io::EventPlan> plans = {plan("a", "theta_1 - " + level()),
+                                              plan("b", "theta_dot_" + last + " - " + level()),
+                                              plan("c", "theta_1*theta_dot_" + last + " - " + level()),
+                                              plan("d", "sin(theta_1 - theta_dot_" + last + ") - t/20"),
+                                              plan("e", "sqrt(abs(theta_" + last + ")) - " + level()),
+                                              plan("f", "theta_1 > " + level() + " ? 1 : -1")};
+    setup.events = io::events_of(plans, setup.subject, setup.start);
+    const RunReport bounded = pendula::Run(setup).go();
+    for (Event& event : setup.events) {
+      ASSERT_TRUE(event.enclose);
+      event.enclose = nullptr;
+    }
+    const RunReport searched = pendula::Run(setup).go();
+    for (std::size_t k = 0; k < plans.size(); ++k) {
+      EXPECT_EQ(bounded.events[k].count, searched.events[k].count) << chain << ": " << plans[k].when;
+      found += searched.events[k].count;
+      if (searched.events[k].count == 0) continue;
+      EXPECT_EQ(bounded.events[k].first, searched.events[k].first) << chain << ": " << plans[k].when;
+      EXPECT_EQ(bounded.events[k].last, searched.events[k].last) << chain << ": " << plans[k].when;
+    }
+    with += bounded.event_cost.glances;
+    without += searched.event_cost.glances;
+  }
+  EXPECT_GT(found, 1000);
+  EXPECT_LT(with, without);  // measured 19,676 and 23,538: all events of a step share its glances
+}
+
 /// A motion whose steps are long.
 RunSetup slow_motion(const RunOptions& options, double duration) {
   const Eigen::VectorXd one = Eigen::VectorXd::Constant(1, 0.1);

@@ -30,8 +30,9 @@ void warn(const std::string& what) {
 template <class Space>
 std::string link_of(const io::Scenario<Space>& scenario) {
   const Chain<Space>& chain = scenario.chain;
-  if (!scenario.feedback.empty() || view::lab_leaves_out_loads(chain)) warn("torques, drives and feedback");
-  if (view::lab_leaves_out_damping(chain)) warn("damping of single links: all have that of the first");
+  if (!scenario.feedback.empty()) warn("feedback");
+  if (scenario.natural) warn("natural units: it shows the numbers of the scenario as SI");
+  for (const std::string& what : view::lab_leaves_out(chain)) warn(what);
   view::LabLink link = view::lab_link(chain);
   const auto& start = scenario.start;
   link.put("th", start.theta());

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cmath>
 #include <nlohmann/json_fwd.hpp>
 #include <pendula/chain/chain.hpp>
 #include <ranges>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace pendula::view {
 
@@ -42,14 +44,22 @@ LabLink lab_link(const Chain<Space>& chain) {
   return link;
 }
 
-/// Whether a laboratory leaves out torques and drives of a chain, or damping of single links.
+/// What of a chain a laboratory leaves out or changes, in words; its bounds are those of src/view/lab/spec.js.
 template <class Space>
-bool lab_leaves_out_loads(const Chain<Space>& chain) {
-  return chain.constant_torque().any() || !chain.drives().empty();
-}
-template <class Space>
-bool lab_leaves_out_damping(const Chain<Space>& chain) {
-  return (chain.damping().array() != chain.damping()[0]).any();
+std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
+  constexpr int most_links = 300;
+  constexpr double most_gravity = 100, most_damping = 1000, most_size = 1e6;
+  std::vector<std::string> words;
+  const auto damping = chain.damping().array();
+  if (chain.links() > most_links) words.push_back("links after the " + std::to_string(most_links) + "th");
+  if (chain.constant_torque().any() || !chain.drives().empty()) words.emplace_back("torques and drives");
+  if ((damping != damping[0]).any()) words.emplace_back("damping of single links: all have that of the first");
+  if (std::abs(chain.gravity()) > most_gravity) words.emplace_back("gravity beyond 100");
+  if (damping[0] > most_damping) words.emplace_back("damping beyond 1000");
+  if ((chain.masses().array() >= most_size).any() || (chain.lengths().array() >= most_size).any()) {
+    words.emplace_back("masses or lengths of a million and more");
+  }
+  return words;
 }
 
 /// Whether this build has the laboratory: it takes emscripten.

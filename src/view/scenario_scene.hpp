@@ -43,7 +43,7 @@ template <class Scenario>
 std::string laboratory_of(const Scenario& scenario) {
   if constexpr (requires { scenario.chain; }) {
     const auto& chain = scenario.chain;
-    const bool is_whole = scenario.feedback.empty() && !lab_leaves_out_loads(chain) && !lab_leaves_out_damping(chain);
+    const bool is_whole = scenario.feedback.empty() && lab_leaves_out(chain).empty();
     if (has_lab() && is_whole && !scenario.natural) return lab_link(chain).text();
   }
   return {};

@@ -467,12 +467,28 @@ def test_the_page_of_a_run_goes_on_in_a_laboratory(space, browser, tmp_path):
     context.close()
 
 
-def test_the_page_of_a_run_that_a_laboratory_has_not_whole_offers_none(browser, tmp_path):
-    text = CHAIN.format(space="planar").replace("[start]", "torque = [0.1, 0]\n[start]")
+@pytest.mark.parametrize(
+    ("chain", "left_out"),
+    [
+        ("torque = [0.1, 0]", "torques and drives"),
+        ("damping = [0.1, 0]", "damping of single links"),
+        ("gravity = 200", "gravity beyond 100"),
+        ('units = "natural"', "natural units"),
+        ("links = 301", "links after the 300th"),
+    ],
+)
+def test_what_a_laboratory_leaves_out_is_said(chain, left_out, browser, tmp_path):
+    text = CHAIN.format(space="planar").replace("[start]", f"{chain}\n[start]")
+    if chain.startswith("links"):
+        text = text.replace("[1, 2]", "1").replace("[1, 0.5]", "0.01")
+    text = text.replace("duration = 3", "duration = 0.01")
     done = program("simulate", "-", "--view", str(tmp_path / "run.html"), text=text)
     assert done.returncode == 0, done.stderr
     page = browser.new_page()
     page.goto(f"file://{tmp_path / 'run.html'}")
     assert not page.get_by_role("button", name="Go on from here").is_visible()
-    assert (tmp_path / "run.html").stat().st_size < 400_000
+    assert "Pendulum laboratory" not in (tmp_path / "run.html").read_text()
     page.close()
+    told = program("lab", "-", "-o", str(tmp_path / "lab.html"), text=text)
+    assert told.returncode == 0
+    assert f"the laboratory leaves out {left_out}" in told.stderr

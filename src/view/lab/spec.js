@@ -2,7 +2,7 @@
 
 const levels = ["first", "student", "all"];
 const speedChoices = [1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
-const mostLinks = 300;
+const mostLinks = 300; // this bound, and those of stateOf, are told in view/lab.hpp, too
 const listed = 4; // links whose numbers have sliders of their own
 
 /// Numbers of a model that is no chain, as describe tells them, link by link.
