@@ -55,6 +55,15 @@ def until(page: Page, condition: str, seconds: float = 20) -> None:
         page.wait_for_timeout(20)
 
 
+def begin_anew(page: Page, act: Callable[[], object]) -> None:
+    """Does what makes the page load again, and waits until the new one has begun.
+
+    The old page goes on for a moment with the new link, and would answer for the new one."""
+    page.evaluate("window.isOld = true")
+    act()
+    until(page, "!window.isOld && window.pendulaLab?.history.rows > 0")
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     with sync_playwright() as playwright:
