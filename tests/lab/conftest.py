@@ -55,6 +55,12 @@ def until(page: Page, condition: str, seconds: float = 20) -> None:
         page.wait_for_timeout(20)
 
 
+def await_frame(page: Page) -> None:
+    """Waits until the page has drawn what it knows now."""
+    page.evaluate("() => { window.framesThen = pendulaLab.frames; pendulaLab.changed(); }")
+    until(page, "pendulaLab.frames > framesThen && !pendulaLab.isSending && !pendulaLab.isWaiting")
+
+
 def begin_anew(page: Page, act: Callable[[], object]) -> None:
     """Does what makes the page load again, and waits until the new one has begun.
 
@@ -106,6 +112,7 @@ def open_lab(lab_file: Path, browser: Browser) -> Iterator[Callable[..., Page]]:
         page.on("request", lambda request: _only(request))
         page.goto(f"file://{file}" + (f"#{link}" if link else ""))
         until(page, "window.pendulaLab?.history.rows > 0")
+        await_frame(page)
         return page
 
     def _only(request) -> None:
