@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <pendula/chain/chain_motion.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/state.hpp>
@@ -64,6 +65,21 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return state;
   }
 
+  /// Bounds of how far angles and their rates get within the last step from where they began: infinite for those near
+  /// a pole.
+  bool bound_excursions(const Place& begin, double* q, double* v) const {
+    using std::abs;
+    const Real h = abs(Real(prediction_.last_h()));
+    for (int i = 0; i < links(); ++i) {
+      const Excursions farthest = excursions_of(begin.rods.along[i], i, h);
+      for (std::size_t a = 0; a < Space::dof; ++a) {
+        q[entry(i, a)] = static_cast<double>(farthest.angles[a]);
+        v[entry(i, a)] = static_cast<double>(farthest.rates[a]);
+      }
+    }
+    return true;
+  }
+
  protected:
   using Base::columns_, Base::constants_, Base::rods_;
 
@@ -85,6 +101,49 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   }
   Numbers rod_in_step(const Real* along, int i, const Weights& up_to) const {
     return components<D>([&](std::size_t k) { return Real(along[k] + weighed(up_to, past(i).advance[k].numbers())); });
+  }
+
+  struct Excursions {
+    std::array<Real, Space::dof> angles, rates;
+  };
+  // In the plane an angle's rate is smooth wherever the rod is: its stages tell all of it. h is the size of the step.
+  Excursions excursions_of(const Real* along, int i, const Real& h) const requires(Space::dof == 1) {
+    std::array<L, D> rod, moved;
+    for (std::size_t k = 0; k < D; ++k) {
+      moved[k] = columns_.weight(0) * past(i).advance[k][0];
+      rod[k] = L(along[k]) + columns_.integral(moved[k]);
+    }
+    alignas(pack_alignment) Real turned[Z];
+    ((rod[0] * moved[1] - rod[1] * moved[0]) / fma(rod[0], rod[0], rod[1] * rod[1])).store(turned);
+    const auto [turn, change] = columns_.excursion(turned);
+    return {{turn}, {change / h}};
+  }
+  // In space rates of angles are narrow by a pole: from bounds of the rod, which is as long as it ever was.
+  Excursions excursions_of(const Real* along, int i, const Real& h) const requires(Space::dof > 1) {
+    using std::asin, std::sqrt;
+    const Real& inverse_length = constants_[i].inverse_length;
+    Numbers moved_by, changed_by;
+    for (std::size_t k = 0; k < D; ++k) {
+      alignas(pack_alignment) Real moved[Z];
+      (columns_.weight(0) * past(i).advance[k][0]).store(moved);
+      const auto [integral, change] = columns_.excursion(moved);
+      moved_by[k] = inverse_length * integral;
+      changed_by[k] = inverse_length * change / h;
+    }
+    const Real far = sqrt(dot(moved_by, moved_by)), change = sqrt(dot(changed_by, changed_by)), fastest = far / h;
+    const Real level = inverse_length * sqrt(along[0] * along[0] + along[1] * along[1]);  // from the axis by the pole
+    const Real nearest = level - far;
+    constexpr Real infinite = std::numeric_limits<Real>::infinity();
+    Excursions bounds;
+    bounds.angles = {far < 1 ? Real(asin(far)) : infinite, infinite};
+    bounds.rates.fill(infinite);
+    if (!(nearest > Real(0.1) * level)) return bounds;
+    // theta_dot is how fast the rod climbs over its level, phi_dot how fast its level turns over the level squared.
+    bounds.angles[1] = asin(far / level);
+    bounds.rates = {change / nearest + fastest * (1 / nearest - 1 / level),
+                    (level * change + far * fastest) / (nearest * nearest) +
+                        level * fastest * (1 / (nearest * nearest) - 1 / (level * level))};
+    return bounds;
   }
 
   State empty_state(double time) const {

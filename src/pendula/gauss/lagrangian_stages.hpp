@@ -113,6 +113,16 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     return motion;
   }
 
+  /// Bounds of how far coordinates and rates get within the last step from where they began.
+  bool bound_excursions(const Place& /*begin*/, double* q, double* v) const {
+    for (std::size_t k = 0; k < count_; ++k) {
+      const auto [moved_by, changed_by] = columns_.excursion(moved(k));
+      q[k] = moved_by;
+      v[k] = changed_by / std::abs(prediction_.last_h());
+    }
+    return true;
+  }
+
   // --- A step ---
 
   /// Predicts the stages of a step.

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <pendula/gauss/node_polynomials.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/numeric/compensated.hpp>
@@ -96,6 +98,23 @@ class StageColumns {
   /// Coefficients of the Legendre polynomials on the step, times h, of the polynomial through stage values that hold
   /// the factor h b.
   L legendre(const Real* x) const { return product(legendre_, x); }
+
+  /// Bounds of |∫_0^x f| and of |f(x) − f(0)| over the step, both times h, where the polynomial through stage values
+  /// h b f is all that is known of f: its last two coefficients tell what it misses.
+  struct Excursion {
+    Real integral, change;
+  };
+  Excursion excursion(const Real* x) const {
+    constexpr Real missed_at_most(4);  // last coefficients; 1.3 were seen
+    alignas(pack_alignment) Real coefficients[Z];
+    legendre(x).store(coefficients);
+    using std::abs;
+    Real changing(0), last(abs(coefficients[stages_ - 1]));
+    for (std::size_t k = 1; k < stages_; ++k) changing += abs(coefficients[k]);
+    if (stages_ > 1) last = std::max(last, abs(coefficients[stages_ - 2]));
+    const Real missed = missed_at_most * last;
+    return {abs(coefficients[0]) + changing + missed, 2 * (changing + missed)};
+  }
 
   /// The polynomial through the last step's stage values, at this step's stages.
   L extrapolated(const Real* last) const { return product(extrapolation_, last); }

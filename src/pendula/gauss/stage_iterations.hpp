@@ -39,6 +39,9 @@ class StageIterations {
     choice_.begin_look();
   }
   State glance(const Place& begin, double time, double x) const { return stages_.glance(begin, time, x); }
+  bool bound_excursions(const Place& begin, double* q, double* v) const {
+    return stages_.bound_excursions(begin, q, v);
+  }
 
   template <class Numbers>
   void member(Numbers& numbers) {

@@ -34,7 +34,7 @@ struct SolverTraits {
 template <class S>
 concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::Place& place,
                                const typename S::Place& kept, const StepTask& task, MemberNumbers& numbers, double time,
-                               double h, double x, double tolerance, double noticed, Status status) {
+                               double h, double x, double tolerance, double noticed, double* each, Status status) {
   typename S::Model;  // what it is built from, with the number of stages and options of its own
   typename S::Real;   // the number type that it computes in, and that round-off is measured in
   requires std::default_initializable<typename S::Place>;
@@ -53,6 +53,9 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
   solver.go_to(kept);
   // The state within the last step, by the polynomials through its stages: x steps after the place where it began.
   { fixed.glance(kept, time, x) } -> std::convertible_to<typename S::State>;
+  // Bounds of how far each coordinate and its rate get, anywhere in the last step, from where they were when it began;
+  // whether they are known.
+  { fixed.bound_excursions(kept, each, each) } -> std::same_as<bool>;
   // All numbers that the next steps depend on.
   solver.member(numbers);
 

@@ -84,6 +84,12 @@ class GaussStepper : private StepSolution<Solver> {
     return solver_.glance(before_.place, time, before_.elapsed(time) / before_.step);
   }
 
+  /// Bounds of how far coordinates and rates get, anywhere in the last step, from where they were when it began.
+  /// Whether they are known.
+  bool bound_excursions(double* q, double* v) const {
+    return before_.step != 0 && !before_.in_parts && solver_.bound_excursions(before_.place, q, v);
+  }
+
   /// The same at the full order of the method: takes a step from where the last one began to `time`. Its stages are
   /// predicted by the polynomials.
   Outcome look(double time, State& there) {

@@ -173,10 +173,8 @@ class VelocityStages {
     State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
     for (std::size_t k = 0; k < count_; ++k) {
       alignas(pack_alignment) Stored pushed, moved;
-      (columns_.hb() * L::load(last_a_[k])).store(pushed);
-      const double rate = begin[count_ + k].value;
-      (columns_.hb() * columns_.integral(pushed, L(rate))).store(moved);
-      double place = begin[k].value, speed = rate;
+      find_advances(begin, k, pushed, moved);
+      double place = begin[k].value, speed = begin[count_ + k].value;
       for (std::size_t j = 0; j < count_of_stages(); ++j) {
         place += up_to[j] * moved[j];
         speed += up_to[j] * pushed[j];
@@ -187,10 +185,27 @@ class VelocityStages {
     return state;
   }
 
+  /// Bounds of how far coordinates and rates get within the last step from where they began.
+  bool bound_excursions(const Place& begin, double* q, double* v) const {
+    for (std::size_t k = 0; k < count_; ++k) {
+      alignas(pack_alignment) Stored pushed, moved;
+      find_advances(begin, k, pushed, moved);
+      q[k] = columns_.excursion(moved).integral;
+      v[k] = columns_.excursion(pushed).integral;
+    }
+    return true;
+  }
+
  protected:
   using L = Pack<Width, RegisterFor<Width>>;
   using Rows = PackRows<static_cast<std::size_t>(Width)>;
   using Stored = double[static_cast<std::size_t>(Width)];
+
+  // h b times the accelerations and the rates at the stages of the last step.
+  void find_advances(const Place& begin, std::size_t k, Stored& pushed, Stored& moved) const {
+    (columns_.hb() * L::load(last_a_[k])).store(pushed);
+    (columns_.hb() * columns_.integral(pushed, L(begin[count_ + k].value))).store(moved);
+  }
 
   static constexpr Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
 

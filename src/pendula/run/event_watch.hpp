@@ -118,10 +118,15 @@ class StepStates {
     range.least = begin_;
     range.most = end_;
     if (!step_.bound_excursions(range.most)) return false;
-    range.least.q -= range.most.q;
-    range.least.v -= range.most.v;
-    range.most.q += begin_.q;
-    range.most.v += begin_.v;
+    // Rates that follow from momenta are rounded as the largest of them.
+    const auto lay_around = [](const auto& begin, auto& least, auto& most) {
+      constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
+      most.array() += rounding * (most.array() + begin.cwiseAbs().maxCoeff());
+      least -= most;
+      most += begin;
+    };
+    lay_around(begin_.q, range.least.q, range.most.q);
+    lay_around(begin_.v, range.least.v, range.most.v);
     return true;
   }
 

@@ -242,16 +242,14 @@ class SeriesSteps {
 
   /// Bounds of how far a coordinate and its rate get within the last step from where they begin.
   Part excursion(int i) const requires(!is_batch<L>) {
-    constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
     constexpr double beyond = 4;  // last terms: what rates by momenta may differ by from those of the series
     const auto k = static_cast<std::size_t>(i);
     const auto last = static_cast<std::size_t>(order_) - (info_.has_momenta ? 1 : 0);
     const L tau = step_ / unit_;
     const L place = tau * sum(tau, [&](std::size_t order) { return abs(coefficient(order, k)); });
-    const L turned = tau * sum(tau, [&](std::size_t order) { return abs(rate(order, k)); }) +
-                     beyond * abs(rate(last, k)) * std::pow(tau, static_cast<double>(last));
-    return {{place + rounding * (place + abs(coefficient(0, k)))},
-            {(turned + rounding * (turned + abs(rate(0, k)))) / unit_}};
+    const L turned = tau * sum(tau, [&](std::size_t order) { return abs(rate(order, k)); });
+    const L rest = std::max(abs(rate(last, k)) * tau, abs(rate(last - 1, k))) * std::pow(tau, double(last - 1));
+    return {{place}, {(turned + beyond * rest) / unit_}};
   }
 
   /// The same where rates are those of the momenta there.
