@@ -17,6 +17,7 @@ import gymnasium
 import numpy as np
 import pendula.envs
 from gymnasium.envs.classic_control import AcrobotEnv, CartPoleEnv
+from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
 from scipy.integrate import solve_ivp
 
 STEP, DURATION = 0.02, 10.0  # s
@@ -119,7 +120,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=0.5, help="of each measurement of speed")
     parser.add_argument("--repetitions", type=int, default=5)
     options = parser.parse_args()
-    many = {"num_envs": 64, "max_episode_steps": 10**9}
+    many = {"num_envs": 1024, "max_episode_steps": 10**9}
     none, one = np.zeros(1), 1
     by_pendula = pendula.envs.CartPendulum
     truth = cart_angle()
@@ -153,9 +154,13 @@ def main() -> None:
     print()
     for links in (1, 2, 3):
         envs = pendula.envs.CartPendulumVectorEnv(links=links, **many)
-        actions = list(np.random.default_rng(1).uniform(-1, 1, (200, many["num_envs"], 1)))
+        actions = list(np.random.default_rng(1).uniform(-1, 1, (20, many["num_envs"], 1)))
         rate = speed(envs, actions, options.seconds, options.repetitions, many["num_envs"])
-        print(f"`CartPendulumVectorEnv`, 64 members, {links} links, random actions: {rate:,.0f} steps/s")
+        print(f"`CartPendulumVectorEnv`, 1024 members, {links} links, random actions: {rate:,.0f} steps/s")
+    envs = CartPoleVectorEnv(num_envs=many["num_envs"], max_episode_steps=10**9)
+    actions = list(np.random.default_rng(1).integers(0, 2, (20, many["num_envs"])))
+    rate = speed(envs, actions, options.seconds, options.repetitions, many["num_envs"])
+    print(f"Gymnasium's `CartPoleVectorEnv`, Euler, 1024 members: {rate:,.0f} steps/s")
 
 
 if __name__ == "__main__":

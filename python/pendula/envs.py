@@ -38,16 +38,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from ._core import InputError
 from ._derivatives import differentiate
 from ._models import Model
-from ._runs import mapping, number, numbers
+from ._runs import mapping, number, numbers, plainly
 from ._simulation import Simulation
 from ._systems import Chain, System
 
 try:
     import gymnasium
     from gymnasium.spaces import Box
+    from gymnasium.utils.seeding import np_random
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
 except ImportError as _error:
@@ -87,8 +89,8 @@ class Pendulum(gymnasium.Env[Any, Any]):
             raise InputError(f"dtype: expected float32 or float64, got {dtype!r}")
         self._step, self._tolerance = _positive("step", step), _positive("tolerance", tolerance)
         self._system, self._task, self._links, self._motors = system, task, links, motors
-        self._simulation: Simulation | None = None
-        self._started(system.at_zero())  # what is wrong with the system is told now
+        self._state: NDArray[np.float64] | None = None
+        self._members = self._made_members()  # what is wrong with the system is told now
         each = np.broadcast_to(numbers("lengths", lengths), (links,))
         self._share = np.ascontiguousarray(each / each.sum())  # of each link in the height
         places = np.array([*limits, *[np.inf] * links])
@@ -97,6 +99,16 @@ class Pendulum(gymnasium.Env[Any, Any]):
         one = np.ones(motors, dtype)
         self.observation_space = self._seeable = Box(-seen, seen, dtype=dtype)
         self.action_space = Box(-one, one, dtype=dtype)
+
+    def _made_members(self) -> _core.HeldMembers:
+        return _core.HeldMembers(self._started(self._system.at_zero())._made, self._step)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_members"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._members = self._made_members()
 
     @abstractmethod
     def _inputs(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,45 +121,24 @@ class Pendulum(gymnasium.Env[Any, Any]):
     @property
     def state(self) -> NDArray[np.float64]:
         """What moves, in 64 bits, as x, theta_1, ..., x_dot, theta_dot_1, ...; an acrobot has no x."""
-        return self._now().state
+        return self._now().copy()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Starts an episode: at random, or where ``options["start"]`` says. Raises InputError."""
         super().reset(seed=seed)
-        given = mapping("options", options)
-        start = given.pop("start", None)
-        if given:
-            raise InputError(f"options: expected start alone, got {', '.join(given)}")
-        if start is None:
-            state = self.np_random.uniform(-NOISE, NOISE, self._limits.size)
-            if self._task == "balance":
-                state[self._angles()] += np.pi
-            begun = self._started(self._named(state))
-        else:
-            begun = self._started({**self._system.at_zero(), **mapping("options.start", start)})
-            if self._is_outside(begun.state):
-                limits = zip(begun.names, self._limits, begun.state, strict=True)
-                raise InputError(
-                    "options.start: "
-                    + ", ".join(
-                        f"expected |{name}| <= {limit:g}, got {one:g}"
-                        for name, limit, one in limits
-                        if abs(one) > limit
-                    )
-                )
-        self._simulation = begun
-        state = begun.state
-        return self._seen(state[None])[0], {"state": state}
+        self._state = self._begun(self.np_random, options)
+        return self._seen(self._state[None])[0], {"state": self.state}
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Holds an action for a step. Raises InputError; RunFailed where the mathematics fails."""
-        state = self._moved(self._inputs(self._acted(action, (self._motors,))))
-        states = state[None]
+        inputs = self._inputs(self._acted(action, (self._motors,)))
+        states = self._moved(inputs[None], self._now()[None])
+        self._state = states[0]
         heights = self._heights(states)
         over = self._over(states, heights)
-        return self._seen(states)[0], float((1 + heights[0]) / 2), bool(over[0]), False, {"state": state}
+        return self._seen(states)[0], float((1 + heights[0]) / 2), bool(over[0]), False, {"state": self.state}
 
     def linearize(
         self, action: ArrayLike | None = None, state: ArrayLike | None = None
@@ -237,19 +228,39 @@ class Pendulum(gymnasium.Env[Any, Any]):
     def _started(self, start: Mapping[str, object]) -> Simulation:
         return Simulation(self._system, start, tolerance=self._tolerance, remember=False)
 
-    def _now(self) -> Simulation:
-        if self._simulation is None:
-            raise gymnasium.error.ResetNeeded("expected reset() first, got none")
-        return self._simulation
+    def _begun(self, random: np.random.Generator, options: dict[str, Any] | None) -> NDArray[np.float64]:
+        """The state that an episode starts in."""
+        given = mapping("options", options)
+        start = given.pop("start", None)
+        if given:
+            raise InputError(f"options: expected start alone, got {', '.join(given)}")
+        if start is None:
+            state: NDArray[np.float64] = random.uniform(-NOISE, NOISE, self._limits.size)
+            if self._task == "balance":
+                state[self._angles()] += np.pi
+            return state
+        begun = self._started({**self._system.at_zero(), **mapping("options.start", start)})
+        if self._is_outside(begun.state):
+            limits = zip(begun.names, self._limits, begun.state, strict=True)
+            raise InputError(
+                "options.start: "
+                + ", ".join(
+                    f"expected |{name}| <= {limit:g}, got {one:g}"
+                    for name, limit, one in limits
+                    if abs(one) > limit
+                )
+            )
+        return begun.state
 
-    def _moved(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The state a step later. As :meth:`Simulation.step`, of inputs that need no names."""
-        simulation = self._now()
-        with simulation._alone():
-            core = simulation._core
-            core.hold(inputs.tolist())
-            core.advance_to(core.time + self._step)
-            return core.state
+    def _now(self) -> NDArray[np.float64]:
+        if self._state is None:
+            raise gymnasium.error.ResetNeeded("expected reset() first, got none")
+        return self._state
+
+    def _moved(self, inputs: NDArray[np.float64], states: NDArray[np.float64]) -> NDArray[np.float64]:
+        """States a step later, each with its row of inputs held."""
+        with plainly():
+            return self._members.move(np.ascontiguousarray(inputs), np.ascontiguousarray(states))
 
 
 class CartPendulum(Pendulum):
@@ -378,8 +389,7 @@ class Acrobot(Pendulum):
 class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
     """Many environments of one kind: each goes on to the bit as a single one with its seed.
 
-    They move one after the other, on one core: in Python there are no lanes yet whose inputs differ. What is done once
-    for all is what is made of their states.
+    They move side by side in the lanes of one core.
 
     Parameters
     ----------
@@ -395,7 +405,6 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
     single: type[Pendulum]
     metadata: dict[str, Any]
     num_envs: int
-    envs: list[Pendulum]
     observation_space: gymnasium.Space[NDArray[Any]]
     action_space: gymnasium.Space[NDArray[Any]]
     single_observation_space: gymnasium.Space[NDArray[Any]]
@@ -417,8 +426,9 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
         self.metadata = {**self.single.metadata, "autoreset_mode": self._mode}
         self.num_envs = _count("num_envs", num_envs, 1)
         self._most = None if max_episode_steps is None else _count("max_episode_steps", max_episode_steps, 1)
-        self.envs = [self.single(**options) for _ in range(num_envs)]
-        first = self.envs[0]
+        self._one = first = self.single(**options)
+        self._randoms: list[np.random.Generator | None] = [None] * num_envs
+        self._states: NDArray[np.float64] | None = None
         self.single_observation_space, self.single_action_space = first.observation_space, first.action_space
         self.observation_space = batch_space(first.observation_space, num_envs)
         self.action_space = batch_space(first.action_space, num_envs)
@@ -440,50 +450,62 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
         mask = np.asarray(given.pop("reset_mask", np.ones(count, bool)))
         if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
             raise InputError(f"options.reset_mask: expected ({count},) of bool, some true, got {mask!r}")
-        for k in np.flatnonzero(mask):
-            self.envs[k].reset(seed=seeds[k], options=given)
+        if self._states is None:
+            if not mask.all():
+                raise gymnasium.error.ResetNeeded("expected reset() of all first, got none")
+            self._states = np.empty((count, self._one._limits.size))
+        begun = {k: self._begin(k, seeds[k], given) for k in np.flatnonzero(mask).tolist()}
+        for k, state in begun.items():  # all or none
+            self._states[k] = state
         self._elapsed[mask], self._done[mask] = 0, False
-        states = np.stack([env.state for env in self.envs])
-        return self._first._seen(states), _told(states, mask)
+        return self._one._seen(self._states), _told(self._states, mask)
 
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Holds an action each, (num_envs, motors). Raises InputError; RunFailed where the mathematics fails."""
-        inputs = self._first._inputs(self._first._acted(actions, (self.num_envs, self._first._motors)))
+        one = self._one
+        inputs = one._inputs(one._acted(actions, (self.num_envs, one._motors)))
+        if self._states is None:
+            raise gymnasium.error.ResetNeeded("expected reset() first, got none")
         begun = self._done.copy()
         if begun.any() and self._mode == AutoresetMode.DISABLED:
             over = ", ".join(map(str, np.flatnonzero(begun)))
             raise InputError(f"step: expected reset with reset_mask of what is over, got none of {over}")
-        for k in np.flatnonzero(begun):
-            self.envs[k].reset()
-        moved = [
-            env.state if is_new else env._moved(row)
-            for env, row, is_new in zip(self.envs, inputs, begun, strict=True)
-        ]
-        states = np.stack(moved)
+        if begun.any():
+            states = self._states.copy()
+            states[~begun] = one._moved(inputs[~begun], states[~begun])
+            for k in np.flatnonzero(begun).tolist():
+                states[k] = self._begin(k)
+        else:
+            states = one._moved(inputs, self._states)
         self._elapsed = np.where(begun, 0, self._elapsed + 1)
-        heights = self._first._heights(states)
+        heights = one._heights(states)
         rewards = np.where(begun, 0.0, (1 + heights) / 2)
-        terminated = self._first._over(states, heights) & ~begun
+        terminated = one._over(states, heights) & ~begun
         truncated = np.zeros(self.num_envs, bool) if self._most is None else self._elapsed >= self._most
         self._done = terminated | truncated
-        seen = self._first._seen(states)
+        seen = one._seen(states)
         infos: dict[str, Any] = {}
         if self._mode == AutoresetMode.SAME_STEP and self._done.any():
             for ended in np.flatnonzero(self._done).tolist():
                 last = {"final_obs": seen[ended].copy(), "final_info": {"state": states[ended].copy()}}
                 infos = self._add_info(infos, last, ended)
-                self.envs[ended].reset()
-                states[ended] = self.envs[ended].state
+                states[ended] = self._begin(ended)
             self._elapsed[self._done] = 0
-            seen = self._first._seen(states)
+            seen = one._seen(states)
             self._done = np.zeros(self.num_envs, bool)
+        self._states = states
         return seen, rewards, terminated, truncated, {**infos, **_told(states, np.ones(self.num_envs, bool))}
 
-    @property
-    def _first(self) -> Pendulum:
-        return self.envs[0]
+    def _begin(
+        self, k: int, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> NDArray[np.float64]:
+        """The state that an episode of one environment starts in: that of a single one with its seed."""
+        random = self._randoms[k]
+        if random is None or seed is not None:
+            random = self._randoms[k] = np_random(seed)[0]
+        return self._one._begun(random, options)
 
 
 class CartPendulumVectorEnv(PendulumVectorEnv):

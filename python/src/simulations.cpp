@@ -8,8 +8,10 @@
 #include <pendula/pendula.h>
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <pendula/ensemble/held_members.hpp>
 #include <pendula/pendula.hpp>
 #include <pendula/run/lyapunov.hpp>
 #include <pendula/system/outcome.hpp>
@@ -30,6 +32,12 @@ namespace {
 struct Moved {
   std::shared_ptr<const Prepared> made;
   Simulation simulation;
+};
+
+/// Motions of one system side by side.
+struct Held {
+  std::shared_ptr<const Prepared> made;
+  HeldMembers members;
 };
 
 /// While it lives, an interruption stops the simulation.
@@ -93,6 +101,27 @@ void define_simulations(nb::module_& module) {
       .def("save", [](const Moved& self) { return vector_of(self.simulation.save().numbers); })
       .def("resume", [](Moved& self, const Numbers& saved) {
         self.simulation.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
+      });
+  nb::class_<Held>(module, "HeldMembers")
+      .def("__init__",
+           [](Held* self, const std::shared_ptr<const Prepared>& made, double duration) {
+             new (self) Held{
+                 made, HeldMembers(made->subject, static_cast<std::size_t>(made->start.q.size()), made->run, duration)};
+           })
+      .def("move", [](Held& self, const Starts& inputs, const Starts& states) {
+        std::vector<double> moved(states.data(), states.data() + states.size());
+        HeldMembers::Moved found;
+        Interruption interruption;
+        {
+          const nb::gil_scoped_release others_may_go_on;
+          found = self.members.move({inputs.data(), inputs.size()}, moved, std::ref(interruption));
+        }
+        if (interruption.is_requested()) throw nb::python_error();
+        if (!found.outcome) {
+          throw RunFailed("member " + std::to_string(found.member) + ": " +
+                          message(found.outcome, self.made->subject->coordinates()));
+        }
+        return array_of(std::move(moved), states.shape(1));
       });
   module.def("lyapunov",
              [](const Prepared& made, double duration,

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <pendula/ensemble/lane_kind.hpp>
+#include <pendula/run/plain_members.hpp>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/outcome.hpp>
+#include <span>
+#include <vector>
+
+namespace pendula {
+
+/// Motions of one system that go on side by side, each with inputs of its own, which are held. They are in lanes where
+/// there are some for the system and the options (lane_kind), and else go one by one. What becomes of a motion depends
+/// on itself alone, to the last bit.
+class HeldMembers {
+ public:
+  /// `duration` of each move  [s]. `options` are those of a motion alone; in lanes, steps of another kind may take
+  /// their place (quickest_in_lanes). Throws std::invalid_argument for a subject with drives, or pieces, and for
+  /// options that make no sense.
+  HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coordinates, const RunOptions& options,
+              double duration);
+
+  std::size_t coordinates() const { return coordinates_; }
+  std::size_t inputs() const { return inputs_; }
+
+  /// What became of the members: how the first failed, and which it was; ok where none did.
+  struct Moved {
+    Outcome outcome;
+    std::size_t member = 0;
+  };
+
+  /// Moves each of `states`, (members x 2 coordinates): coordinates, then rates, over the duration with its row of
+  /// `inputs`, (members x inputs). If one fails, or `stop` stops them, states are where they began. Throws
+  /// std::invalid_argument on sizes that do not fit.
+  Moved move(std::span<const double> inputs, std::span<double> states, const std::function<bool()>& stop);
+
+ private:
+  using Numbers = std::span<const double>;
+  bool go_in_lanes(Numbers inputs, Numbers states, std::span<MemberEnd> ends, MemberWatch& watch) const;
+  Outcome go_alone(Numbers inputs, Numbers state, const MemberEnd& end, const std::function<bool()>& stop) const;
+
+  std::shared_ptr<const Subject> subject_;
+  RunOptions options_, in_lanes_;
+  double duration_;
+  std::size_t coordinates_, inputs_;
+  std::optional<LaneKind> kind_;  // none: no lanes
+  std::vector<double> ends_;
+};
+
+}  // namespace pendula
