@@ -44,7 +44,7 @@ bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tan
   const bool by_series = options.method == Method::taylor;
   if (by_series && system->table().of_1.series_next == nullptr) return false;
   if (!is_explicit(options.method) && misses_loads(setup, options)) return false;
-  if ((!is_explicit(options.method) || by_series) && system->info().depends_on_time) return false;
+  if (!is_explicit(options.method) && system->info().depends_on_time) return false;
   if (!system->switches().empty()) return false;  // each member ends its steps elsewhere
   if (system->may_be_narrow()) return false;      // lanes do not look between their stages
   kind.kernel = &system->table();
