@@ -38,25 +38,16 @@ struct Journey {
         options(options_of(path.options)),
         start(motion_of(*path.model, path.time, path.q, path.v)),
         state(2 * start.q.size()),
-        parameters(index(path.model->parameters.size())),
-        inputs(index(path.model->inputs.size())),
+        varied(index(path.model->parameters.size() + path.model->inputs.size())),
         times(index(path.time_count)) {
     if (path.times == nullptr || path.time_count == 0)
       throw std::invalid_argument("times: expected one or more, got none");
   }
 
-  /// How many numbers motions are differentiated by besides their start: between parameters and inputs, switches of a
-  /// system of several pieces have some, which nobody sets.
-  Eigen::Index varied() const {
-    Eigen::Index count = 0;
-    for (const Varied& one : varied_by(*subject)) count += one.size;
-    return count;
-  }
-
   std::shared_ptr<const Subject> subject;
   RunOptions options;
   Motion start;
-  Eigen::Index state, parameters, inputs, times;  // how many
+  Eigen::Index state, varied, times;  // numbers of a state; parameters and inputs; rows
 };
 
 /// Moves by `act`, a function of a MotionTask. Throws RunFailure.
@@ -98,13 +89,9 @@ pendula_status pendula_push(const pendula_path* path, const double* of_start, co
     const Journey journey(*path);
     const Eigen::Index columns = index(count);
     Directions<> by_start = Directions<>::Zero(journey.state, columns);
-    Directions<> by_varied = Directions<>::Zero(journey.varied(), columns);
+    Directions<> by_varied = Directions<>::Zero(journey.varied, columns);
     if (of_start != nullptr) by_start = Given(of_start, journey.state, columns);
-    if (of_parameters != nullptr) {
-      const Given given(of_parameters, journey.parameters + journey.inputs, columns);
-      by_varied.topRows(journey.parameters) = given.topRows(journey.parameters);
-      by_varied.bottomRows(journey.inputs) = given.bottomRows(journey.inputs);
-    }
+    if (of_parameters != nullptr) by_varied = Given(of_parameters, journey.varied, columns);
     const Forward moved =
         moved_along(*path, journey, [&](const MotionTask& task) { return move_variations(task, by_start, by_varied); });
     if (!moved.outcome) return PENDULA_STOPPED;
@@ -126,9 +113,7 @@ pendula_status pendula_pull(const pendula_path* path, const double* gradients, d
     if (!moved.outcome) return PENDULA_STOPPED;
     write_states(moved, states);
     if (by_start != nullptr) std::ranges::copy(moved.of_start, by_start);
-    if (by_parameters == nullptr) return PENDULA_OK;
-    by_parameters = std::ranges::copy(moved.of_parameters.head(journey.parameters), by_parameters).out;
-    std::ranges::copy(moved.of_parameters.tail(journey.inputs), by_parameters);
+    if (by_parameters != nullptr) std::ranges::copy(moved.of_parameters, by_parameters);
     return PENDULA_OK;
   });
 }

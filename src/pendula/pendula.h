@@ -187,7 +187,8 @@ pendula_status pendula_linearize(const pendula_simulation* simulation, double* a
 
 /* --- Derivatives --- */
 
-/* A motion that is differentiated exactly as its steps move it; the sizes of the steps are held. */
+/* A motion that is differentiated exactly as its steps move it; the sizes of the steps are held. Models with functions
+ * of several pieces are refused. */
 typedef struct pendula_path {
   const pendula_model* model;
   double time;         /* s; start of the motion at q and v */
