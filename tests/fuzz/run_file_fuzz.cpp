@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -20,7 +19,6 @@ const std::string& file() {
   static const std::string name = [] {
     const std::filesystem::path memory = "/dev/shm";
     const auto folder = std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path();
-    std::atexit([] { std::filesystem::remove(file()); });
     return (folder / ("pendula_run_file_fuzz_" + std::to_string(getpid()) + ".h5")).string();
   }();
   return name;
@@ -37,6 +35,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const InputError&) {
     // as it should be
   }
+  std::filesystem::remove(file());
   return 0;
 }
 
