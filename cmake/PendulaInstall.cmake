@@ -1,7 +1,8 @@
-# What an install holds: the library, its headers with the kernels of this build, the generator for more of them, the
-# program with its pictures, scenarios, manual page and completion for shells, the script that installs what these take,
-# and the CMake package. Its components: `program`, what the wheel of the Python package holds, too; `system`, the rest of
-# what the program takes; `devel`, all else.
+# What an install holds: the library, its headers with the kernels of this build, the shared library for C, the generator
+# for more kernels, the program with its pictures, scenarios, manual page and completion for shells, the script that
+# installs what these take, and the packages for CMake and pkg-config. Its components: `program`, what the wheel of the
+# Python package holds, too; `system`, the rest of what the program takes; `shared`, what programs in C need to run;
+# `devel`, all else.
 include(CMakePackageConfigHelpers)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME devel)
 
@@ -9,6 +10,13 @@ set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pendula")
 set(codegen_dir "${CMAKE_INSTALL_DATADIR}/pendula/codegen")
 
 install(TARGETS pendula_kernels pendula EXPORT pendulaTargets FILE_SET HEADERS)
+if(TARGET pendula_c)
+  install(TARGETS pendula_c EXPORT pendulaTargets LIBRARY COMPONENT shared NAMELINK_COMPONENT devel
+          INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  cmake_path(RELATIVE_PATH PROJECT_SOURCE_DIR BASE_DIRECTORY "${PROJECT_SOURCE_DIR}/${CMAKE_INSTALL_LIBDIR}/pkgconfig" OUTPUT_VARIABLE to_prefix)
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/pendula.pc.in" "${PROJECT_BINARY_DIR}/pendula.pc" @ONLY)
+  install(FILES "${PROJECT_BINARY_DIR}/pendula.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+endif()
 install(EXPORT pendulaTargets NAMESPACE pendula:: DESTINATION "${package_dir}")
 if(PENDULA_BUILD_PROGRAM)
   set(data_dir "${CMAKE_INSTALL_DATADIR}/pendula")

@@ -19,6 +19,21 @@
 
 #include "front/errors.hpp"
 
+namespace pendula::front {
+namespace {
+
+/// In the order in which motions are differentiated by them (run/derivatives.hpp).
+std::vector<Constant> parameters_of(const Subject& subject) {
+  std::vector<Constant> constants = subject.constants();
+  if (dynamic_cast<const SystemSubject*>(&subject) != nullptr) return constants;
+  constants.resize(4);  // masses, lengths, gravity and damping of a chain; its torques are inputs
+  std::swap(constants[2], constants[3]);
+  return constants;
+}
+
+}  // namespace
+}  // namespace pendula::front
+
 pendula_model::pendula_model(std::shared_ptr<const pendula::Subject> moved, std::size_t coordinate_count)
     : subject(std::move(moved)),
       coordinates(coordinate_count),
@@ -27,6 +42,13 @@ pendula_model::pendula_model(std::shared_ptr<const pendula::Subject> moved, std:
       units(names.size()) {
   for (const pendula::Quantity& quantity : subject->quantities()) {
     for (std::size_t k = 0; k < quantity.size(); ++k) units[quantity.column(k)] = quantity.unit;
+  }
+  for (const pendula::Constant& constant : pendula::front::parameters_of(*subject)) {
+    for (std::size_t k = 0; k < constant.values.size(); ++k) {
+      parameter_names.push_back(constant.per_link ? constant.name + "_" + std::to_string(k + 1) : constant.name);
+      parameter_units.push_back(constant.unit);
+      parameters.push_back(constant.values[k]);
+    }
   }
 }
 
@@ -194,6 +216,19 @@ const char* pendula_column_name(const pendula_model* model, size_t column) {
 }
 const char* pendula_column_unit(const pendula_model* model, size_t column) {
   return column < model->units.size() ? model->units[column].c_str() : nullptr;
+}
+
+size_t pendula_parameters(const pendula_model* model) {
+  return model->parameters.size();
+}
+const char* pendula_parameter_name(const pendula_model* model, size_t parameter) {
+  return parameter < model->parameters.size() ? model->parameter_names[parameter].c_str() : nullptr;
+}
+const char* pendula_parameter_unit(const pendula_model* model, size_t parameter) {
+  return parameter < model->parameters.size() ? model->parameter_units[parameter].c_str() : nullptr;
+}
+void pendula_parameter_values(const pendula_model* model, double* values) {
+  std::ranges::copy(model->parameters, values);
 }
 
 pendula_status pendula_energies(const pendula_model* model, double time, const double* q, const double* v,

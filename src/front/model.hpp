@@ -13,6 +13,8 @@ struct pendula_model {
   std::shared_ptr<const pendula::Subject> subject;
   std::size_t coordinates;
   std::vector<std::string> inputs, names, units;  // of inputs the names; of columns both
+  std::vector<std::string> parameter_names, parameter_units;
+  std::vector<double> parameters;
 };
 
 namespace pendula::front {

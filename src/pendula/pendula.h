@@ -65,8 +65,8 @@ pendula_model* pendula_model_of_chain(const pendula_chain* chain);
  * concatenated; NULL: the defaults of the model. */
 pendula_model* pendula_model_named(const char* name, int links, const double* parameters, size_t count);
 
-/* A model of a SystemTable (pendula/system/system_table.hpp), which must outlive it. `inputs` are constant; may be
- * NULL. */
+/* A model of a SystemTable (pendula/system/system_table.hpp), compiled with the headers of this very version, which
+ * must outlive it. `inputs` are constant; may be NULL. */
 pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
                                       const double* inputs, size_t input_count);
 
@@ -91,6 +91,14 @@ const char* pendula_input_name(const pendula_model* model, size_t input);
 /* Name and unit of a column: "theta_dot_1", "rad/s"; valid as long as the model. NULL if out of range. */
 const char* pendula_column_name(const pendula_model* model, size_t column);
 const char* pendula_column_unit(const pendula_model* model, size_t column);
+/* Number of parameters, each number for itself: of a chain its masses, lengths and damping, link by link, then its
+ * gravity; of another model those that pendula_model_named() takes, in the same order. */
+size_t pendula_parameters(const pendula_model* model);
+/* Name and unit of a parameter: "masses_2", "kg"; valid as long as the model. NULL if out of range. */
+const char* pendula_parameter_name(const pendula_model* model, size_t parameter);
+const char* pendula_parameter_unit(const pendula_model* model, size_t parameter);
+/* Writes the values of the parameters, (pendula_parameters()). */
+void pendula_parameter_values(const pendula_model* model, double* values);
 /* Writes the numbers of one row, (pendula_columns()). */
 pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row);
 
@@ -176,6 +184,42 @@ pendula_status pendula_finish(pendula_simulation* simulation);
 /* d(q, v)/dt = A (q, v) + B inputs, linearised about the current motion; row by row: A is (2n, 2n), B (2n, inputs).
  * Either may be NULL. */
 pendula_status pendula_linearize(const pendula_simulation* simulation, double* a, double* b);
+
+/* --- Derivatives --- */
+
+/* A motion that is differentiated exactly as its steps move it; the sizes of the steps are held. Models with functions
+ * of several pieces are refused. */
+typedef struct pendula_path {
+  const pendula_model* model;
+  double time;         /* s; start of the motion at q and v */
+  const double *q, *v; /* v may be NULL: at rest */
+  const double* times; /* (time_count) s, ascending from the start on; a step ends at each */
+  size_t time_count;
+  const double* inputs;           /* held, (pendula_inputs()); or NULL: those of the model */
+  const pendula_options* options; /* or NULL; only gauss in momentum form, and radau */
+  int (*stop)(void* context);     /* or NULL; asked before every step; nothing is written if it stops the run */
+  void* context;
+} pendula_path;
+
+/* Writes d(q, v)/dt of a motion, (2n), while `inputs` are held, (pendula_inputs()); NULL: those of the model. A chain
+ * needs a kernel for that. */
+pendula_status pendula_field(const pendula_model* model, double time, const double* q, const double* v,
+                             const double* inputs, double* field);
+
+/* Forward: writes the states (q, v) at the times, (times, 2n), and what they change by, (times, 2n, count), row by row,
+ * where the start changes by `of_start`, (2n, count), and parameters, then inputs, by `of_parameters`,
+ * (pendula_parameters() + pendula_inputs(), count). Inputs change by constants. Any of the four may be NULL: no change,
+ * or not wanted.
+ *
+ * Where an event g(q, v, t) = 0 ends the motion, its time changes, too: by dt = -(g_x dx) / (g_x f + g_t), and the
+ * state there by dx + f dt, with f of pendula_field(). */
+pendula_status pendula_push(const pendula_path* path, const double* of_start, const double* of_parameters, size_t count,
+                            double* states, double* changes);
+
+/* Backward, the transpose: from the gradients of a number by the states at the times, (times, 2n), writes its gradients
+ * by the start, (2n), and by parameters, then inputs. The results may be NULL. Steps are taken once more for it. */
+pendula_status pendula_pull(const pendula_path* path, const double* gradients, double* states, double* by_start,
+                            double* by_parameters);
 
 /* --- Ensembles --- */
 

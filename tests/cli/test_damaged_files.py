@@ -1,6 +1,6 @@
 """Files that are damaged: whoever goes on from one is told so, or gets what the whole file gives, to the last bit.
 
-Nothing hangs, dies of a signal, or takes long to say so. PENDULA_DRAWS asks for more damages than are drawn here.
+Nothing hangs, dies of a signal, or takes long to say so. tests/campaign/damages.py draws more damages.
 """
 
 import signal
@@ -75,7 +75,7 @@ def check_damages(few: int, file: Path, others: list[Path], go_on: Callable[[], 
 
     assert is_done(before[file])
     whole = contents(made)
-    for number, draw in enumerate(draws(few)):
+    for number, draw in draws(few):
         data = damaged(draw, before[file])
         if is_done(data):
             assert contents(made) == whole, f"draw {number}"
@@ -136,7 +136,7 @@ def test_an_ensemble_that_is_damaged_is_moved_again_or_left_alone(tmp_path):
     assert ends_in_order(command, tmp_path)
     file = tmp_path / "out.h5"
     whole, was = file.read_bytes(), contents(file)
-    for draw in draws(20):
+    for _, draw in draws(20):
         data = damaged(draw, whole)
         file.write_bytes(data)
         assert ends_in_order([*command, "--resume"], tmp_path)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import xarray
 from conftest import Result, program
+from damage import draws
 
 MAP = """\
 [chain]
@@ -137,21 +138,18 @@ def test_ranks_do_not_matter(whole, tmp_path, ranks):
 
 
 def test_killed_at_any_time_it_goes_on(whole, tmp_path):
-    """Twenty kills at random moments, some of them while the file is written."""
-    moments = random.Random(3)
-    kills = 0
+    """Kills at random moments, some of them while the file is written; tests/campaign/damages.py draws more."""
     resume: tuple[str, ...] = ()
-    while kills < 20:
+    for _, draw in draws(25):
         process = subprocess.Popen(
             command(tmp_path, "--threads", "2", *resume),
             cwd=tmp_path,
             stderr=subprocess.PIPE,
             text=True,
         )
-        time.sleep(moments.uniform(0.005, 0.15))
+        time.sleep(draw.uniform(0.005, 0.15))
         process.kill()
         process.communicate()
-        kills += process.returncode == -signal.SIGKILL
         if (tmp_path / "out.h5").exists() and not (tmp_path / "out.h5.parts").exists():
             assert contents(tmp_path / "out.h5") == whole  # it was done: begin anew
             (tmp_path / "out.h5").unlink()

@@ -36,11 +36,15 @@ function(python_out_of_sight out_python)
   set(${out_python} "${WORK}/python/bin/${name}" PARENT_SCOPE)
 endfunction()
 
-# Copies the project NAME of this folder to WORK and sets `configure` and `build` to the commands that make it.
-macro(take_project name)
-  set(project "${WORK}/${name}")
+# Copies the project FOLDER, by its name one of this folder, to WORK and sets `configure` and `build` to the commands that
+# make it.
+macro(take_project folder)
+  set(original "${folder}")
+  cmake_path(ABSOLUTE_PATH original BASE_DIRECTORY "${CMAKE_CURRENT_LIST_DIR}")
+  cmake_path(GET original FILENAME project)
+  set(project "${WORK}/${project}")
   file(REMOVE_RECURSE "${project}" "${project}-build")
-  file(COPY "${CMAKE_CURRENT_LIST_DIR}/${name}/" DESTINATION "${project}")
+  file(COPY "${original}/" DESTINATION "${project}")
   python_out_of_sight(python)
   set(configure "${CMAKE_COMMAND}" -S "${project}" -B "${project}-build" -G "${GENERATOR}" -D CMAKE_BUILD_TYPE=Debug
                 -D "CMAKE_CXX_COMPILER=${CXX}" -D "PENDULA_PYTHON=${python}")

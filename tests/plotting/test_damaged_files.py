@@ -1,4 +1,4 @@
-"""Pictures of damaged files: drawn, or told in one line; PENDULA_DRAWS asks for more damages than are drawn here."""
+"""Pictures of damaged files: drawn, or told in one line; tests/campaign/damages.py draws more."""
 
 import os
 import sys
@@ -58,7 +58,7 @@ def kinds(folder, pendula):
 def test_it_is_drawn_or_told_in_one_line(runs, pendula):
     for name, whole, show in kinds(runs, pendula):
         file = runs / f"damaged-{name}"
-        for number, draw in enumerate(draws(5)):
+        for number, draw in draws(5):
             file.write_bytes(damaged(draw, whole))
             began = time.monotonic()
             try:

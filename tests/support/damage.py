@@ -3,12 +3,22 @@
 import os
 import random
 from collections.abc import Iterator
+from pathlib import Path
 
 
-def draws(few: int) -> Iterator[random.Random]:
-    """A generator for each of so many draws; PENDULA_DRAWS in the environment asks for more."""
-    for seed in range(int(os.environ.get("PENDULA_DRAWS", few))):
-        yield random.Random(seed)
+def draws(few: int) -> Iterator[tuple[int, random.Random]]:
+    """So many draws, each a number and a generator. A campaign (tests/campaign/damages.py) asks by the environment for
+    others: PENDULA_DRAWS, how many; PENDULA_FIRST_DRAW; PENDULA_SEED; PENDULA_DRAW, a file to tell which this is."""
+    asked = os.environ.get
+    first, told, seed = (
+        int(asked("PENDULA_FIRST_DRAW", 0)),
+        asked("PENDULA_DRAW"),
+        int(asked("PENDULA_SEED", 0)),
+    )
+    for number in range(first, first + int(asked("PENDULA_DRAWS", few))):
+        if told:
+            Path(told).write_text(str(number))
+        yield number, random.Random(seed * 10**9 + number)
 
 
 def flip(draw: random.Random, data: bytearray) -> None:
