@@ -2,8 +2,8 @@
 cmake_minimum_required(VERSION 3.25)
 
 # Scripts of a page, in the order in which they stand in one module: each knows the names of those before it.
-set(before format data motion palette player gestures plots)
-set(space three camera bodies impostors trace space)
+set(before format data motion palette player gestures plots shapes)
+set(space three camera bodies impostors fittings trace space)
 set(after pickers panels marks laboratory controls main)
 
 include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")

@@ -6,7 +6,7 @@ cmake_minimum_required(VERSION 3.25)
 include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")
 
 # Scripts in the order in which they stand in one module; those of other pages first, which both have.
-set(shared format palette gestures plots)
+set(shared format palette gestures plots shapes)
 set(own vectors spec link history stage hand panels controls main)
 
 file(WRITE "${OUTPUT}.new" "// Made by cmake/embed_lab.cmake.\n#include \"view/assets.hpp\"\n\nnamespace pendula::view::assets {\n\n")

@@ -26,11 +26,6 @@ STARTS = {
     "swinging_atwood": {"q": [1, 1.5707963267948966]},
 }
 
-# What is drawn as no ball, and what is between the origin or a point and another: what model files cannot say yet.
-KINDS = {"cart_chain": {"cart": "cart"}, "driven_chain": {"pivot": "pivot"}}
-SPRINGS = {"spring_pendulum": [[None, "bob"]]}
-STRINGS = {"swinging_atwood": [[None, "bob"]]}
-
 
 def generator(codegen: Path, command: str, model: str, *more: str) -> str:
     links = ["--links", str(LINKS[model])] if model in LINKS else []
@@ -53,9 +48,6 @@ def main() -> None:
             generator(codegen, "program", name, "--as", "bytecode", "--output", str(program))
             described = json.loads(generator(codegen, "describe", name).splitlines()[-1])
             del described["file"]
-            for point in described["points"]:
-                point["kind"] = KINDS.get(name, {}).get(point["name"], "ball")
-            described |= {"springs": SPRINGS.get(name, []), "strings": STRINGS.get(name, [])}
             models[name] = {"model": described, "program": program.read_text(), "start": STARTS.get(name, {})}
     output.write_text(json.dumps(models))
 

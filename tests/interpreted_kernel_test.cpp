@@ -188,6 +188,9 @@ TEST(InterpretedKernel, SaysWhatItsProgramSays) {
   EXPECT_TRUE(info.is_positive[0] && !info.is_positive[1] && info.constant_masses && !info.depends_on_time);
   EXPECT_EQ(info.inputs[0], "u");
   EXPECT_EQ(info.point_sizes[0], 2);
+  EXPECT_EQ(info.point_kinds[0], "cart");
+  EXPECT_EQ(info.connection_kinds[0], "spring");
+  EXPECT_EQ(std::vector(info.connection_ends.begin(), info.connection_ends.end()), (std::vector{-1, 0}));
   EXPECT_EQ(table->of_8.call_arguments, nullptr);
 }
 
@@ -201,24 +204,26 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
     return "nothing";
   };
   EXPECT_EQ(told(""), "line 0: expected a program, got ");
-  EXPECT_EQ(told(changed("program|12", "program|9")), "line 1: expected a whole number from 12 to 12, got 9");
+  EXPECT_EQ(told(changed("program|13", "program|9")), "line 1: expected a whole number from 13 to 13, got 9");
   EXPECT_EQ(told(changed("links|1", "links|one")), "line 4: expected a whole number from 1 to 1000000, got one");
   EXPECT_EQ(told(changed("kg|1|1.0|1|0", "kg|1|1.0|1")), "line 8: expected another word, got the end of the line");
-  EXPECT_EQ(told(changed("bob|2", "bob|2|3")), "line 11: expected the end of the line, got 3");
+  EXPECT_EQ(told(changed("bob|2|cart", "bob|2|cart|3")), "line 11: expected the end of the line, got 3");
   EXPECT_EQ(told(changed("hamiltonian_form", "hamiltonian")),
-            "line 13: expected a function that kernels have, got hamiltonian");
-  EXPECT_EQ(told(changed("read|1|p|0", "read|1|v|0")), "line 15: expected an array of this function, got v");
-  EXPECT_EQ(told(changed("read|1|p|0", "read|1|p|1")), "line 15: expected a whole number from 0 to 0, got 1");
-  EXPECT_EQ(told(changed("factor|1|5|0", "factor|3|5|0")), "line 19: expected a whole number from 0 to 0, got 5");
-  EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 19: expected an operation, got invert");
-  EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 21: expected a whole number from 0 to 5, got 6");
-  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 23: expected a write to every row of every output, got function");
-  EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|2|1|2\nsum|0|0")), "line 14: expected 2 sums, got 1");
+            "line 14: expected a function that kernels have, got hamiltonian");
+  EXPECT_EQ(told(changed("read|1|p|0", "read|1|v|0")), "line 16: expected an array of this function, got v");
+  EXPECT_EQ(told(changed("read|1|p|0", "read|1|p|1")), "line 16: expected a whole number from 0 to 0, got 1");
+  EXPECT_EQ(told(changed("factor|1|5|0", "factor|3|5|0")), "line 20: expected a whole number from 0 to 0, got 5");
+  EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 20: expected an operation, got invert");
+  EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 22: expected a whole number from 0 to 5, got 6");
+  EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 24: expected a write to every row of every output, got function");
+  EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|2|1|2\nsum|0|0")), "line 15: expected 2 sums, got 1");
   EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|1|1|2\nsum|0|1")),
-            "line 13: expected a whole number from 0 to 0, got 1");
+            "line 14: expected a whole number from 0 to 0, got 1");
   EXPECT_EQ(told(changed("write|1|kept|0\n", "")).substr(10),
             "expected a write to every row of every output, got function");
-  EXPECT_EQ(told(changed("point|bob|2\n", "")), "line 142: expected an array of this function, got r");
+  EXPECT_EQ(told(changed("point|bob|2|cart\nconnection|spring|-1|0\n", "")),
+            "line 142: expected an array of this function, got r");
+  EXPECT_EQ(told(changed("spring|-1|0", "spring|-1|1")), "line 12: expected a whole number from -1 to 0, got 1");
   EXPECT_EQ(told(changed("coordinate|x|m|0|0\n", "")),
             "expected a name, a model, links and coordinates, got a description without one of them");
 }

@@ -57,10 +57,12 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
             {
                 "name": point.name,
                 "columns": [f"{point.name}_{axis}" for axis in "xyz"[: len(point.components)]],
+                "kind": point.kind,
                 "remark": remark(point.name),
             }
             for point in model.points
         ],
+        "connections": [{"kind": each.kind, "ends": list(each.ends)} for each in model.connections],
     }
 
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
 from pathlib import Path
+from typing import NoReturn
 
 import mpmath
 from sympy import Add, Expr, Integer, Symbol, expand, lambdify, sympify
@@ -76,10 +77,25 @@ class Input:
     unit: str
 
 
+POINT_KINDS = ("bob", "cart", "pivot")
+ORIGIN = "origin"  # where springs and threads may end, too
+
+
 @dataclass(frozen=True)
 class Point:
+    """kind: what it is drawn as, one of POINT_KINDS."""
+
     name: str
     components: tuple[Expr, ...]
+    kind: str = "bob"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Something drawn between two points, by number, -1 for the origin. kind: "spring" or "thread"."""
+
+    kind: str
+    ends: tuple[int, int]
 
 
 @dataclass
@@ -101,6 +117,7 @@ class Model:
     parameters: list[Parameter] = field(default_factory=list)
     inputs: list[Input] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
     _forces: list[tuple[Symbol, _Said]] = field(default_factory=list)
     _lagrangian: _Said | None = None
     _dissipation: _Said | None = None
@@ -202,8 +219,14 @@ class Model:
             self._fail(f"force: expected a coordinate of the model first, got {coordinate}")
         self._forces.append((coordinate, self._said(value, "force")))
 
-    def point(self, name: str, components: Sequence[Expr]) -> None:
-        """A point for files and pictures: 2 or 3 components, m."""
+    def point(self, name: str, components: Sequence[Expr], *, kind: str = "bob") -> Point:
+        """A point for files and pictures: 2 or 3 components, m.
+
+        kind: what it is drawn as. A "bob" is a ball, a "cart" a box with wheels on the line along which it runs, a
+        "pivot" a ring: what others hang on.
+        """
+        if kind not in POINT_KINDS:
+            self._fail(f"point {name}: kind: expected {_listed(POINT_KINDS)}, got {kind!r}")
         if isinstance(components, str) or not isinstance(components, Iterable):
             self._fail(f"point {name}: expected 2 or 3 components, got {components!r}")
         values = tuple(self._expression(value, f"point {name}") for value in components)
@@ -213,7 +236,36 @@ class Model:
         for axis in "xyz"[: len(values)]:
             self._declare(f"{name}_{axis}", f"a component of the point {name}")
         self._check(Add(*values), f"point {name}", (*self._positions(), self.time))
-        self.points.append(Point(name, values))
+        self.points.append(Point(name, values, kind))
+        return self.points[-1]
+
+    def spring(self, start: Point | str, end: Point | str) -> None:
+        """Draws a spring between two points, or a point and "origin". What it does stands in the Lagrangian."""
+        self._connect("spring", start, end)
+
+    def thread(self, start: Point | str, end: Point | str) -> None:
+        """Draws a thread between two points, or a point and "origin", whose length may change."""
+        self._connect("thread", start, end)
+
+    def _connect(self, kind: str, start: Point | str, end: Point | str) -> None:
+        ends = self._end(kind, start), self._end(kind, end)
+        if ends[0] == ends[1]:
+            self._fail(f"{kind}: expected two different points, got {self._end_name(ends[0])} twice")
+        self.connections.append(Connection(kind, ends))
+
+    def _end(self, kind: str, given: Point | str) -> int:
+        """The number of a point."""
+        names = [point.name for point in self.points]
+        name = given.name if isinstance(given, Point) else given
+        if name in names:
+            return names.index(name)
+        if name == ORIGIN:
+            return -1
+        known = ", ".join([*names, ORIGIN])
+        self._fail(f"{kind}: expected a point that the model has by now, one of {known}; got {given!r}")
+
+    def _end_name(self, number: int) -> str:
+        return ORIGIN if number < 0 else self.points[number].name
 
     # --- what the generator asks
 
@@ -390,7 +442,7 @@ class Model:
             self._fail(f"expected {what}, got {value!r}")
         return value
 
-    def _fail(self, what: str) -> None:
+    def _fail(self, what: str) -> NoReturn:
         raise GenerationError(f"{self._line()}: {what}")
 
     def _line(self) -> str:
@@ -401,6 +453,10 @@ class Model:
                 return f"{self.file}:{frame.f_lineno}"
             frame = frame.f_back
         return self.file
+
+
+def _listed(words: Sequence[str]) -> str:
+    return f"{', '.join(map(repr, words[:-1]))} or {words[-1]!r}"
 
 
 def rate_name(coordinate: str) -> str:

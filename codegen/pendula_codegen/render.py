@@ -24,7 +24,7 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.links import find_link
-from pendula_codegen.model import Coordinate, Input, Model, Parameter
+from pendula_codegen.model import Connection, Coordinate, Input, Model, Parameter
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.system_info import depends_on_time, has_constant_masses, is_periodic
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
@@ -148,6 +148,7 @@ class Words:
     bases     of what functions are taken of, whether it is a base
     switches  what decides between pieces of functions
     held      what moves it
+    kinds     of points, and what is drawn between them, where the system says so
     alias     a further name of the structure
     own       names that somebody else has chosen, and that stand in the header as they are
     """
@@ -169,6 +170,8 @@ class Words:
     number: str = "Real"
     bases: list[bool] = field(default_factory=list)
     switches: list[str] = field(default_factory=list)
+    kinds: list[str] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
     held: list[Expr] = field(default_factory=list)
     alias: str = ""
     own: list[str] = field(default_factory=list)
@@ -278,6 +281,8 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
         number="_real",
         bases=bases,
         switches=switches,
+        kinds=[point.kind for point in model.points],
+        connections=model.connections,
         held=model.held_expressions(),
         alias=alias,
         own=[parameter.name for parameter in ordered] + [alias] * bool(alias),
@@ -315,6 +320,8 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
                 periodic,
                 words.bases,
                 words.switches,
+                words.kinds,
+                words.connections,
             ),
             *(series_constants(tapes) if tapes is not None else []),
         ],

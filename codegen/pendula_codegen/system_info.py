@@ -30,7 +30,8 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
         standard = "nan" if p.default is None else repr(p.default)
         rows.append(("parameter", p.name, p.unit, len(p.symbols), standard, p.positive, p.per_link))
     rows += [("input", i.symbol.name, i.unit) for i in model.inputs]
-    rows += [("point", p.name, len(p.components)) for p in model.points]
+    rows += [("point", p.name, len(p.components), p.kind) for p in model.points]
+    rows += [("connection", each.kind, *each.ends) for each in model.connections]
     rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
     rows += [("switch", switch.value) for switch in model.switches]
     series = tapes.series

@@ -6,6 +6,7 @@ import pytest
 from sympy import Rational, sqrt
 
 from pendula_codegen.errors import GenerationError
+from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.render import render_model
@@ -46,8 +47,43 @@ REFUSED = {
     "model.force(x, x * oo)": "is no finite real number",
     "model.force(x, (1e-200 * x)**2)": "force: the number 1.00E-400 is out of the range",
     "model.force(x, 1e200 * x * 1e200)": "force: the number 1.00E+400 is out of the range",
+    "model.point('bob', (x, y), kind='wagon')": "point bob: kind: expected 'bob', 'cart' or 'pivot', got 'wagon'",
+    "model.point('bob', (x, y), kind=1)": "point bob: kind: expected 'bob', 'cart' or 'pivot', got 1",
+    "model.spring('origin', 'bob')": "spring: expected a point that the model has by now, one of origin; got 'bob'",
+    "model.thread(model.point('bob', (x, y)), 'origin_1')": "by now, one of bob, origin; got 'origin_1'",
+    "model.spring('origin', (x, y))": "spring: expected a point that the model has by now, one of origin; got (x, y)",
+    "model.spring(model.point('bob', (x, y)), 'bob')": "spring: expected two different points, got bob twice",
     "model.force(x, Symbol('x', positive=True))": "force holds a symbol 'x' that is not the model's own, a coordinate",
 }
+
+
+def test_points_say_what_they_are_drawn_as(tmp_path):
+    """Whatever a kernel is printed as, it says the same as the file."""
+    model = read(
+        tmp_path,
+        "wall = model.point('wall', (0, 1), kind='pivot'); model.point('cart', (x, 0), kind='cart'); "
+        "model.point('ball', (x, y)); model.spring(wall, 'cart'); model.thread('origin', 'ball')",
+    )
+    assert [point.kind for point in model.points] == ["pivot", "cart", "bob"]
+    assert [(each.kind, each.ends) for each in model.connections] == [("spring", (0, 1)), ("thread", (-1, 2))]
+    lines = [
+        "point wall 2 pivot",
+        "point cart 2 cart",
+        "point ball 2 bob",
+        "connection spring 0 1",
+        "connection thread -1 2",
+    ]
+    c = render_c(model, "said.py", "said.c").replace("\\t", " ")
+    program = render_bytecode(model).replace("\t", " ")
+    llvm = render_llvm(model, "sse2").replace("\\09", " ")
+    for line in lines:
+        assert line in c
+        assert line in program.splitlines()
+        assert line in llvm
+    header = render_model(model, "said.py").text
+    assert 'point_kinds = {"pivot", "cart", "bob"};' in header
+    assert 'connection_kinds = {"spring", "thread"};' in header
+    assert "connection_ends = {0, 1, -1, 2};" in header
 
 
 @pytest.mark.parametrize("line", REFUSED)

@@ -179,7 +179,7 @@ class Solution:
     def to_html(self, file: str | PathLike[str]) -> None:
         """Writes the page that ``pendula simulate --view`` writes: one file that moves, and needs nothing else.
 
-        The run is made again for it, by the same steps. The program's page of a chain also carries the laboratory.
+        The run is made again for it, by the same steps. The program's page also carries the laboratory.
         """
         with plainly():
             _core.write_page(self._result, fspath(file), *places(), tell)

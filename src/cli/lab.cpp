@@ -3,13 +3,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
-#include <span>
 #include <string>
 #include <variant>
-#include <vector>
 
 #include "cli/commands.hpp"
-#include "io/generator.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
@@ -44,40 +41,47 @@ std::string link_of(const io::Scenario<Space>& scenario) {
   return link.text();
 }
 
-/// What a page is told of a model: its program, and what describe tells.
-json model_start(const io::ModelName& name, const io::Toolchain& toolchain) {
-  const json described = json::parse(io::describe_model(name, toolchain));
-  return {{"title", described["model"]}, {"model", described}, {"program", io::model_program(name, toolchain)}};
+void no_words(const std::string&) {}
+
+/// What a page is told of a model.
+json model_start(const io::ModelName& name, const SystemInfo& info, const io::Toolchain& toolchain) {
+  json start = view::lab_model(info, io::kernel_program(name, toolchain, no_words));
+  start["title"] = info.model;
+  return start;
+}
+
+/// The same of a model and its start in a scenario.
+json start_of(const io::SystemScenario& scenario, io::ModelName name, const io::Toolchain& toolchain) {
+  name.laws.clear();
+  if (!scenario.feedback.empty()) warn("feedback");
+  for (const std::string& what : view::lab_leaves_out(*scenario.system)) warn(what);
+  json start = model_start(name, scenario.system->info(), toolchain);
+  view::LabLink link = view::lab_link(*scenario.system);
+  link.put("q", scenario.start.q);
+  link.put("v", scenario.start.v);
+  start["state"] = link.text();
+  return start;
 }
 
 json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
   std::optional<io::ModelName> model;
   const io::FindSystem find = [&](const io::ModelName& name) {
     model = name;
-    return io::find_kernel(name, toolchain, [](const std::string&) {}).table;
+    return io::find_kernel(name, toolchain, no_words).table;
   };
   const io::ScenarioText text = io::read_scenario_text(options.scenario);
   const io::AnyScenario scenario = io::parse_scenario(text.text, text.name, options.overrides, find);
-  const std::string title = std::filesystem::path(text.name).stem().string();
-  return std::visit(
+  json start = std::visit(
       [&](const auto& found) -> json {
         if constexpr (requires { found.chain; }) {
-          return {{"title", title}, {"state", link_of(found)}};
+          return {{"state", link_of(found)}};
         } else {
-          model->laws.clear();
-          if (!found.feedback.empty() || !found.system->numbers().sines.empty()) warn("drives and feedback");
-          json start = model_start(*model, toolchain);
-          view::LabLink link;
-          const std::vector<double>& all = found.system->numbers().parameters;
-          link.put("p", std::span(all).first(all.size() - 2 * found.system->info().switches.size()));
-          link.put("q", found.start.q);
-          link.put("v", found.start.v);
-          start["title"] = title;
-          start["state"] = link.text();
-          return start;
+          return start_of(found, *model, toolchain);
         }
       },
       scenario);
+  start["title"] = std::filesystem::path(text.name).stem().string();
+  return start;
 }
 
 }  // namespace
@@ -93,7 +97,8 @@ ExitStatus lab(const LabOptions& options) {
   json start = json::object();
   const bool is_scenario = options.scenario == "-" || options.scenario.ends_with(".toml");
   if (!is_scenario && !options.scenario.empty()) {
-    start = model_start({options.scenario, options.links}, toolchain);
+    const io::ModelName name{options.scenario, options.links};
+    start = model_start(name, io::find_kernel(name, toolchain, no_words).table->info, toolchain);
   } else if (is_scenario) {
     start = scenario_start(options, toolchain);
   }

@@ -49,8 +49,9 @@ def define(model, links):
     model.dissipation = drag * (x_dot**2 + y_dot**2) / 2
     model.force(r, push)
 
-    # Points, for files and pictures.
+    # Points, for files and pictures, and what is drawn between them; kind="cart" or "pivot" draws no ball.
     model.point("bob", (x, y))
+    model.spring("origin", "bob")
 )";
 
 std::string with_name(std::string text, const std::string& name) {

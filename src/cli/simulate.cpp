@@ -6,6 +6,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/integrator.hpp>
@@ -29,6 +30,7 @@
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
 #include "io/summary.hpp"
+#include "view/lab.hpp"
 #include "view/page.hpp"
 #include "view/scenario_scene.hpp"
 
@@ -43,6 +45,17 @@ io::RunSource read_run_source(const SimulateOptions& options) {
 
 /// Rows of a film: four for each frame of pendula_plot, so that traces are smooth.
 const RowTimes film_times{1.0 / 120, {}};
+
+/// Gives a page's laboratory the model that moves there. Where its program cannot be made, there is no laboratory.
+void add_model(view::Scene& scene, const io::ModelName& name, const SystemInfo& info,
+               const std::function<void(const std::string&)>& tell) {
+  try {
+    const std::string program = io::kernel_program(name, io::Toolchain::of_this_program(), tell);
+    scene.laboratory_model = view::lab_model(info, program).dump();
+  } catch (const io::ModelError&) {
+    scene.laboratory.clear();
+  }
+}
 
 /// Keeps the last checkpoint of a run.
 class LastCheckpoint : public Observer {
@@ -227,14 +240,17 @@ ExitStatus simulate(const SimulateOptions& options) {
     if (check_film(*options.video) != done) return wrong_input;
   }
   std::string model, kernel_by = "build";
+  std::optional<io::ModelName> model_name;
+  const auto tell = [&](const std::string& what) {
+    if (!options.quiet) std::cerr << "pendula: " << what << '\n';
+  };
   const io::FindSystem find = [&](io::ModelName name) {
     const io::Toolchain toolchain = io::Toolchain::of_this_program();
     if (options.resume) name.folder = io::model_folder(*options.resume, name.model, name.folder);
     model = io::model_source(name, toolchain);
     io::require_same_model(source, model);
-    const io::ModelKernel kernel = io::find_kernel(name, toolchain, [&](const std::string& what) {
-      if (!options.quiet) std::cerr << "pendula: " << what << '\n';
-    });
+    const io::ModelKernel kernel = io::find_kernel(name, toolchain, tell);
+    model_name = name;
     kernel_by = kernel.by();
     return kernel.table;
   };
@@ -244,7 +260,10 @@ ExitStatus simulate(const SimulateOptions& options) {
         const RunSetup setup = io::setup_of(scenario);
         check_events(options, setup);
         view::Scene scene = view::scene_of(scenario, source);
-        scene.laboratory = view::laboratory_of(scenario);
+        if (options.view) scene.laboratory = view::laboratory_of(scenario);
+        if constexpr (requires { scenario.system; }) {
+          if (!scene.laboratory.empty()) add_model(scene, *model_name, scenario.system->info(), tell);
+        }
         RunSession session(setup, scene, scenario, source, model, options);
         io::Summary summary = session.run();
         summary.kernel_by = kernel_by;

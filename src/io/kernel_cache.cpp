@@ -136,4 +136,11 @@ ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
   return {kept, table, was_there};
 }
 
+std::string kernel_program(const ModelName& model, Toolchain toolchain,
+                           const std::function<void(const std::string&)>& tell) {
+  toolchain.kernels_by = "interpreter";
+  const ModelKernel kernel = find_kernel(model, toolchain, tell);
+  return kernel.file.empty() ? model_program(model, toolchain) : program_in(kernel.file);
+}
+
 }  // namespace pendula::io

@@ -28,6 +28,10 @@ struct ModelKernel {
 ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
                         const std::function<void(const std::string&)>& tell);
 
+/// The program by which an interpreter runs the kernel of a model, from the cache or made now. Throws ModelError.
+std::string kernel_program(const ModelName& model, Toolchain toolchain,
+                           const std::function<void(const std::string&)>& tell);
+
 /// The text of a model's file; empty if its kernel is part of this program. Throws as find_kernel.
 std::string model_source(const ModelName& name, const Toolchain& toolchain);
 

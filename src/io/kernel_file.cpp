@@ -93,6 +93,16 @@ void seal_kernel(const fs::path& file) {
   }
 }
 
+std::string program_in(const fs::path& kept) {
+  InputFile file = read_input_file(kept, largest_kernel);
+  if (!file.problem.empty() || !is_sealed(file.text)) {
+    throw ModelError("expected the program of a kernel in " + kept.string() +
+                     ", got: " + (file.problem.empty() ? "it is not what was written" : file.problem));
+  }
+  file.text.resize(file.text.size() - seal_of({}).size());
+  return std::move(file.text);
+}
+
 std::shared_ptr<const SystemTable> load_kernel(const fs::path& kept, const Toolchain& toolchain, std::string& problem) {
   Descriptor opened(open(kept.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   struct stat status {};

@@ -16,6 +16,9 @@ inline constexpr const char *compiled_kernel = ".so", *llvm_kernel = ".o", *inte
 /// Appends the hash. Throws ModelError if the file cannot be written.
 void seal_kernel(const std::filesystem::path& file);
 
+/// The program of an interpreted kernel in its file, without the seal. Throws ModelError.
+std::string program_in(const std::filesystem::path& kept);
+
 /// Loads a kernel. Returns null, and says why in `problem`, unless the file is complete, the user's own, and of this
 /// version.
 std::shared_ptr<const SystemTable> load_kernel(const std::filesystem::path& kept, const Toolchain& toolchain,

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json_fwd.hpp>
 #include <pendula/chain/chain.hpp>
+#include <pendula/run/system_subject.hpp>
 #include <ranges>
 #include <string>
 #include <string_view>
@@ -61,6 +62,15 @@ std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
   }
   return words;
 }
+
+/// What a system is, without a state: parameters, and inputs that are held. The link goes with `lab_model`.
+LabLink lab_link(const SystemSubject& system);
+
+/// What of a system a laboratory leaves out, in words. Feedback is the scenario's, and left out, too.
+std::vector<std::string> lab_leaves_out(const SystemSubject& system);
+
+/// What a laboratory begins with that moves a model by its program: "model" and "program".
+nlohmann::json lab_model(const SystemInfo& info, std::string program);
 
 /// Whether this build has the laboratory: it takes emscripten.
 bool has_lab();

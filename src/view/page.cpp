@@ -255,20 +255,32 @@ json Page::described(const Run& run) const {
 }
 
 json Page::described() const {
-  json coordinates = json::array(), points = json::array(), runs = json::array();
+  json coordinates = json::array(), points = json::array(), runs = json::array(), connections = json::array();
   for (const Coordinate& each : scene_.coordinates) {
     coordinates.push_back({each.name, each.unit, each.is_angle, each.column, each.rate_column});
   }
-  for (const Point& each : scene_.points) points.push_back({each.name, each.column, each.components, each.mass});
+  for (const Point& each : scene_.points) {
+    points.push_back({each.name, each.column, each.components, each.mass, each.kind});
+  }
+  for (const Connection& each : scene_.connections) connections.push_back({each.kind, each.from, each.to});
   for (const Run& run : runs_) runs.push_back(described(run));
-  return {{"title", scene_.title},          {"subject", scene_.subject},
-          {"scenario", scene_.scenario},    {"version", scene_.version},
-          {"columns", scene_.columns},      {"dimension", scene_.dimension()},
-          {"coordinates", coordinates},     {"points", points},
-          {"rods", name_of(scene_.rods)},   {"lengths", scene_.lengths},
-          {"timeUnit", scene_.time_unit},   {"lengthUnit", scene_.length_unit},
-          {"loaded", scene_.loaded},        {"laboratory", scene_.laboratory},
-          {"three", assets::three_version}, {"runs", runs}};
+  return {{"title", scene_.title},
+          {"subject", scene_.subject},
+          {"scenario", scene_.scenario},
+          {"version", scene_.version},
+          {"columns", scene_.columns},
+          {"dimension", scene_.dimension()},
+          {"coordinates", coordinates},
+          {"points", points},
+          {"connections", connections},
+          {"rods", name_of(scene_.rods)},
+          {"lengths", scene_.lengths},
+          {"timeUnit", scene_.time_unit},
+          {"lengthUnit", scene_.length_unit},
+          {"loaded", scene_.loaded},
+          {"laboratory", scene_.laboratory},
+          {"three", assets::three_version},
+          {"runs", runs}};
 }
 
 /// What stands for {{name}}.
@@ -288,7 +300,8 @@ std::string Page::part(const std::string& name) const {
   if (name == "runs") {
     for (const Run& run : runs_) text += "<script type=\"text/plain\" class=\"run\">" + encoded(run) + "</script>\n";
   } else if (name == "laboratory" && !scene_.laboratory.empty()) {
-    const json start = {{"title", scene_.title}};
+    json start = scene_.laboratory_model.empty() ? json::object() : json::parse(scene_.laboratory_model);
+    start["title"] = scene_.title;
     text = "<script type=\"application/json\" id=\"laboratory\">" + script_json(lab_page(start)) + "</script>";
   } else if (name == "three" && in_space) {
     text += "<!-- three.js r" + std::string(assets::three_version) + "\n\n" + std::string(assets::three_licence) +

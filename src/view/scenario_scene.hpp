@@ -38,15 +38,16 @@ Scene subject_scene(const Scenario& scenario) {
   return scene;
 }
 
-/// The laboratory's link of a chain in SI that it has all of; empty for all else, and where this build has none.
+/// The laboratory's link of what is moved, in SI, if the laboratory has all of it; empty for all else, and where this
+/// build has none.
 template <class Scenario>
 std::string laboratory_of(const Scenario& scenario) {
+  if (!has_lab() || !scenario.feedback.empty() || scenario.natural) return {};
   if constexpr (requires { scenario.chain; }) {
-    const auto& chain = scenario.chain;
-    const bool is_whole = scenario.feedback.empty() && lab_leaves_out(chain).empty();
-    if (has_lab() && is_whole && !scenario.natural) return lab_link(chain).text();
+    return lab_leaves_out(scenario.chain).empty() ? lab_link(scenario.chain).text() : "";
+  } else {
+    return lab_leaves_out(*scenario.system).empty() ? lab_link(*scenario.system).text() : "";
   }
-  return {};
 }
 
 /// What a page is told of a run besides its rows.

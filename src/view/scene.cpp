@@ -39,6 +39,19 @@ Scene chain_scene(std::vector<std::string> columns, std::size_t dof, const Eigen
 
 }  // namespace detail
 
+std::string point_kind(const SystemInfo& info, std::size_t k) {
+  return info.point_kinds.empty() ? "bob" : std::string(info.point_kinds[k]);
+}
+
+std::vector<Connection> connections_of(const SystemInfo& info) {
+  std::vector<Connection> connections;
+  for (std::size_t k = 0; k < info.connection_kinds.size(); ++k) {
+    connections.push_back(
+        {std::string(info.connection_kinds[k]), info.connection_ends[2 * k], info.connection_ends[2 * k + 1]});
+  }
+  return connections;
+}
+
 Scene scene_of(const SystemSubject& subject) {
   const SystemInfo& info = subject.info();
   const std::size_t count = info.coordinates.size();
@@ -52,9 +65,10 @@ Scene scene_of(const SystemSubject& subject) {
   }
   std::size_t column = 1 + 2 * count + info.inputs.size();
   for (std::size_t k = 0; k < info.points.size(); ++k) {
-    scene.points.push_back({std::string(info.points[k]), column, info.point_sizes[k], 0});
+    scene.points.push_back({std::string(info.points[k]), column, info.point_sizes[k], 0, point_kind(info, k)});
     column += static_cast<std::size_t>(info.point_sizes[k]);
   }
+  scene.connections = connections_of(info);
   scene.rods = Rods::rigid;
   scene.loaded = subject.loaded();
   return scene;

@@ -21,7 +21,14 @@ struct Point {
   std::string name;
   std::size_t column = 0;
   int components = 2;
-  double mass = 0;  ///< kg; 0 where it is not known
+  double mass = 0;           ///< kg; 0 where it is not known
+  std::string kind = "bob";  ///< what it is drawn as: "bob", "cart" or "pivot"
+};
+
+/// Something drawn between two points, by number; -1 is the origin.
+struct Connection {
+  std::string kind;  ///< "spring" or "thread"
+  int from = -1, to = -1;
 };
 
 /// What joins the points.
@@ -40,11 +47,13 @@ struct Scene {
   std::vector<std::string> columns;
   std::vector<Coordinate> coordinates;
   std::vector<Point> points;
+  std::vector<Connection> connections;
   Rods rods = Rods::none;
   std::vector<double> lengths;  ///< of a chain's rods [m]: its points need not be stored, its angles tell them
   bool loaded = false;          ///< whether energy may come from outside, or go there
   std::string time_unit = "s", length_unit = "m";
-  std::string laboratory;  ///< the link of a laboratory to go on in, without a state; empty: the page offers none
+  std::string laboratory;        ///< the link of a laboratory to go on in, without a state; empty: the page offers none
+  std::string laboratory_model;  ///< JSON, what the laboratory begins with of a model (lab_model); empty of a chain
 
   /// Of the space that the points are in: 2 or 3, 0 without points.
   int dimension() const;
@@ -66,6 +75,12 @@ Scene scene_of(const ChainSubject<Space>& subject) {
   scene.loaded = chain.loaded();
   return scene;
 }
+
+/// What point k is drawn as.
+std::string point_kind(const SystemInfo& info, std::size_t k);
+
+/// What is drawn between the points of a system.
+std::vector<Connection> connections_of(const SystemInfo& info);
 
 /// The same of any other system, whose rods are what stays rigid.
 Scene scene_of(const SystemSubject& subject);

@@ -5,7 +5,7 @@
 namespace pendula::test {
 
 // A mass m on a spring k with a force u, as the generator writes it, with bars in place of tabs.
-inline constexpr std::string_view spring = R"(program|12
+inline constexpr std::string_view spring = R"(program|13
 name|spring
 model|spring
 links|1
@@ -15,7 +15,8 @@ coordinate|x|m|0|0
 parameter|m|kg|1|1.0|1|0
 parameter|k|N/m|1|1.0|0|0
 input|u|N
-point|bob|2
+point|bob|2|cart
+connection|spring|-1|0
 series|0|0|0|2
 function|hamiltonian_form|6
 read|0|parameters|0

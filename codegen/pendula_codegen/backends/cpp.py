@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from pendula_codegen.entry_points import Function, SystemKernel
-from pendula_codegen.model import Coordinate, Input, Parameter
+from pendula_codegen.model import Connection, Coordinate, Input, Parameter
 from pendula_codegen.places import Place
 from pendula_codegen.polynomial import Number, as_double
 from pendula_codegen.program import Program
@@ -382,8 +382,10 @@ def constants(
     periodic: Sequence[bool],
     bases: Sequence[bool] = (),
     switches: Sequence[str] = (),
+    point_kinds: Sequence[str] = (),
+    connections: Sequence[Connection] = (),
 ) -> list[str]:
-    """Static members by which a kernel says what it is; `bases` of arguments, where there are any."""
+    """Static members by which a kernel says what it is; the last four where there are any."""
     members = [
         ("std::string_view", "coordinate_names", [c.symbol.name for c in coordinates]),
         ("std::string_view", "coordinate_units", [c.unit for c in coordinates]),
@@ -401,7 +403,13 @@ def constants(
         ("int", "point_sizes", [size for _, size in points]),
         *([("bool", "argument_is_base", list(bases))] if bases else []),
         *([("std::string_view", "switch_names", list(switches))] if switches else []),
+        *([("std::string_view", "point_kinds", list(point_kinds))] if point_kinds else []),
     ]
+    if connections:
+        members += [
+            ("std::string_view", "connection_kinds", [each.kind for each in connections]),
+            ("int", "connection_ends", [end for each in connections for end in each.ends]),
+        ]
     lines = []
     for element, name, values in members:
         head = f"static constexpr std::array<{element}, {len(values)}> {name} = {{"

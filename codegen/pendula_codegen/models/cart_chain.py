@@ -15,7 +15,7 @@ def define(model, links):
     push = model.input("push", "N")
 
     position = (x, 0)
-    model.point("cart", position)
+    model.point("cart", position, kind="cart")
     kinetic, potential = cart * model.rate(x) ** 2 / 2, 0
     dissipated = friction * model.rate(x) ** 2
     for i in range(links):

@@ -17,7 +17,7 @@ def define(model, links):
 
     t = model.time
     position = (x_amplitude * sin(frequency * t + x_phase), y_amplitude * sin(frequency * t + y_phase))
-    model.point("pivot", position)
+    model.point("pivot", position, kind="pivot")
     kinetic, potential, dissipated = 0, 0, 0
     for i in range(links):
         position = (position[0] + length[i] * sin(theta[i]), position[1] - length[i] * cos(theta[i]))

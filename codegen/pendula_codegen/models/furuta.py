@@ -30,5 +30,5 @@ def define(model, links):
     model.lagrangian = kinetic - m * g * center[2]
     model.dissipation = Rational(1, 2) * (arm_friction * alpha_dot**2 + rod_friction * theta_dot**2)
     model.force(alpha, torque)
-    model.point("joint", joint)
+    model.point("joint", joint, kind="pivot")
     model.point("center", center)

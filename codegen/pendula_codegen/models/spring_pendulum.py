@@ -14,4 +14,4 @@ def define(model, links):
     stretch = sqrt(x**2 + y**2 + z**2) - rest
     model.lagrangian = m * speed_squared / 2 - k * stretch**2 / 2 - m * g * z
     model.dissipation = Rational(1, 2) * friction * speed_squared
-    model.point("bob", (x, y, z))
+    model.spring("origin", model.point("bob", (x, y, z)))

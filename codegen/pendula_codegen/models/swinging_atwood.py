@@ -13,4 +13,4 @@ def define(model, links):
     r_dot, theta_dot = model.rate(r), model.rate(theta)
     kinetic = m * ((1 + mu) * r_dot**2 + r**2 * theta_dot**2) / 2
     model.lagrangian = kinetic - m * g * r * (mu - cos(theta))
-    model.point("bob", bob)
+    model.thread("origin", model.point("bob", bob))

@@ -95,6 +95,11 @@ bool KernelDescription::take(KernelText& text) {
   } else if (kind == "point") {
     points_.push_back(text.word());
     point_sizes_.push_back(text.whole(2, 3));
+    point_kinds_.push_back(text.word());
+  } else if (kind == "connection") {
+    connection_kinds_.push_back(text.word());
+    const int last = static_cast<int>(points_.size()) - 1;
+    for (int end = 0; end < 2; ++end) connection_ends_.push_back(text.whole(-1, last));
   } else if (kind == "argument") {
     argument_is_base_.push_back(text.flag());
   } else if (kind == "switch") {
@@ -137,7 +142,10 @@ SystemInfo KernelDescription::info() const {
           constant_masses_,
           argument_is_base_.all(),
           switches_,
-          series_};
+          series_,
+          point_kinds_,
+          connection_kinds_,
+          connection_ends_};
 }
 
 }  // namespace pendula

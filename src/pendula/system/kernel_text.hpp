@@ -68,9 +68,10 @@ class KernelDescription {
   int links_ = 0;
   SeriesInfo series_;
   bool depends_on_time_ = false, constant_masses_ = false;
-  Names coordinates_, coordinate_units_, parameters_, parameter_units_, inputs_, input_units_, points_, switches_;
+  Names coordinates_, coordinate_units_, parameters_, parameter_units_, inputs_, input_units_, points_, switches_,
+      point_kinds_, connection_kinds_;
   Flags is_angle_, is_periodic_, is_positive_, is_per_link_, argument_is_base_;
-  std::vector<int> parameter_sizes_, point_sizes_;
+  std::vector<int> parameter_sizes_, point_sizes_, connection_ends_;
   std::vector<double> parameter_defaults_;
 };
 

@@ -58,6 +58,10 @@ struct SystemInfo {
   /// ones, are 1 or 0: whether it is > 0, whether it is < 0.
   std::span<const std::string_view> switches;
   SeriesInfo series;
+  /// What points are drawn as: "bob", "cart" or "pivot"; empty: all are bobs.
+  std::span<const std::string_view> point_kinds;
+  std::span<const std::string_view> connection_kinds;  ///< "spring" or "thread"
+  std::span<const int> connection_ends;                ///< two a connection: 0-based points, -1 is the origin
 
   /// How many parameters are those of the model itself, without the last ones that tell pieces.
   std::size_t own_parameters() const { return parameters.size() - 2 * switches.size(); }
@@ -87,7 +91,10 @@ constexpr SystemInfo info_of() {
           S::constant_masses,
           argument_bases<S>(),
           switch_names<S>(),
-          series_of<S>()};
+          series_of<S>(),
+          point_kinds<S>(),
+          connection_kinds<S>(),
+          connection_ends<S>()};
 }
 
 }  // namespace pendula

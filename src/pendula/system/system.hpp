@@ -76,6 +76,25 @@ constexpr std::span<const std::string_view> switch_names() {
   return {};
 }
 
+/// What the points of a kernel are drawn as; empty if it does not say.
+template <class S>
+constexpr std::span<const std::string_view> point_kinds() {
+  if constexpr (requires { S::point_kinds; }) return S::point_kinds;
+  return {};
+}
+
+/// What is drawn between points, and between which; empty if there is nothing.
+template <class S>
+constexpr std::span<const std::string_view> connection_kinds() {
+  if constexpr (requires { S::connection_kinds; }) return S::connection_kinds;
+  return {};
+}
+template <class S>
+constexpr std::span<const int> connection_ends() {
+  if constexpr (requires { S::connection_ends; }) return S::connection_ends;
+  return {};
+}
+
 /// Whether a kernel provides the Taylor series of its motions.
 template <class S>
 inline constexpr bool has_series = requires {

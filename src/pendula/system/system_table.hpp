@@ -124,6 +124,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 12;
+inline constexpr int system_interface = 13;
 
 }  // namespace pendula

@@ -93,7 +93,7 @@ class Engine {
     this.copies = [];
   }
 
-  /// What moves: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters}. `start`: {time, q, v}.
+  /// What moves: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters, inputs}. `start`: {time, q, v}.
   /// `step`: constant steps of 4 stages, in place of the tolerance. Throws where it makes no sense.
   begin(spec, start, step = 0) {
     this.free();
@@ -127,8 +127,14 @@ class Engine {
     this.#numbers.set(q, this.q / 8);
     this.#numbers.set(v, this.v / 8);
   }
+  // Inputs of a program are held.
   #simulation(time) {
-    return this.#require(this.module.lab_simulation(this.model, time, this.q, this.v, this.step, tolerance, this.step ? 4 : 8));
+    const simulation = this.#require(this.module.lab_simulation(this.model, time, this.q, this.v, this.step, tolerance, this.step ? 4 : 8));
+    if (this.spec.inputs?.some((each) => each !== 0)) {
+      this.#numbers.set(this.spec.inputs, this.held / 8);
+      this.#require(this.module.pendula_hold(simulation, this.held, this.inputs) === 0);
+    }
+    return simulation;
   }
 
   /// Names of the columns of a row of the model.
@@ -242,11 +248,13 @@ class Engine {
     this.#require(this.module.pendula_hold(this.simulation, this.held, this.inputs) === 0);
   }
 
-  /// On what each point of a program hangs by something rigid: the point before, the first on the origin (-1), or nothing
-  /// (-2). Seen at several coordinates about q. `components`: of each point.
-  hangs(q, components) {
+  /// What the points of a program tell at several coordinates about q. `hangs`: on what each hangs by something rigid: the
+  /// point before, the first on the origin (-1) if it moves, or nothing (-2). `rails`: the direction in which each moves, if it is
+  /// always the same, else null. `components`: of each point.
+  shape(q, components) {
     const firsts = components.map((_, k) => components.slice(0, k).reduce((sum, count) => sum + count, 0));
     const draws = [0, 0.37, -0.81, 1.3].map((by) => this.pointsAt(q.map((x, k) => x + by * (1 + 0.4 * k))));
+    const way = (points, k) => Array.from({ length: components[k] }, (_, axis) => points[firsts[k] + axis] - draws[0][firsts[k] + axis]);
     const distance = (points, k) => {
       let square = 0;
       for (let axis = 0; axis < components[k]; ++axis) {
@@ -255,10 +263,12 @@ class Engine {
       }
       return Math.sqrt(square);
     };
-    return components.map((_, k) => {
+    const hangs = components.map((_, k) => {
       const all = draws.map((points) => distance(points, k));
-      return all[0] > 0 && all.every((each) => Math.abs(each - all[0]) < 1e-9 * all[0]) ? k - 1 : -2;
+      const moves = k > 0 || draws.some((points) => way(points, k).some((x) => x !== 0));
+      return moves && all[0] > 0 && all.every((each) => Math.abs(each - all[0]) < 1e-9 * all[0]) ? k - 1 : -2;
     });
+    return { hangs, rails: components.map((_, k) => directionOf(draws.slice(1).map((points) => way(points, k)))) };
   }
 
   /// Goes to a time at once.
@@ -321,6 +331,18 @@ class Engine {
 }
 
 const shadowDistance = 1e-7;
+
+/// The unit vector along which all ways lie, null where they do not.
+function directionOf(ways) {
+  const length = Math.hypot(...ways[0]);
+  if (!(length > 0)) return null;
+  const along = ways[0].map((x) => x / length);
+  const isAlong = ways.every((way) => {
+    const ahead = way.reduce((sum, x, axis) => sum + x * along[axis], 0);
+    return Math.hypot(...way.map((x, axis) => x - ahead * along[axis])) < 1e-9 * (length + Math.abs(ahead));
+  });
+  return isAlong ? along : null;
+}
 
 function sumOf(vectors, space) {
   return Array.from({ length: space }, (_, axis) => vectors.reduce((sum, vector) => sum + vector[axis], 0));

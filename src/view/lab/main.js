@@ -7,7 +7,7 @@ class Lab {
     this.stage = new Stage(at("canvas"));
     this.computer = new Computer();
     this.hand = new Hand();
-    this.clock = this.shown = 0;
+    this.clock = this.shown = this.state.t;
     this.playing = false;
     this.since = 0;
     this.energy = 0;
@@ -63,20 +63,19 @@ class Lab {
     if (model) {
       const space = Math.max(2, ...model.points.map((point) => point.columns.length));
       const count = model.points.length;
-const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
-      stage.shape({ space, count, hangs: this.#hangs ?? model.points.map(() => -2), kinds: model.points.map((point) => point.kind ?? "ball"),
-        bonds: bondsOf(model), masses: model.points.map(() => 1), reach: 1.5 * spread });
+      const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
+      stage.shape({ space, count, ...shapeOf(model, this.#shape), masses: model.points.map(() => 1), reach: 1.5 * spread });
       this.row = new Float64Array(3 + 2 * this.size);
     } else {
       const reach = state.l.reduce((sum, length) => sum + length, 0);
-      stage.shape({ space: state.space, count: state.n, hangs: state.m.map((_, k) => k - 1), kinds: [], bonds: [], masses: state.m, reach });
+      stage.shape({ space: state.space, count: state.n, hangs: state.m.map((_, k) => k - 1), kinds: [], rails: [], connections: [], masses: state.m, reach });
       this.row = new Float64Array(3 + 2 * this.size);
     }
     this.row.set(state.q, 1);
     this.row.set(state.v, 1 + this.size);
   }
   #points = null;
-  #hangs = null;
+  #shape = null;
 
   /// Sends what moves to the worker, from the present row or the start.
   async #send() {
@@ -101,7 +100,7 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
       for (const panel of this.panels) if (panel instanceof CopiesPanel || panel instanceof ExponentPanel) panel.begin();
       if (model && !this.#points) {
         this.#points = answer.rows.subarray(3 + 2 * this.size);
-        this.#hangs = answer.hangs;
+        this.#shape = answer.shape;
         this.#begin();
         this.row = answer.rows.slice();
       }
@@ -154,7 +153,7 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
   /// Begins again where the link begins.
   again() {
     this.hand.letGo();
-    this.shown = this.clock = 0;
+    this.shown = this.clock = this.state.t;
     this.history.clear(this.history.rowSize);
     this.#begin();
     this.watch.turns = [];
@@ -341,7 +340,7 @@ const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
       this.isPosed = false;
       this.#startIsNow(this.row);
       this.history.clear(this.history.rowSize);
-      this.shown = this.clock = 0;
+      this.shown = this.clock = this.state.t;
       this.#later();
       this.play(model ? this.wasPlaying : false);
       this.controls.refresh();

@@ -12,10 +12,11 @@ const modelParameters = (model?.parameters ?? []).flatMap((each) => {
 });
 
 const freshState = () => ({
-  n: 2, space: 2, m: [1, 1], l: [1, 1], g: 9.81, d: 0,
+  n: 2, space: 2, m: [1, 1], l: [1, 1], g: 9.81, d: 0, t: 0,
   q: model ? (moved.start?.q ?? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1))) : [2.0943951023931953, 2.6179938779914944],
   v: model ? (moved.start?.v ?? model.coordinates.map(() => 0)) : [0, 0],
   p: modelParameters.map((each) => moved.start?.p?.[each.name] ?? each.default ?? 1),
+  u: (model?.inputs ?? []).map(() => 0),
   speed: 1, level: "student", lang: "", theme: "", copies: 0, apart: 1e-6,
   show: ["trace"],
 });
@@ -39,7 +40,7 @@ function stateOf(words) {
     const x = Number(told.get(key) ?? NaN);
     if (told.has(key) && Number.isFinite(x)) state[key] = clamp(x, low, high);
   };
-  number("n", 1, mostLinks), number("space", 2, 3), number("g", -100, 100), number("d", 0, 1000);
+  number("t", -1e9, 1e9), number("n", 1, mostLinks), number("space", 2, 3), number("g", -100, 100), number("d", 0, 1000);
   number("speed", 1 / 128, 8), number("copies", 0, 200), number("apart", 1e-14, 0.1);
   state.n = Math.round(state.n), state.space = Math.round(state.space), state.copies = Math.round(state.copies);
   const size = model ? model.coordinates.length : state.n;
@@ -53,6 +54,7 @@ function stateOf(words) {
   state.l = list("l", state.n, positive) ?? state.l;
   if (model) {
     state.p = list("p", modelParameters.length) ?? state.p;
+    state.u = list("u", state.u.length) ?? state.u;
     state.q = list("q", size) ?? state.q, state.v = list("v", size) ?? state.v;
   } else {
     const part = (key, others) => list(key, state.n) ?? others;
@@ -97,7 +99,9 @@ function linkOf(state) {
   const short = (numbers) => (numbers.every((x) => x === numbers[0]) ? `${numbers[0]}` : numbers.join(","));
   const put = (key, value) => words.push(`${key}=${value}`);
   if (models[named] || named === "chain") put("model", named);
+  if (state.t) put("t", state.t);
   if (model) {
+    if (state.u.some((each) => each !== 0)) put("u", state.u.join(","));
     put("p", state.p.join(",")), put("q", state.q.join(",")), put("v", short(state.v));
   } else {
     const { n } = state;
@@ -114,6 +118,6 @@ function linkOf(state) {
 
 /// What the engine is told of a state.
 function specOf(state) {
-  if (model) return { program: moved.program, parameters: state.p, components: model.points.map((each) => each.columns.length) };
+  if (model) return { program: moved.program, parameters: state.p, inputs: state.u, components: model.points.map((each) => each.columns.length) };
   return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d) };
 }

@@ -29,9 +29,10 @@ class Stage {
     this.ruler.from.push(0), this.ruler.to.push(0);
   }
 
-  /// What there is to draw: how many points, what each hangs on, masses, and how far it all reaches.
-  shape({ space, count, hangs, kinds, bonds, masses, reach }) {
-    Object.assign(this, { space, count, hangs, kinds, bonds, masses, reach });
+  /// What there is to draw: how many points, what each hangs on, its kind and its rail, what is between points, masses, and
+  /// how far it all reaches.
+  shape({ space, count, hangs, kinds, rails, connections, masses, reach }) {
+    Object.assign(this, { space, count, hangs, kinds, rails, connections, masses, reach });
     this.places = new Float64Array(3 * count);
     const largest = Math.max(...masses, 1e-300);
     const size = reach * clamp(0.075 / Math.sqrt(Math.max(count, 1)), 0.006, 0.05);
@@ -243,9 +244,13 @@ class Stage {
     const { pen, count } = this;
     const points = Array.from({ length: count }, (_, i) => this.#shown(places, i));
     const pivot = this.project(0, 0, 0);
+    this.#drawRails(places);
     pen.strokeStyle = palette.css("rod");
-    for (const { kind, from, to } of this.bonds) this.#drawBond(kind, from < 0 ? pivot : points[from], points[to]);
-    if (this.kinds.includes("cart")) this.#drawRail();
+    pen.lineWidth = 2;
+    for (const { kind, ends } of this.connections) {
+      const [from, to] = ends.map((end) => (end < 0 ? pivot : points[end]));
+      drawConnection(pen, kind, from, to, 0.045 * this.reach * this.pixels);
+    }
     const thick = clamp((0.014 * this.reach * this.pixels) / Math.sqrt(count / 3 + 1), 1.3, 5);
     pen.lineWidth = thick;
     pen.beginPath();
@@ -256,9 +261,7 @@ class Stage {
       pen.lineTo(points[i][0], points[i][1]);
     }
     pen.stroke();
-    if (this.hangs.includes(-1) || this.bonds.some(({ from }) => from < 0)) {
-      this.#drawPivot(pivot);
-    }
+    if (this.hangs.includes(-1) || this.connections.some(({ ends }) => ends.includes(-1))) drawPivot(pen, pivot);
     if (count > balls) {
       this.#drawManyBalls(points);
       if (held) this.#drawBall(points[held.bob], held.bob, true);
@@ -267,65 +270,35 @@ class Stage {
     const order = points.map((_, i) => i);
     if (this.space === 3) order.sort((a, b) => points[a][3] - points[b][3]);
     for (const i of order) {
-      if (this.kinds[i] === "cart") this.#drawCart(points[i]);
-      else if (this.kinds[i] === "pivot") this.#drawPivot(points[i]);
+      if (this.kinds[i] === "cart") this.#drawCart(places, i);
+      else if (this.kinds[i] === "pivot") drawPivot(pen, points[i]);
       else this.#drawBall(points[i], i, i === held?.bob);
     }
   }
 
-  #drawPivot([x, y]) {
-    const { pen } = this;
-    pen.beginPath();
-    pen.arc(x, y, 4.5, 0, 2 * Math.PI);
-    pen.fillStyle = palette.css("panel");
-    pen.strokeStyle = palette.css("ink");
-    pen.lineWidth = 2;
-    pen.fill();
-    pen.stroke();
+  // Two places on the rail of a cart, on the screen: before and behind the origin, as far as one sees.
+  #railEnds(places, i) {
+    const along = this.rails[i] ?? [1, 0, 0];
+    const place = Array.from(places.subarray(3 * i, 3 * i + 3));
+    const ahead = place.reduce((sum, x, axis) => sum + x * along[axis], 0);
+    const far = this.space === 2 ? (this.width + this.height) / this.pixels + Math.hypot(this.view.x, this.view.y) : 1.6 * this.reach;
+    return [-far, far].map((way) => this.project(...place.map((x, axis) => x + (way - ahead) * along[axis])));
   }
 
-  #drawRail() {
-    const { pen } = this;
-    const y = this.project(0, 0, 0)[1] + 0.07 * this.reach * this.pixels;
-    pen.strokeStyle = palette.css("edge");
-    pen.lineWidth = 2;
-    line(pen, 0, y, this.width, y);
+  get #cartSize() {
+    return 0.065 * this.reach * this.pixels;
   }
 
-  #drawCart([x, y]) {
-    const { pen } = this;
-    const size = 0.07 * this.reach * this.pixels;
-    pen.fillStyle = palette.css("bob");
-    pen.strokeStyle = palette.css("panel");
-    pen.lineWidth = 1.5;
-    pen.beginPath();
-    pen.rect(x - 1.5 * size, y - 0.6 * size, 3 * size, 1.2 * size);
-    pen.fill();
-    pen.fillStyle = palette.css("rod");
-    for (const side of [-0.9, 0.9]) {
-      pen.beginPath();
-      pen.arc(x + side * size, y + 0.65 * size, 0.35 * size, 0, 2 * Math.PI);
-      pen.fill();
-      pen.stroke();
-    }
+  #drawRails(places) {
+    this.kinds.forEach((kind, i) => {
+      if (kind === "cart" && this.rails[i]) drawRail(this.pen, ...this.#railEnds(places, i), this.#cartSize);
+    });
   }
 
-  // A spring with its windings, or a string.
-  #drawBond(kind, from, to) {
-    const { pen } = this;
-    const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
-    const length = Math.hypot(dx, dy) || 1;
-    pen.lineWidth = kind === "spring" ? 2 : 1.5;
-    pen.beginPath();
-    pen.moveTo(from[0], from[1]);
-    const turns = kind === "spring" ? 24 : 0;
-    const wide = 0.045 * this.reach * this.pixels;
-    for (let k = 1; k < turns; ++k) {
-      const [along, across] = [0.08 + (0.84 * k) / turns, (k % 2 ? wide : -wide) / length];
-      pen.lineTo(from[0] + along * dx - across * dy, from[1] + along * dy + across * dx);
-    }
-    pen.lineTo(to[0], to[1]);
-    pen.stroke();
+  #drawCart(places, i) {
+    const [[x0, y0], [x1, y1]] = this.#railEnds(places, i);
+    const place = this.#shown(places, i);
+    drawCart(this.pen, place, uprightAngle(x1 - x0, y1 - y0), this.#cartSize * place[2], palette.css("bob"));
   }
 
   // All in one colour, but for the last.
@@ -456,11 +429,17 @@ class Stage {
   }
 }
 
-/// Springs and strings of a model, between points by number; the origin is -1.
-function bondsOf(model) {
-  const number = (name) => model.points.findIndex((point) => point.name === name);
-  const bond = (kind) => ([from, to]) => ({ kind, from: from === null ? -1 : number(from), to: number(to) });
-  return [...(model.springs ?? []).map(bond("spring")), ...(model.strings ?? []).map(bond("string"))];
+/// How a model is drawn; `seen` is what the engine knows of its shape, null before it does.
+function shapeOf(model, seen) {
+  const { connections } = model;
+  const kinds = model.points.map((point) => point.kind);
+  const isConnected = (i, on) => connections.some(({ ends }) => ends.includes(i) && ends.includes(on));
+  const hangs = kinds.map((kind, i) => {
+    const on = seen?.hangs[i] ?? -2;
+    return kind === "cart" || isConnected(i, on) ? -2 : on;
+  });
+  const inSpace = (along) => along && (along.length === 2 ? [along[0], 0, along[1]] : along);
+  return { kinds, connections, hangs, rails: kinds.map((_, i) => inSpace(seen?.rails[i] ?? null)) };
 }
 
 function arrow(pen, x0, y0, x, y) {

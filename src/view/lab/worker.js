@@ -17,7 +17,7 @@ const orders = {
     engine.begin(spec, start);
     if (copies) engine.copy(copies, apart);
     if (measure) engine.measure(true);
-    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, hangs: spec.program ? engine.hangs(start.q, spec.components) : null };
+    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, shape: spec.program ? engine.shape(start.q, spec.components) : null };
   },
 
   copy({ copies, apart }) {

@@ -4,12 +4,13 @@
 function laboratoryLink(time) {
   const [run] = runs;
   const row = run.rowAt(time);
-  const keys = { theta: ["th", "w"], phi: ["ph", "wp"] };
-  const words = new Map();
-  for (const [name, , , column, rate] of scene.coordinates) {
-    keys[name.split("_")[0]].forEach((key, k) => {
+  const chain = { theta: ["th", "w"], phi: ["ph", "wp"] };
+  const words = new Map([["t", [run.t[row]]]]);
+  for (const [name, , , ...columns] of scene.coordinates) {
+    const keys = scene.lengths.length ? chain[name.split("_")[0]] : ["q", "v"];
+    keys.forEach((key, k) => {
       if (!words.has(key)) words.set(key, []);
-      words.get(key).push(run.column(k === 0 ? column : rate)[row]);
+      words.get(key).push(run.column(columns[k])[row]);
     });
   }
   return [scene.laboratory, ...[...words].map(([key, numbers]) => `${key}=${numbers.join(",")}`)].join("&");

@@ -12,7 +12,7 @@ class Motion {
   constructor() {
     this.count = scene.points.length;
     this.hangs = scene.points.map((_, i) => (scene.rods === "none" ? free : i - 1));
-    if (scene.rods === "rigid") this.hangs = this.hangs.map((on, i) => (this.#isRigid(i, on) ? on : free));
+    if (scene.rods === "rigid") this.hangs = this.hangs.map((on, i) => (this.#isRod(i, on) ? on : free));
     this.#measure();
   }
 
@@ -109,15 +109,63 @@ class Motion {
     }
   }
 
+  // Whether a rod is between point i and the one before it: nothing else is, and it moves. Carts are on rails.
+  #isRod(i, on) {
+    if (kindOf(i) === "cart") return false;
+    if (scene.connections.some(([, a, b]) => (a === i && b === on) || (a === on && b === i))) return false;
+    if (on === origin && kindOf(i) === "pivot" && this.#span(i).every((span) => span === 0)) return false;
+    return this.#isRigid(i, on);
+  }
+
+  // Component of a point at a row of the first run.
+  #place(j, axis, row) {
+    return j >= 0 && axis < scene.points[j][2] ? runs[0].column(scene.points[j][1] + axis)[row] : 0;
+  }
+
+  /// How far a point gets from a place, in the first run.
+  farthest(i, place) {
+    let far = 0;
+    for (let row = 0; row < runs[0].rows; ++row) far = Math.max(far, Math.hypot(...place.map((x, axis) => this.#place(i, axis, row) - x)));
+    return far;
+  }
+
+  // How far a point gets along each axis.
+  #span(i) {
+    return Array.from({ length: dimension }, (_, axis) => {
+      let [low, high] = [Infinity, -Infinity];
+      for (let row = 0; row < runs[0].rows; ++row) {
+        const x = this.#place(i, axis, row);
+        [low, high] = [Math.min(low, x), Math.max(high, x)];
+      }
+      return high - low;
+    });
+  }
+
+  /// The direction in which a cart runs, a unit vector: from where it is at first to where it is farthest from that, x if it
+  /// rests; null if it leaves that line.
+  railOf(i) {
+    const run = runs[0];
+    const from = (row) => Array.from({ length: dimension }, (_, axis) => this.#place(i, axis, row) - this.#place(i, axis, 0));
+    let [far, along] = [0, [1, 0, 0].slice(0, dimension)];
+    for (let row = 1; row < run.rows; ++row) {
+      const way = from(row);
+      const length = Math.hypot(...way);
+      if (length > far) [far, along] = [length, way.map((x) => x / length)];
+    }
+    for (let row = 1; row < run.rows; ++row) {
+      const way = from(row);
+      const ahead = way.reduce((sum, x, axis) => sum + x * along[axis], 0);
+      if (Math.hypot(...way.map((x, axis) => x - ahead * along[axis])) > 1e-4 * far) return null;
+    }
+    return along;
+  }
+
   // Whether point i stays where it is from the one before it, over the rows of the first run.
   #isRigid(i, on) {
     const run = runs[0];
     const distance = (row) => {
       let square = 0;
-      for (let axis = 0; axis < dimension; ++axis) {
-        const place = (j) => (j >= 0 && axis < scene.points[j][2] ? run.column(scene.points[j][1] + axis)[row] : 0);
-        square += (place(i) - place(on)) ** 2;
-      }
+      for (let axis = 0; axis < dimension; ++axis) square += (this.#place(i, axis, row) - this.#place(on, axis, row)) ** 2;
       return Math.sqrt(square);
     };
     const first = distance(0);
@@ -173,8 +221,21 @@ class Motion {
     const masses = scene.points.map((point) => point[3]);
     const largest = Math.max(...masses);
     const size = this.reach * Math.min(0.055, Math.max(0.005, 0.07 / Math.sqrt(this.count)));
-    return masses.map((mass) => (largest > 0 && mass > 0 ? size * Math.max(Math.cbrt(mass / largest), 0.2) : 0.7 * size));
+    return masses.map((mass, i) => {
+      if (kindOf(i) === "pivot") return 0.4 * size;
+      return largest > 0 && mass > 0 ? size * Math.max(Math.cbrt(mass / largest), 0.2) : 0.7 * size;
+    });
   }
+}
+
+/// What a point is drawn as: "bob", "cart" or "pivot".
+function kindOf(i) {
+  return scene.points[i][4];
+}
+
+/// Whether anything is fixed to the origin.
+function holdsOrigin(motion) {
+  return motion.hangs.includes(origin) || scene.connections.some((ends) => ends.includes(origin));
 }
 
 function norm(vectors, i) {

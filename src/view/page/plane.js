@@ -10,6 +10,7 @@ class Stage {
     this.canvas = host.appendChild(element("canvas", { tabIndex: 0 }));
     this.pen = this.canvas.getContext("2d");
     this.places = runs.map(() => new Float64Array(motion.count * 2));
+    this.rails = scene.points.map((_, i) => (kindOf(i) === "cart" ? motion.railOf(i) : null));
     this.paths = runs.map((run) => traced.map((point) => motion.path(run, point)));
     this.view = { x: 0, y: 0, zoom: 1 };
     this.onChange = () => {};
@@ -91,8 +92,9 @@ class Stage {
     this.#drawGrid();
     runs.forEach((run, k) => this.motion.at(run, time, this.places[k]));
     runs.forEach((_, k) => this.#drawTraces(k, time, trace));
+    this.#drawRails();
     for (let k = runs.length - 1; k >= 0; --k) this.#drawBodies(k);
-    this.#drawPivot();
+    if (holdsOrigin(this.motion)) drawPivot(pen, [this.#x(0), this.#y(0)]);
   }
 
   #x(x) {
@@ -167,6 +169,33 @@ class Stage {
     this.pen.lineTo(this.#x(places[2 * point]), this.#y(places[2 * point + 1]));
   }
 
+  // On the screen; of the origin, too.
+  #shown(places, i) {
+    return i < 0 ? [this.#x(0), this.#y(0)] : [this.#x(places[2 * i]), this.#y(places[2 * i + 1])];
+  }
+
+  #cartSize(i) {
+    return Math.max(1.5 * this.radii[i] * this.scale, 4);
+  }
+
+  // As far as one sees.
+  #drawRails() {
+    const far = (this.width + this.height) / this.scale + Math.hypot(this.view.x, this.view.y);
+    this.rails.forEach((along, i) => {
+      if (!along) return;
+      const place = Array.from(this.places[0].subarray(2 * i, 2 * i + 2));
+      const end = (way) => this.#shown(place.map((x, axis) => x + way * along[axis]), 0);
+      drawRail(this.pen, end(-far), end(far), this.#cartSize(i));
+    });
+  }
+
+  #drawConnections(places) {
+    const wide = Math.max(0.04 * this.motion.reach * this.scale, 3);
+    for (const [kind, from, to] of scene.connections) {
+      drawConnection(this.pen, kind, this.#shown(places, from), this.#shown(places, to), wide);
+    }
+  }
+
   #drawBodies(k) {
     const { pen, motion } = this;
     const many = runs.length > 1;
@@ -175,6 +204,7 @@ class Stage {
     pen.lineCap = "round";
     pen.strokeStyle = many ? rgba(palette.run(k), alpha * 0.8) : palette.css("rod");
     pen.lineWidth = many ? 1.5 : Math.max(1.2, Math.min(4, (0.012 * motion.reach * this.scale) / Math.sqrt(motion.count / 4 + 1)));
+    this.#drawConnections(places);
     pen.beginPath();
     for (let i = 0; i < motion.count; ++i) {
       const on = motion.hangs[i];
@@ -187,38 +217,33 @@ class Stage {
     this.#drawBobs(k, places, alpha);
   }
 
-  // The last one in the colour of its trace; of runs that are many only that one.
+  // The last one in the colour of its trace; of runs that are many only that one. Balls of one colour are one path.
   #drawBobs(k, places, alpha) {
     const { pen, motion } = this;
     const last = motion.count - 1;
-    const bob = (i) => {
-      const x = this.#x(places[2 * i]);
-      const y = this.#y(places[2 * i + 1]);
-      const radius = Math.max(this.radii[i] * this.scale, 1.2);
-      pen.moveTo(x + radius, y);
-      pen.arc(x, y, radius, 0, 2 * Math.PI);
-    };
-    if (runs.length <= 8) {
-      pen.fillStyle = runs.length > 1 ? rgba(palette.run(k)) : palette.css("bob");
+    const own = runs.length > 1 ? palette.run(k) : null;
+    const draw = (points, colour) => {
+      for (const i of points.filter((each) => kindOf(each) !== "bob")) {
+        if (kindOf(i) === "cart") this.#drawCart(i, places, colour);
+        else drawPivot(pen, this.#shown(places, i));
+      }
+      pen.fillStyle = colour;
       pen.beginPath();
-      for (let i = 0; i < last; ++i) bob(i);
+      for (const i of points.filter((each) => kindOf(each) === "bob")) {
+        const [x, y] = this.#shown(places, i);
+        const radius = Math.max(this.radii[i] * this.scale, 1.2);
+        pen.moveTo(x + radius, y);
+        pen.arc(x, y, radius, 0, 2 * Math.PI);
+      }
       pen.fill();
-    }
-    pen.fillStyle = rgba(runs.length > 1 ? palette.run(k) : palette.rgb.trace, alpha);
-    pen.beginPath();
-    bob(last);
-    pen.fill();
+    };
+    const points = Array.from({ length: motion.count }, (_, i) => i);
+    if (runs.length <= 8) draw(points.slice(0, last), own ? rgba(own) : palette.css("bob"));
+    draw(points.slice(last), rgba(own ?? palette.rgb.trace, alpha));
   }
 
-  #drawPivot() {
-    if (!this.motion.hangs.includes(origin)) return;
-    const { pen } = this;
-    pen.beginPath();
-    pen.arc(this.#x(0), this.#y(0), 4, 0, 2 * Math.PI);
-    pen.fillStyle = palette.css("panel");
-    pen.strokeStyle = palette.css("ink");
-    pen.lineWidth = 2;
-    pen.fill();
-    pen.stroke();
+  #drawCart(i, places, colour) {
+    const [dx, dy] = this.rails[i] ?? [1, 0];
+    drawCart(this.pen, this.#shown(places, i), uprightAngle(dx, -dy), this.#cartSize(i), colour);
   }
 }

@@ -100,7 +100,8 @@ class Stage {
     this.floor = Math.min(low[2], -0.02 * reach) - 0.16 * reach;
     this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (this.floor + Math.max(high[2], 0)) / 2];
     const half = [0, 1, 2].map((axis) => Math.max(high[axis] - this.middle[axis], this.middle[axis] - low[axis]));
-    this.radius = Math.max(half[0], half[1], half[2], 0.5 * reach) * 1.12;
+    const fixed = scene.points.map((_, i) => (kindOf(i) === "bob" ? 0 : this.motion.farthest(i, this.middle)));
+    this.radius = Math.max(half[0], half[1], half[2], 0.5 * reach, ...fixed) * 1.12;
   }
 
   #light() {
@@ -127,7 +128,7 @@ class Stage {
     const post = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(0, 0, 0), new THREE.Vector3(0, 0, this.floor)]);
     this.post = new THREE.Line(post, new THREE.LineBasicMaterial());
     this.pivot = new THREE.Mesh(new THREE.SphereBufferGeometry(Math.min(0.014 * this.motion.reach, 1.4 * Math.max(...this.motion.radii)), 16, 12), new THREE.MeshBasicMaterial());
-    this.post.visible = this.pivot.visible = this.motion.hangs.includes(origin);
+    this.post.visible = this.pivot.visible = holdsOrigin(this.motion);
     this.scene.add(this.disc, this.grid, this.post, this.pivot);
   }
 
@@ -158,7 +159,8 @@ class Stage {
     const [x, y, z] = this.sun;
     const height = this.floor + 0.001 * this.radius;
     const matrix = new THREE.Matrix4().set(1, 0, -x / z, (x / z) * height, 0, 1, -y / z, (y / z) * height, 0, 0, 0, height, 0, 0, 0, 1);
-    const flat = { material: new THREE.MeshBasicMaterial(), disc: discMaterial(), rod: rodMaterial() };
+    // A material for meshes in instances, and one for others: three.js compiles each once.
+    const flat = { material: new THREE.MeshBasicMaterial(), single: new THREE.MeshBasicMaterial(), disc: discMaterial(), rod: rodMaterial() };
     flat.disc.uniforms.shaded.value = flat.rod.uniforms.shaded.value = 0;
     return { matrix, ...flat };
   }
@@ -173,6 +175,8 @@ class Stage {
     const width = (runs.length > 8 ? 0.0025 : 0.004) * this.radius;
     this.traces = runs.map((run) => traced.map((point) => new Trace(motion.path(run, point), most, width)));
     for (const body of this.bodies) this.scene.add(...body.objects);
+    this.fittings = runs.slice(0, runs.length <= 8 ? runs.length : 1).map(() => new Fittings(motion, radii, this.shadow));
+    for (const each of this.fittings) this.scene.add(...each.objects);
     for (const trace of this.traces.flat()) this.scene.add(trace.mesh);
   }
 
@@ -183,13 +187,14 @@ class Stage {
     this.scene.background = new THREE.Color(...unit(rgb.ground));
     this.scene.fog = new THREE.Fog(this.scene.background, 1, 2); // placed with each frame
     this.disc.material.color.setRGB(...unit(rgb.floor));
-    for (const material of [this.shadow.material, this.shadow.disc, this.shadow.rod]) paint(material, unit(rgb.shade));
+    for (const material of [this.shadow.material, this.shadow.single, this.shadow.disc, this.shadow.rod]) paint(material, unit(rgb.shade));
     this.post.material.color.setRGB(...unit(rgb.edge));
     this.pivot.material.color.setRGB(...unit(rgb.ink));
     this.#colourGrid(unit(rgb.line), unit(rgb.floor));
     this.bodies.forEach((body, k) => {
       const own = unit(palette.run(k));
       for (const trace of this.traces[k]) trace.colour(own);
+      this.fittings[k]?.colour({ cart: runs.length > 1 ? own : unit(rgb.bob), spring: unit(rgb.rod), rail: unit(rgb.edge), pivot: unit(rgb.ink) });
       body.colour(runs.length > 1 ? { ball: own, tip: own, rod: own } : { ball: unit(rgb.bob), tip: own, rod: unit(rgb.rod) });
     });
   }
@@ -208,6 +213,7 @@ class Stage {
     runs.forEach((run, k) => {
       const places = this.motion.at(run, time, this.places[k]);
       this.bodies[k].move(places);
+      this.fittings[k]?.move(places);
       traced.forEach((point, n) => {
         this.traces[k][n].mesh.visible = trace > 0;
         if (trace === 0) return;

@@ -1,0 +1,70 @@
+// What carts, springs and pivots look like on a canvas: here and in the laboratory.
+
+/// Zigzags of a spring, however long it is.
+const springTurns = 10;
+
+/// A line along which a cart runs has no direction: the angle to draw it at, so that its upper side is up.
+function uprightAngle(dx, dy) {
+  const angle = Math.atan2(dy, dx);
+  if (angle > Math.PI / 2 + 1e-9) return angle - Math.PI;
+  return angle <= -Math.PI / 2 + 1e-9 ? angle + Math.PI : angle;
+}
+
+/// How far a rail is below the middle of a cart, in the cart's size.
+const railBelow = 1.02;
+
+function drawRail(pen, [x0, y0], [x1, y1], size) {
+  const angle = uprightAngle(x1 - x0, y1 - y0);
+  const [dx, dy] = [-Math.sin(angle) * railBelow * size, Math.cos(angle) * railBelow * size];
+  pen.strokeStyle = palette.css("edge");
+  pen.lineWidth = 2;
+  line(pen, x0 + dx, y0 + dy, x1 + dx, y1 + dy);
+}
+
+/// A box with wheels, whose middle is [x, y].
+function drawCart(pen, [x, y], angle, size, colour) {
+  pen.save();
+  pen.translate(x, y);
+  pen.rotate(angle);
+  pen.fillStyle = colour;
+  pen.strokeStyle = palette.css("panel");
+  pen.lineWidth = Math.min(1.5, 0.12 * size);
+  pen.beginPath();
+  pen.rect(-1.6 * size, -0.62 * size, 3.2 * size, 1.24 * size);
+  pen.fill();
+  pen.fillStyle = palette.css("rod");
+  for (const side of [-0.95, 0.95]) {
+    pen.beginPath();
+    pen.arc(side * size, 0.66 * size, 0.36 * size, 0, 2 * Math.PI);
+    pen.fill();
+    pen.stroke();
+  }
+  pen.restore();
+}
+
+/// A spring with its windings, `wide` to each side, or a thread.
+function drawConnection(pen, kind, [x0, y0], [x1, y1], wide) {
+  const [dx, dy] = [x1 - x0, y1 - y0];
+  const length = Math.hypot(dx, dy) || 1;
+  const corners = kind === "spring" ? 2 * springTurns : 0;
+  const [first, last] = [0.1, 0.9];
+  pen.beginPath();
+  pen.moveTo(x0, y0);
+  for (let k = 0; k <= corners && corners; ++k) {
+    const along = first + ((last - first) * k) / corners;
+    const across = k === 0 || k === corners ? 0 : ((k % 2 ? wide : -wide) / length);
+    pen.lineTo(x0 + along * dx - across * dy, y0 + along * dy + across * dx);
+  }
+  pen.lineTo(x1, y1);
+  pen.stroke();
+}
+
+function drawPivot(pen, [x, y]) {
+  pen.beginPath();
+  pen.arc(x, y, 4.5, 0, 2 * Math.PI);
+  pen.fillStyle = palette.css("panel");
+  pen.strokeStyle = palette.css("ink");
+  pen.lineWidth = 2;
+  pen.fill();
+  pen.stroke();
+}
