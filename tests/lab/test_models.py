@@ -130,11 +130,12 @@ def test_the_page_of_a_model_goes_on_in_a_laboratory(name, scenario, context):
     state = "Array.from({}.subarray(1, 1 + 2 * pendulaLab.size))"
     begun = laboratory.evaluate(state.format("pendulaLab.row"))
     assert furthest(begun, state_at(file, time)) < 1e-11  # measured 2.7e-15
-    end = laboratory.evaluate(
-        f"""pendulaLab.computer.ask("advance", {{ until: {time} + 0.5, hand: null }}).then(({{ rows, rowSize }}) =>
-              [rows.at(-rowSize), {state.format("rows.subarray(-rowSize)")}])"""
-    )
-    assert end[0] >= time + 0.5 - 1e-9
+    end = [time]
+    while end[0] < time + 0.5 - 1e-9:  # an answer has the rows of 25 ms of work
+        end = laboratory.evaluate(
+            f"""pendulaLab.computer.ask("advance", {{ until: {time} + 0.5, hand: null }}).then(({{ rows, rowSize }}) =>
+                  [rows.at(-rowSize), {state.format("rows.subarray(-rowSize)")}])"""
+        )
     assert furthest(end[1], state_at(file, end[0])) < 1e-11  # measured 6.5e-14
 
 

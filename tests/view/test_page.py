@@ -3,7 +3,9 @@
 import csv
 import io
 import itertools
+import json
 import math
+import re
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -406,3 +408,9 @@ def test_a_frame_costs_little(open_page, name):
     median = sorted(cost for _, cost in later)[len(later) // 2]
     print(f"{name}: {len(later) / seconds:.0f} frames/s, {median:.1f} ms of script each")
     assert median <= FRAMES[name]  # measured 2.6, 1.0, 2.2, 2.7, 5.5
+
+
+def test_a_page_knows_carts_from_bobs(pages):
+    text = (pages.folder / "cart.html").read_text()
+    scene = re.search(r'<script type="application/json" id="scene">(.*?)</script>', text, re.DOTALL)[1]
+    assert [point[4] for point in json.loads(scene)["points"]] == ["cart", "bob", "bob"]

@@ -176,7 +176,7 @@ class Stage {
     this.traces = runs.map((run) => traced.map((point) => new Trace(motion.path(run, point), most, width)));
     for (const body of this.bodies) this.scene.add(...body.objects);
     this.fittings = runs.slice(0, runs.length <= 8 ? runs.length : 1).map(() => new Fittings(motion, radii, this.shadow));
-    for (const each of this.fittings) this.scene.add(...each.objects);
+    for (const object of this.fittings.flatMap((each) => each.objects)) this.scene.add(object);
     for (const trace of this.traces.flat()) this.scene.add(trace.mesh);
   }
 
