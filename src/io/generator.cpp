@@ -1,13 +1,8 @@
 #include "io/generator.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cstddef>
 #include <cstdlib>
-#include <cstring>
-#include <fstream>
 #include <pendula/numeric/number_text.hpp>
 #include <sstream>
 #include <string_view>
@@ -104,25 +99,6 @@ std::vector<std::string> built_in_models(const Toolchain& toolchain) {
   }
   std::ranges::sort(names);
   return names;
-}
-
-std::string model_program(const ModelName& name, const Toolchain& toolchain) {
-  std::string file = (fs::temp_directory_path() / "pendula-XXXXXX").string();
-  const int descriptor = mkstemp(file.data());
-  if (descriptor < 0) throw ModelError("expected to write a temporary file, " + file + ": " + std::strerror(errno));
-  close(descriptor);
-  std::vector<std::string> arguments = about("program", name, toolchain);
-  arguments.insert(arguments.end(), {"--as", "bytecode", "--output", file});
-  try {
-    run_generator(arguments, toolchain);
-  } catch (...) {
-    fs::remove(file);
-    throw;
-  }
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  fs::remove(file);
-  return text.str();
 }
 
 std::string describe_model(const ModelName& name, const Toolchain& toolchain) {

@@ -29,9 +29,6 @@ std::string run_generator(const std::vector<std::string>& arguments, const Toolc
 std::vector<double> written_values(const ModelName& name, const Toolchain& toolchain,
                                    std::span<const double> parameters, const Motion& start, unsigned seed);
 
-/// The kernel of a model as the program that an interpreter runs.
-std::string model_program(const ModelName& name, const Toolchain& toolchain);
-
 /// Coordinates, parameters, inputs and points of a model with their units, as JSON.
 std::string describe_model(const ModelName& name, const Toolchain& toolchain);
 

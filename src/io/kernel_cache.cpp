@@ -88,22 +88,9 @@ const SystemTable* built_in_table(const ModelName& name) {
   return nullptr;
 }
 
-}  // namespace
-
-std::string model_source(const ModelName& name, const Toolchain& toolchain) {
-  return built_in_table(name) ? "" : read_model(find_model(name, toolchain));
-}
-
-std::string_view ModelKernel::by() const {
-  if (file.empty()) return "build";
-  if (file.extension() == llvm_kernel) return "llvm";
-  return file.extension() == compiled_kernel ? "compiler" : "interpreter";
-}
-
-ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
+/// The kernel of a model from the cache, or made now.
+ModelKernel kept_kernel(const ModelName& model, const Toolchain& toolchain,
                         const std::function<void(const std::string&)>& tell) {
-  const SystemTable* const own = model.laws.empty() ? built_in_table(model) : nullptr;
-  if (own != nullptr) return {{}, {own, [](const SystemTable*) {}}};
   const std::string name = kernel_name(model);
   const std::vector<std::string> arguments = about("program", model, toolchain);
   Key key;
@@ -136,11 +123,29 @@ ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
   return {kept, table, was_there};
 }
 
+}  // namespace
+
+std::string model_source(const ModelName& name, const Toolchain& toolchain) {
+  return built_in_table(name) ? "" : read_model(find_model(name, toolchain));
+}
+
+std::string_view ModelKernel::by() const {
+  if (file.empty()) return "build";
+  if (file.extension() == llvm_kernel) return "llvm";
+  return file.extension() == compiled_kernel ? "compiler" : "interpreter";
+}
+
+ModelKernel find_kernel(const ModelName& model, const Toolchain& toolchain,
+                        const std::function<void(const std::string&)>& tell) {
+  const SystemTable* const own = model.laws.empty() ? built_in_table(model) : nullptr;
+  if (own != nullptr) return {{}, {own, [](const SystemTable*) {}}};
+  return kept_kernel(model, toolchain, tell);
+}
+
 std::string kernel_program(const ModelName& model, Toolchain toolchain,
                            const std::function<void(const std::string&)>& tell) {
   toolchain.kernels_by = "interpreter";
-  const ModelKernel kernel = find_kernel(model, toolchain, tell);
-  return kernel.file.empty() ? model_program(model, toolchain) : program_in(kernel.file);
+  return program_in(kept_kernel(model, toolchain, tell).file);
 }
 
 }  // namespace pendula::io
