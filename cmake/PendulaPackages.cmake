@@ -42,16 +42,8 @@ file(WRITE "${clean_up}" "#!/bin/sh\nset -e\nif [ \"$1\" = remove ] || [ \"$1\" 
 file(CHMOD "${clean_up}" PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_CONTROL_EXTRA "${clean_up}")
 
-# The licences of pendula, and of what is compiled into it, as this system's packages state them.
-foreach(part IN ITEMS eigen3:libeigen3-dev xsimd:libxsimd-dev boost:libboost-dev hdf5:libhdf5-dev isa-l:libisal-dev random123:librandom123-dev
-                      cli11:libcli11-dev tomlplusplus:libtomlplusplus-dev nlohmann-json:nlohmann-json3-dev
-                      three.js:libjs-three emscripten:emscripten)
-  string(REGEX MATCH "^([^:]*):(.*)$" matched "${part}")
-  if(EXISTS "/usr/share/doc/${CMAKE_MATCH_2}/copyright")
-    install(FILES "/usr/share/doc/${CMAKE_MATCH_2}/copyright" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/pendula/licences"
-            RENAME "${CMAKE_MATCH_1}" COMPONENT system)
-  endif()
-endforeach()
+include(PendulaLicences)
+pendula_install_licences("${CMAKE_INSTALL_DATADIR}/doc/pendula/licences" COMPONENT system)
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/libpendula-dev" RENAME copyright)
 if(TARGET pendula_c)
   install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/${shared_package}"
