@@ -77,6 +77,16 @@ TEST(HeldMembers, GoWhereEachGoesAlone) {
   }
 }
 
+// Explicit steps would be a hundred thousand.
+TEST(HeldMembers, MayBeStiff) {
+  Members<Planar> members(2, 3);
+  const Chain<Planar> chain = random_chain<Planar>(members.random, 2);
+  const Eigen::VectorXd damping = Eigen::VectorXd::Constant(2, 1e7);
+  members.subject = std::make_shared<ChainSubject<Planar>>(
+      Chain<Planar>({chain.masses(), chain.lengths(), chain.gravity(), damping}));
+  EXPECT_LT(apart(members), 1e-29);  // measured
+}
+
 TEST(HeldMembers, DependOnThemselvesAlone) {
   const Members<Planar> members(2, 11);
   std::vector<double> all = members.states, last(all.end() - 4, all.end());

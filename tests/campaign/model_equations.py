@@ -73,8 +73,14 @@ class Said:
     def force(self, coordinate: Symbol, value: Expr) -> None:
         self.forces[coordinate] = self.forces.get(coordinate, 0) + value
 
-    def point(self, name: str, components: tuple) -> None:
+    def point(self, name: str, components: tuple, *, kind: str = "bob") -> str:
         self.points[name] = tuple(map(sympify, components))
+        return name
+
+    def spring(self, start: str, end: str) -> None:
+        """What is drawn moves nothing."""
+
+    thread = spring
 
 
 class Printer(C99CodePrinter):

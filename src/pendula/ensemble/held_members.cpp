@@ -17,15 +17,26 @@ namespace pendula {
 
 namespace {
 
-class StopWatch : public MemberWatch {
+// Ends what takes many steps, as stiff motions do that explicit steps move: implicit steps move it anew.
+class Impatience : public MemberWatch {
  public:
-  explicit StopWatch(const std::function<bool()>& stop) : stop_(stop) {}
-  bool wants_steps() const override { return false; }
+  Impatience(std::size_t members, const std::function<bool()>& stop) : steps_(members), stop_(stop) {}
+
+  bool is_slow(std::size_t member) const { return steps_[member] >= most_steps; }
+
+  bool wants_steps() const override { return true; }
   bool wants_looks() const override { return false; }
-  void after_step(MemberSteps& /*steps*/) override {}
+  void after_step(MemberSteps& steps) override {
+    for (int lane = 0; lane < steps.lanes(); ++lane) {
+      if (steps.took_step(lane) && ++steps_[steps.member(lane)] >= most_steps) steps.finish(lane);
+    }
+  }
   bool stops() override { return stop_(); }
 
  private:
+  static constexpr int most_steps = 200;
+
+  std::vector<int> steps_;
   const std::function<bool()>& stop_;
 };
 
@@ -93,10 +104,10 @@ HeldMembers::Moved HeldMembers::move(std::span<const double> inputs, std::span<d
     ends[k].v = ends[k].q + coordinates_;
     if (!kind_) ends[k].status = Status::not_converged;
   }
-  StopWatch watch(stop);
+  Impatience watch(count, stop);
   if (kind_ && !go_in_lanes(inputs, states, ends, watch)) return {{.status = Status::interrupted}, 0};
   for (std::size_t k = 0; k < count; ++k) {
-    if (ends[k].status == Status::ok) continue;  // others may go by Newton's iteration
+    if (ends[k].status == Status::ok && !watch.is_slow(k)) continue;
     const Outcome outcome = go_alone(inputs.subspan(k * inputs_, inputs_), states.subspan(k * row, row), ends[k], stop);
     if (!outcome) return {outcome, k};
   }
