@@ -389,8 +389,8 @@ def test_what_a_kernel_says_of_itself(everything):
         "parameter\tb\t\t1\t0.7\t1\t0",
         "input\tu\tN",
         "input\tw\twhat? μ",
-        "point\tp\t2",
-        "point\tr\t3",
+        "point\tp\t2\tbob",
+        "point\tr\t3\tbob",
         *(line for line in lines if line.startswith("argument\t")),
         f"series\t1\t61\t77\t{loaded.table.series.kept}",
     ]

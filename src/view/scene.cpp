@@ -45,6 +45,7 @@ std::string point_kind(const SystemInfo& info, std::size_t k) {
 
 std::vector<Connection> connections_of(const SystemInfo& info) {
   std::vector<Connection> connections;
+  connections.reserve(info.connection_kinds.size());
   for (std::size_t k = 0; k < info.connection_kinds.size(); ++k) {
     connections.push_back(
         {std::string(info.connection_kinds[k]), info.connection_ends[2 * k], info.connection_ends[2 * k + 1]});

@@ -318,7 +318,7 @@ def test_in_a_frame_of_another_page(lab_file, open_lab, tmp_path):
     outer = tmp_path / "outer.html"
     outer.write_text(
         f'<!DOCTYPE html><iframe src="file://{lab_file}#n=3&th=1" width="700" height="500"></iframe>'
-        "<script>window.pendulaLab = { history: { rows: 1 } }</script>"
+        "<script>window.pendulaLab = { history: { rows: 1 }, frames: 0, changed() { ++this.frames; } }</script>"
     )
     page = open_lab(file=outer, motion="no-preference")
     frame = page.frames[1]

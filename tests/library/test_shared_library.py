@@ -20,7 +20,8 @@ def test_the_functions_of_the_header_are_seen_and_nothing_else():
     declared = set(re.findall(r"^[^\s/].*?\b(pendula_\w+)\(", HEADER.read_text(), re.MULTILINE))
     symbols = [line.split() for line in read("NM", "-D", "--defined-only").splitlines()]
     assert {name for _, kind, name in symbols if kind == "T"} == {f"{name}@@PENDULA_0" for name in declared}
-    assert [name for _, kind, name in symbols if kind != "T"] == ["PENDULA_0"]
+    # The version itself, which some linkers write with its own version.
+    assert {name.split("@@")[0] for _, kind, name in symbols if kind != "T"} == {"PENDULA_0"}
 
 
 def test_programs_ask_for_its_interface():

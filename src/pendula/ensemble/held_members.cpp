@@ -71,7 +71,7 @@ HeldMembers::HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coo
       duration_(duration),
       coordinates_(coordinates),
       inputs_(inputs_of(*subject_).size()) {
-  if (!(duration_ > 0 && std::isfinite(duration_))) {
+  if (!(duration_ > 0) || std::isinf(duration_)) {
     throw std::invalid_argument("members: duration: expected a positive number, got " + std::to_string(duration_));
   }
   const bool driven = as_its_kind(*subject_, [](const auto& kind) { return is_driven(kind); });
