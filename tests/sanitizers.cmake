@@ -22,10 +22,11 @@ execute_process(COMMAND "${CMAKE_COMMAND}" --preset asan -B "${BUILD}" ${compile
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" --target cpp_tests --parallel 2
                 COMMAND_ERROR_IS_FATAL ANY)
 # The long runs repeat what the others do, millions of times: without sanitizers they take seconds, here many minutes. Of
-# NarrowEvents two of nine methods stay, gauss and taylor.
+# NarrowEvents and EventsWithinBounds those stay that choose steps.
 set(long_runs EnergyAndAngularMomentumAreKept EnergyStaysWhatItIs FullTurnsAreCounted RandomCrossings WhatTurnsOften
               OfAPublishedDoublePendulum ComeInPairs ReachesTheAccuracy NarrowEvents.AreAllFound/gauss_
               NarrowEvents.AreAllFound/[rdfb] NarrowEventsInLanes
+              AreThoseThatAreFoundWithout/gauss_ AreThoseThatAreFoundWithout/[rv] AreThoseThatAreFoundWithout/dense_
               TangentsGrowAsThoseOfExplicitSteps)
 list(JOIN long_runs "|" long_runs)
 execute_process(COMMAND "${CMAKE_CTEST_COMMAND}" --test-dir "${BUILD}" --label-regex cpp --exclude-regex "${long_runs}"
