@@ -114,20 +114,22 @@ class StepStates {
   }
 
  private:
-  bool find_range(MotionRange& range) const {
+  bool find_range(MotionRange& range) {
     range.least = begin_;
     range.most = end_;
     if (!step_.bound_excursions(range.most)) return false;
+    // What is damped at once, between the start and the first stage, no polynomial through the stages knows.
+    range.most.v += (glance(0).v - begin_.v).cwiseAbs();
     // Rates that follow from momenta are rounded as the largest of them.
-    const auto lay_around = [](const auto& begin, auto& least, auto& most) {
+    const auto lay_around = [](const auto& begin, const auto& end, auto& least, auto& most) {
       constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
       most.array() += rounding * (most.array() + begin.cwiseAbs().maxCoeff());
       least -= most;
       most += begin;
+      return (least.array() <= end.array()).all() && (end.array() <= most.array()).all();
     };
-    lay_around(begin_.q, range.least.q, range.most.q);
-    lay_around(begin_.v, range.least.v, range.most.v);
-    return true;
+    return lay_around(begin_.q, end_.q, range.least.q, range.most.q) &&
+           lay_around(begin_.v, end_.v, range.least.v, range.most.v);
   }
 
   const Motion& new_glance(double u, Motion& motion) {
@@ -302,7 +304,9 @@ class EventWatch {
   /// Whether bounds of the states show that the function keeps its sign in the step.
   template <class Step>
   bool is_excluded(std::size_t k, detail::StepStates<Step>& states) {
-    if (!events_[k].enclose || sides_[k].sign == 0) return false;
+    constexpr int coarse = 2;  // polynomials of such a degree bound too little to be worth the question
+    if (!events_[k].enclose || sides_[k].sign == 0 || degree_ <= coarse) return false;
+    if (events_[k].formula != nullptr && events_[k].formula->size() == 0) return false;  // of time alone
     const MotionRange* const range = states.range();
     if (range == nullptr || events_[k].enclose(*range).side() != sides_[k].sign) return false;
     sides_[k].value = std::numeric_limits<double>::quiet_NaN();
