@@ -5,7 +5,8 @@ usage: python bench/heyoka_races.py RACES.json FIGURES.json [--repetitions N] [-
 heyoka (Biscani, Izzo 2021; doi:10.1093/mnras/stab1032) compiles the Taylor recursions of the equations that
 it is given while the program runs. It comes as a Python package, so it races in a process of its own, on the
 problems that pendula_bench left in the first file; a run is one call into compiled code, and compiling is not
-counted. Chains it gets by the tensions of their rods, other systems by their Lagrangians.
+counted. Chains it gets by the tensions of their rods, other systems by their Lagrangians; with its fast_math and
+without.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import math
 import statistics
 import time
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import heyoka as hy
@@ -22,6 +24,8 @@ from heyoka_systems import System
 
 NAME = "heyoka"
 TOLERANCES = (1e-8, 1e-10, 1e-12, 1e-13, 1e-14, 1e-15, 1e-16, 1e-17)
+COARSE = (1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-11)  # beside them, of few coordinates
+FEW = 4
 ALLOWED_FLOORS = 10
 # Twenty links take 20 s to compile. Longer chains are compiled to loops, which take 1.7 times as long to run.
 UNROLLED_LINKS = 20
@@ -57,6 +61,11 @@ class Chain:
 
 
 Problem = Chain | System
+
+
+def tolerances(coordinates: int) -> tuple[float, ...]:
+    """Settings of the one knob, from coarse to fine."""
+    return tuple(sorted({*TOLERANCES, *(COARSE if coordinates <= FEW else ())}, reverse=True))
 
 
 def error_of(problem: Problem, state: np.ndarray) -> float:
@@ -99,12 +108,18 @@ def equations(problem: Chain) -> list[tuple]:
 class Run:
     """One whole run, made ready."""
 
-    def __init__(self, problem: Problem, formulation: list[tuple], tolerance: float) -> None:
-        """Compiles."""
+    def __init__(
+        self, problem: Problem, formulation: list[tuple], tolerance: float, *, reassociated: bool
+    ) -> None:
+        """Compiles; `reassociated`: by heyoka's fast_math."""
         self.problem = problem
         self.start = problem.start()
         self.integrator = hy.taylor_adaptive(
-            formulation, self.start.copy(), tol=tolerance, compact_mode=not problem.unrolled
+            formulation,
+            self.start.copy(),
+            tol=tolerance,
+            compact_mode=not problem.unrolled,
+            fast_math=reassociated,
         )
 
     def __call__(self) -> float:
@@ -133,9 +148,9 @@ def attempt(run: Run) -> float:
 def scan(problem: Problem, longest: float) -> tuple[list[dict], Run, dict]:
     """Every setting; then run and trial that count: the cheapest good one, or the most accurate."""
     trials, runs = [], []
-    for formulation in problem.formulations():
-        for tolerance in TOLERANCES:
-            run = Run(problem, formulation, tolerance)
+    for formulation, reassociated in product(problem.formulations(), (False, True)):
+        for tolerance in tolerances(len(problem.start()) // 2):
+            run = Run(problem, formulation, tolerance, reassociated=reassociated)
             seconds = attempt(run)
             trials.append({"setting": tolerance, "milliseconds": seconds * 1e3, "error": run.error()})
             runs.append(run)

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 #include <peers/pendula.hpp>
+#include <pendula/chain/state.hpp>
 #include <sstream>
 #include <steps.hpp>
 #include <string>

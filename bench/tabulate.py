@@ -32,6 +32,7 @@ OVER_CASADI = {
     "residual": ((1.8, "planar 1–4, spatial 1–3"), (1.5, "other systems")),
     "residual_with_jacobians": ((2.7, "planar 1–4, spatial 1–3"), (2.5, "other systems")),
 }
+EQUAL_ERROR = ("pendula by tolerance", "pendula series", "pendula Gauss by tolerance", "heyoka")
 LINKS = (2, 5, 10, 20, 50, 100, 1000, 10_000, 100_000)
 BASELINE = "GSL rk8pd 1e-12"
 LINEAR = 2.5  # what caches may take, up to 1.76 as measured; an O(n²) part would make it 100
@@ -365,6 +366,27 @@ def kernel_races(figures: Figures) -> str:
     return field_table({p: (figures.kernel_races[p]["floor"], figures.kernel_field(p)) for p in problems})
 
 
+def cheapest(race: dict, name: str, error: float) -> float | None:
+    """Milliseconds of a contestant's quickest run within an error, of all settings that were tried."""
+    runs = race["trials"].get(name, {"runs": []})["runs"]
+    return min(
+        (r["milliseconds"] for r in runs if r["error"] is not None and r["error"] <= error), default=None
+    )
+
+
+def equal_error(figures: Figures) -> str:
+    """The time to an error: of what pendula chooses, of either method, of heyoka; and heyoka's over pendula's."""
+    rows = []
+    for problem, race in figures.kernel_races.items():
+        for what, error in (("10 floors", 10 * race["floor"]), ("1e-9", 1e-9), ("1e-6", 1e-6)):
+            chosen, series, gauss, heyoka = (cheapest(race, name, error) for name in EQUAL_ERROR)
+            lead = f"{number(heyoka / chosen)}×" if chosen and heyoka else "–"
+            times = (f"{t:.3f}" if t else "–" for t in (chosen, series, gauss, heyoka))
+            rows.append([problem, what, *times, lead])
+    rows.sort(key=lambda row: not row[-1].startswith("0."))  # where heyoka wins, first
+    return table(["", "error", *EQUAL_ERROR, "heyoka over pendula"], rows)
+
+
 def field_table(fields: dict[str, tuple[float, dict[str, dict]]]) -> str:
     """Floor and contestants of each problem."""
     names = list(dict.fromkeys(name for _, field in fields.values() for name in field))
@@ -523,6 +545,7 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "tolerance races": tolerance_races,
     "kernel machine": kernel_machine,
     "kernel races": kernel_races,
+    "equal error": equal_error,
     "functions": functions,
     "sines": sines,
 }

@@ -1,28 +1,39 @@
 #include <algorithm>
 #include <contestant.hpp>
 #include <peers/pendula.hpp>
+#include <pendula/chain/state.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/method_choice.hpp>
 #include <systems.hpp>
+#include <tuple>
+#include <utility>
 
 namespace bench {
 namespace {
 
 using pendula::Form, pendula::Iteration, pendula::Method, pendula::Planar, pendula::RunOptions, pendula::Solver;
 
+/// What a run is of, and from where.
+std::pair<std::shared_ptr<const pendula::Subject>, pendula::Motion> start_of(const Problem& problem) {
+  if (problem.kernel.empty()) {
+    const auto angles = Eigen::VectorXd::Constant(problem.links, problem.angle);
+    return {std::make_shared<pendula::ChainSubject<Planar>>(chain_of(problem)),
+            pendula::State<Planar>::from_angles(angles)};
+  }
+  const SystemStart& start = system_start(problem);
+  const auto vector = [](const std::vector<double>& values) {
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  };
+  return {subject_of(problem), {0, vector(start.q), vector(start.v)}};
+}
+
 /// A run of the library; how long its steps are is for those that derive from it.
 class PendulaRun : public Run {
  public:
   PendulaRun(const Problem& problem, const RunOptions& options) : problem_(problem) {
-    if (problem.kernel.empty()) {
-      start_ = pendula::State<Planar>::from_angles(Eigen::VectorXd::Constant(problem.links, problem.angle));
-      integrator_ = pendula::make_integrator(chain_of(problem), options);
-    } else {
-      const SystemStart& start = system_start(problem);
-      const auto vector = [](const std::vector<double>& values) {
-        return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-      };
-      start_ = {0, vector(start.q), vector(start.v)};
-      integrator_ = subject_of(problem)->make_integrator(options);
-    }
+    std::shared_ptr<const pendula::Subject> subject;
+    std::tie(subject, start_) = start_of(problem);
+    integrator_ = subject->make_integrator(options);
   }
 
   void operator()() override {
@@ -104,15 +115,40 @@ void add(std::vector<Contestant>& contestants, const std::string& name, const Ru
   contestants.push_back({"pendula " + name, "steps", built_in, settings, make});
 }
 
-/// As the program does where a scenario names a tolerance and nothing else.
+RunOptions by_tolerance(Method method, double tolerance) {
+  return {.method = method, .stages = pendula::stages_for(method, tolerance), .step = 0, .tolerance = tolerance};
+}
+
+/// As the program does where a scenario names a tolerance and nothing else. Choosing is not timed, as nothing is that
+/// makes a run ready.
+RunOptions chosen_options(const Problem& problem, double tolerance) {
+  pendula::RunSetup setup;
+  std::tie(setup.subject, setup.start) = start_of(problem);
+  setup.options = by_tolerance(Method::gauss, tolerance);
+  setup.duration = problem.duration;
+  const double of_series = pendula::choose_method(setup).series_tolerance;
+  return of_series > 0 ? by_tolerance(Method::taylor, of_series) : setup.options;
+}
+
 void add_by_tolerance(std::vector<Contestant>& contestants) {
-  const auto any = [](const Problem& problem) { return problem.kernel.empty(); };
-  const auto settings = [](const Problem&) { return tolerances(9, 17, 2); };
+  const auto built_in = [](const Problem& problem) { return problem.kernel.empty() || subject_of(problem) != nullptr; };
+  const auto settings = [](const Problem&) { return tolerances(4, 17, 2); };
   const auto make = [](const Problem& problem, double tolerance) {
-    const int stages = pendula::stages_for(Method::gauss, tolerance);
-    return std::make_unique<ChosenSteps>(problem, RunOptions{.stages = stages, .step = 0, .tolerance = tolerance});
+    return std::make_unique<ChosenSteps>(problem, chosen_options(problem, tolerance));
   };
-  contestants.push_back({"pendula by tolerance", "tolerance", any, settings, make});
+  contestants.push_back({"pendula by tolerance", "tolerance", built_in, settings, make});
+}
+
+/// Steps by one method, whatever would be chosen.
+void add_method(std::vector<Contestant>& contestants, const std::string& name, Method method) {
+  const auto few = [](const Problem& problem) {
+    return problem.kernel.empty() ? problem.links <= 4 : subject_of(problem) != nullptr;
+  };
+  const auto settings = [](const Problem&) { return tolerances(4, 17, 2); };
+  const auto make = [method](const Problem& problem, double tolerance) {
+    return std::make_unique<ChosenSteps>(problem, by_tolerance(method, tolerance));
+  };
+  contestants.push_back({"pendula " + name, "tolerance", few, settings, make});
 }
 
 }  // namespace
@@ -132,6 +168,9 @@ void add_pendula(std::vector<Contestant>& contestants) {
 }
 
 void add_kernels(std::vector<Contestant>& contestants) {
+  add_by_tolerance(contestants);
+  add_method(contestants, "series", Method::taylor);
+  add_method(contestants, "Gauss by tolerance", Method::gauss);
   const auto kernel = [](int stages, Iteration iteration) { return options_of(stages, Solver::dense, iteration); };
   for (const int stages : {8, 6}) {
     const std::string name = "kernel s = " + std::to_string(stages);
