@@ -1,6 +1,7 @@
 """The built-in models as the laboratory has them: python lab_models.py CODEGEN OUTPUT, with the generator's packages.
 
-Writes JSON: by name what describe tells of a model, and its program for the interpreter.
+Writes JSON: by name how many links a model has at `first`, and what is `made` of it, by number of links: what describe
+tells of it, its program for the interpreter, and where it begins.
 """
 
 import json
@@ -10,13 +11,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-LINKS = {"cart_chain": 2, "driven_chain": 2, "joint_springs": 3}  # of those that have links; else 1
+LINKS = {"cart_chain": 2, "driven_chain": 2, "joint_springs": 3}  # at first, of those that have links
+MOST_LINKS = 3  # programs grow by the square of it
 
-# Where they begin, and with what parameters that are not their defaults.
+# Where they begin, and with what parameters that are not their defaults. Angles of links come last.
 STARTS = {
-    "cart_chain": {"q": [0, 2.0, 1.2]},
+    "cart_chain": {"q": [0, 2.0, 1.2, 0.8]},
     "driven_chain": {
-        "q": [3.0, 3.1],
+        "q": [3.0, 3.1, 3.0],
         "p": {"y_amplitude": 0.05, "frequency": 120, "damping": 0.05, "lengths": 0.5},
     },
     "furuta": {"q": [0, 2.6], "v": [3, 0]},
@@ -27,10 +29,10 @@ STARTS = {
 }
 
 
-def generator(codegen: Path, command: str, model: str, *more: str) -> str:
-    links = ["--links", str(LINKS[model])] if model in LINKS else []
+def generator(codegen: Path, command: str, model: str, links: int, *more: str) -> str:
+    counted = ["--links", str(links)] if model in LINKS else []
     return subprocess.run(
-        [sys.executable, "-m", "pendula_codegen", command, "--model", model, *links, *more],
+        [sys.executable, "-m", "pendula_codegen", command, "--model", model, *counted, *more],
         env={**os.environ, "PYTHONPATH": str(codegen), "PYTHONDONTWRITEBYTECODE": "1"},
         stdout=subprocess.PIPE,
         text=True,
@@ -42,14 +44,24 @@ def main() -> None:
     codegen, output = Path(sys.argv[1]), Path(sys.argv[2])
     names = sorted(file.stem for file in (codegen / "pendula_codegen/models").glob("[a-z]*.py"))
     models = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for name in names:
-            program = Path(folder) / f"{name}.program"
-            generator(codegen, "program", name, "--as", "bytecode", "--output", str(program))
-            described = json.loads(generator(codegen, "describe", name).splitlines()[-1])
-            del described["file"]
-            models[name] = {"model": described, "program": program.read_text(), "start": STARTS.get(name, {})}
+    for name in names:
+        counts = range(1, MOST_LINKS + 1) if name in LINKS else [1]
+        made = {links: make(codegen, name, links) for links in counts}
+        models[name] = {"first": LINKS.get(name, 1), "made": made}
     output.write_text(json.dumps(models))
+
+
+def make(codegen: Path, name: str, links: int) -> dict:
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "program"
+        generator(codegen, "program", name, links, "--as", "bytecode", "--output", str(program))
+        text = program.read_text()
+    described = json.loads(generator(codegen, "describe", name, links).splitlines()[-1])
+    del described["file"]
+    start = dict(STARTS.get(name, {}))
+    if "q" in start:
+        start["q"] = start["q"][: len(described["coordinates"])]
+    return {"model": described, "program": text, "start": start}
 
 
 if __name__ == "__main__":

@@ -13,23 +13,25 @@
 #include "io/toolchain.hpp"
 #include "io/whole_file.hpp"
 #include "view/lab.hpp"
+#include "view/scenario_scene.hpp"
 
 namespace pendula::cli {
 namespace {
 
 using nlohmann::json;
 
-void warn(const std::string& what) {
-  std::cerr << "pendula: warning: the laboratory leaves out " << what << '\n';
+template <class Scenario>
+void warn(const Scenario& scenario) {
+  for (const std::string& what : view::laboratory_leaves_out(scenario)) {
+    std::cerr << "pendula: warning: the laboratory leaves out " << what << '\n';
+  }
 }
 
 /// A chain and its start as a link.
 template <class Space>
 std::string link_of(const io::Scenario<Space>& scenario) {
   const Chain<Space>& chain = scenario.chain;
-  if (!scenario.feedback.empty()) warn("feedback");
-  if (scenario.natural) warn("natural units: it shows the numbers of the scenario as SI");
-  for (const std::string& what : view::lab_leaves_out(chain)) warn(what);
+  warn(scenario);
   view::LabLink link = view::lab_link(chain);
   const auto& start = scenario.start;
   link.put("th", start.theta());
@@ -51,10 +53,8 @@ json model_start(const io::ModelName& name, const SystemInfo& info, const io::To
 }
 
 /// The same of a model and its start in a scenario.
-json start_of(const io::SystemScenario& scenario, io::ModelName name, const io::Toolchain& toolchain) {
-  name.laws.clear();
-  if (!scenario.feedback.empty()) warn("feedback");
-  for (const std::string& what : view::lab_leaves_out(*scenario.system)) warn(what);
+json start_of(const io::SystemScenario& scenario, const io::ModelName& name, const io::Toolchain& toolchain) {
+  warn(scenario);
   json start = model_start(name, scenario.system->info(), toolchain);
   view::LabLink link = view::lab_link(*scenario.system);
   link.put("q", scenario.start.q);

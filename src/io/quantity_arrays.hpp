@@ -18,6 +18,7 @@ struct RunContents {
   std::vector<Constant> constants;
   std::vector<std::string> events;  ///< names of the events that the run looks for
   std::optional<NaturalUnits> natural;
+  std::string drawing = {};  ///< what points are drawn as, JSON (view/scene.hpp); empty of a chain
 };
 
 /// Attributes that tell a unit as UDUNITS knows it, and beside it the natural unit.

@@ -1,11 +1,13 @@
 #include "view/lab.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/version.hpp>
 #include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "view/assets.hpp"
 #include "view/encode.hpp"
@@ -31,19 +33,23 @@ void LabLink::add(double number) {
   text_ += shortest(number);
 }
 
+void put_inputs(LabLink& link, std::span<const double> held, std::span<const InputSine> sines) {
+  if (std::ranges::any_of(held, [](double input) { return input != 0; })) link.put("u", held);
+  std::vector<double> numbers;
+  for (const InputSine& sine : sines) {
+    if (sine.amplitude == 0) continue;
+    numbers.insert(numbers.end(), {static_cast<double>(sine.input), sine.amplitude, sine.frequency, sine.phase});
+  }
+  if (!numbers.empty()) link.put("s", numbers);
+}
+
 LabLink lab_link(const SystemSubject& system) {
   const SystemNumbers& numbers = system.numbers();
   const std::size_t indicators = 2 * system.info().switches.size();
   LabLink link;
   link.put("p", std::span(numbers.parameters).first(numbers.parameters.size() - indicators));
-  if (!numbers.inputs.empty()) link.put("u", numbers.inputs);
+  put_inputs(link, numbers.inputs, numbers.sines);
   return link;
-}
-
-std::vector<std::string> lab_leaves_out(const SystemSubject& system) {
-  std::vector<std::string> words;
-  if (!system.numbers().sines.empty()) words.emplace_back("drives that change with time");
-  return words;
 }
 
 nlohmann::json lab_model(const SystemInfo& info, std::string program) {

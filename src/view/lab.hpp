@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <nlohmann/json_fwd.hpp>
 #include <pendula/chain/chain.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <ranges>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,7 +34,10 @@ class LabLink {
   std::string text_;
 };
 
-/// What a chain is, without a state.
+/// What acts from outside: inputs that are held, and sines on them, four numbers each.
+void put_inputs(LabLink& link, std::span<const double> held, std::span<const InputSine> sines);
+
+/// What a chain is, without a state. Its torques are its inputs, link by link.
 template <class Space>
 LabLink lab_link(const Chain<Space>& chain) {
   LabLink link;
@@ -42,6 +47,14 @@ LabLink lab_link(const Chain<Space>& chain) {
   link.put("l", chain.lengths());
   link.put("g", chain.gravity());
   link.put("d", chain.damping()[0]);
+  const auto& torque = chain.constant_torque();
+  std::vector<InputSine> sines;
+  for (const Drive<Space>& drive : chain.drives()) {
+    for (int k = 0; k < Space::torque_components; ++k) {
+      sines.push_back({(drive.link * Space::torque_components) + k, drive.amplitude[k], drive.frequency, drive.phase});
+    }
+  }
+  put_inputs(link, {torque.data(), static_cast<std::size_t>(torque.size())}, sines);
   return link;
 }
 
@@ -53,7 +66,6 @@ std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
   std::vector<std::string> words;
   const auto damping = chain.damping().array();
   if (chain.links() > most_links) words.push_back("links after the " + std::to_string(most_links) + "th");
-  if (chain.constant_torque().any() || !chain.drives().empty()) words.emplace_back("torques and drives");
   if ((damping != damping[0]).any()) words.emplace_back("damping of single links: all have that of the first");
   if (std::abs(chain.gravity()) > most_gravity) words.emplace_back("gravity beyond 100");
   if (damping[0] > most_damping) words.emplace_back("damping beyond 1000");
@@ -63,11 +75,8 @@ std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
   return words;
 }
 
-/// What a system is, without a state: parameters, and inputs that are held. The link goes with `lab_model`.
+/// What a system is, without a state: parameters and inputs. The link goes with `lab_model`.
 LabLink lab_link(const SystemSubject& system);
-
-/// What of a system a laboratory leaves out, in words. Feedback is the scenario's, and left out, too.
-std::vector<std::string> lab_leaves_out(const SystemSubject& system);
 
 /// What a laboratory begins with that moves a model by its program: "model" and "program".
 nlohmann::json lab_model(const SystemInfo& info, std::string program);

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/version.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "io/natural_units.hpp"
 #include "io/run_source.hpp"
@@ -38,15 +41,30 @@ Scene subject_scene(const Scenario& scenario) {
   return scene;
 }
 
+/// What of a scenario a laboratory leaves out or changes, in words. Continuous feedback is part of a model's program.
+template <class Scenario>
+std::vector<std::string> laboratory_leaves_out(const Scenario& scenario) {
+  std::vector<std::string> words;
+  if constexpr (requires { scenario.chain; }) {
+    if (!scenario.feedback.empty()) words.emplace_back("feedback");
+    if (scenario.natural) words.emplace_back("natural units: it shows the numbers of the scenario as SI");
+    for (std::string& what : lab_leaves_out(scenario.chain)) words.push_back(std::move(what));
+  } else {
+    const auto is_sampled = [](const io::FeedbackPlan& plan) { return plan.sample > 0; };
+    if (std::ranges::any_of(scenario.feedback, is_sampled)) words.emplace_back("sampled feedback");
+  }
+  return words;
+}
+
 /// The laboratory's link of what is moved, in SI, if the laboratory has all of it; empty for all else, and where this
 /// build has none.
 template <class Scenario>
 std::string laboratory_of(const Scenario& scenario) {
-  if (!has_lab() || !scenario.feedback.empty() || scenario.natural) return {};
+  if (!has_lab() || !laboratory_leaves_out(scenario).empty()) return {};
   if constexpr (requires { scenario.chain; }) {
-    return lab_leaves_out(scenario.chain).empty() ? lab_link(scenario.chain).text() : "";
+    return lab_link(scenario.chain).text();
   } else {
-    return lab_leaves_out(*scenario.system).empty() ? lab_link(*scenario.system).text() : "";
+    return lab_link(*scenario.system).text();
   }
 }
 

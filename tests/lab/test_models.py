@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from conftest import program, until
+from conftest import await_frame, program, until
 from playwright.sync_api import Browser, Page
 
 # A cart on a slope, between two springs, and what hangs on it; scalars come before what there is one of a link.
@@ -40,6 +40,9 @@ parameters = { masses = [1, 0.5], cart_mass = 2.0 }
 [[system.drive]]
 input = "push"
 constant = 1.5
+amplitude = 3.0
+frequency = 2.5
+phase = 0.4
 [start]
 theta_1 = 1.0
 theta_2 = 0.3
@@ -50,6 +53,15 @@ links = 1
 parameters = { y_amplitude = 0.1, frequency = 7.0 }
 [start]
 theta_1 = 1.0
+""",
+    "balanced": """[system]
+model = "cart_chain"
+links = 1
+[[system.feedback]]
+input = "push"
+value = "2*x + 4*x_dot - 60*(theta_1 - pi) - 16*theta_dot_1"
+[start]
+theta_1 = 3.0
 """,
     "own": """[system]
 model = "sprung.py"
@@ -146,11 +158,7 @@ def furthest(here: list[float], there: list[float]) -> float:
 @pytest.mark.parametrize(
     ("more", "left_out"),
     [
-        (
-            '[[system.drive]]\ninput = "push"\namplitude = 1.0\nfrequency = 2.0\n',
-            "drives that change with time",
-        ),
-        ('[[system.feedback]]\ninput = "push"\nvalue = "-x"\n', "feedback"),
+        ('[[system.feedback]]\ninput = "push"\nvalue = "-x"\nsample = 0.1\n', "sampled feedback"),
     ],
 )
 def test_what_a_laboratory_leaves_out_of_a_model_is_said(more, left_out, scenario, tmp_path):
@@ -237,11 +245,106 @@ def test_a_laboratory_draws_the_same(scenario, open_lab, tmp_path):
     assert stage["hangs"] == [-2, -2, 1]  # the bob by a rod on the cart
 
 
+@pytest.fixture
+def own_lab(scenario, open_lab, tmp_path):
+    """The laboratory of the cart on its slope, which has begun to move."""
+    moving = "s_dot = 0.7\ntheta_dot = -1.3\n"
+    told = program("lab", str(scenario("own", moving)), "-o", str(tmp_path / "lab.html"))
+    assert (told.returncode, told.stderr) == (0, "")
+    return open_lab(file=tmp_path / "lab.html")
+
+
+def test_velocities_of_points_are_drawn(own_lab):
+    own_lab.evaluate(
+        """(() => {
+          const { stage } = pendulaLab;
+          const draw = stage.draw.bind(stage);
+          stage.draw = (what) => draw((window.told = what));
+        })()"""
+    )
+    own_lab.get_by_role("button", name="Velocities").click()
+    until(own_lab, "window.told?.rates")
+    cart = [0.7 * 0.8, 0, 0.7 * 0.6]
+    bob = [cart[0] - 1.3 * math.cos(1.0), 0, cart[2] - 1.3 * math.sin(1.0)]
+    rates = own_lab.evaluate("Array.from(told.rates)")
+    assert furthest(rates, [0, 0, 0, *cart, *bob]) < 1e-8  # measured 6.6e-12
+
+
+def test_a_driven_pivot_has_a_velocity(open_lab):
+    page = open_lab("model=driven_chain&n=1&p=1,1,0,0.1,0.2,7,0,0,9.81")
+    row = page.evaluate("Array.from(pendulaLab.row)")
+    speed = [7 * 0.1, 7 * 0.2]  # frequency times amplitudes
+    assert furthest(row[-4:-2], speed) < 1e-8  # measured 1.1e-9
+
+
+# Words on the canvas.
+WORDS = """(() => {
+  const pen = CanvasRenderingContext2D.prototype;
+  const before = pen.fillText;
+  window.words = [];
+  pen.fillText = function (text, ...place) {
+    if (this.canvas.id === "canvas") window.words.push(text);
+    return before.call(this, text, ...place);
+  };
+})()"""
+
+
+def angles_told(page: Page) -> list[str]:
+    page.evaluate(WORDS)
+    page.get_by_role("button", name="Angles").click()
+    until(page, "words.some((each) => each.endsWith('°'))")
+    await_frame(page)
+    page.evaluate("words.length = 0")
+    await_frame(page)
+    return page.evaluate("words.filter((each) => each.endsWith('°'))")
+
+
+def test_angles_of_what_turns_are_drawn(own_lab):
+    """Of the rod and the thread, not of the spring along the slope."""
+    bob = (0.3 * 0.8 + math.sin(1.0), 0.3 * 0.6 - math.cos(1.0))
+    thread = math.degrees(math.atan2(bob[0], -bob[1]))
+    assert angles_told(own_lab) == ["57°", f"{thread:.0f}°"]
+
+
+@pytest.mark.parametrize(
+    ("link", "angles"),
+    [
+        ("model=furuta&q=0.3,2&v=0", ["115°"]),  # not of the arm, which stays level
+        ("model=swinging_atwood&q=1,0.5&v=0", ["29°"]),
+        ("n=2&th=0.5,4", ["29°", "−131°"]),
+        ("n=1&space=3&th=0.5&ph=2", ["29°"]),
+    ],
+)
+def test_angles_are_from_the_vertical(link, angles, open_lab):
+    assert angles_told(open_lab(link)) == angles
+
+
+def test_copies_of_a_model_part(open_lab):
+    """A cart's place has no part in its motion: copies that differ in it alone would stay together."""
+    page = open_lab("model=cart_chain&copies=50&apart=1e-6", motion="no-preference")
+    until(page, "pendulaLab.copies?.count === 50")
+    copies = "pendulaLab.panels.find((panel) => panel.distances).distances"
+    until(page, f"{copies}.some(([, far]) => far > 1e-2)")
+    page.keyboard.press("Space")
+    await_frame(page)
+    # The last bob of the first and of the last copy.
+    spread = page.evaluate(
+        """(() => {
+          const { places, count } = pendulaLab.copies;
+          const each = places.length / count;
+          return Math.hypot(...[1, 2, 3].map((k) => places.at(-k) - places[each - k]));
+        })()"""
+    )
+    assert 1e-3 < spread < 10
+
+
 def test_built_in_models_say_what_they_are(open_lab):
     page = open_lab()
     told = page.evaluate(
-        """Object.entries(JSON.parse(document.getElementById("models").textContent)).map(([name, { model }]) =>
-             [name, model.points.map(({ kind }) => kind).join(), model.connections.map(({ kind }) => kind).join()])"""
+        """Object.entries(JSON.parse(document.getElementById("models").textContent)).map(([name, { first, made }]) => {
+             const { points, connections } = made[first].model;
+             return [name, points.map(({ kind }) => kind).join(), connections.map(({ kind }) => kind).join()];
+           })"""
     )
     assert {name: (kinds, connections) for name, kinds, connections in told} == {
         "cart_chain": ("cart,bob,bob", ""),

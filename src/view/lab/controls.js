@@ -59,6 +59,12 @@ function unitWords(unit) {
   return unit === "1" ? "" : unitText(unit).replace("^2", "²").replace("^3", "³");
 }
 
+/// The inputs of a chain: torques, link by link.
+function torquesOf({ n, space }) {
+  const axes = space === 2 ? [""] : ["x_", "y_", "z_"];
+  return Array.from({ length: n }, (_, k) => axes.map((axis) => ({ name: `torque_${axis}${k + 1}`, unit: "N m" }))).flat();
+}
+
 /// All settings, for as many links as there are now.
 class Controls {
   constructor(lab) {
@@ -77,6 +83,7 @@ class Controls {
     this.#makeMenu();
     if (model) this.#makeModel();
     else this.#makeChain();
+    this.#makeDrives();
     this.#makeStart();
     this.refresh();
   }
@@ -161,11 +168,15 @@ class Controls {
   #makeModel() {
     const { lab } = this;
     this.#title("settings.model");
+    if (linkChoices.length > 1) {
+      this.#slider({ key: "links", unit: "", low: 1, high: Math.max(...linkChoices), step: 1, get: () => model.links, set: (n) => linkChoices.includes(n) && n !== model.links && lab.go(named, n) });
+    }
     modelParameters.forEach((each, k) => {
-      const size = Math.abs(each.default ?? 1) || 1;
+      const now = this.#state.p[k] || each.default || 0;
+      const size = Math.abs(now) || 1;
       this.#slider({
         label: each.label, key: "", unit: unitWords(each.unit), logarithmic: each.positive,
-        low: each.positive ? size / 20 : Math.min(0, 2.5 * (each.default ?? 0)), high: each.positive ? size * 20 : Math.max(2.5 * (each.default ?? 1), 1), step: 0.01 * size,
+        low: each.positive ? size / 20 : Math.min(0, 2.5 * now), high: each.positive ? size * 20 : now > 0 ? 2.5 * now : 1, step: 0.01 * size,
         get: () => this.#state.p[k],
         set: (x) => {
           const p = this.#state.p.slice();
@@ -174,6 +185,40 @@ class Controls {
         },
       });
     });
+  }
+
+  // Sines on inputs, and what is held: of each input of a model; of a chain of the torque on its first rod, and on those that
+  // the link tells of.
+  #makeDrives() {
+    const { lab } = this;
+    const state = this.#state;
+    const inputs = model?.inputs ?? torquesOf(state);
+    const first = model ? inputs.map((_, k) => k) : [state.space === 2 ? 0 : 1];
+    const isShown = (k) => first.includes(k) || state.u[k] !== 0 || state.s.some(([input]) => input === k);
+    const shown = inputs.map((_, k) => k).filter(isShown);
+    if (shown.length === 0) return;
+    this.#title("settings.drive", "student");
+    for (const k of shown) {
+      const names = { input: symbol(inputs[k].name) };
+      const unit = unitWords(inputs[k].unit);
+      if (!state.s.some(([input]) => input === k)) state.s.push([k, 0, 3, 0]);
+      const set = (sine, part, x) => {
+        sine[part] = x;
+        lab.change({ s: state.s });
+      };
+      for (const sine of state.s.filter(([input]) => input === k)) {
+        const [, amplitude, frequency] = sine;
+        const most = Math.max(2 * Math.abs(amplitude), 10);
+        this.#slider({ key: "drive.amplitude", names, unit, low: 0, high: most, step: most / 200, level: "student", get: () => sine[1], set: (x) => set(sine, 1, x) });
+        this.#slider({ key: "drive.frequency", names, unit: "rad/s", low: 0, high: Math.max(2 * frequency, 15), step: 0.05, level: "student", get: () => sine[2], set: (x) => set(sine, 2, x) });
+        this.#slider({ key: "drive.phase", names, unit: "°", low: -180, high: 180, step: 1, level: "all", get: () => (sine[3] * 180) / Math.PI, set: (x) => set(sine, 3, (x * Math.PI) / 180) });
+      }
+      const most = Math.max(2 * Math.abs(state.u[k]), 10);
+      this.#slider({
+        key: "drive.held", names, unit, low: -most, high: most, step: most / 200, level: "all", get: () => this.#state.u[k],
+        set: (x) => lab.change({ u: this.#state.u.map((each, i) => (i === k ? x : each)) }),
+      });
+    }
   }
 
   // Where it begins. Of long chains all angles together.

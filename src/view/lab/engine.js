@@ -93,7 +93,8 @@ class Engine {
     this.copies = [];
   }
 
-  /// What moves: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters, inputs}. `start`: {time, q, v}.
+  /// What moves: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters}; of both `inputs` that are
+  /// held, of a chain its torques, and `sines` on them: [input, amplitude, frequency, phase] each. `start`: {time, q, v}.
   /// `step`: constant steps of 4 stages, in place of the tolerance. Throws where it makes no sense.
   begin(spec, start, step = 0) {
     this.free();
@@ -116,18 +117,26 @@ class Engine {
     this.exponent = null;
   }
 
-  #chain({ space, masses, lengths, gravity, damping }) {
-    return this.module.lab_chain(space, masses.length, this.#put(masses), this.#put(lengths), gravity, this.#put(damping));
+  #chain({ space, masses, lengths, gravity, damping, sines = [] }) {
+    const numbers = [masses, lengths, damping, sines.flat()].map((each) => this.#put(each));
+    return this.module.lab_chain(space, masses.length, numbers[0], numbers[1], gravity, numbers[2], numbers[3], sines.length);
   }
-  #program({ program, parameters }) {
-    return this.module.pendula_model_of_program(this.#putText(program), this.#put(parameters), parameters.length);
+  #program({ program, parameters, sines = [] }) {
+    const { module } = this;
+    let model = module.pendula_model_of_program(this.#putText(program), this.#put(parameters), parameters.length);
+    for (const sine of model ? sines : []) {
+      const driven = module.pendula_model_driven(model, ...sine);
+      module.pendula_model_free(model);
+      model = this.#require(driven);
+    }
+    return model;
   }
 
   #write({ q, v }) {
     this.#numbers.set(q, this.q / 8);
     this.#numbers.set(v, this.v / 8);
   }
-  // Inputs of a program are held.
+  // Its inputs are held.
   #simulation(time) {
     const simulation = this.#require(this.module.lab_simulation(this.model, time, this.q, this.v, this.step, tolerance, this.step ? 4 : 8));
     if (this.spec.inputs?.some((each) => each !== 0)) {
@@ -147,9 +156,9 @@ class Engine {
     return { time: this.time, q: this.#read(this.q, this.size), v: this.#read(this.v, this.size) };
   }
 
-  /// Numbers of a row: t, q, v, kinetic and potential energy, and of programs the components of points.
+  /// Numbers of a row: t, q, v, kinetic and potential energy, and of programs the components of points and of their velocities.
   get rowSize() {
-    return 3 + 2 * this.size + this.pointCount;
+    return 3 + 2 * this.size + 2 * this.pointCount;
   }
   get pointCount() {
     return this.spec.program ? this.columns - 2 - 2 * this.size - this.inputs : 0;
@@ -166,17 +175,25 @@ class Engine {
     row.set(this.#read(this.v, size), 1 + size);
     row.set(this.#read(this.energies, 2), 1 + 2 * size);
     if (this.pointCount) {
-      module.pendula_row(this.model, this.time, this.q, this.v, this.row);
-      row.set(this.#read(this.row + 8 * (this.columns - 1 - this.pointCount), this.pointCount), 3 + 2 * size);
+      const motion = { time: this.time, q: row.subarray(1, 1 + size), v: row.subarray(1 + size, 1 + 2 * size) };
+      row.set(this.pointsAt(motion.q), 3 + 2 * size);
+      row.set(this.#pointRates(motion), 3 + 2 * size + this.pointCount);
     }
     return row;
   }
 
-  /// Points of any coordinates, of a program: for a hand that places it.
-  pointsAt(q) {
+  // By central differences along the motion: pivots may move by themselves.
+  #pointRates({ time, q, v }) {
+    const by = 1e-5 / (1 + Math.max(...v.map(Math.abs)));
+    const [before, after] = [-by, by].map((h) => this.pointsAt(q.map((x, k) => x + h * v[k]), time + h));
+    return after.map((x, k) => (x - before[k]) / (2 * by));
+  }
+
+  /// Points of any coordinates, of a program.
+  pointsAt(q, time = this.time) {
     const v = new Float64Array(this.size);
     this.#write({ q, v });
-    this.#require(this.module.pendula_row(this.model, this.time, this.q, this.v, this.row) === 0);
+    this.#require(this.module.pendula_row(this.model, time, this.q, this.v, this.row) === 0);
     return this.#read(this.row + 8 * (this.columns - 1 - this.pointCount), this.pointCount);
   }
 
@@ -228,7 +245,8 @@ class Engine {
   /// A damped spring between a bob and the hand, as torques on the links that carry it, held for half a row.
   #hold(hand) {
     const { space, lengths, masses, gravity } = this.spec;
-    const torques = new Float64Array(this.inputs);
+    const own = this.spec.inputs ?? [];
+    const torques = Float64Array.from({ length: this.inputs }, (_, k) => own[k] ?? 0);
     this.isHeld = hand !== null;
     if (hand) {
       const { q, v } = this.motion();
@@ -250,8 +268,9 @@ class Engine {
 
   /// What the points of a program tell at several coordinates about q. `hangs`: on what each hangs by something rigid: the
   /// point before, the first on the origin (-1) if it moves, or nothing (-2). `rails`: the direction in which each moves, if it is
-  /// always the same, else null. `components`: of each point.
-  shape(q, components) {
+  /// always the same, else null. `arms`: which rods and `connections`, [from, to], turn from the vertical. `components`: of each
+  /// point.
+  shape(q, components, connections) {
     const firsts = components.map((_, k) => components.slice(0, k).reduce((sum, count) => sum + count, 0));
     const draws = [0, 0.37, -0.81, 1.3].map((by) => this.pointsAt(q.map((x, k) => x + by * (1 + 0.4 * k))));
     const way = (points, k) => Array.from({ length: components[k] }, (_, axis) => points[firsts[k] + axis] - draws[0][firsts[k] + axis]);
@@ -268,7 +287,21 @@ class Engine {
       const moves = k > 0 || draws.some((points) => way(points, k).some((x) => x !== 0));
       return moves && all[0] > 0 && all.every((each) => Math.abs(each - all[0]) < 1e-9 * all[0]) ? k - 1 : -2;
     });
-    return { hangs, rails: components.map((_, k) => directionOf(draws.slice(1).map((points) => way(points, k)))) };
+    const place = (points, k) => (k < 0 ? [0, 0, 0] : points.slice(firsts[k], firsts[k] + components[k]));
+    const upward = (points, [from, to]) => {
+      const start = place(points, from);
+      const along = Array.from(place(points, to), (x, axis) => x - start[axis]);
+      return along.at(-1) / Math.hypot(...along);
+    };
+    const turns = (ends) => {
+      const all = draws.map((points) => upward(points, ends));
+      return all.every(Number.isFinite) && all.some((each) => Math.abs(each - all[0]) > 1e-9);
+    };
+    const rods = hangs.map((on, k) => [on, k]).filter(([on]) => on > -2);
+    return {
+      hangs, arms: [...rods, ...connections].filter(turns),
+      rails: components.map((_, k) => directionOf(draws.slice(1).map((points) => way(points, k)))),
+    };
   }
 
   /// Goes to a time at once.
@@ -281,14 +314,12 @@ class Engine {
     return this.module.pendula_steps(this.simulation);
   }
 
-  /// So many copies, each a little further from the motion in its first coordinate.
+  /// So many copies, each a little further from the motion in every coordinate: of some the motion does not depend.
   copy(count, apart) {
     for (const copy of this.copies) this.module.pendula_simulation_free(copy);
     const { q, v } = this.motion();
     this.copies = Array.from({ length: count }, (_, k) => {
-      const moved = q.slice();
-      moved[0] += apart * (k + 1);
-      this.#write({ q: moved, v });
+      this.#write({ q: q.map((x) => x + apart * (k + 1)), v });
       return this.#simulation(this.time);
     });
   }
@@ -299,6 +330,12 @@ class Engine {
     this.copies.forEach((copy, k) => all.set(this.motion(copy).q, k * this.size));
     return all;
   }
+  /// Their points, of a program.
+  copyPoints() {
+    const all = new Float64Array(this.copies.length * this.pointCount);
+    if (this.pointCount) this.copies.forEach((copy, k) => all.set(this.pointsAt(this.motion(copy).q), k * this.pointCount));
+    return all;
+  }
 
   /// Begins to measure the leading exponent: by a copy beside the motion that is brought back every half second.
   measure(on) {
@@ -307,8 +344,7 @@ class Engine {
     this.exponent = null;
     if (!on) return;
     const { q, v } = this.motion();
-    q[0] += shadowDistance;
-    this.#write({ q, v });
+    this.#write({ q: q.map((x) => x + shadowDistance / Math.sqrt(this.size)), v });
     this.shadow = this.#simulation(this.time);
     this.exponent = { since: this.time, last: this.time, sum: 0, value: NaN };
   }
@@ -348,15 +384,15 @@ function sumOf(vectors, space) {
   return Array.from({ length: space }, (_, axis) => vectors.reduce((sum, vector) => sum + vector[axis], 0));
 }
 
-/// Writes rod × force: of a link in the plane one number, in space three.
+/// Adds rod × force: of a link in the plane one number, in space three.
 function putTorque(torques, space, link, rod, force) {
   if (space === 2) {
-    torques[link] = rod[0] * force[1] - rod[1] * force[0];
+    torques[link] += rod[0] * force[1] - rod[1] * force[0];
     return;
   }
   for (let axis = 0; axis < 3; ++axis) {
     const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-    torques[3 * link + axis] = rod[a] * force[b] - rod[b] * force[a];
+    torques[3 * link + axis] += rod[a] * force[b] - rod[b] * force[a];
   }
 }
 

@@ -68,7 +68,7 @@ class Lab {
       this.row = new Float64Array(3 + 2 * this.size);
     } else {
       const reach = state.l.reduce((sum, length) => sum + length, 0);
-      stage.shape({ space: state.space, count: state.n, hangs: state.m.map((_, k) => k - 1), kinds: [], rails: [], connections: [], masses: state.m, reach });
+      stage.shape({ space: state.space, count: state.n, hangs: state.m.map((_, k) => k - 1), arms: state.m.map((_, k) => [k - 1, k]), kinds: [], rails: [], connections: [], masses: state.m, reach });
       this.row = new Float64Array(3 + 2 * this.size);
     }
     this.row.set(state.q, 1);
@@ -99,7 +99,7 @@ class Lab {
       this.copies = null;
       for (const panel of this.panels) if (panel instanceof CopiesPanel || panel instanceof ExponentPanel) panel.begin();
       if (model && !this.#points) {
-        this.#points = answer.rows.subarray(3 + 2 * this.size);
+        this.#points = answer.rows.subarray(3 + 2 * this.size, 3 + 2 * this.size + pointColumns);
         this.#shape = answer.shape;
         this.#begin();
         this.row = answer.rows.slice();
@@ -142,12 +142,12 @@ class Lab {
     this.again();
   }
 
-  /// Something else moves: the page begins again, with the same looks.
-  go(name) {
+  /// Something else moves, of so many links: the page begins again, with the same looks.
+  go(name, links = 0) {
     const { level, lang, theme } = this.state;
     const looks = Object.entries({ level, lang, theme }).filter(([, value]) => value).map(([key, value]) => `&${key}=${value}`);
     clearTimeout(this.writing);
-    location.hash = `model=${name || ""}${looks.join("")}`;
+    location.hash = `model=${name || ""}${links ? `&n=${links}` : ""}${looks.join("")}`;
   }
 
   /// Begins again where the link begins.
@@ -257,18 +257,25 @@ class Lab {
     this.energy = history.get(row, 1 + 2 * size) + history.get(row, 2 + 2 * size);
   }
 
-  #takeCopies(all) {
+  #takeCopies({ all, points }) {
     const { size, stage, state } = this;
     const count = all.length / size;
     const each = 3 * stage.count;
-    if (model) return; // their points are not known here
     if (!this.copies || this.copies.count !== count) this.copies = { count, places: new Float64Array(count * each) };
-    for (let k = 0; k < count; ++k) placesOfChain(state, all.subarray(k * size, (k + 1) * size), this.copies.places.subarray(k * each, (k + 1) * each));
+    for (let k = 0; k < count; ++k) {
+      const places = this.copies.places.subarray(k * each, (k + 1) * each);
+      if (model) this.#placePoints(points.subarray(k * pointColumns, (k + 1) * pointColumns), places);
+      else placesOfChain(state, all.subarray(k * size, (k + 1) * size), places);
+    }
     const { history } = this;
     const row = history.rows - 1;
     let largest = 0;
+    const { isAngle } = this;
     for (let k = 0; k < count; ++k) {
-      for (let i = 0; i < size; ++i) largest = Math.max(largest, Math.abs(wrap(all[k * size + i] - history.get(row, 1 + i))));
+      for (let i = 0; i < size; ++i) {
+        const off = all[k * size + i] - history.get(row, 1 + i);
+        largest = Math.max(largest, Math.abs(isAngle[i] ? wrap(off) : off));
+      }
     }
     this.panels.find((panel) => panel instanceof CopiesPanel).add(history.end, largest);
   }
@@ -329,6 +336,7 @@ class Lab {
       row.set(posedChain(state, row.subarray(1, 1 + size), hand.bob, hand.wanted), 1);
     }
     this.row.fill(0, 1 + size, 1 + 2 * size);
+    if (model) this.row.fill(0, 3 + 2 * size + pointColumns);
     this.isPosed = true;
     this.changed();
   }
@@ -349,6 +357,7 @@ class Lab {
       const last = this.history.rows - 1;
       const numbers = this.history.numbers.subarray(last * this.history.rowSize, (last + 1) * this.history.rowSize);
       this.#startIsNow(numbers);
+      if (isDriven(this.state)) [this.state.t] = numbers; // what drives it does not begin again
       this.controls.refresh();
       this.#writeLink();
     }
@@ -399,7 +408,6 @@ class Lab {
       copies: state.copies ? this.copies : null,
       held: this.hand.isHolding ? { bob: this.hand.bob, place: this.playing ? this.hand.place : this.hand.wanted } : null,
       show: this.show,
-      angles: model ? null : { theta: q.subarray(0, state.n), phi: state.space === 3 ? q.subarray(state.n) : null },
     });
     const panel = this.panels[this.frames % this.panels.length];
     if (this.playing && panel.isSeen) panel.draw();
@@ -416,11 +424,14 @@ class Lab {
     });
   }
 
-  // By the rates of a chain; of a model nothing.
+  // By the rates of a chain; of a model rows have them.
   #rates() {
-    if (model) return null;
     const { state, row, size, stage } = this;
     const rates = new Float64Array(3 * stage.count);
+    if (model) {
+      this.#placePoints(row.subarray(3 + 2 * size + pointColumns), rates);
+      return rates;
+    }
     const sum = [0, 0, 0];
     const each = ratesOfRods(state.space, state.l, row.subarray(1, 1 + size), row.subarray(1 + size, 1 + 2 * size));
     each.forEach((rate, i) => {
@@ -612,7 +623,8 @@ class Lab {
   // Somebody typed another link.
   #follow() {
     if (location.hash.slice(1) === linkOf(this.state)) return;
-    if ((new URLSearchParams(location.hash.slice(1)).get("model") ?? null) !== named) {
+    const words = location.hash.slice(1);
+    if (new URLSearchParams(words).get("model") !== named || movedBy(words) !== moved) {
       location.reload(); // something else moves
       return;
     }

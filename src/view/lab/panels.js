@@ -155,7 +155,7 @@ class ErrorPanel extends Panel {
     this.curve(pen, palette.css("accent"), value);
     pen.restore();
     const off = Math.abs(lab.row[1 + 2 * size] + lab.row[2 + 2 * size] - lab.energy) / scale;
-    this.name(["", (model ? off > 1e-8 : lab.state.d > 0) ? text("error.damped") : text("error.now", { error: readable(off, 2) })]);
+    this.name(["", (model ? off > 1e-8 : lab.state.d > 0 || isDriven(lab.state)) ? text("error.damped") : text("error.now", { error: readable(off, 2) })]);
   }
 }
 
@@ -275,7 +275,7 @@ class CopiesPanel extends Panel {
     const button = element("button", { type: "button", id: "copies" });
     button.dataset.text = "copies.start";
     const apart = picker("copies.apart", () => lab.setCopies(lab.state.copies, 10 ** -Number(apart.value)));
-    for (const power of [3, 6, 9, 12]) apart.append(element("option", { value: power, textContent: `${powerOfTen(-power)} rad`, selected: power === 6 }));
+    for (const power of [3, 6, 9, 12]) apart.append(element("option", { value: power, textContent: `${powerOfTen(-power)}${model ? "" : " rad"}`, selected: power === 6 }));
     super(lab, labPanel("panel.copies", "student", [apart, button]));
     button.addEventListener("click", () => lab.setCopies(lab.state.copies ? 0 : 50, 10 ** -Number(apart.value)));
     this.button = button;
@@ -317,7 +317,7 @@ class CopiesPanel extends Panel {
     distances.forEach(([time], k) => pen.lineTo(axes.atX(time), axes.atY(logs[k])));
     pen.stroke();
     pen.restore();
-    this.name(["", text("copies.distance", { count: lab.state.copies })]);
+    this.name(["", text(lab.isAngle.every(Boolean) ? "copies.distance" : "copies.distance.any", { count: lab.state.copies })]);
   }
 }
 

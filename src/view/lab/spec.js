@@ -11,12 +11,15 @@ const modelParameters = (model?.parameters ?? []).flatMap((each) => {
   return Array.from({ length: count }, (_, k) => ({ ...each, label: each.per_link ? `${each.name} ${k + 1}` : each.name }));
 });
 
+const pointColumns = (model?.points ?? []).reduce((sum, each) => sum + each.columns.length, 0);
+
 const freshState = () => ({
   n: 2, space: 2, m: [1, 1], l: [1, 1], g: 9.81, d: 0, t: 0,
   q: model ? (moved.start?.q ?? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1))) : [2.0943951023931953, 2.6179938779914944],
   v: model ? (moved.start?.v ?? model.coordinates.map(() => 0)) : [0, 0],
   p: modelParameters.map((each) => moved.start?.p?.[each.name] ?? each.default ?? 1),
-  u: (model?.inputs ?? []).map(() => 0),
+  u: model ? model.inputs.map(() => 0) : [0, 0], // inputs that are held; of a chain torques, link by link
+  s: [], // sines on them: [input, amplitude, frequency, phase]
   speed: 1, level: "student", lang: "", theme: "", copies: 0, apart: 1e-6,
   show: ["trace"],
 });
@@ -26,6 +29,24 @@ function numbersOf(words, n) {
   const numbers = words.split(",").map((word) => (word.endsWith("deg") ? (parseFloat(word) * Math.PI) / 180 : Number(word)));
   if (!numbers.every(Number.isFinite)) return null;
   return Array.from({ length: n }, (_, k) => numbers[Math.min(k, numbers.length - 1)]);
+}
+
+/// Sines on inputs, from four numbers each; null where they make no sense.
+function sinesOf(words, inputs) {
+  const numbers = words.split(",").map(Number);
+  if (numbers.length % 4 !== 0 || !numbers.every(Number.isFinite)) return null;
+  const sines = Array.from({ length: numbers.length / 4 }, (_, k) => numbers.slice(4 * k, 4 * k + 4));
+  return sines.every(([input]) => Number.isInteger(input) && input >= 0 && input < inputs) ? sines : null;
+}
+
+/// Those that do something.
+function actingSines(state) {
+  return state.s.filter(([, amplitude]) => amplitude !== 0);
+}
+
+/// Whether the energy changes by what acts from outside.
+function isDriven(state) {
+  return state.u.some((each) => each !== 0) || actingSines(state).length > 0;
 }
 
 function clamp(x, low, high) {
@@ -50,11 +71,12 @@ function stateOf(words) {
     return found && found.every(good) ? found : null;
   };
   const positive = (x) => x > 0 && x < 1e6;
+  state.u = list("u", state.u.length) ?? state.u;
+  state.s = sinesOf(told.get("s") ?? "", state.u.length) ?? state.s;
   state.m = list("m", state.n, positive) ?? state.m;
   state.l = list("l", state.n, positive) ?? state.l;
   if (model) {
     state.p = list("p", modelParameters.length) ?? state.p;
-    state.u = list("u", state.u.length) ?? state.u;
     state.q = list("q", size) ?? state.q, state.v = list("v", size) ?? state.v;
   } else {
     const part = (key, others) => list(key, state.n) ?? others;
@@ -84,6 +106,11 @@ function resize(state) {
   const length = state.l.reduce((sum, each) => sum + each, 0);
   if (n !== before && (n > listed || before > listed)) state.l = Array.from({ length: n }, () => Number((length / n).toPrecision(4)));
   else state.l = grown(state.l, n, () => state.l.at(-1));
+  // Torques in the plane are not those in space.
+  const torques = space === 2 ? 1 : 3;
+  const isAlike = state.u.length === torques * before;
+  state.u = grown(isAlike ? state.u : [], torques * n, () => 0);
+  state.s = isAlike ? state.s.filter(([input]) => input < state.u.length) : [];
   state.q = grown(theta, n, () => theta.at(-1));
   state.v = grown(turn, n, () => 0);
   if (space === 3) {
@@ -99,9 +126,11 @@ function linkOf(state) {
   const short = (numbers) => (numbers.every((x) => x === numbers[0]) ? `${numbers[0]}` : numbers.join(","));
   const put = (key, value) => words.push(`${key}=${value}`);
   if (models[named] || named === "chain") put("model", named);
+  if (linkChoices.length > 1) put("n", model.links);
   if (state.t) put("t", state.t);
+  if (state.u.some((each) => each !== 0)) put("u", short(state.u));
+  if (actingSines(state).length) put("s", actingSines(state).flat().join(","));
   if (model) {
-    if (state.u.some((each) => each !== 0)) put("u", state.u.join(","));
     put("p", state.p.join(",")), put("q", state.q.join(",")), put("v", short(state.v));
   } else {
     const { n } = state;
@@ -118,6 +147,10 @@ function linkOf(state) {
 
 /// What the engine is told of a state.
 function specOf(state) {
-  if (model) return { program: moved.program, parameters: state.p, inputs: state.u, components: model.points.map((each) => each.columns.length) };
-  return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d) };
+  const acting = { inputs: state.u, sines: actingSines(state) };
+  if (model) {
+    const [components, connections] = [model.points.map(({ columns }) => columns.length), model.connections.map(({ ends }) => ends)];
+    return { program: moved.program, parameters: state.p, components, connections, ...acting };
+  }
+  return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d), ...acting };
 }

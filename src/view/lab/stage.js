@@ -29,10 +29,10 @@ class Stage {
     this.ruler.from.push(0), this.ruler.to.push(0);
   }
 
-  /// What there is to draw: how many points, what each hangs on, its kind and its rail, what is between points, masses, and
-  /// how far it all reaches.
-  shape({ space, count, hangs, kinds, rails, connections, masses, reach }) {
-    Object.assign(this, { space, count, hangs, kinds, rails, connections, masses, reach });
+  /// What there is to draw: how many points, what each hangs on, its kind and its rail, what is between points, `arms` that turn
+  /// from the vertical, [from, to], masses, and how far it all reaches.
+  shape({ space, count, hangs, arms, kinds, rails, connections, masses, reach }) {
+    Object.assign(this, { space, count, hangs, arms, kinds, rails, connections, masses, reach });
     this.places = new Float64Array(3 * count);
     const largest = Math.max(...masses, 1e-300);
     const size = reach * clamp(0.075 / Math.sqrt(Math.max(count, 1)), 0.006, 0.05);
@@ -113,7 +113,7 @@ class Stage {
     this.view.y -= dy / this.pixels;
   }
 
-  /// Draws all. `what`: {places, rates, trace, copies, held, show: Set, angles}.
+  /// Draws all. `what`: {places, rates, trace, copies, held, show: Set}.
   draw(what) {
     const { pen } = this;
     this.#aim();
@@ -223,16 +223,14 @@ class Stage {
     for (let k = 0; k < count; ++k) {
       const colour = palette.ramp(count > 1 ? k / (count - 1) : 0);
       pen.strokeStyle = rgba(colour, 0.5);
-      pen.beginPath();
-      const [x0, y0] = this.project(0, 0, 0);
-      pen.moveTo(x0, y0);
       const part = places.subarray(k * each, (k + 1) * each);
-      for (let i = 0; i < this.count; ++i) {
-        const [x, y] = this.#shown(part, i);
-        pen.lineTo(x, y);
+      const points = Array.from({ length: this.count }, (_, i) => this.#shown(part, i));
+      this.#drawRods(points);
+      for (const { ends } of this.connections) {
+        const [from, to] = ends.map((end) => (end < 0 ? this.project(0, 0, 0) : points[end]));
+        line(pen, from[0], from[1], to[0], to[1]);
       }
-      pen.stroke();
-      const [x, y, near] = this.#shown(part, this.count - 1);
+      const [x, y, near] = points.at(-1);
       pen.fillStyle = rgba(colour, 0.9);
       pen.beginPath();
       pen.arc(x, y, Math.max(0.5 * this.radii[this.count - 1] * this.pixels * near, 2), 0, 2 * Math.PI);
@@ -253,14 +251,7 @@ class Stage {
     }
     const thick = clamp((0.014 * this.reach * this.pixels) / Math.sqrt(count / 3 + 1), 1.3, 5);
     pen.lineWidth = thick;
-    pen.beginPath();
-    for (let i = 0; i < count; ++i) {
-      const on = this.hangs[i];
-      if (on === -2) pen.moveTo(points[i][0], points[i][1]);
-      else if (on !== i - 1 || i === 0) pen.moveTo(...(on < 0 ? pivot : points[on]).slice(0, 2));
-      pen.lineTo(points[i][0], points[i][1]);
-    }
-    pen.stroke();
+    this.#drawRods(points);
     if (this.hangs.includes(-1) || this.connections.some(({ ends }) => ends.includes(-1))) drawPivot(pen, pivot);
     if (count > balls) {
       this.#drawManyBalls(points);
@@ -274,6 +265,18 @@ class Stage {
       else if (this.kinds[i] === "pivot") drawPivot(pen, points[i]);
       else this.#drawBall(points[i], i, i === held?.bob);
     }
+  }
+
+  #drawRods(points) {
+    const { pen } = this;
+    pen.beginPath();
+    points.forEach(([x, y], i) => {
+      const on = this.hangs[i];
+      if (on === -2) pen.moveTo(x, y);
+      else if (on !== i - 1 || i === 0) pen.moveTo(...(on < 0 ? this.project(0, 0, 0) : points[on]).slice(0, 2));
+      pen.lineTo(x, y);
+    });
+    pen.stroke();
   }
 
   // Two places on the rail of a cart, on the screen: before and behind the origin, as far as one sees.
@@ -365,18 +368,13 @@ class Stage {
     }
   }
 
-  // From the vertical to the rod, in the plane of both.
-  #drawAngles({ places, angles }) {
-    if (!angles) return;
+  // From the vertical to the arm, in the plane of both.
+  #drawAngles({ places }) {
     const { pen } = this;
     const radius = Math.min(0.16 * this.reach, 0.5 * this.reach / Math.sqrt(this.count));
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "center";
-    for (let i = 0; i < Math.min(this.count, 8); ++i) {
-      const on = i - 1;
-      const from = on < 0 ? [0, 0, 0] : [0, 1, 2].map((axis) => places[3 * on + axis]);
-      const theta = wrap(angles.theta[i]);
-      const phi = angles.phi ? angles.phi[i] : 0;
+    for (const [i, { from, theta, phi }] of anglesOf(this.space, this.arms.slice(0, 8), places).entries()) {
       const place = (angle, r) => this.project(
         from[0] + r * Math.sin(angle) * Math.cos(phi), from[1] + r * Math.sin(angle) * Math.sin(phi), from[2] - r * Math.cos(angle));
       pen.strokeStyle = palette.css("quiet", 0.7);
@@ -390,7 +388,7 @@ class Stage {
       for (let k = 0; k <= 32; ++k) pen.lineTo(...place((theta * k) / 32, radius).slice(0, 2));
       pen.stroke();
       const [x, y] = place(theta / 2, 1.35 * radius);
-      pen.fillText(`${((theta * 180) / Math.PI).toFixed(0).replace("-", "−")}°`, x, y + 4);
+      pen.fillText(`${Math.round((theta * 180) / Math.PI) || 0}°`.replace("-", "−"), x, y + 4);
     }
   }
 
@@ -429,6 +427,16 @@ class Stage {
   }
 }
 
+/// Where each arm begins, its angle from the downward vertical, and in space the direction of the plane of both.
+function anglesOf(space, arms, places) {
+  const place = (i) => (i < 0 ? [0, 0, 0] : [0, 1, 2].map((axis) => places[3 * i + axis]));
+  return arms.map(([on, i]) => {
+    const from = place(on);
+    const [x, y, z] = place(i).map((c, axis) => c - from[axis]);
+    return space === 2 ? { from, theta: Math.atan2(x, -z), phi: 0 } : { from, theta: Math.atan2(Math.hypot(x, y), -z), phi: Math.atan2(y, x) };
+  });
+}
+
 /// How a model is drawn; `seen` is what the engine knows of its shape, null before it does.
 function shapeOf(model, seen) {
   const { connections } = model;
@@ -439,7 +447,8 @@ function shapeOf(model, seen) {
     return kind === "cart" || isConnected(i, on) ? -2 : on;
   });
   const inSpace = (along) => along && (along.length === 2 ? [along[0], 0, along[1]] : along);
-  return { kinds, connections, hangs, rails: kinds.map((_, i) => inSpace(seen?.rails[i] ?? null)) };
+  const arms = (seen?.arms ?? []).filter(([on, i]) => hangs[i] === on || isConnected(i, on));
+  return { kinds, connections, hangs, arms, rails: kinds.map((_, i) => inSpace(seen?.rails[i] ?? null)) };
 }
 
 function arrow(pen, x0, y0, x, y) {

@@ -3,11 +3,22 @@
 const beginning = JSON.parse(document.getElementById("start").textContent);
 const texts = JSON.parse(document.getElementById("texts").textContent);
 
-// A model that the link names, or that the page was written for, in place of a chain.
+// Built-in models: how many links each has at `first`, and what is `made` of it, by number of links.
 const models = JSON.parse(document.getElementById("models").textContent);
+const chainAlone = {};
+
+/// What the words of a link say that moves: a built-in model, or what the page was written for.
+function movedBy(words) {
+  const told = new URLSearchParams(words);
+  const family = models[told.get("model")];
+  if (family) return family.made[told.get("n")] ?? family.made[family.first];
+  return told.get("model") === "chain" ? chainAlone : beginning;
+}
+
 const named = new URLSearchParams(location.hash.slice(1)).get("model");
-const moved = models[named] ?? (named === "chain" ? {} : beginning);
-const model = moved.model ?? null;
+const moved = movedBy(location.hash.slice(1));
+const model = moved.model ?? null; // null: a chain
+const linkChoices = Object.keys(models[named]?.made ?? {}).map(Number);
 
 const at = (id) => document.getElementById(id);
 

@@ -17,7 +17,7 @@ const orders = {
     engine.begin(spec, start);
     if (copies) engine.copy(copies, apart);
     if (measure) engine.measure(true);
-    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, shape: spec.program ? engine.shape(start.q, spec.components) : null };
+    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, shape: spec.program ? engine.shape(start.q, spec.components, spec.connections) : null };
   },
 
   copy({ copies, apart }) {
@@ -47,7 +47,7 @@ const orders = {
     rows.forEach((row, k) => all.set(row, k * engine.rowSize));
     const { exponent } = engine;
     return {
-      rows: all, rowSize: engine.rowSize, copies: engine.copies.length ? engine.copiesNow() : null,
+      rows: all, rowSize: engine.rowSize, copies: engine.copies.length ? { all: engine.copiesNow(), points: engine.copyPoints() } : null,
       exponent: exponent && Number.isFinite(exponent.value) ? [exponent.last, exponent.value] : null,
       isLate: engine.time < until - 1e-9, milliseconds: performance.now() - began,
     };

@@ -48,7 +48,7 @@ function lowered(digits) {
 
 /// theta_12_dot as θ₁₂: what a plot calls a coordinate.
 function symbol(name) {
-  const greek = { theta: "θ", phi: "φ", psi: "ψ", alpha: "α", beta: "β", gamma: "γ" };
+  const greek = { theta: "θ", phi: "φ", psi: "ψ", alpha: "α", beta: "β", gamma: "γ", torque: "τ" };
   const [stem, ...rest] = name.split("_");
   const index = rest.join("_");
   const below = /^\d+$/.test(index) ? lowered(index) : index && `_${index}`;
