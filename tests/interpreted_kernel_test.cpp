@@ -101,6 +101,38 @@ class Springs {
     }
   }
 
+  /// How the same changes along a direction: v/2, a/2, and then a/8.
+  void check_series_along() {
+    PackRows<width> unit(1), order(4), state(2), d_parameters(2), d_inputs(1), d_state(2), next(2), kept(2), d_next(2),
+        d_kept(2), third(2), d_third(2), none(1);
+    std::mt19937 draw(7);
+    std::uniform_real_distribution<double> some(0.5, 2.0);
+    for (PackRows<width>* rows : {&state, &d_parameters, &d_inputs, &d_state}) {
+      for (std::size_t k = 0; k < rows->rows(); ++k) std::generate_n((*rows)[k], width, [&] { return some(draw); });
+    }
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      unit[0][lane] = 0.5;
+      order[2][lane] = 0.25;
+    }
+    functions_.series_start_along(at(), unit[0], state[0], d_parameters[0], d_inputs[0], d_state[0], next[0], kept[0],
+                                  d_next[0], d_kept[0]);
+    functions_.series_next_along(at(), order[0], next[0], kept[0], none[0], d_next[0], d_kept[0], none[0], third[0],
+                                 none[0], d_third[0], none[0]);
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const double m = parameters_[0][lane], k = parameters_[1][lane], u = inputs_[0][lane];
+      const double dm = d_parameters[0][lane], dk = d_parameters[1][lane];
+      const double x = state[0][lane], a = (u - k * x) / m, jerk = (u - k * next[0][lane]) / m;
+      const double da = (d_inputs[0][lane] - dk * x - k * d_state[0][lane] - a * dm) / m;
+      EXPECT_DOUBLE_EQ(next[1][lane], a / 2);
+      EXPECT_DOUBLE_EQ(d_next[0][lane], d_state[1][lane] / 2);
+      EXPECT_NEAR(d_next[1][lane], da / 2, 1e-14);   // measured 1.8e-15
+      EXPECT_NEAR(d_third[0][lane], da / 8, 1e-14);  // measured 4.4e-16
+      // Inputs of higher orders do not vary.
+      const double d_jerk = (-dk * next[0][lane] - k * d_next[0][lane] - jerk * dm) / m;
+      EXPECT_NEAR(d_third[1][lane], d_jerk / 4, 1e-14);  // measured 8.9e-16
+    }
+  }
+
   /// A step whose stages all are where it begins.
   void check_iteration() {
     PackRows<width> m(width), hb(1), increments(2);
@@ -179,6 +211,14 @@ TEST(InterpretedKernel, HasTheSeriesOfItsProgram) {
   Springs<8>(*table).check_series();
 }
 
+TEST(InterpretedKernel, HasTheChangesOfItsSeries) {
+  const auto table = read(with_tabs(spring));
+  Springs<1>(*table).check_series_along();
+  Springs<2>(*table).check_series_along();
+  Springs<4>(*table).check_series_along();
+  Springs<8>(*table).check_series_along();
+}
+
 TEST(InterpretedKernel, SaysWhatItsProgramSays) {
   const auto table = read(with_tabs(spring));
   const SystemInfo& info = table->info;
@@ -204,7 +244,7 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
     return "nothing";
   };
   EXPECT_EQ(told(""), "line 0: expected a program, got ");
-  EXPECT_EQ(told(changed("program|13", "program|9")), "line 1: expected a whole number from 13 to 13, got 9");
+  EXPECT_EQ(told(changed("program|14", "program|9")), "line 1: expected a whole number from 14 to 14, got 9");
   EXPECT_EQ(told(changed("links|1", "links|one")), "line 4: expected a whole number from 1 to 1000000, got one");
   EXPECT_EQ(told(changed("kg|1|1.0|1|0", "kg|1|1.0|1")), "line 8: expected another word, got the end of the line");
   EXPECT_EQ(told(changed("bob|2|cart", "bob|2|cart|3")), "line 11: expected the end of the line, got 3");
@@ -216,7 +256,7 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
   EXPECT_EQ(told(changed("factor|1|5|0", "invert|1|5|0")), "line 20: expected an operation, got invert");
   EXPECT_EQ(told(changed("solve|1|2|5|1", "solve|1|2|6|1")), "line 22: expected a whole number from 0 to 5, got 6");
   EXPECT_EQ(told(changed("write|2|v|0\n", "")), "line 24: expected a write to every row of every output, got function");
-  EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|2|1|2\nsum|0|0")), "line 15: expected 2 sums, got 1");
+  EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|2|1|2\nsum|0|0")), "expected 2 sums of series, got 1");
   EXPECT_EQ(told(changed("series|0|0|0|2", "series|0|1|1|2\nsum|0|1")),
             "line 14: expected a whole number from 0 to 0, got 1");
   EXPECT_EQ(told(changed("write|1|kept|0\n", "")).substr(10),

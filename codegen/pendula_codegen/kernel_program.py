@@ -49,12 +49,11 @@ def render_bytecode(model: Model) -> str:
     kernel = ModelKernel(model)
     table = kernel_table(kernel)
     functions = [
-        function for function in (*table.of_many, *table.plain, *series_functions(table)) if function
+        function for function in (*table.of_many, *table.plain, *series_functions(table.series)) if function
     ]
     lines = [
         f"program\t{INTERFACE}",
         *info_lines(kernel, table.series),
-        *(f"sum\t{first}\t{second}" for first, second in table.series.series.places),
         *(line for function in functions for line in function_lines(function)),
         "end",
     ]

@@ -40,6 +40,10 @@ Rates follow from q: v_k = (k + 1) q_(k+1) / unit. A coefficient that is not fin
 mass matrix that is singular, or a function at a point where it has none. Coefficients grow as unit^k: who sees them
 overflow takes a smaller unit. Where nothing moves, all coefficients but those of order 0 are zero.
 
+Two more give one order and how it changes along a direction, in dual numbers (pendula_codegen/table.py):
+series_start_along, and series_next_along, which is told the sums of its order. The runtime makes of them the derivative
+of a step (src/pendula/taylor/series_tangent.hpp).
+
 SeriesInfo tells the form and how many sums, operands and kept numbers there are. Kernels in C++ of more than ten
 coordinates, and of chains in space, have no series: their functions are null there.
 """

@@ -36,6 +36,7 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
     rows += [("switch", switch.value) for switch in model.switches]
     series = tapes.series
     rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
+    rows += [("sum", *pair) for pair in series.places]
     return [
         "\t".join(str(int(word)) if isinstance(word, bool) else str(word) for word in row) for row in rows
     ]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from pendula_codegen.entry_points import Function
 from pendula_codegen.forward import slopes
+from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.recording import Recorder
 from pendula_codegen.series_tape import SeriesTapes, series_tapes
@@ -29,6 +30,8 @@ OF_MANY = (
     "acceleration_along",
     "momentum_form_along",
     "call_arguments",
+    "series_start_along",
+    "series_next_along",
 )
 PLAIN = ("residual", "positions", "velocities", "switches")
 
@@ -78,25 +81,34 @@ class _Tables:
         self._functions = self._recorder.functions
 
     def table(self) -> KernelTable:
+        series = series_tapes(self._kernel, self._recorder.row)
+        start, following = series_functions(series)
         composed = {
             "energies": self._energies,
             "acceleration_along": self._acceleration_along,
             "momentum_form_along": self._momentum_form_along,
         }
+        if (
+            len(self._kernel.system.coordinates) <= UNROLLED
+        ):  # factors of larger matrices have no derivative here
+            composed["series_start_along"] = lambda: _along(start, ("parameters", "inputs", "state"))
+            composed["series_next_along"] = lambda: _along(following, ("state", "kept", "sums"))
 
         def of(name: str) -> TableFunction | None:
             if name in composed:
                 return composed[name]()
             return self._one(self._functions[name]) if name in self._functions else None
 
-        series = series_tapes(self._kernel, self._recorder.row)
-        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, self._recorder.names, self._rows())
+        names = self._recorder.names
+        return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, names, self._rows(series))
 
-    def _rows(self) -> dict[str, int]:
+    def _rows(self, series: SeriesTapes) -> dict[str, int]:
         system = self._kernel.system
+        n = len(system.coordinates)
         sizes = {"parameters": len(system.parameters), "times": 1, "inputs": len(system.inputs)}
-        sizes |= dict.fromkeys(("q", "v", "a", "p", "dq", "dv"), len(system.coordinates))
-        return sizes | {f"d_{array}": sizes[array] for array in ("parameters", "inputs")}
+        sizes |= dict.fromkeys(("q", "v", "a", "p", "dq", "dv"), n)
+        sizes |= {"unit": 1, "order": 4, "state": 2 * n, "kept": series.kept, "sums": len(series.series.sums)}
+        return sizes | {f"d_{array}": size for array, size in sizes.items()}
 
     # --- functions
 
@@ -148,11 +160,27 @@ def _taken(function: Function) -> tuple[str, ...]:
     return tuple(argument.name for argument in function.inputs if argument.type == "vector")
 
 
-def series_functions(table: KernelTable) -> tuple[TableFunction, TableFunction]:
+def series_functions(tapes: SeriesTapes) -> tuple[TableFunction, TableFunction]:
     """The tapes of a kernel's series as functions; what they take besides the conditions is said there."""
     return (
-        TableFunction("series_start", ("unit", "state"), ("next", "kept"), table.series.start),
-        TableFunction(
-            "series_next", ("order", "state", "kept", "sums"), ("next", "operands"), table.series.next
-        ),
+        TableFunction("series_start", ("unit", "state"), ("next", "kept"), tapes.start),
+        TableFunction("series_next", ("order", "state", "kept", "sums"), ("next", "operands"), tapes.next),
+    )
+
+
+def _along(function: TableFunction, moved: tuple[str, ...]) -> TableFunction:
+    """A function, and its derivative where some arrays change: `d_state` is how fast `state` does, and so on."""
+    tape = Tape()
+    place = tape.repeat(function.tape)
+    slope = slopes(tape, lambda row: tape.read((f"d_{row[0]}", row[1])) if row[0] in moved else None)
+    values = {row: place[value] for row, value in function.tape.outputs.items()}
+    changes = {
+        (f"d_{array}", k): slope[value] if value in slope else tape.number(0.0)
+        for (array, k), value in values.items()
+    }
+    return TableFunction(
+        f"{function.name}_along",
+        (*function.takes, *(f"d_{array}" for array in moved)),
+        (*function.gives, *(f"d_{array}" for array in function.gives)),
+        tape.give(values | changes),
     )

@@ -130,6 +130,21 @@ class Tape:
         """Adds the steps of a program; its results by where they belong."""
         return _Recording(self, program, row).run(solved)
 
+    def repeat(self, other: Tape) -> dict[Value, Value]:
+        """Adds the steps of another tape; where each of its values stands here."""
+        place: dict[Value, Value] = {}
+        for step in other.steps:
+            operands = (place[value] for value in step.operands)
+            if step.operation == "number":
+                first = self.number(step.number)
+            elif step.operation in ("read", "pow"):
+                more = {"row": step.row} if step.operation == "read" else {"number": step.number}
+                first = self._add(step.operation, *operands, **more)
+            else:
+                first = self._add(step.operation, *operands, count=step.count)
+            place |= {value: first + k for k, value in enumerate(step.results)}
+        return place
+
     def give(self, outputs: Mapping[Row, Value]) -> Tape:
         """The same tape with these outputs, and without steps that none of them needs."""
         needed, steps = {*outputs.values()}, []

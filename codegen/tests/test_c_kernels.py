@@ -15,9 +15,10 @@ from pendula_codegen.backends.c import INTERFACE, quoted
 from pendula_codegen.model import Model, read_model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.models import model_names
-from pendula_codegen.table import OF_MANY, PLAIN
+from pendula_codegen.table import OF_MANY, PLAIN, kernel_table
 from pendula_codegen.written import DIGITS, written
 from series_error import series_error
+from series_truth import Decimals, carry_out
 from test_model_kernels import LINKED, read
 
 CASES = [(name, 2 if name in LINKED else None) for name in model_names()]
@@ -118,13 +119,18 @@ class Truth:
             "p": [Symbol(f"given_{k}") for k in range(self.size)],
         }
         self._written = written(model)
+        self._tapes = kernel_table(kernel).series
         self._arguments = [value for value, _ in kernel.call_arguments]
         self._known: dict[str, object] = {}
 
     def rows(self) -> dict[str, int]:
         """How many rows each array has that functions take."""
         sizes = {name: len(symbols) for name, symbols in self.symbols.items()}
-        varied = {"d_parameters": "parameters", "d_inputs": "inputs", "dq": "q", "dv": "v"}
+        tapes = self._tapes
+        sizes |= {"unit": 1, "order": 4, "state": 2 * self.size, "kept": tapes.kept}
+        sizes["sums"] = len(tapes.series.sums)
+        varied = {"dq": "q", "dv": "v"}
+        varied |= {f"d_{name}": name for name in ("parameters", "inputs", "state", "kept", "sums")}
         return sizes | {name: sizes[of] for name, of in varied.items()}
 
     def _values(self, name: str, expressions: list, at: dict[str, list]) -> list:
@@ -178,6 +184,14 @@ class Truth:
             case "momentum_form_along":
                 slope = self._slope("momentum_form", at, {"parameters": "d_parameters", "inputs": "d_inputs"})
                 return {"dp": slope["p"], "df": slope["f"]}
+            case "series_start" | "series_next":
+                found = carry_out(getattr(self._tapes, function.removeprefix("series_")), at, Decimals())
+                return {array: [rows[k] for k in range(len(rows))] for array, rows in found.items()}
+            case "series_start_along" | "series_next_along":
+                base = function.removesuffix("_along")
+                moved = ("parameters", "inputs", "state") if "start" in base else ("state", "kept", "sums")
+                slope = self._slope(base, at, {array: f"d_{array}" for array in moved})
+                return self.of(base, at) | {f"d_{array}": rows for array, rows in slope.items()}
             case "call_arguments":
                 return {"found": self._values("arguments", self._arguments, at)}
             case "switches":

@@ -89,7 +89,8 @@ def differentiate(
     tolerance, step : float, optional
         As for :class:`Simulation`.
     method, stages, solver, iteration
-        As ``[run]`` of a scenario: Gauss or Radau steps, in momentum form.
+        As ``[run]`` of a scenario: Gauss or Radau steps, in momentum form, or "taylor", of models and of chains with a
+        kernel.
 
     Returns
     -------

@@ -209,6 +209,27 @@ def test_linearize_by_steps_is_the_exponential_of_the_continuous_one() -> None:
 
 
 @pytest.mark.parametrize(
+    ("system", "start"),
+    [
+        (pendula.Chain(masses=[1.0, 2.0], damping=0.1), {"theta": [1.0, 0.5], "theta_dot": [0.1, 0.2]}),
+        (pendula.Model("cart_chain", links=2), {"q": [0.0, 1.0, 0.5]}),
+    ],
+    ids=["chain", "model"],
+)
+def test_taylor_series_have_the_derivatives_of_gauss_steps(system: Any, start: dict[str, Any]) -> None:
+    series, gauss = (
+        pendula.differentiate(system, 2.0, start=start, method=method, tolerance=1e-13)
+        for method in ("taylor", "gauss")
+    )
+    for found, expected in (
+        (series.by_start, gauss.by_start),
+        *((series.by_parameters[name], gauss.by_parameters[name]) for name in gauss.by_parameters),
+    ):
+        assert np.abs(expected).max() > 0
+        assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"duration": 1.0, "method": "dopri5", "tolerance": 1e-9}, "expected method = gauss or radau"),

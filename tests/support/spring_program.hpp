@@ -5,7 +5,7 @@
 namespace pendula::test {
 
 // A mass m on a spring k with a force u, as the generator writes it, with bars in place of tabs.
-inline constexpr std::string_view spring = R"(program|13
+inline constexpr std::string_view spring = R"(program|14
 name|spring
 model|spring
 links|1
@@ -188,6 +188,66 @@ multiply|0|0|3
 multiply|0|0|5
 write|4|next|0
 write|0|next|1
+function|series_start_along|20
+read|0|parameters|0
+read|1|parameters|1
+read|2|inputs|0
+read|3|state|0
+read|4|state|1
+read|5|unit|0
+read|6|d_parameters|0
+read|7|d_parameters|1
+read|8|d_inputs|0
+read|9|d_state|0
+read|10|d_state|1
+inverse|11|0
+subtract_product|12|1|3|2
+multiply|13|12|11
+subtract_product|14|7|3|8
+subtract_product|14|1|9|14
+subtract_product|14|13|6|14
+multiply|14|14|11
+multiply|15|4|5
+multiply|16|13|5
+multiply|17|10|5
+multiply|18|14|5
+multiply|19|11|11
+multiply|19|19|6
+negative|19|19
+write|15|next|0
+write|16|next|1
+write|1|kept|0
+write|11|kept|1
+write|17|d_next|0
+write|18|d_next|1
+write|7|d_kept|0
+write|19|d_kept|1
+function|series_next_along|17
+read|0|inputs|0
+read|1|state|0
+read|2|kept|0
+read|3|kept|1
+read|4|state|1
+read|5|order|2
+read|6|d_state|0
+read|7|d_kept|0
+read|8|d_kept|1
+read|9|d_state|1
+subtract_product|10|2|1|0
+multiply|11|10|3
+multiply|12|7|1
+multiply_add|12|2|6|12
+negative|12|12
+multiply|12|12|3
+multiply_add|12|10|8|12
+multiply|13|4|5
+multiply|14|11|5
+multiply|15|9|5
+multiply|16|12|5
+write|13|next|0
+write|14|next|1
+write|15|d_next|0
+write|16|d_next|1
 end
 )";
 

@@ -10,12 +10,14 @@ from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 from pendula_codegen.tape import Row, Step, Tape, Value
 
-INTERFACE = 13  # system_interface of pendula/system/system_table.hpp
+INTERFACE = 14  # system_interface of pendula/system/system_table.hpp
 # Functions of one argument that are taken of numbers one by one.
 CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
 # What of so many states nothing asks for within steps: it is compiled for eight, and others go that way.
 SELDOM = {
-    **dict.fromkeys(("acceleration_along", "momentum_form_along"), (1, 2, 4)),
+    **dict.fromkeys(
+        ("acceleration_along", "momentum_form_along", "series_start_along", "series_next_along"), (1, 2, 4)
+    ),
     **dict.fromkeys(("momentum_from_velocity", "mass_matrix", "energies"), (2, 4)),
 }
 _SIGNS = {"add": "+", "subtract": "-", "multiply": "*"}

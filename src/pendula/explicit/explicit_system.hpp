@@ -50,6 +50,7 @@ class ExplicitSystem {
   Dynamics& subject() { return *dynamics_; }
   std::size_t coordinates() const { return count(); }
   std::string_view kernel() const { return model_.info().name; }
+  const SystemModel& model() const { return model_; }
 
   template <class Steps>
   Outcome start(double time, const double* q, const double* v, Steps& steps) {

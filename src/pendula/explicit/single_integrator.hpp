@@ -107,9 +107,32 @@ class SingleIntegrator final : public PlainIntegrator {
   const Statistics& statistics() const override { return statistics_; }
   Description describe() const override { return {"", "", subject_.kernel()}; }
 
+  int linearize() override {
+    if constexpr (has_tangents) {
+      if (const auto& tangent = steps_.linearize(subject_.model())) return static_cast<int>(tangent->size());
+    }
+    return 0;
+  }
+  double resolved_decay([[maybe_unused]] double error) const override {
+    if constexpr (has_tangents) return steps_.resolved_decay(error);
+    return 0;
+  }
+  int parameters() override {
+    if constexpr (has_tangents) return static_cast<int>(steps_.tangent()->parameters());
+    return 0;
+  }
+  void push([[maybe_unused]] double* tangents, [[maybe_unused]] int count,
+            [[maybe_unused]] const double* varied) override {
+    if constexpr (has_tangents) steps_.tangent()->push(tangents, count, varied);
+  }
+  void pull([[maybe_unused]] double* gradients, [[maybe_unused]] int count, [[maybe_unused]] double* varied) override {
+    if constexpr (has_tangents) steps_.tangent()->pull(gradients, count, varied);
+  }
+
   void member(MemberNumbers& numbers) override { numbers(time_, statistics_, controller_, steps_, subject_); }
 
  private:
+  static constexpr bool has_tangents = requires(Steps steps) { steps.tangent(); };
   static constexpr int most_attempts = 100;
   static constexpr int most_parts = 1024;
 

@@ -84,7 +84,8 @@ class Differentiated {
   }
 
  private:
-  bool is_dense() const { return integrator_->describe().solver == "dense"; }
+  /// Whether tangents are in the coordinates of a kernel.
+  bool is_dense() const { return integrator_->describe().solver != "chain"; }
 
   TangentMap chain_map(const SystemSubject&, const Motion&, Eigen::Index, Eigen::Index) const {
     throw std::logic_error("a system is no chain");

@@ -117,11 +117,13 @@ class Integrator {
   void resume(const Member& member) { become(*integrator_, member); }
 
   /// From now on every step keeps its derivative, for `push`. Returns the number of rows of a tangent. Throws
-  /// std::invalid_argument for methods without a derivative: explicit ones, and the velocity form.
+  /// std::invalid_argument for methods without a derivative: explicit ones but Taylor series of kernels, and the
+  /// velocity form.
   int linearize() {
     rows_ = integrator_->linearize();
     if (rows_ > 0) return rows_;
-    throw std::invalid_argument("tangents: expected method = gauss or radau in momentum form, other steps have none");
+    throw std::invalid_argument(
+        "tangents: expected method = gauss or radau in momentum form, or taylor by a kernel, other steps have none");
   }
 
   /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z; valid after

@@ -42,7 +42,7 @@ struct Array {
 struct Signature {
   std::string_view name;
   std::size_t taken;
-  std::array<Array, 8> arrays;
+  std::array<Array, 11> arrays;
 };
 
 constexpr std::array<Array, 3> conditions = {
@@ -79,6 +79,30 @@ constexpr std::array<Signature, Program::many + Program::plain + Program::series
        {"dp", Rows::coordinates},
        {"df", Rows::coordinates}}}},
     {"call_arguments", 2, {q, v, {"found", Rows::arguments}}},
+    {"series_start_along",
+     5,
+     {{{"unit", Rows::one},
+       {"state", Rows::state},
+       {"d_parameters", Rows::parameters},
+       {"d_inputs", Rows::inputs},
+       {"d_state", Rows::state},
+       {"next", Rows::state},
+       {"kept", Rows::kept},
+       {"d_next", Rows::state},
+       {"d_kept", Rows::kept}}}},
+    {"series_next_along",
+     7,
+     {{{"order", Rows::order},
+       {"state", Rows::state},
+       {"kept", Rows::kept},
+       {"sums", Rows::sums},
+       {"d_state", Rows::state},
+       {"d_kept", Rows::kept},
+       {"d_sums", Rows::sums},
+       {"next", Rows::state},
+       {"operands", Rows::operands},
+       {"d_next", Rows::state},
+       {"d_operands", Rows::operands}}}},
     {"residual", 3, {q, v, a, E}},
     {"positions", 1, {q, {"r", Rows::components}}},
     {"velocities", 2, {q, v, {"r_dot", Rows::components}}},
@@ -236,14 +260,7 @@ class OwnedKernel {
     program_.coordinates = info.coordinates.size();
     program_.inputs = info.inputs.size();
     program_.series_info = info.series;
-    while (lines.kind() == "sum") {
-      read_sum(lines, info);
-      if (!lines.next()) lines.fail("a function", "the end of the file");
-    }
-    if (sums_.size() != static_cast<std::size_t>(info.series.sums)) {
-      lines.fail(std::to_string(info.series.sums) + " sums", std::to_string(sums_.size()));
-    }
-    program_.sums = sums_;
+    program_.sums = info.series_sums;
     while (lines.kind() == "function") read_function(lines, info);
     if (lines.kind() != "end") lines.fail("a function or the end", lines.kind());
     if (lines.next()) lines.fail("nothing after the end", lines.kind());
@@ -270,13 +287,6 @@ class OwnedKernel {
     if (!program_.functions[which].code.empty()) lines.fail("a function that is not defined yet", name);
     functions_[which].read(lines, taken, given);
     program_.functions[which] = functions_[which].function();
-  }
-
-  void read_sum(KernelText& lines, const SystemInfo& info) {
-    const int first = lines.whole(0, info.series.operands - 1);
-    const int second = lines.whole(0, info.series.operands - 1);
-    end_line(lines);
-    sums_.push_back({static_cast<unsigned short>(first), static_cast<unsigned short>(second)});
   }
 
   static std::size_t count(Rows rows, const SystemInfo& info) {
@@ -317,14 +327,27 @@ class OwnedKernel {
     return 0;
   }
 
-  /// Requires every function, except those that return something the model does not have; these must be missing.
+  static bool is_of_tangents(std::size_t which) {
+    return which == Program::series_start_along || which == Program::series_next_along;
+  }
+
+  /// Requires every function, except those of tangents along series, which models of many coordinates lack, and those
+  /// that return something the model does not have; these must be missing.
   void require_all(const KernelText& lines) {
     const SystemInfo& info = table_.info;
     for (std::size_t k = 0; k < signatures.size(); ++k) {
       const Signature& signature = signatures[k];
       const bool wanted = count(signature.arrays[signature.taken].rows, info) > 0;
       const bool there = !program_.functions[k].code.empty();
+      if (is_of_tangents(k) && !there) continue;
       if (wanted != there) lines.fail((wanted ? "" : "no ") + std::string(signature.name), wanted ? "none" : "one");
+    }
+    if (program_.functions[Program::series_start_along].code.empty() ||
+        program_.functions[Program::series_next_along].code.empty()) {
+      for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) {
+        of->series_start_along = nullptr;
+        of->series_next_along = nullptr;
+      }
     }
     if (info.argument_is_base.empty()) {
       for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) of->call_arguments = nullptr;
@@ -335,7 +358,6 @@ class OwnedKernel {
 
   std::string text_;
   KernelDescription description_;
-  std::vector<SeriesSum> sums_;
   std::array<OwnedFunction, signatures.size()> functions_;
   Program program_;
   SystemTable table_;

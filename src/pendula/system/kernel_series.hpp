@@ -15,7 +15,7 @@ class KernelSeries : KernelNumbers<S, W> {
  public:
   static void start(const Conditions& at, const SeriesRows& rows) {
     if constexpr (has_series<S>) {
-      constexpr std::size_t numbers = 2 * coordinates, row = series_state_row(coordinates, width);
+      constexpr std::size_t row = series_state_row(coordinates, width);
       std::array<L, numbers> state, next;
       std::array<L, static_cast<std::size_t>(S::series_kept) + 1> kept;
       for (std::size_t i = 0; i < numbers; ++i) state[i] = load(rows.state + i * width);
@@ -25,9 +25,44 @@ class KernelSeries : KernelNumbers<S, W> {
     }
   }
 
+  static void start_along(const Conditions& at, const double* unit, const double* state, const double* d_parameters,
+                          const double* d_inputs, const double* d_state, double* next, double* kept, double* d_next,
+                          double* d_kept) {
+    if constexpr (has_series<S> && W == 8) {
+      const std::array<Varied, numbers> from = varied<numbers>(state, d_state);
+      std::array<Varied, numbers> to;
+      std::array<Varied, static_cast<std::size_t>(S::series_kept) + 1> held;
+      S::template series_start<Varied>(
+          Crossing::template read_parameters<Varied>(VariedRows{at.parameters, d_parameters}, at),
+          Crossing::template read<typename Crossing::template Inputs<Varied>>(VariedRows{at.inputs, d_inputs}),
+          Varied(load(unit)), from.data(), to.data(), held.data());
+      write_varied(to.data(), numbers, next, d_next);
+      write_varied(held.data(), held.size() - 1, kept, d_kept);
+    }
+  }
+
+  static void next_along(const Conditions& at, const double* order, const double* state, const double* kept,
+                         const double* sums, const double* d_state, const double* d_kept, const double* d_sums,
+                         double* next, double* operands, double* d_next, double* d_operands) {
+    if constexpr (has_series<S> && W == 8) {
+      const std::array<Varied, numbers> from = varied<numbers>(state, d_state);
+      const auto totals = varied<S::series_sums.size() + 1>(sums, d_sums, S::series_sums.size());
+      std::array<Varied, S::input_names.size() + 1> pushes;
+      for (std::size_t i = 0; i + 1 < pushes.size(); ++i) pushes[i] = Varied(load(at.inputs + i * width));
+      std::array<Varied, 4> of_order;
+      for (std::size_t i = 0; i < of_order.size(); ++i) of_order[i] = Varied(load(order + i * width));
+      std::array<Varied, numbers> to;
+      std::array<Varied, static_cast<std::size_t>(info.operands) + 1> found;
+      S::template series_next<Varied>(VariedRows{kept, d_kept}, pushes.data(), of_order.data(), from.data(),
+                                      totals.data(), to.data(), found.data());
+      write_varied(to.data(), numbers, next, d_next);
+      write_varied(found.data(), found.size() - 1, operands, d_operands);
+    }
+  }
+
   PENDULA_IN_REGISTERS static void next(const Conditions& at, const SeriesRows& rows, int first, int last) {
     if constexpr (has_series<S>) {
-      constexpr std::size_t numbers = 2 * coordinates, given = S::input_names.size();
+      constexpr std::size_t given = S::input_names.size();
       constexpr std::size_t state_row = series_state_row(coordinates, width);
       constexpr std::size_t operand_row = series_operand_row(info, width);
       const Rows kept{rows.kept};
@@ -69,9 +104,23 @@ class KernelSeries : KernelNumbers<S, W> {
  private:
   using Crossing = KernelNumbers<S, W>;
   using Crossing::inputs, Crossing::load, Crossing::parameters, Crossing::store, Crossing::width;
-  using typename Crossing::L, typename Crossing::Rows;
-  static constexpr auto coordinates = static_cast<std::size_t>(S::coordinates);
+  using typename Crossing::L, typename Crossing::Rows, typename Crossing::VariedRows;
+  using Varied = Dual<L>;
+  static constexpr auto coordinates = static_cast<std::size_t>(S::coordinates), numbers = 2 * coordinates;
   static constexpr SeriesInfo info = series_of<S>();
+
+  template <std::size_t size>
+  static std::array<Varied, size> varied(const double* from, const double* slopes, std::size_t count = size) {
+    std::array<Varied, size> found;
+    for (std::size_t i = 0; i < count; ++i) found[i] = VariedRows{from, slopes}[i];
+    return found;
+  }
+  static void write_varied(const Varied* from, std::size_t count, double* to, double* slopes) {
+    for (std::size_t i = 0; i < count; ++i) {
+      store(from[i].value, to + i * width);
+      store(from[i].slope, slopes + i * width);
+    }
+  }
 
   /// Sums of one motion. The terms of orders 1 and k − 1 are added one by one: registers cannot be read yet where their
   /// numbers were just written so. `last` are the operands of the order before.

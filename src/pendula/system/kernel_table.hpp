@@ -49,6 +49,8 @@ class KernelFunctions : KernelNumbers<S, W> {
             &acceleration_along,
             &momentum_form_along,
             tells_arguments<S> ? &call_arguments : nullptr,
+            has_series<S> && W == 8 ? &KernelSeries<S, W>::start_along : nullptr,
+            has_series<S> && W == 8 ? &KernelSeries<S, W>::next_along : nullptr,
             &iterate,
             has_series<S> ? &KernelSeries<S, W>::start : nullptr,
             has_series<S> ? &KernelSeries<S, W>::next : nullptr};

@@ -109,6 +109,9 @@ bool KernelDescription::take(KernelText& text) {
     series_.sums = text.whole(0, many);
     series_.operands = text.whole(0, most_rows);
     series_.kept = text.whole(0, most_rows);
+  } else if (kind == "sum") {
+    const int first = text.whole(0, series_.operands - 1), second = text.whole(0, series_.operands - 1);
+    sums_.push_back({static_cast<unsigned short>(first), static_cast<unsigned short>(second)});
   } else {
     return false;
   }
@@ -120,6 +123,10 @@ SystemInfo KernelDescription::info() const {
   if (name_.empty() || model_.empty() || links_ == 0 || coordinates_.empty()) {
     throw std::invalid_argument(
         "expected a name, a model, links and coordinates, got a description without one of them");
+  }
+  if (sums_.size() != static_cast<std::size_t>(series_.sums)) {
+    throw std::invalid_argument("expected " + std::to_string(series_.sums) + " sums of series, got " +
+                                std::to_string(sums_.size()));
   }
   return {name_,
           model_,
@@ -145,7 +152,8 @@ SystemInfo KernelDescription::info() const {
           series_,
           point_kinds_,
           connection_kinds_,
-          connection_ends_};
+          connection_ends_,
+          sums_};
 }
 
 }  // namespace pendula

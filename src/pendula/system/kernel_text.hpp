@@ -73,6 +73,7 @@ class KernelDescription {
   Flags is_angle_, is_periodic_, is_positive_, is_per_link_, argument_is_base_;
   std::vector<int> parameter_sizes_, point_sizes_, connection_ends_;
   std::vector<double> parameter_defaults_;
+  std::vector<SeriesSum> sums_;
 };
 
 }  // namespace pendula

@@ -62,6 +62,7 @@ struct SystemInfo {
   std::span<const std::string_view> point_kinds;
   std::span<const std::string_view> connection_kinds;  ///< "spring" or "thread"
   std::span<const int> connection_ends;                ///< two a connection: 0-based points, -1 is the origin
+  std::span<const SeriesSum> series_sums;              ///< SeriesInfo::sums of them
 
   /// How many parameters are those of the model itself, without the last ones that tell pieces.
   std::size_t own_parameters() const { return parameters.size() - 2 * switches.size(); }
@@ -94,7 +95,8 @@ constexpr SystemInfo info_of() {
           series_of<S>(),
           point_kinds<S>(),
           connection_kinds<S>(),
-          connection_ends<S>()};
+          connection_ends<S>(),
+          series_sums_of<S>()};
 }
 
 }  // namespace pendula

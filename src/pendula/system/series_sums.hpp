@@ -71,7 +71,30 @@ void sums_of_many(const double* operands, std::span<const SeriesSum> pairs, std:
   }
 }
 
-/// The same where the sums are known: some together, whose operands are loaded once.
+/// Sums of eight motions, and how they change where the operands do, which `d_operands` says in rows alike.
+inline void sums_along(const double* operands, const double* d_operands, std::span<const SeriesSum> pairs,
+                       std::size_t row, std::size_t k, double* sums, double* d_sums) {
+  constexpr std::size_t width = 8;
+  using Lanes = Pack<width, RegisterFor<width>>;
+  const auto at = [&](const double* from, std::size_t j, std::size_t operand) {
+    return Lanes::load(from + row * j + operand * width);
+  };
+  for (const auto& [first, second] : pairs) {
+    Lanes sum(0.0), by_first(0.0), by_second(0.0);
+    for (std::size_t j = 1; j < k; ++j) {
+      const Lanes a = at(operands, j, first), b = at(operands, k - j, second);
+      sum = fma(a, b, sum);
+      by_first = fma(at(d_operands, j, first), b, by_first);
+      by_second = fma(a, at(d_operands, k - j, second), by_second);
+    }
+    sum.store(sums);
+    (by_first + by_second).store(d_sums);
+    sums += width;
+    d_sums += width;
+  }
+}
+
+/// The sums of W motions where they are known: some together, whose operands are loaded once.
 template <int W, const auto& pairs>
 [[gnu::always_inline]] inline void known_sums_of_many(const double* operands, std::size_t row, std::size_t k,
                                                       Pack<W, RegisterFor<W>>* sums) {

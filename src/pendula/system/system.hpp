@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <concepts>
 #include <cstddef>
 #include <pendula/system/series_info.hpp>
@@ -107,6 +108,27 @@ constexpr SeriesInfo series_of() {
   if constexpr (has_series<S>) {
     return {S::series_has_momenta, static_cast<int>(S::series_sums.size()), S::series_operands, S::series_kept};
   }
+  return {};
+}
+
+namespace detail {
+
+template <class S>
+inline constexpr auto sums_of_kernel = [] {
+  std::array<SeriesSum, S::series_sums.size()> sums{};
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    const auto& [first, second] = S::series_sums[k];
+    sums[k] = {static_cast<unsigned short>(first), static_cast<unsigned short>(second)};
+  }
+  return sums;
+}();
+
+}  // namespace detail
+
+/// Their sums.
+template <class S>
+constexpr std::span<const SeriesSum> series_sums_of() {
+  if constexpr (has_series<S>) return detail::sums_of_kernel<S>;
   return {};
 }
 

@@ -66,6 +66,15 @@ struct SystemFunctions {
                               double* df);
   /// Arguments of the model's functions, (arguments, W) (field_look.hpp); null if the kernel does not provide them.
   void (*call_arguments)(const Conditions&, Numbers q, Numbers v, double* found);
+  /// Orders of Taylor series, and how they change where parameters, inputs and states do: series_start, and one order k
+  /// of series_next, whose `order` is (k, 1/k, unit/(k + 1), time), (4, W), and whose `sums` are Σ A_j B_(k−j),
+  /// (SeriesInfo::sums, W); inputs are those of order k. Rows of `state`, `next` and `operands` are those of W motions.
+  /// Null without series, for more than ten coordinates, and in kernels in C++ for W < 8.
+  void (*series_start_along)(const Conditions&, Numbers unit, Numbers state, Numbers d_parameters, Numbers d_inputs,
+                             Numbers d_state, double* next, double* kept, double* d_next, double* d_kept);
+  void (*series_next_along)(const Conditions&, Numbers order, Numbers state, Numbers kept, Numbers sums,
+                            Numbers d_state, Numbers d_kept, Numbers d_sums, double* next, double* operands,
+                            double* d_next, double* d_operands);
 
   IterationChange (*iterate)(const Conditions&, const StageIteration&);
 
@@ -124,6 +133,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 13;
+inline constexpr int system_interface = 14;
 
 }  // namespace pendula

@@ -7,7 +7,9 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -17,6 +19,8 @@
 #include <pendula/system/series_info.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/taylor/series_controller.hpp>
+#include <pendula/taylor/series_tangent.hpp>
+#include <type_traits>
 #include <utility>
 
 namespace pendula {
@@ -62,6 +66,9 @@ class SeriesSteps {
         log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
         state_((static_cast<std::size_t>(order_) + 5) * row_),
+        moved_(row_),
+        turned_(row_),
+        bent_(row_),
         kept_(static_cast<std::size_t>(info_.kept) + 1),
         operands_(static_cast<std::size_t>(order_) * series_operand_row(info_, W) / W + 1),
         inputs_((static_cast<std::size_t>(order_) + 1) * systems.info().inputs.size() + 1),
@@ -119,6 +126,9 @@ class SeriesSteps {
       now_.low[k][lane] = now_.low[n_ + k][lane] = 0;
     }
     is_expanded_ = false;
+    if constexpr (!is_batch<L>) {
+      if (tangent_) tangent_->forget();
+    }
   }
 
   /// Visits the numbers of one motion, as MemberNumbers does.
@@ -171,8 +181,9 @@ class SeriesSteps {
     tried_ = h;
     const L tau = h / unit_;
     L none(0.0);
+    sum_all(tau, rises, moved_);
     for (std::size_t k = 0; k < 2 * n_; ++k) {
-      const L x = from_row<L>(now_.state[k]), change = fma(tau, rise(k, tau), from_row<L>(now_.low[k])),
+      const L x = from_row<L>(now_.state[k]), change = fma(tau, from_row<L>(moved_[k]), from_row<L>(now_.low[k])),
               there = x + change;
       to_row(there, trial_.state[k]);
       to_row(change - (there - x), trial_.low[k]);
@@ -217,11 +228,33 @@ class SeriesSteps {
     } else {
       std::swap(begin_, now_);
       std::swap(now_, trial_);
+      if (tangent_) {
+        tangent_->keep(tried_, motion_of(begin_.parts, time_), motion_of(now_.parts, time_ + tried_));
+      }
     }
     begin_time_ = select(which, time_, begin_time_);
     time_ = select(which, time_ + tried_, time_);
     step_ = select(which, tried_, step_);
     is_expanded_ = false;
+  }
+
+  /// From now on steps keep their derivative; nothing where the kernel has none.
+  std::optional<SeriesTangent>& linearize(const SystemModel& model) requires(!is_batch<L>) {
+    if (!tangent_ && SeriesTangent::is_had_of(model.table())) tangent_.emplace(model, order_).forget();
+    is_expanded_ = false;
+    return tangent_;
+  }
+  std::optional<SeriesTangent>& tangent() requires(!is_batch<L>) { return tangent_; }
+
+  /// The largest z for which a step multiplies what decays as e^(−z) correctly to `error` of z: the series of e^(−z) is
+  /// off by z^(order+1)/(order+1)!.
+  double resolved_decay(double error) const requires(!is_batch<L>) {
+    const double most = std::log(error) + std::lgamma(order_ + 2);
+    double z = 0;
+    for (double step = 64; step > 1e-3; step /= 2) {
+      if (order_ * std::log(z + step) + (z + step) <= most) z += step;
+    }
+    return z;
   }
 
   /// A coordinate and its rate at the fraction `share` of the last step, by the series of the coordinate.
@@ -281,6 +314,15 @@ class SeriesSteps {
     return !info.depends_on_time && std::ranges::all_of(info.argument_is_base, std::identity());
   }
 
+  Motion motion_of(const Parts& parts, double time) const requires(!is_batch<L>) {
+    Motion motion{time, Eigen::VectorXd(links()), Eigen::VectorXd(links())};
+    for (int i = 0; i < links(); ++i) {
+      motion.q[i] = parts[i].place[0];
+      motion.v[i] = parts[i].rate[0];
+    }
+    return motion;
+  }
+
   /// The order that needs the fewest operations for a tolerance.
   static int order_for(double tolerance) {
     const double order = 4 - 1.25 * std::log10(std::max(tolerance, finest));
@@ -303,11 +345,11 @@ class SeriesSteps {
   L coefficient(std::size_t order, std::size_t k) const { return from_row<L>(state_[order * row_ + k]); }
 
   /// Σ term(k+1) τ^k, in four strands that do not wait for one another.
-  template <class Term>
-  L sum(const L& tau, Term term) const {
-    const L tau2 = tau * tau, tau4 = tau2 * tau2;
+  template <class Lanes, class Term>
+  Lanes sum(const Lanes& tau, Term term) const {
+    const Lanes tau2 = tau * tau, tau4 = tau2 * tau2;
     std::size_t order = (static_cast<std::size_t>(order_) + 3) / 4 * 4;
-    L a = term(order - 3), b = term(order - 2), c = term(order - 1), d = term(order);
+    Lanes a = term(order - 3), b = term(order - 2), c = term(order - 1), d = term(order);
     for (order -= 4; order > 0; order -= 4) {
       a = fma(a, tau4, term(order - 3));
       b = fma(b, tau4, term(order - 2));
@@ -327,13 +369,45 @@ class SeriesSteps {
     return sum(tau, [&](std::size_t order) { return L(static_cast<double>(order)) * coefficient(order, k); });
   }
 
-  /// Σ (k+2) (k+1) c_(k+2) τ^k
-  L bend(std::size_t k, const L& tau) const {
-    L sum(0.0);
-    for (auto order = static_cast<std::size_t>(order_); order > 1; --order) {
-      sum = fma(sum, tau, L(static_cast<double>(order * (order - 1))) * coefficient(order, k));
+  /// Weights w and orders d of Σ w c_(k+d) τ^(k−1), k = 1, 2, …: a polynomial less its constant, over τ; its first and
+  /// second derivatives.
+  struct Rises {
+    static constexpr std::size_t ahead = 0;
+    static double weight(std::size_t /*k*/) { return 1; }
+  };
+  struct Slopes {
+    static constexpr std::size_t ahead = 0;
+    static double weight(std::size_t k) { return static_cast<double>(k); }
+  };
+  struct Bends {
+    static constexpr std::size_t ahead = 1;
+    static double weight(std::size_t k) { return static_cast<double>(k * (k + 1)); }
+  };
+  static constexpr Rises rises{};
+  static constexpr Slopes slopes{};
+  static constexpr Bends bends{};
+
+  /// Such a sum of all coordinates; of one motion as many at once as a row of its state has.
+  template <class Which>
+  void sum_all(const L& tau, Which which, PackRows<W>& to) const {
+    const auto add = [&]<class Lanes>(const Lanes& at, std::size_t first, std::type_identity<Lanes>) {
+      to_row(sum(at,
+                 [&](std::size_t k) {
+                   const Lanes row = from_row<Lanes>(state_[(k + which.ahead) * row_ + first]);
+                   if constexpr (std::is_same_v<Which, Rises>) return row;
+                   return Lanes(which.weight(k)) * row;
+                 }),
+             to[first]);
+    };
+    if constexpr (is_batch<L>) {
+      for (std::size_t k = 0; k < 2 * n_; ++k) add(tau, k, std::type_identity<L>());
+    } else if (row_ == 4) {
+      add(Pack<4, RegisterFor<4>>(tau), 0, std::type_identity<Pack<4, RegisterFor<4>>>());
+    } else {
+      for (std::size_t k = 0; k < row_; k += 8) {
+        add(Pack<8, RegisterFor<8>>(tau), k, std::type_identity<Pack<8, RegisterFor<8>>>());
+      }
     }
-    return sum;
   }
 
   void read_rates(const L& time, PackRows<W>& state, Parts& parts) {
@@ -349,9 +423,13 @@ class SeriesSteps {
   /// add, and for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
   Mask solves(const L& time, const L& h, double share) {
     const L inverse = L(1.0) / unit_, tau = L(share) * h * inverse;
+    sum_all(tau, rises, moved_);
+    sum_all(tau, slopes, turned_);
+    if (info_.has_momenta) sum_all(tau, bends, bent_);
     for (std::size_t i = 0; i < n_; ++i) {
-      to_row(fma(tau, rise(i, tau), coefficient(0, i)), seen_[i]);
-      to_row(info_.has_momenta ? slope(i, tau) * inverse : fma(tau, rise(n_ + i, tau), coefficient(0, n_ + i)),
+      to_row(fma(tau, from_row<L>(moved_[i]), coefficient(0, i)), seen_[i]);
+      to_row(info_.has_momenta ? from_row<L>(turned_[i]) * inverse
+                               : fma(tau, from_row<L>(moved_[n_ + i]), coefficient(0, n_ + i)),
              seen_[n_ + i]);
     }
     systems_.here(fma(L(share), h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
@@ -359,7 +437,8 @@ class SeriesSteps {
     for (std::size_t i = 0; i < n_; ++i) farthest = max(farthest, abs(coefficient(0, i)));
     Mask found(L(0.0) == L(0.0));
     for (std::size_t i = 0; i < n_; ++i) {
-      const L by_series = info_.has_momenta ? bend(i, tau) * (inverse * inverse) : slope(n_ + i, tau) * inverse;
+      const L by_series =
+          info_.has_momenta ? from_row<L>(bent_[i]) * (inverse * inverse) : from_row<L>(turned_[n_ + i]) * inverse;
       const L defect = max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(rounded) * farthest, L(0.0));
       found = found & (defect * from_row<L>(scales_[n_ + i]) <= L(largest_defect_));
     }
@@ -375,6 +454,12 @@ class SeriesSteps {
       systems_.expand(time_, unit_, order_, inputs_,
                       {.unit = unit_row_[0], .state = state_[0], .kept = kept_[0], .operands = operands_[0]});
       longest_ = size_by_terms();
+      if constexpr (!is_batch<L>) {
+        if (tangent_) {
+          tangent_->expand(time_, unit_, state_[0], inputs_[0]);
+          longest_ = std::min(longest_, step_of(tangent_->log_radius(looked_at)));
+        }
+      }
       const Mask is_good = longest_ > L(0.0);
       if (all(is_good)) break;
       unit_ = select(is_good, unit_, L(shorter_unit) * unit_);
@@ -394,8 +479,11 @@ class SeriesSteps {
       is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
       log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(tiny))));
     }
-    const L log_step = std::numbers::ln2 * min(log_radius + L(log_reach_), L(600.0));
-    return select(is_finite, exp(log_step) * unit_, L(0.0));
+    return select(is_finite, step_of(log_radius), L(0.0));
+  }
+
+  L step_of(const L& log_radius) const {
+    return exp(L(std::numbers::ln2) * min(log_radius + L(log_reach_), L(600.0))) * unit_;
   }
 
   /// Terms are relative to each coordinate itself, plus 1 rad or the size of the whole motion if that is smaller, so
@@ -442,9 +530,11 @@ class SeriesSteps {
   int looks_;              // places of a step where accelerations are compared
   double largest_defect_;  // of accelerations, times h, relative to scales
   double log_reach_;       // step size relative to the estimated radius of convergence, log₂
-  PackRows<W> state_, kept_, operands_, inputs_;
-  Place now_, trial_, begin_;  // begin_: of one motion
-  PackRows<W> seen_;           // a motion on the way of a step
+  PackRows<W> state_;
+  PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
+  PackRows<W> kept_, operands_, inputs_;
+  Place now_, trial_, begin_;          // begin_: of one motion
+  PackRows<W> seen_;                   // a motion on the way of a step
   PackRows<W> rates_;
   PackRows<W> scales_;  // of the terms of coordinates, then of rates: what they are multiplied by
   PackRows<W> unit_row_;
@@ -452,6 +542,7 @@ class SeriesSteps {
   L tried_{0.0}, step_{1.0};  // of the tried step, of the last one
   L unit_{1.0}, longest_{0.0}, energy_sum_{0.0};
   bool is_expanded_ = false, is_seated_ = false;
+  std::conditional_t<is_batch<L>, std::false_type, std::optional<SeriesTangent>> tangent_;
 };
 
 }  // namespace pendula
