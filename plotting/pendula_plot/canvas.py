@@ -46,9 +46,15 @@ class Canvas:
 
     def discs(self, middles: np.ndarray, radii: np.ndarray, colour: Colour) -> None:
         """Discs, or ellipses where radii are (…, 2)."""
+        if len(middles) == 0:
+            return
         radii = np.broadcast_to(np.reshape(radii, (len(middles), -1)), (len(middles), 2))
         places = middles[:, None] + radii[:, None] * CIRCLE.vertices
         self._fill(Path(places.reshape(-1, 2), np.tile(CIRCLE.codes, len(middles))), colour)
+
+    def polygon(self, corners: np.ndarray, colour: Colour) -> None:
+        """A filled area, (corners, 2)."""
+        self._fill(Path(np.vstack([corners, corners[:1]])), colour)
 
     def image(self) -> Image.Image:
         size = (self.size, self.size)

@@ -14,15 +14,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from . import animation
+from . import animation, shapes
 from .canvas import Canvas, Colour
-from .run import PlotError, Run
+from .run import Connection, PlotError, Run
 
 # What is large has multiples of 4: these colours Pillow finds exactly in a palette.
 BACKGROUND, FLOOR, SHADOW, ROD, BOB = (16, 20, 32), (36, 44, 60), (8, 8, 16), (152, 164, 192), (208, 216, 236)
 TRACE_OLD, TRACE_NEW, WHITE = (58, 76, 140), (255, 184, 77), (255, 255, 255)
+RAIL = (92, 104, 128)
 FIRST_RUN, LAST_RUN = (86, 180, 233), (255, 222, 90)
 TRACE_SECONDS, TRACE_PIECES = 3.0, 24
+CART, SPRING = 0.032, 0.02  # size of a cart, and half the width of a spring, of the picture
 SAMPLES = 6
 X264_IN_TIME = ["-preset", "veryfast"]
 VP9_IN_TIME = ["-deadline", "realtime", "-cpu-used", "5", "-lag-in-frames", "0"]
@@ -85,11 +87,25 @@ class Body:
 
     places: np.ndarray  # (rows, points, dimension)
     rods: list[tuple[int, int]]
+    connections: list[Connection]  # between points of `places`
+    kinds: list[str]
+    rails: dict[int, np.ndarray]  # of carts: the direction of their rail
     radii: np.ndarray  # relative to the picture
+
+    def of_kind(self, kind: str) -> list[int]:
+        return [k for k, each in enumerate(self.kinds) if each == kind]
+
+    @property
+    def pivots(self) -> list[int]:
+        """Also the origin, where something is fixed to it."""
+        held = {end for each in self.connections for end in (each.start, each.end)}
+        held.update(end for rod in self.rods for end in rod)
+        return [*([0] if 0 in held else []), *self.of_kind("pivot")]
 
 
 def body_of(run: Run) -> Body:
-    """Of a chain all rods; of a model those between neighbours, from the origin on, that keep their length."""
+    """Of a chain all rods; of a model those between neighbours, from the origin on, that keep their length, where
+    nothing else is between them and carts are on rails."""
     if run.dimension < 2:
         raise PlotError(f"{run.name}: expected points to film, got a run without any")
     bobs = run.positions()
@@ -97,11 +113,33 @@ def body_of(run: Run) -> Body:
     count = places.shape[1]
     lengths = np.linalg.norm(np.diff(places, axis=1), axis=2)
     keeps = np.ptp(lengths, axis=0) <= 1e-6 * lengths.max(axis=0) + 1e-300
-    rods = [(k, k + 1) for k in range(count - 1) if run.is_chain or keeps[k] or (k == 0 and count == 2)]
+    kinds = ["", *(run.kinds or ["bob"] * (count - 1))]
+    connections = [Connection(each.kind, each.start + 1, each.end + 1) for each in run.connections]
+    joined = {frozenset((each.start, each.end)) for each in connections}
+
+    def is_rod(k: int) -> bool:
+        if run.is_chain:
+            return True
+        if kinds[k + 1] == "cart" or {k, k + 1} in joined:
+            return False
+        if k == 0 and kinds[1] == "pivot" and not np.ptp(places[:, 1], axis=0).any():
+            return False
+        return bool(keeps[k]) or (k == 0 and count == 2)
+
+    rods = [(k, k + 1) for k in range(count - 1) if is_rod(k)]
+    rails = {k: rail_of(places[:, k]) for k, kind in enumerate(kinds) if kind == "cart"}
     masses = run.masses
     relative = np.ones(count - 1) if masses is None else np.cbrt(masses / masses.max())
     largest = min(0.022, 0.6 / count)
-    return Body(places, rods, np.maximum(largest * relative, 0.2 * largest))
+    radii = np.maximum(largest * relative, 0.2 * largest)
+    return Body(places, rods, connections, kinds, rails, radii)
+
+
+def rail_of(path: np.ndarray) -> np.ndarray:
+    """The direction of the line along which a point moves; level where it rests."""
+    way = path - path[0]
+    farthest = way[np.argmax(np.linalg.norm(way, axis=1))]
+    return farthest if farthest.any() else np.eye(path.shape[1])[0]
 
 
 def rows_at(run: Run, fps: float, seconds: float) -> np.ndarray:
@@ -166,9 +204,9 @@ class Film:
         self._draw_trace(self.bodies[0], row)
         for body, look in reversed([*zip(self.bodies, self.looks, strict=True)]):
             self._draw_body(body, row, *look)
-        self.canvas.discs(
-            self.stage.pixels(self.bodies[0].places[row, :1]), np.array([3.0]), WHITE
-        )  # where it hangs
+        first = self.bodies[0]
+        pivots = self.stage.pixels(first.places[row, first.pivots])
+        self.canvas.discs(pivots, np.full(len(pivots), 3.0), WHITE)  # where it hangs
         return self.canvas.image()
 
     def _draw_grid(self) -> None:
@@ -189,7 +227,8 @@ class Film:
         fallen = body.places[row].copy()
         fallen[:, 2] = self.stage.floor
         pixels = self.stage.pixels(fallen)
-        self.canvas.lines([pixels[[*rod]] for rod in body.rods], SHADOW, 3)
+        lines = [*body.rods, *((each.start, each.end) for each in body.connections)]
+        self.canvas.lines([pixels[[*ends]] for ends in lines], SHADOW, 3)
         radii = body.radii[:, None] * self.stage.size * (1, 1 / 3)
         self.canvas.discs(pixels[1:], radii, SHADOW)
 
@@ -203,11 +242,29 @@ class Film:
                 self.canvas.lines([path], colour, width)
 
     def _draw_body(self, body: Body, row: int, bob: Colour, rod: Colour, share: float) -> None:
-        """Rods, then bobs; `share` of their full size."""
+        """Rails, springs and rods, then carts and bobs; `share` of their full size."""
         pixels = self.stage.pixels(body.places[row])
         width = share * max(1, min(3, round(120 / len(pixels))))
+        size = share * CART * self.stage.size
+        carts = [(pixels[k], self._rail_axes(along)) for k, along in body.rails.items()]
+        for middle, axes in carts:
+            self.canvas.lines([shapes.rail(middle, axes, size, 2 * self.stage.size)], RAIL, 2)
+        for each in body.connections:
+            ends = pixels[[each.start, each.end]]
+            is_spring = each.kind == "spring"
+            path = shapes.spring(*ends, share * SPRING * self.stage.size) if is_spring else ends
+            self.canvas.lines([path], rod, 2 * share)
         self.canvas.lines([pixels[[*ends]] for ends in body.rods], rod, width)
-        self.canvas.discs(pixels[1:], share * body.radii * self.stage.size, bob)
+        for middle, axes in carts:
+            self.canvas.polygon(shapes.cart_box(middle, axes, size), bob)
+            radius = shapes.PROPORTIONS["wheel"] * size
+            self.canvas.discs(shapes.wheels(middle, axes, size), np.full(2, radius), rod)
+        bobs = body.of_kind("bob")
+        radii = share * self.stage.size * body.radii[np.array(bobs, dtype=int) - 1]
+        self.canvas.discs(pixels[bobs], radii, bob)
+
+    def _rail_axes(self, along: np.ndarray) -> np.ndarray:
+        return shapes.upright(self.stage.axes[:2] @ along)
 
 
 def check(path: Path) -> None:

@@ -36,15 +36,26 @@ class Point:
     columns: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Connection:
+    """A "spring" or "thread" between two points, by number; -1 is the origin."""
+
+    kind: str
+    start: int
+    end: int
+
+
 @dataclass
 class Run:
-    """Rows of one run."""
+    """Rows of one run. `kinds` say what points are drawn as, "bob", "cart" or "pivot"; none where no file says so."""
 
     name: str
     columns: dict[str, np.ndarray]
     units: dict[str, str] = field(default_factory=dict)
     scenario: str = ""
     settings: list[str] = field(default_factory=list)
+    kinds: list[str] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
 
     @property
     def time(self) -> np.ndarray:
@@ -194,7 +205,17 @@ def read_hdf5(path: Path) -> Run:
                 columns[name + link] = data if data.ndim == 1 else data[:, k]
                 units[name + link] = unit
         scenario, settings = (file["run"][name].asstr()[()] for name in ("scenario", "set"))
-    return Run(str(path), columns, units, scenario, json.loads(settings))
+        drawing = json.loads(file["run/drawing"].asstr()[()]) if "drawing" in file["run"] else {}
+    run = Run(str(path), columns, units, scenario, json.loads(settings))
+    run.kinds = [str(kind) for kind in drawing.get("kinds", [])]
+    run.connections = [
+        Connection(str(kind), int(start), int(end)) for kind, start, end in drawing.get("connections", [])
+    ]
+    points = range(-1, len(run.points))
+    ends = {end for each in run.connections for end in (each.start, each.end)}
+    if len(run.kinds) not in (0, len(run.points)) or not ends <= set(points):
+        raise PlotError(f"{path}: expected run/drawing of {len(run.points)} points, got that of others")
+    return run
 
 
 def unit_of(attributes: Mapping[str, object]) -> str:

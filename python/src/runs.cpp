@@ -253,6 +253,7 @@ Table table_of(const Result& result, const std::vector<double>& numbers) {
 }  // namespace
 
 void describe(const Subject& subject, io::RunContents contents, const view::Scene& scene, Result& result) {
+  contents.drawing = view::drawing_of(scene);
   for (const view::Point& point : scene.points) {
     std::vector<std::size_t>& columns = result.points.emplace_back();
     for (int k = 0; k < point.components; ++k) columns.push_back(point.column + static_cast<std::size_t>(k));

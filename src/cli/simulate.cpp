@@ -78,9 +78,9 @@ class RunSession {
         origin_(io::origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
-        file_(open_rows(output_, options, origin_, source.saved, io::contents_of(setup_, plan))),
+        file_(open_rows(output_, options, origin_, source.saved, contents(plan, scene))),
         events_(open_events(options, setup_)),
-        film_rows_(open_film_rows(io::contents_of(setup_, plan, false))),
+        film_rows_(open_film_rows(contents(plan, scene, false))),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_, page_->times(setup_.duration));
@@ -150,6 +150,12 @@ class RunSession {
     } catch (const io::OutputError& error) {
       if (summary.ending.ok()) summary.ending = {"output_failed", error.what(), {}, {}};
     }
+  }
+
+  io::RunContents contents(const io::RunPlan& plan, const view::Scene& scene, bool with_events = true) const {
+    io::RunContents contents = io::contents_of(setup_, plan, with_events);
+    contents.drawing = view::drawing_of(scene);
+    return contents;
   }
 
   /// A film is made from a temporary run file with rows for each frame; for a resumed run from its own file, which has

@@ -95,6 +95,7 @@ void RunFile::guarded(Action action) {
 void RunFile::create(const RunOrigin& origin) {
   file_ = hdf5::create_file(path_);
   run_ = write_origin(file_, origin);
+  if (!contents_.drawing.empty()) hdf5::write_text(run_, "drawing", contents_.drawing);
   if (contents_.quantities.empty()) return;
   // Each event needs a name, a count, two times and a warning; `room` is ample for the rest.
   constexpr std::size_t room = std::size_t{1} << 16, room_of_event = 1024;

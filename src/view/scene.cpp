@@ -1,6 +1,7 @@
 #include "view/scene.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 
@@ -51,6 +52,15 @@ std::vector<Connection> connections_of(const SystemInfo& info) {
         {std::string(info.connection_kinds[k]), info.connection_ends[2 * k], info.connection_ends[2 * k + 1]});
   }
   return connections;
+}
+
+std::string drawing_of(const Scene& scene) {
+  if (scene.rods != Rods::rigid) return {};
+  using nlohmann::json;
+  json kinds = json::array(), connections = json::array();
+  for (const Point& point : scene.points) kinds.push_back(point.kind);
+  for (const Connection& each : scene.connections) connections.push_back({each.kind, each.from, each.to});
+  return json{{"kinds", kinds}, {"connections", connections}}.dump();
 }
 
 Scene scene_of(const SystemSubject& subject) {

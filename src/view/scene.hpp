@@ -82,6 +82,10 @@ std::string point_kind(const SystemInfo& info, std::size_t k);
 /// What is drawn between the points of a system.
 std::vector<Connection> connections_of(const SystemInfo& info);
 
+/// What points are drawn as, and what is between them, for pictures that are made from a file: JSON, {"kinds": ["cart",
+/// …], "connections": [["spring", 0, 1], …]}. Empty of a chain.
+std::string drawing_of(const Scene& scene);
+
 /// The same of any other system, whose rods are what stays rigid.
 Scene scene_of(const SystemSubject& subject);
 

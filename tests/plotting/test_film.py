@@ -1,5 +1,6 @@
 """`simulate --video` and `pendula gallery`."""
 
+import json
 import os
 import re
 import subprocess
@@ -8,11 +9,13 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
-from pendula_plot import animation
-from pendula_plot.film import Film
-from pendula_plot.run import read_run
+from pendula_plot import animation, shapes
+from pendula_plot import film as film_module
+from pendula_plot.film import Film, body_of
+from pendula_plot.run import Connection, PlotError, Run, read_run
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -229,3 +232,98 @@ def test_every_case_of_the_gallery_is_an_example():
             f"| {case.title} | {case.text} | [{case.scenario}.toml](../examples/{case.scenario}.toml) |"
             in listed
         )
+
+
+CART = """\
+[system]
+model = "cart_chain"
+links = 1
+[start]
+theta_1 = 1.0
+[run]
+tolerance = 1e-9
+duration = 1.0
+[output]
+interval = 0.02
+"""
+
+
+def pixel(image: Image.Image, place: np.ndarray) -> tuple[int, int, int]:
+    """At a place of a canvas, whose y is up."""
+    return image.getpixel((round(float(place[0])), image.height - 1 - round(float(place[1]))))
+
+
+def test_a_film_draws_a_cart_on_its_rail(runs, pendula):
+    (runs / "cart.toml").write_text(CART)
+    done = pendula("simulate", "cart.toml", "-o", "cart.h5", PENDULA_KERNELS_BY="interpreter")
+    assert done.returncode == 0, done.stderr
+    run = read_run(runs / "cart.h5")
+    assert (run.kinds, run.connections) == (["cart", "bob"], [])
+    film = Film([run], 20, 400)
+    size = film_module.CART * 400
+    for row in (film.rows[0], film.rows[-1]):
+        image = film._frame(row)
+        middle = film.stage.pixels(film.bodies[0].places[row, 1])
+        for side in (-1.4, 1.4):
+            assert pixel(image, middle + size * np.array([side, 0.4])) == film_module.BOB
+        assert pixel(image, middle - size * np.array([0, 1.02])) == film_module.RAIL
+        assert pixel(image, (2, middle[1] - 1.02 * size)) == film_module.RAIL
+    assert film.bodies[0].pivots == []  # nothing hangs on the origin
+    assert film.bodies[0].rods == [(1, 2)]
+
+
+def drawn_run(**more) -> Run:
+    """A bob that swings on a spring from a wall, beside a pivot that rests in the origin."""
+    t = np.linspace(0, 1, 51)
+    columns = {"t": t, "pivot_x": 0 * t, "pivot_y": 0 * t, "wall_x": 0 * t - 1, "wall_y": 0 * t}
+    columns |= {"bob_x": 0.5 + 0.3 * np.sin(6 * t), "bob_y": 0 * t - 0.2}
+    return Run("drawn", columns, **more)
+
+
+def test_a_film_draws_springs_and_threads():
+    kinds = ["pivot", "pivot", "bob"]
+    body = body_of(
+        drawn_run(kinds=kinds, connections=[Connection("spring", 1, 2), Connection("thread", -1, 2)])
+    )
+    assert body.connections == [Connection("spring", 2, 3), Connection("thread", 0, 3)]
+    assert body.rods == [(1, 2)]  # from pivot to wall, which keep their distance; none where the spring is
+    assert body.pivots == [0, 1, 2]
+    plain, sprung = (
+        np.asarray(next(Film([run], 20, 400).frames()), dtype=int)
+        for run in (drawn_run(), drawn_run(kinds=kinds, connections=[Connection("spring", 1, 2)]))
+    )
+    rods = [(np.abs(image - film_module.ROD).max(axis=2) < 8) for image in (plain, sprung)]
+    heights = [int(rod.any(axis=1).sum()) for rod in rods]
+    assert heights[0] < 6 and heights[1] > 30  # pixels; measured 3, 42
+
+
+@pytest.mark.parametrize("length", [1.0, 40.0, 300.0])
+def test_a_spring_has_as_many_zigzags_however_long(length):
+    path = shapes.spring(np.array([10.0, 20.0]), np.array([10.0, 20.0 + length]), 5.0)
+    assert len(path) == 2 * 10 + 3
+    assert np.array_equal(path[[0, -1]], [(10, 20), (10, 20 + length)])
+    assert np.allclose(np.abs(path[2:-2, 0] - 10), 5) and np.allclose(path[[1, -2], 0], 10)
+
+
+SLOPES = [((1, 0), 0), ((-2, 0), 0), ((-0.8, -0.6), 37), ((0.8, -0.6), -37), ((0, -1), 90)]
+
+
+@pytest.mark.parametrize(("along", "angle"), SLOPES)
+def test_carts_stand_upright(along, angle):
+    axes = shapes.upright(np.array(along, dtype=float))
+    assert np.degrees(np.arctan2(axes[0, 1], axes[0, 0])) == pytest.approx(angle, abs=0.2)
+    assert axes[1, 1] > -1e-9 and np.allclose(axes @ axes.T, np.eye(2))
+
+
+def test_films_and_pages_have_the_same_proportions():
+    script = (ROOT / "src/view/page/shapes.js").read_text()
+    assert (
+        json.loads(re.search(r"const proportions = (\{.*?\});", script, re.DOTALL)[1]) == shapes.PROPORTIONS
+    )
+
+
+def test_a_drawing_of_other_points_is_refused(runs, pendula):
+    with h5py.File(runs / "double.h5", "a") as file:
+        file["run/drawing"] = json.dumps({"kinds": ["bob"], "connections": [["spring", 0, 7]]})
+    with pytest.raises(PlotError, match="expected run/drawing of 2 points"):
+        read_run(runs / "double.h5")

@@ -388,7 +388,7 @@ class Stage {
       for (let k = 0; k <= 32; ++k) pen.lineTo(...place((theta * k) / 32, radius).slice(0, 2));
       pen.stroke();
       const [x, y] = place(theta / 2, 1.35 * radius);
-      pen.fillText(`${((theta * 180) / Math.PI).toFixed(0).replace("-", "−")}°`, x, y + 4);
+      pen.fillText(`${Math.round((theta * 180) / Math.PI) || 0}°`.replace("-", "−"), x, y + 4);
     }
   }
 

@@ -35,11 +35,12 @@ class Fittings {
     if (across.length() < 1e-6) across.set(0, 1, 0);
     across.normalize();
     const frame = new THREE.Matrix4().makeBasis(along, across, along.clone().cross(across));
-    const wheels = [-0.95, 0.95].flatMap((x) => [-0.8, 0.8].map((y) => {
-      const wheel = new THREE.CylinderBufferGeometry(0.36 * size, 0.36 * size, 0.2 * size, 16);
-      return add(wheel.translate(x * size, y * size, -0.66 * size), "rail");
+    const { cartLong, cartHigh, wheelAside, wheelBelow, wheel: round } = proportions;
+    const wheels = [-wheelAside, wheelAside].flatMap((x) => [-0.8, 0.8].map((y) => {
+      const wheel = new THREE.CylinderBufferGeometry(round * size, round * size, 0.2 * size, 16);
+      return add(wheel.translate(x * size, y * size, -wheelBelow * size), "rail");
     }));
-    const box = add(new THREE.BoxBufferGeometry(3.2 * size, 1.6 * size, 1.24 * size), "cart");
+    const box = add(new THREE.BoxBufferGeometry(2 * cartLong * size, 1.6 * size, 2 * cartHigh * size), "cart");
     const rails = !this.motion.railOf(i) ? [] : [-0.8, 0.8].map((y) => {
       const rail = new THREE.BoxBufferGeometry(4 * this.motion.reach, 0.1 * size, 0.1 * size);
       return add(rail.translate(0, y * size, -1.06 * size), "rail");
@@ -90,7 +91,8 @@ function springGeometry(long, wide, radius) {
   curve.arcLengthDivisions = 400;
   // Straight to the axis at both ends, half a turn from there.
   curve.getPoint = (t) => {
-    const part = clampPart((t - 0.1) / 0.8);
+    const { springEnd } = proportions;
+    const part = clampPart((t - springEnd) / (1 - 2 * springEnd));
     const angle = 2 * Math.PI * springTurns * part;
     const grown = wide * clampPart(2 * springTurns * Math.min(part, 1 - part));
     return new THREE.Vector3(grown * Math.cos(angle), grown * Math.sin(angle), t * long);

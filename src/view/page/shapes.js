@@ -1,7 +1,13 @@
 // What carts, springs and pivots look like on a canvas: here and in the laboratory.
 
+/// Lengths in the size of a cart, or parts of a spring; films have the same (plotting/pendula_plot/shapes.py).
+const proportions = {
+  "springTurns": 10, "springEnd": 0.1,
+  "cartLong": 1.6, "cartHigh": 0.62, "wheelAside": 0.95, "wheelBelow": 0.66, "wheel": 0.36, "railBelow": 1.02
+};
+
 /// Zigzags of a spring, however long it is.
-const springTurns = 10;
+const { springTurns } = proportions;
 
 /// A line along which a cart runs has no direction: the angle to draw it at, so that its upper side is up.
 function uprightAngle(dx, dy) {
@@ -10,12 +16,9 @@ function uprightAngle(dx, dy) {
   return angle <= -Math.PI / 2 + 1e-9 ? angle + Math.PI : angle;
 }
 
-/// How far a rail is below the middle of a cart, in the cart's size.
-const railBelow = 1.02;
-
 function drawRail(pen, [x0, y0], [x1, y1], size) {
   const angle = uprightAngle(x1 - x0, y1 - y0);
-  const [dx, dy] = [-Math.sin(angle) * railBelow * size, Math.cos(angle) * railBelow * size];
+  const [dx, dy] = [-Math.sin(angle), Math.cos(angle)].map((x) => x * proportions.railBelow * size);
   pen.strokeStyle = palette.css("edge");
   pen.lineWidth = 2;
   line(pen, x0 + dx, y0 + dy, x1 + dx, y1 + dy);
@@ -23,6 +26,7 @@ function drawRail(pen, [x0, y0], [x1, y1], size) {
 
 /// A box with wheels, whose middle is [x, y].
 function drawCart(pen, [x, y], angle, size, colour) {
+  const { cartLong, cartHigh, wheelAside, wheelBelow, wheel } = proportions;
   pen.save();
   pen.translate(x, y);
   pen.rotate(angle);
@@ -30,12 +34,12 @@ function drawCart(pen, [x, y], angle, size, colour) {
   pen.strokeStyle = palette.css("panel");
   pen.lineWidth = Math.min(1.5, 0.12 * size);
   pen.beginPath();
-  pen.rect(-1.6 * size, -0.62 * size, 3.2 * size, 1.24 * size);
+  pen.rect(-cartLong * size, -cartHigh * size, 2 * cartLong * size, 2 * cartHigh * size);
   pen.fill();
   pen.fillStyle = palette.css("rod");
-  for (const side of [-0.95, 0.95]) {
+  for (const side of [-wheelAside, wheelAside]) {
     pen.beginPath();
-    pen.arc(side * size, 0.66 * size, 0.36 * size, 0, 2 * Math.PI);
+    pen.arc(side * size, wheelBelow * size, wheel * size, 0, 2 * Math.PI);
     pen.fill();
     pen.stroke();
   }
@@ -47,7 +51,7 @@ function drawConnection(pen, kind, [x0, y0], [x1, y1], wide) {
   const [dx, dy] = [x1 - x0, y1 - y0];
   const length = Math.hypot(dx, dy) || 1;
   const corners = kind === "spring" ? 2 * springTurns : 0;
-  const [first, last] = [0.1, 0.9];
+  const [first, last] = [proportions.springEnd, 1 - proportions.springEnd];
   pen.beginPath();
   pen.moveTo(x0, y0);
   for (let k = 0; k <= corners && corners; ++k) {
