@@ -18,7 +18,8 @@ struct RunContents {
   std::vector<Constant> constants;
   std::vector<std::string> events;  ///< names of the events that the run looks for
   std::optional<NaturalUnits> natural;
-  std::string drawing = {};  ///< what points are drawn as, JSON (view/scene.hpp); empty of a chain
+  /// What points are drawn as, JSON (view/scene.hpp); empty of a chain.
+  std::string drawing = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
 /// Attributes that tell a unit as UDUNITS knows it, and beside it the natural unit.
