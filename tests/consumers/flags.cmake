@@ -3,13 +3,13 @@
 include("${CMAKE_CURRENT_LIST_DIR}/steps.cmake")
 
 take_project(flags)
-list(APPEND configure -D "CMAKE_PREFIX_PATH=${prefix}")
+list(APPEND configure -D "CMAKE_PREFIX_PATH=${prefix}" -D CMAKE_BUILD_TYPE=)  # each program has flags of its own
 step(${configure})
 step(${build})
 file(GLOB programs "${project}-build/bin/*")
 list(LENGTH programs count)
-if(count LESS 6)
-  message(FATAL_ERROR "expected a program for each of at least 6 kinds of flags, got ${programs}")
+if(count LESS 7)
+  message(FATAL_ERROR "expected a program for each of at least 6 kinds of flags, and a stepper, got ${programs}")
 endif()
 foreach(program IN LISTS programs)
   step("${program}")

@@ -2,7 +2,8 @@
 include("${CMAKE_CURRENT_LIST_DIR}/steps.cmake")
 
 take_project(subdirectory)
-step(${configure} -D "PENDULA_CHECKOUT=${SOURCE}" -D PENDULA_ARCHS=${ARCH})
+# Neither optimised nor for a debugger: the library is compiled here to be linked.
+step(${configure} -D CMAKE_BUILD_TYPE= -D "PENDULA_CHECKOUT=${SOURCE}" -D PENDULA_ARCHS=${ARCH})
 step(${build})
 step("${project}-build/swing")
 message(STATUS "${output}")
