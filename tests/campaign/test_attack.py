@@ -301,7 +301,7 @@ print(done.stdout)
 """
     )
     liar.chmod(liar.stat().st_mode | stat.S_IXUSR)
-    case = drawing.draw("ensembles", 1, 3)
+    case = drawing.draw("ensembles", 1, 4)
     verdict = judging.judge(case, room, judging.Program(liar, tmp_path / "run"))
     assert verdict.kind == kind, verdict
 
