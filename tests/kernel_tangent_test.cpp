@@ -3,8 +3,8 @@
 
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>
-#include <pendula/gauss/lagrangian_variation.hpp>
 #include <pendula/gauss/stepper.hpp>
+#include <pendula/system/lagrangian_variation.hpp>
 
 #include "support/kernels.hpp"
 #include "support/tangents.hpp"

@@ -186,7 +186,8 @@ class Truth:
                 return {"dp": slope["p"], "df": slope["f"]}
             case "series_start" | "series_next":
                 found = carry_out(getattr(self._tapes, function.removeprefix("series_")), at, Decimals())
-                return {array: [rows[k] for k in range(len(rows))] for array, rows in found.items()}
+                gives = ("next", "kept") if function == "series_start" else ("next", "operands")
+                return {array: [found[array][k] for k in range(len(found.get(array, ())))] for array in gives}
             case "series_start_along" | "series_next_along":
                 base = function.removesuffix("_along")
                 moved = ("parameters", "inputs", "state") if "start" in base else ("state", "kept", "sums")
@@ -249,7 +250,7 @@ def error(loaded: LoadedKernel, truth: Truth, width: int, seed: int) -> float:
             assert {*true} == {*found}, name
             for array, rows in found.items():
                 values = [row[lane] for row in rows]
-                size = max(1.0, *(abs(float(value)) for value in true[array]))
+                size = max([1.0, *(abs(float(value)) for value in true[array])])
                 for value, expected in zip(values, true[array], strict=True):
                     worst = (
                         max(worst, abs(float(value - expected)) / size) if math.isfinite(value) else math.inf
@@ -407,6 +408,7 @@ def test_what_a_kernel_says_of_itself(everything):
         "point\tr\t3\tbob",
         *(line for line in lines if line.startswith("argument\t")),
         f"series\t1\t61\t77\t{loaded.table.series.kept}",
+        *(f"sum\t{first}\t{second}" for first, second in loaded.table.series.series.places),
     ]
 
 

@@ -63,7 +63,8 @@ def _function(function: TableFunction, names: Mapping[Row, str]) -> list[str]:
 def _head(function: TableFunction, read: Set[str]) -> str:
     arguments = [("const Conditions", "at", bool(read & {*CONDITIONS}))]
     arguments += [("const double", name, name in read) for name in function.takes]
-    arguments += [("double", name, True) for name in function.gives]
+    given = {array for array, _ in function.tape.outputs}
+    arguments += [("double", name, name in given) for name in function.gives]
     listed = ", ".join(f"{'' if used else 'UNUSED '}{kind} *{name}" for kind, name, used in arguments)
     return f"static void NAME({function.name})({listed}) {{"
 

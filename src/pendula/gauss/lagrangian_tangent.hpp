@@ -7,8 +7,8 @@
 #include <pendula/gauss/lagrangian_direction.hpp>
 #include <pendula/gauss/lagrangian_jacobians.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
-#include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/gauss/stage_system.hpp>
+#include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <vector>
 

@@ -2,10 +2,10 @@
 #include <limits>
 #include <memory>
 #include <pendula/chain/chain_variation.hpp>
-#include <pendula/gauss/lagrangian_variation.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/schedule.hpp>
 #include <pendula/run/subject_model.hpp>
+#include <pendula/system/lagrangian_variation.hpp>
 #include <stdexcept>
 #include <utility>
 

@@ -2,11 +2,11 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cstddef>
-#include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_model.hpp>
+#include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>
 

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <pendula/gauss/lagrangian_variation.hpp>
-#include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/lagrangian_variation.hpp>
 #include <pendula/system/motion.hpp>
+#include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/series_info.hpp>
 #include <pendula/system/series_sums.hpp>
 #include <pendula/system/system_model.hpp>

@@ -2,9 +2,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
-#include <pendula/gauss/parameter_slopes.hpp>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/system/motion.hpp>
+#include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <vector>
 
