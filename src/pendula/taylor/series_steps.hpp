@@ -533,8 +533,8 @@ class SeriesSteps {
   PackRows<W> state_;
   PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
   PackRows<W> kept_, operands_, inputs_;
-  Place now_, trial_, begin_;          // begin_: of one motion
-  PackRows<W> seen_;                   // a motion on the way of a step
+  Place now_, trial_, begin_;  // begin_: of one motion
+  PackRows<W> seen_;           // a motion on the way of a step
   PackRows<W> rates_;
   PackRows<W> scales_;  // of the terms of coordinates, then of rates: what they are multiplied by
   PackRows<W> unit_row_;
