@@ -212,7 +212,7 @@ def test_linearize_by_steps_is_the_exponential_of_the_continuous_one() -> None:
     ("system", "start"),
     [
         (pendula.Chain(masses=[1.0, 2.0], damping=0.1), {"theta": [1.0, 0.5], "theta_dot": [0.1, 0.2]}),
-        (pendula.Model("cart_chain", links=2), {"q": [0.0, 1.0, 0.5]}),
+        (pendula.Model("cart_chain", links=2), {"theta": [1.0, 0.5]}),
     ],
     ids=["chain", "model"],
 )
