@@ -194,23 +194,23 @@ class SeriesTangent {
     }
   }
 
-  /// Of a coefficient of all directions, in which rates, or momenta, count by what they move within a unit of time. NaN
-  /// if it is not finite.
+  /// Of a coefficient of all directions, in which rates, or momenta, count by what they move within a unit of time; not
+  /// finite if one of them is not.
   double size_of_term(std::size_t k) const {
     const std::size_t n = rows_ / 2;
     const auto entry = [&](std::size_t order, std::size_t row, std::size_t column) {
       return d_state_[column / width][order * rows_ + row][column % width];
     };
     const auto scale = [&](std::size_t row) { return row < n ? 1 : std::abs(entry(1, row - n, row)); };
-    double largest = 0, none = 0;
+    double largest = 0;
     for (std::size_t column = 0; column < rows_; ++column) {
       for (std::size_t row = 0; row < rows_; ++row) {
         const double term = entry(k, row, column) * scale(row) / scale(column);
-        none += term - term;
+        if (!std::isfinite(term)) return term;
         largest = std::max(largest, std::abs(term));
       }
     }
-    return largest + none;
+    return largest;
   }
 
   SystemModel model_;
