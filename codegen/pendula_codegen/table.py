@@ -88,9 +88,8 @@ class _Tables:
             "acceleration_along": self._acceleration_along,
             "momentum_form_along": self._momentum_form_along,
         }
-        if (
-            len(self._kernel.system.coordinates) <= UNROLLED
-        ):  # factors of larger matrices have no derivative here
+        # The factors of larger matrices, which series keep, have no derivative here.
+        if len(self._kernel.system.coordinates) <= UNROLLED:
             composed["series_start_along"] = lambda: _along(start, ("parameters", "inputs", "state"))
             composed["series_next_along"] = lambda: _along(following, ("state", "kept", "sums"))
 

@@ -123,7 +123,9 @@ class Integrator {
     rows_ = integrator_->linearize();
     if (rows_ > 0) return rows_;
     throw std::invalid_argument(
-        "tangents: expected method = gauss or radau in momentum form, or taylor by a kernel, other steps have none");
+        "tangents: expected method = gauss or radau in momentum form, or taylor of a model or of a chain with a "
+        "kernel, up to "
+        "ten coordinates; other steps have no derivative");
   }
 
   /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z; valid after

@@ -134,7 +134,7 @@ class SeriesTangent {
 
   /// Only where somebody asks.
   const Directions<>& by_parameters() {
-    if (by_parameters_.cols() == parameters()) return by_parameters_;
+    if (by_parameters_.rows() == size()) return by_parameters_;  // there may be no parameters
     const Directions<> alone = Directions<>::Identity(parameters(), parameters());
     Directions<> moved = Directions<>::Zero(size(), parameters());
     if (!info().has_momenta) LagrangianVariation(model_, begin_).rates(Directions<>(moved), moved, alone);
