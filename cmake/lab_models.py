@@ -29,6 +29,22 @@ STARTS = {
 }
 
 
+# The laboratory takes Gauss steps; these are for derivatives along Taylor series, and a program may lack them.
+UNUSED = ("series_start_along", "series_next_along")
+
+
+def without(program: str, functions: tuple[str, ...]) -> str:
+    """A program without some of its functions, each of which goes to where the next one begins."""
+    kept, is_wanted = [], True
+    for line in program.splitlines(keepends=True):
+        kind, *words = line.split()
+        if kind in ("function", "end"):
+            is_wanted = not words or words[0] not in functions
+        if is_wanted:
+            kept.append(line)
+    return "".join(kept)
+
+
 def generator(codegen: Path, command: str, model: str, links: int, *more: str) -> str:
     counted = ["--links", str(links)] if model in LINKS else []
     return subprocess.run(
@@ -61,7 +77,7 @@ def make(codegen: Path, name: str, links: int) -> dict:
     start = dict(STARTS.get(name, {}))
     if "q" in start:
         start["q"] = start["q"][: len(described["coordinates"])]
-    return {"model": described, "program": text, "start": start}
+    return {"model": described, "program": without(text, UNUSED), "start": start}
 
 
 if __name__ == "__main__":
