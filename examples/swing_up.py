@@ -16,6 +16,9 @@ import casadi
 
 INTERVALS, DURATION = 60, 3.0  # s
 MOST_FORCE, MOST_WAY = 60.0, 2.0  # N, m
+NUMBERS = casadi.DM([1, 1, 1, 1, 0, 0, 1, 0, 9.81])  # masses, lengths, damping, cart, friction, gravity
+# Second derivatives, for solvers that ask: differences of the exact first ones.
+OPTIONS = {"jacobian_options": {"enable_fd": True, "fd_method": "central"}}
 
 
 def by_hand() -> casadi.Function:
@@ -32,17 +35,16 @@ def by_hand() -> casadi.Function:
     return casadi.Function("f", [casadi.vertcat(q, v), u], [casadi.vertcat(v, acceleration)])
 
 
-def interval(kind: str, library: str, substeps: int, order: int = 2) -> casadi.Function:
+def interval(
+    kind: str, library: str, substeps: int, order: int = 2, duration: float = DURATION / INTERVALS
+) -> casadi.Function:
     """x, u -> x an interval later."""
-    x, u, h = casadi.MX.sym("x", 6), casadi.MX.sym("u"), DURATION / INTERVALS / substeps
+    x, u, h = casadi.MX.sym("x", 6), casadi.MX.sym("u"), duration / substeps
     later = x
     if kind == "pendula":
-        step = casadi.external("cart_next", library)
-        numbers = casadi.DM(
-            [1, 1, 1, 1, 0, 0, 1, 0, 9.81]
-        )  # masses, lengths, damping, cart, friction, gravity
+        step = casadi.external("cart_next", library, OPTIONS)
         for _ in range(substeps):
-            later = step(later, u, numbers, 0, h)
+            later = step(later, u, NUMBERS, 0, h)
         return casadi.Function("next", [x, u], [later])
     f, y, w = by_hand(), casadi.SX.sym("x", 6), casadi.SX.sym("u")
     options = {"number_of_finite_elements": substeps, "simplify": True}

@@ -5,7 +5,7 @@ import subprocess
 from importlib.util import find_spec
 
 import pytest
-from conftest import COMPILER, CONSUMER, FLAGS, consumer, numbers
+from conftest import COMPILER, CONSUMER, EXAMPLES, FLAGS, consumer, numbers
 
 STEP = 0.02
 
@@ -81,3 +81,21 @@ def test_casadi_calls_functions_and_their_jacobians_where_it_is_installed(name, 
         error = float(casadi.norm_inf(casadi.vec(casadi.DM(found[place]) - true)))
         size = max(1.0, float(casadi.norm_inf(casadi.vec(true))))
         assert error < 1e-9 * size  # measured 1.8e-11
+
+
+@needs_casadi
+def test_second_derivatives_are_those_that_casadi_finds_by_itself_where_it_is_installed(cart, monkeypatch):
+    import casadi
+
+    monkeypatch.syspath_prepend(EXAMPLES)
+    from swing_up import NUMBERS, OPTIONS, by_hand
+
+    theirs, ours = by_hand(), casadi.external("system_dynamics", str(library(cart)), OPTIONS)
+    x, u, weights = casadi.MX.sym("x", 6), casadi.MX.sym("u"), casadi.DM([0.3, -0.7, 0.5, 1.1, -0.4, 0.8])
+    at = casadi.DM([0.3, 2.9, 1.2, 0.4, -1.3, 0.7, 5.0])
+    found = []
+    for rates in (ours(x, u, NUMBERS, 0), theirs(x, u)):
+        hessian, _ = casadi.hessian(casadi.dot(weights, rates), x)
+        found.append(casadi.Function("hessian", [x, u], [hessian])(at[:6], at[6]))
+    error = float(casadi.norm_inf(casadi.vec(found[0] - found[1])))
+    assert error < 1e-6, found  # of 24; measured 1.5e-7

@@ -54,8 +54,8 @@ def test_what_the_page_shows_is_what_its_commands_print(title, tmp_path):
 
 def test_the_lines_of_python_are_those_of_the_example():
     example = [line.strip() for line in (ROOT / "examples/swing_up.py").read_text().splitlines()]
-    [lines] = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    assert not [line for line in lines.splitlines() if line not in example]
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    assert blocks and not [line for block in blocks for line in block.splitlines() if line not in example]
 
 
 def is_measured(line: str) -> bool:
