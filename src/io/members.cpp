@@ -52,7 +52,8 @@ RunSetup MemberScenario::setup() const {
           .every = asked.every,
           .accuracy = asked.places.contains("accuracy") ? asked.accuracy : Accuracy{},
           .doubted = false,
-          .estimate = asked.estimate};
+          .estimate = asked.estimate,
+          .chooses_method = asked.chooses_method};
 }
 
 MemberScenarios::MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell)
