@@ -56,7 +56,10 @@ def test_members_in_lanes_end_where_others_do(name, moved):
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_gauss_steps_in_lanes_are_those_of_others(name, moved):
     text = SCENARIOS[name]
-    for steps, most in ((["--set=run.step=0.002", "--set=run.stages=4"], 3e-11), ([], 2e-4)):
+    for steps, most in (
+        (["--set=run.step=0.002", "--set=run.stages=4"], 3e-11),
+        (['--set=run.method="gauss"'], 2e-4),
+    ):
         alone, lanes = moved(text, ALONE, *steps), moved(text, *steps)
         for key in alone.keys() - {"steps", "energy_error"}:
             assert np.abs(lanes[key] - alone[key]).max() < most, key
@@ -66,7 +69,7 @@ def test_long_runs_of_models_stay_in_lanes(moved):
     """As long as they keep the energy: more than 2000 steps."""
     text = SCENARIOS["atwood"].replace("mu = 2.5", "mu = 3.0").replace("duration = 2.0", "duration = 200.0")
     text = text[: text.rindex("\n[[ensemble.axis]]")].replace("to = 2.5", "to = 1.5")  # regular ones
-    alone = moved(text)
+    alone = moved(text, '--set=run.method="gauss"')
     lanes = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
     assert (lanes["steps"] > 2000).all()  # measured 2503 at least
     assert not (alone["steps"] == lanes["steps"]).any()
@@ -119,7 +122,7 @@ def test_who_takes_long_there_goes_as_the_scenario_says(moved):
     """A series is tried for 20,000 steps at most."""
     text = SCENARIOS["atwood"].replace("mu = 2.5", "mu = 3.0")
     text = text[: text.index("\n[[ensemble.axis]]")] + AXIS.format("run.duration", 200.0, 2000.0)
-    alone = moved(text)
+    alone = moved(text, '--set=run.method="gauss"')
     tried = moved(text.replace("[ensemble]", '[ensemble]\nmethod = "auto"'))
     same = alone["steps"] == tried["steps"]
     assert same.any() and not same.all()
