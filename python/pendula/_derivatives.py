@@ -11,7 +11,7 @@ from . import _core
 from ._core import InputError
 from ._runs import mapping, number, numbers, plainly, warn
 from ._simulation import RUN_OPTIONS, Beginning, Simulation
-from ._systems import System
+from ._systems import System, system_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -205,8 +205,7 @@ def linearize(
     >>> A.shape, B.shape
     ((2, 2), (2, 1))
     """
-    if not isinstance(system, System):
-        raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
+    system = system_of(system)
     start = {**system.at_zero(), **mapping("at", at)}
     if step is None:
         if tolerance is not None:

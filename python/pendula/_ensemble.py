@@ -16,7 +16,7 @@ from ._events import event_tables
 from ._progress import progress_line
 from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
 from ._simulation import RUN_OPTIONS, Beginning
-from ._systems import System
+from ._systems import System, system_of
 
 if TYPE_CHECKING:
     import xarray
@@ -130,9 +130,7 @@ def ensemble(
     method = options.pop("method", None)
     starts, keys, drawn = mapping("start", start), mapping("axes", axes), mapping("random", random)
     # A model may have no start where all is zero.
-    begin = {}
-    if isinstance(system, System):
-        begin = system.at_zero() or some_start(starts, keys, drawn)
+    begin = system_of(system).at_zero() or some_start(starts, keys, drawn)
     # Names alone are asked for, which feedback does not change; a program cannot step what is sampled.
     made = Beginning.of(system, begin, tolerance=None, step=None, options={}, feeds_back=False).prepare()
     design = Design(system, [made.columns[k] for k in made.state])

@@ -14,7 +14,7 @@ import numpy as np
 from . import _core, _toml
 from ._core import InputError
 from ._runs import mapping, merged, number, places, plainly, tell, warn
-from ._systems import System
+from ._systems import System, system_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,8 +44,7 @@ class Beginning(NamedTuple):
         remember: bool = True,
         feeds_back: bool = True,
     ) -> Beginning:
-        if not isinstance(system, System):
-            raise InputError(f"system: expected a Chain or a Model, got {type(system).__name__}")
+        system = system_of(system)
         if step is None and tolerance is None:
             tolerance = 1e-9
         run = {"duration": 1.0, "step": step, "tolerance": tolerance, **options}

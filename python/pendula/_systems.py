@@ -32,6 +32,15 @@ def tables_of(name: str, given: object) -> list[dict[str, object]]:
     return copy.deepcopy([mapping(f"{name}[{k}]", one) for k, one in enumerate(given)])
 
 
+def system_of(given: object) -> System:
+    """Raises InputError on what is no system; of a function of ``pendula.model`` it says how to make one."""
+    if isinstance(given, System):
+        return given
+    name, kind = getattr(given, "__name__", None), type(given).__name__
+    got = f"the function {name}: {name}() is a Model" if kind == "ModelFunction" else kind
+    raise InputError(f"system: expected a Chain or a Model, got {got}")
+
+
 class System(ABC):
     """What chains and models have in common: how they are run."""
 

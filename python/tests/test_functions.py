@@ -39,6 +39,12 @@ def test_a_function_is_a_model():
     assert np.array_equal(again.y, run.y)
 
 
+def test_it_is_called_before_it_moves():
+    for take in (pendula.Simulation, pendula.linearize):
+        with pytest.raises(pendula.InputError, match=r"got the function bob: bob\(\) is a Model$"):
+            take(bob, {"theta": 0.5})
+
+
 def test_it_may_use_what_surrounds_it():
     stiffness = 3.0
 
