@@ -177,13 +177,13 @@ class Engine {
     if (this.pointCount) {
       const motion = { time: this.time, q: row.subarray(1, 1 + size), v: row.subarray(1 + size, 1 + 2 * size) };
       row.set(this.pointsAt(motion.q), 3 + 2 * size);
-      row.set(this.#pointRates(motion), 3 + 2 * size + this.pointCount);
+      row.set(this.pointRates(motion), 3 + 2 * size + this.pointCount);
     }
     return row;
   }
 
-  // By central differences along the motion: pivots may move by themselves.
-  #pointRates({ time, q, v }) {
+  /// Velocities of points, by central differences along the motion: pivots may move by themselves.
+  pointRates({ time, q, v }) {
     const by = 1e-5 / (1 + Math.max(...v.map(Math.abs)));
     const [before, after] = [-by, by].map((h) => this.pointsAt(q.map((x, k) => x + h * v[k]), time + h));
     return after.map((x, k) => (x - before[k]) / (2 * by));
@@ -198,26 +198,38 @@ class Engine {
   }
 
   /// Coordinates near to q at which components of a point, from `first` on, are as near as can be to a place: damped least
-  /// squares, by differences.
-  pose(q, first, place) {
+  /// squares.
+  pose(q, first, place, time) {
     const wanted = Array.from(place);
     let now = Float64Array.from(q);
     const reach = Math.hypot(...wanted) + 1;
     for (let round = 0; round < 12; ++round) {
-      const here = this.pointsAt(now);
+      const here = this.pointsAt(now, time);
       const off = wanted.map((x, k) => x - here[first + k]);
       if (Math.hypot(...off) < 1e-9 * reach) break;
-      const slopes = Array.from(now, (x, k) => {
-        const moved = now.slice();
-        const by = 1e-6 * (1 + Math.abs(x));
-        moved[k] += by;
-        const there = this.pointsAt(moved);
-        return wanted.map((_, axis) => (there[first + axis] - here[first + axis]) / by);
-      });
-      const step = leastChange(slopes, off);
+      const step = leastChange(this.#slopes(now, first, off.length, time), off);
       now = now.map((x, k) => x + step[k]);
     }
     return now;
+  }
+
+  /// Rates at which the point is as near as can be to a velocity.
+  ratesFor(q, first, velocity, time) {
+    const driven = this.pointRates({ time, q, v: new Float64Array(q.length) });
+    const off = Array.from(velocity, (x, k) => x - driven[first + k]);
+    return Float64Array.from(leastChange(this.#slopes(q, first, off.length, time), off));
+  }
+
+  // How components of a point move with each coordinate, by differences.
+  #slopes(q, first, count, time) {
+    const here = this.pointsAt(q, time);
+    return Array.from(q, (x, k) => {
+      const moved = q.slice();
+      const by = 1e-6 * (1 + Math.abs(x));
+      moved[k] += by;
+      const there = this.pointsAt(moved, time);
+      return Array.from({ length: count }, (_, axis) => (there[first + axis] - here[first + axis]) / by);
+    });
   }
 
   /// Goes to the next row. `hand`: what pulls at a chain, {bob, place, speed}, or null.

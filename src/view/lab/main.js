@@ -313,37 +313,53 @@ class Lab {
 
   moveHand(place) {
     this.hand.wanted = place;
-    if (!this.playing) this.#pose();
+    if (!this.playing && !this.throws) this.#pose(place);
     this.changed();
   }
 
+  /// Whether a point of a model is held that will have the speed of the hand: time waits meanwhile.
+  get throws() {
+    return Boolean(model) && this.hand.isHolding && this.wasPlaying;
+  }
+
   // At rest, and where the hand is.
-  async #pose() {
+  #pose(place) {
     const { hand, state, row, size } = this;
     if (model) {
-      if (this.isPosing) return;
-      this.isPosing = true;
-      const point = model.points[hand.bob];
-      const first = model.points.slice(0, hand.bob).reduce((sum, each) => sum + each.columns.length, 0);
-      const [x, y, z] = hand.wanted;
-      const place = point.columns.length === 2 ? [x, z] : [x, y, z];
-      const answer = await this.computer.ask("pose", { q: row.subarray(1, 1 + size), first, place }).catch(() => null);
-      this.isPosing = false;
-      if (!answer) return;
-      this.row.set(answer.q, 1);
-      this.row.set(answer.points, 3 + 2 * size);
-    } else {
-      row.set(posedChain(state, row.subarray(1, 1 + size), hand.bob, hand.wanted), 1);
+      this.posing ??= this.#poseModel(hand.bob, place).finally(() => (this.posing = null));
+      return;
     }
-    this.row.fill(0, 1 + size, 1 + 2 * size);
-    if (model) this.row.fill(0, 3 + 2 * size + pointColumns);
+    row.set(posedChain(state, row.subarray(1, 1 + size), hand.bob, place), 1);
+    row.fill(0, 1 + size, 1 + 2 * size);
+    this.isPosed = true;
+    this.changed();
+  }
+  async #poseModel(bob, place, speed = [0, 0, 0]) {
+    const { size, order } = this;
+    const first = model.points.slice(0, bob).reduce((sum, each) => sum + each.columns.length, 0);
+    const of = ([x, y, z]) => (model.points[bob].columns.length === 2 ? [x, z] : [x, y, z]);
+    const asked = { q: this.row.slice(1, 1 + size), time: this.state.t, first, place: of(place), speed: of(speed) };
+    const answer = await this.computer.ask("pose", asked).catch(() => null);
+    if (!answer || order !== this.order) return;
+    this.row.set(answer.q, 1);
+    this.row.set(answer.v, 1 + size);
+    this.row.set(answer.points, 3 + 2 * size);
+    this.row.set(answer.rates, 3 + 2 * size + pointColumns);
     this.isPosed = true;
     this.changed();
   }
 
-  drop() {
-    if (!this.hand.isHolding) return;
-    this.hand.letGo();
+  async drop() {
+    const { hand, order, throws } = this;
+    if (!hand.isHolding) return;
+    const { bob } = hand;
+    hand.letGo();
+    if (model) {
+      await this.posing;
+      if (throws) await this.#poseModel(bob, hand.place, hand.speed);
+      else if (this.isPosed) await this.#poseModel(bob, hand.wanted); // where the hand was last
+      if (order !== this.order || hand.isHolding) return;
+    }
     if (this.isPosed) {
       this.isPosed = false;
       this.#startIsNow(this.row);
@@ -377,7 +393,8 @@ class Lab {
     const passed = this.last === null || this.last === undefined ? 0 : Math.min((now - this.last) / 1000, 0.1);
     this.last = now;
     const { history } = this;
-    if (this.hand.isHolding && this.playing) this.hand.move(passed);
+    if (this.hand.isHolding && (this.playing || this.throws)) this.hand.move(passed);
+    if (this.throws) this.#pose(this.hand.place);
     if (this.playing && history.rows) {
       this.clock = Math.min(this.clock + passed * this.state.speed, history.end + 0.05);
       this.isDue = true;
@@ -406,7 +423,7 @@ class Lab {
       rates: this.show.has("velocities") ? this.#rates() : null,
       trace: this.show.has("trace") ? this.#trace() : null,
       copies: state.copies ? this.copies : null,
-      held: this.hand.isHolding ? { bob: this.hand.bob, place: this.playing ? this.hand.place : this.hand.wanted } : null,
+      held: this.hand.isHolding ? { bob: this.hand.bob, place: this.playing || this.throws ? this.hand.place : this.hand.wanted } : null,
       show: this.show,
     });
     const panel = this.panels[this.frames % this.panels.length];

@@ -30,9 +30,11 @@ const orders = {
     return {};
   },
 
-  pose({ q, first, place }) {
-    const posed = engine.pose(q, first, place);
-    return { q: posed, points: engine.pointsAt(posed) };
+  /// A point at a place, with a speed there.
+  pose({ q, time, first, place, speed }) {
+    const posed = engine.pose(q, first, place, time);
+    const v = speed.some((each) => each !== 0) ? engine.ratesFor(posed, first, speed, time) : new Float64Array(q.length);
+    return { q: posed, v, points: engine.pointsAt(posed, time), rates: engine.pointRates({ time, q: posed, v }) };
   },
 
   /// Rows up to a time.
