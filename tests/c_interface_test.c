@@ -58,6 +58,9 @@ static void a_chain(void) {
   expect(pendula_energies(chain, 0, NULL, v, held) == PENDULA_INVALID, "energies of nothing");
   expect(pendula_model_of_program("no program", NULL, 0) == NULL && pendula_error_kind() == PENDULA_INVALID,
          "a program that is none");
+  expect(
+      pendula_model_of_kernel(NULL, NULL, 0) == NULL && strstr(pendula_error(), "kernel: expected the address") != NULL,
+      "a kernel that is none");
   options.tolerance = 1e-10;
   run = pendula_simulation_new(chain, 0, q, v, &options);
   event.context = &counter;
@@ -88,6 +91,70 @@ static void a_chain(void) {
   expect(pendula_linearize(run, a, NULL) == PENDULA_OK && a[2] == 1 && a[0] == 0, "its derivative");
   expect(pendula_finish(run) == PENDULA_OK, "the end");
   pendula_simulation_free(copy);
+  pendula_simulation_free(run);
+  pendula_model_free(chain);
+}
+
+/* A step of the run's own size, and what is seen within it. */
+static void steps(void) {
+  const double masses[2] = {1, 1}, lengths[2] = {1, 1}, q[2] = {2, 1}, v[2] = {0, 0}, torques[2] = {0.5, -0.1};
+  pendula_chain numbers = {2, 2, masses, lengths, 9.81, NULL, NULL, NULL, 0};
+  pendula_model* chain = pendula_model_of_chain(&numbers);
+  pendula_options options = {0};
+  pendula_simulation *run, *cut;
+  double there[4], other[4], saved[4096], largest = 0;
+  size_t count;
+  options.tolerance = 1e-12;
+  options.forget = 1;
+  run = pendula_simulation_new(chain, 0, q, v, &options);
+  cut = pendula_simulation_new(chain, 0, q, v, &options);
+  count = pendula_saved(run);
+  expect(count < 4096, "what is saved");
+  for (int k = 1; k <= 200; ++k) {
+    const double time = 0.01 * k;
+    while (pendula_time(run) < time) {
+      expect(pendula_save(run, saved, count) == PENDULA_OK && pendula_step(run) == PENDULA_OK, "a step");
+    }
+    expect(pendula_at(run, time, there, there + 2) == PENDULA_OK, "a time within it");
+    expect(pendula_advance_to(cut, time) == PENDULA_OK, "an advance");
+    pendula_motion(cut, other, other + 2);
+    for (int i = 0; i < 4; ++i) largest = fmax(largest, fabs(there[i] - other[i]));
+  }
+  expect(pendula_steps(run) < 100, "communication does not cut steps");               /* measured 36 */
+  expect(largest < 1e-10, "states of steps that are cut, and of those that are not"); /* measured 3.0e-13 */
+  expect(pendula_at(run, 0, there, there + 2) == PENDULA_INVALID, "an earlier step");
+
+  /* Back to where the last step began, and by other torques on from within it. */
+  expect(pendula_at(run, 2, there, there + 2) == PENDULA_OK && pendula_time(run) > 2, "a step beyond");
+  expect(pendula_resume(run, saved, count) == PENDULA_OK && pendula_time(run) < 2, "taking it back");
+  expect(pendula_at(run, 2, other, other + 2) == PENDULA_INVALID, "what is not known any more");
+  expect(pendula_step(run) == PENDULA_OK && pendula_at(run, 2, other, other + 2) == PENDULA_OK &&
+             memcmp(there, other, sizeof there) == 0,
+         "the same step to the bit");
+  expect(pendula_resume(run, saved, count) == PENDULA_OK && pendula_restart(run, 2, there, there + 2) == PENDULA_OK &&
+             pendula_hold(run, torques, 2) == PENDULA_OK && pendula_advance_to(run, 2.5) == PENDULA_OK &&
+             pendula_time(run) == 2.5,
+         "other torques");
+  pendula_simulation_free(cut);
+  pendula_simulation_free(run);
+  pendula_model_free(chain);
+}
+
+/* Elapsed time adds up with rounding: an advance ends at the very time that it was asked for. */
+static void ends_of_advances(void) {
+  const double masses[1] = {1}, lengths[1] = {1}, q[1] = {1};
+  pendula_chain numbers = {2, 1, masses, lengths, 9.81, NULL, NULL, NULL, 0};
+  pendula_model* chain = pendula_model_of_chain(&numbers);
+  pendula_simulation* run = pendula_simulation_new(chain, 0.1, q, NULL, NULL);
+  double there[2], now[2];
+  for (int k = 1; k <= 300; ++k) {
+    const double time = 0.1 + 0.0123 * k;
+    expect(pendula_advance_to(run, time) == PENDULA_OK && pendula_time(run) == time, "the time of an advance");
+    expect(pendula_at(run, time, there, there + 1) == PENDULA_OK, "the motion there");
+    pendula_motion(run, now, now + 1);
+    expect(memcmp(there, now, sizeof there) == 0, "which is the present one");
+  }
+  expect(pendula_at(run, 1, there, there + 1) == PENDULA_OK, "an earlier one");
   pendula_simulation_free(run);
   pendula_model_free(chain);
 }
@@ -329,6 +396,8 @@ static void sizes(void) {
 
 int main(void) {
   a_chain();
+  steps();
+  ends_of_advances();
   errors();
   an_ensemble();
   exponents();

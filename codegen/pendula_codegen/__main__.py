@@ -6,6 +6,7 @@ import argparse
 import json
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from pendula_codegen.backends.llvm import INSTRUCTION_SETS
@@ -15,9 +16,17 @@ from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.export import LANGUAGES, Request, Values, render_export, require_size
+from pendula_codegen.export import (
+    LANGUAGES,
+    MOST_COORDINATES,
+    Request,
+    Values,
+    render_chain_fmu,
+    render_export,
+    require_size,
+)
 from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws
-from pendula_codegen.fmu import MARK, packed_fmu
+from pendula_codegen.fmu import DEFAULT_TOLERANCE, MARK, Drive, Runtime, packed_fmu
 from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
 from pendula_codegen.links import LINKS, find_link
 from pendula_codegen.model import Model, read_model
@@ -133,6 +142,17 @@ def _parser() -> argparse.ArgumentParser:
         export.add_argument(f"--{name}", type=_numbers, help="numbers to begin with, with commas")
     export.add_argument("--time", type=float, default=0.0, help="to begin with")
     export.add_argument("--step", type=float, help="to begin with")
+    export.add_argument("--library", type=Path, help="pendula's static library, for an FMU of adaptive steps")
+    export.add_argument("--headers", type=Path, help="the folder of pendula/pendula.h")
+    export.add_argument("--flag", action="append", default=[], help="of the compiler, with that library")
+    export.add_argument("--tolerance", type=float, default=DEFAULT_TOLERANCE, help="of adaptive steps")
+    export.add_argument(
+        "--drive",
+        type=_numbers,
+        action="append",
+        default=[],
+        help="link from 0, amplitude, frequency, phase of a chain's drive, for an FMU of adaptive steps",
+    )
     export.add_argument("--output", required=True, type=Path, help="a folder")
     export.set_defaults(run=_run_export)
 
@@ -210,29 +230,50 @@ def _fed_model(options: argparse.Namespace) -> Model:
 
 
 def _run_export(options: argparse.Namespace) -> None:
-    laws: list[SampledLaw] = []
-    if options.space is not None:
-        chain = Chain(find_link(options.space), 1 if options.links is None else options.links)
-        require_size(len(chain.coordinates))
-        kernel, file = ChainKernel(chain), None
-        what = f"--space {options.space} --links {chain.links}"
-    else:
-        model = _fed_model(options)
-        laws = sampled_laws(model, options.sampled)
-        kernel, file = ModelKernel(model), Path(model.file)
-        what = f"--model {Path(options.model).name}{links_argument(model)}"
-    values = Values(options.parameters, options.inputs, options.q, options.v, options.time, options.step)
-    request = Request(options.name, options.language, options.number, options.stages, values, laws)
-    command = f"{what} {_export_words(options)} --output ."
-    texts = render_export(kernel, request, command, options.space, file)
+    texts, runtime = _exported_chain(options) if options.space is not None else _exported_model(options)
     files: dict[str, str | bytes] = {**texts}
     if options.language == "fmu":
-        files = {f"{options.name}.fmu": packed_fmu(options.name, texts)}
+        files = {f"{options.name}.fmu": packed_fmu(options.name, texts, runtime)}
     for name, content in files.items():
         path = options.output / name
         _require_own(path)
         write_atomically(path, content)
         print(path)
+
+
+def _exported_chain(options: argparse.Namespace) -> tuple[dict[str, str], Runtime | None]:
+    chain = Chain(find_link(options.space), 1 if options.links is None else options.links)
+    runtime = _runtime(options, drives=[Drive.of(numbers) for numbers in options.drive])
+    request, words = _request(options, [], runtime), _export_words(options)
+    command = f"--space {options.space} --links {chain.links} {words} --output ."
+    if runtime is not None and (options.drive or len(chain.coordinates) > MOST_COORDINATES):
+        return render_chain_fmu(chain, request, command, options.space), runtime
+    require_size(len(chain.coordinates))
+    return render_export(ChainKernel(chain), request, command, options.space), runtime
+
+
+def _exported_model(options: argparse.Namespace) -> tuple[dict[str, str], Runtime | None]:
+    model = _fed_model(options)
+    laws = sampled_laws(model, options.sampled)
+    what = f"--model {Path(options.model).name}{links_argument(model)}"
+    runtime = _runtime(options)
+    request = _request(options, laws, runtime)
+    command = f"{what} {_export_words(options)} --output ."
+    texts = render_export(ModelKernel(model), request, command, None, Path(model.file))
+    if runtime is not None:
+        runtime = replace(runtime, kernel=render_c(model, Path(options.model).name, "kernel.c"))
+    return texts, runtime
+
+
+def _runtime(options: argparse.Namespace, **more: object) -> Runtime | None:
+    if options.language != "fmu" or options.library is None:
+        return None
+    return Runtime(options.library, options.headers, options.flag, options.tolerance, **more)
+
+
+def _request(options: argparse.Namespace, laws: list[SampledLaw], runtime: Runtime | None) -> Request:
+    values = Values(options.parameters, options.inputs, options.q, options.v, options.time, options.step)
+    return Request(options.name, options.language, options.number, options.stages, values, laws, runtime)
 
 
 def _export_words(options: argparse.Namespace) -> str:
@@ -246,6 +287,7 @@ def _export_words(options: argparse.Namespace) -> str:
     for key in ("parameters", "inputs", "q", "v"):
         numbers = getattr(options, key)
         words += [f"--{key}={','.join(map(repr, numbers))}"] if numbers else []
+    words += [f"--drive={','.join(map(repr, numbers))}" for numbers in options.drive]
     words += [f"--time {options.time!r}"] if options.time else []
     words += [f"--step {options.step!r}"] if options.step else []
     return " ".join(words)

@@ -16,6 +16,28 @@ from pendula_codegen.places import Place
 from pendula_codegen.vocabulary import Form, Leaf, Vocabulary
 
 
+def declared_by(chain: Chain) -> Declared:
+    """What a chain has, which takes none of its equations."""
+    links = chain.numbers
+    axes = [""] if len(chain.model.torque) == 1 else [f"_{axis}" for axis in "xyz"]
+    of_links = {
+        "masses": ("kg", chain.mass, None, True),
+        "lengths": ("m", chain.length, None, True),
+        "damping": ("N m s", chain.damping, 0.0, False),
+    }
+    parameters = [
+        Parameter(field, unit, tuple(map(of, links)), default, positive, per_link=True)
+        for field, (unit, of, default, positive) in of_links.items()
+    ]
+    gravity = Parameter("gravity", "m/s^2", (chain.model.gravity,), 9.81, positive=False, per_link=False)
+    return Declared(
+        coordinates=[Coordinate(q, "rad") for q in chain.coordinates],
+        parameters=[*parameters, gravity],
+        inputs=[Input(Symbol(f"torque_{i}{axis}"), "N m") for i in links for axis in axes],
+        points=[(f"bob_{i}", chain.model.dimension) for i in links],
+    )
+
+
 class ChainKernel(SystemKernel):
     """Everything that is emitted for one link model and number of links."""
 
@@ -55,24 +77,7 @@ class ChainKernel(SystemKernel):
 
     @property
     def declared(self) -> Declared:
-        chain, links = self.chain, self.chain.numbers
-        axes = [""] if self.input_rows == 1 else [f"_{axis}" for axis in "xyz"]
-        of_links = {
-            "masses": ("kg", chain.mass, None, True),
-            "lengths": ("m", chain.length, None, True),
-            "damping": ("N m s", chain.damping, 0.0, False),
-        }
-        parameters = [
-            Parameter(field, unit, tuple(map(of, links)), default, positive, per_link=True)
-            for field, (unit, of, default, positive) in of_links.items()
-        ]
-        gravity = Parameter("gravity", "m/s^2", (chain.model.gravity,), 9.81, positive=False, per_link=False)
-        return Declared(
-            coordinates=[Coordinate(q, "rad") for q in chain.coordinates],
-            parameters=[*parameters, gravity],
-            inputs=[Input(Symbol(f"torque_{i}{axis}"), "N m") for i in links for axis in axes],
-            points=[(f"bob_{i}", chain.model.dimension) for i in links],
-        )
+        return declared_by(self.chain)
 
     @property
     def input_rows(self) -> int:

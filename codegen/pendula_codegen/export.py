@@ -7,17 +7,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
 from pathlib import Path
 
 from pendula_codegen.backends.c99 import NUMBERS, C99Printer
 from pendula_codegen.casadi_face import Side, quoted, shapes, slopes_of
+from pendula_codegen.chain import Chain
+from pendula_codegen.chain_kernel import declared_by
 from pendula_codegen.entry_points import Declared, SystemKernel
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import SampledLaw
-from pendula_codegen.fmu import DEFAULT_STEP, UNSUPPORTED, token_of, variables_of
+from pendula_codegen.fmu import (
+    DEFAULT_STEP,
+    OF_EXCHANGE,
+    UNSUPPORTED,
+    Runtime,
+    settings_of,
+    token_of,
+    variables_of,
+)
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import CPP_KEYWORDS, Parameter
@@ -35,6 +45,7 @@ LANGUAGES = {
     "casadi": {**_C, "export_casadi.c.j2": "_casadi.c"},
     "fmu": {**_C, "export_fmu.c.j2": "_fmu.c", "export_fmu.xml.j2": "_fmu.xml"},
 }
+_ADAPTIVE = {"export_fmu_adaptive.c.j2": "_adaptive.c"}
 MOST_COORDINATES = 16  # everything is written out, and matrices are dense
 
 # What a function is made of: entry points of the kernel, and what it calls what they give.
@@ -266,6 +277,7 @@ class Request:
     number   double or float
     stages   of the Gauss step
     laws     of a controller that samples
+    runtime  what an FMU takes adaptive steps by
     """
 
     name: str
@@ -274,6 +286,7 @@ class Request:
     stages: int = 2
     values: Values = field(default_factory=Values)
     laws: Sequence[SampledLaw] = ()
+    runtime: Runtime | None = None
 
     def check(self) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) or self.name in CPP_KEYWORDS:
@@ -360,25 +373,59 @@ def render_export(
         "step": request.values.step,
         "time": request.values.time,
     }
+    templates = LANGUAGES[request.language]
     if request.language == "fmu":
-        context |= _fmu_context(declared, context["values"], request, context["banner"])
+        chain = getattr(kernel, "chain", None)
+        context |= _fmu_context(declared, request, context["banner"], chain, has_equations=True)
+        templates = templates | (_ADAPTIVE if request.runtime is not None else {})
+    return _rendered(request, templates, context)
+
+
+def render_chain_fmu(chain: Chain, request: Request, command: str, space: str) -> dict[str, str]:
+    """The same of a chain of any length, with drives or without, as an FMU for co-simulation by its runtime."""
+    request.check()
+    declared = declared_by(chain)
+    printer = C99Printer("double", "", {})
+    text = banner(f"A chain of {chain.links} links.", "export", space, command)
+    context = {"banner": text, "name": request.name, "literal": printer.literal, "time": request.values.time}
+    context |= _fmu_context(declared, request, text, chain, has_equations=False)
+    return _rendered(request, _ADAPTIVE | {"export_fmu.xml.j2": "_fmu.xml"}, context)
+
+
+def _rendered(request: Request, templates: dict[str, str], context: dict[str, object]) -> dict[str, str]:
     return {
         f"{request.name}{ending}": ENVIRONMENT.get_template(template).render(context)
-        for template, ending in LANGUAGES[request.language].items()
+        for template, ending in templates.items()
     }
 
 
 def _fmu_context(
-    declared: Declared, values: dict[str, list[float | None]], request: Request, text: str
+    declared: Declared, request: Request, text: str, chain: Chain | None, has_equations: bool
 ) -> dict[str, object]:
-    step = request.values.step or DEFAULT_STEP
-    variables = variables_of(declared, values, step)
+    step, runtime = request.values.step or DEFAULT_STEP, request.runtime
+    values = _numbers(declared, request.values)
+    settings = settings_of(step, runtime, has_equations)
+    variables = variables_of(declared, values, settings, has_equations)
+    n = len(declared.coordinates)
     return {
+        "n": n,
+        "states": 2 * n,
+        "parameters": len(values["parameters"]),
+        "inputs": len(declared.inputs),
+        "points": sum(count for _, count in declared.points),
+        "values": values,
+        "literals": lambda numbers: ", ".join(map(repr, numbers)),
+        "equations": has_equations,
+        "settings": [setting.key for setting in settings],
+        "names_of_settings": {setting.key: setting.name for setting in settings},
+        "tolerance": runtime.tolerance if runtime is not None else None,
+        "chain": {"dimension": chain.model.dimension, "links": chain.links} if chain else None,
+        "drives": runtime.drives if runtime is not None else (),
         "variables": variables,
         "units": sorted({variable.unit for variable in variables} - {""}),
         "internal_step": step,
-        "token": token_of([text, repr(request), repr(variables)]),
-        "unsupported_functions": UNSUPPORTED,
+        "token": token_of([text, repr(replace(request, runtime=None)), repr(variables)]),
+        "unsupported_functions": (*UNSUPPORTED, *(() if has_equations else OF_EXCHANGE)),
     }
 
 

@@ -319,7 +319,7 @@ void CommandLine::add_export() {
       ->required();
   takes_words(exports->add_option("--as", options.language,
                                   "c: C99, NAME.h and NAME.c; casadi: functions for CasADi and acados besides; fmu: "
-                                  "NAME.fmu, for simulators that know FMI 3.0"),
+                                  "NAME.fmu, for simulators that know FMI 3.0, with pendula's adaptive steps"),
               "LANGUAGE", {"c", "casadi", "fmu"})
       ->required();
   takes_file(exports->add_option("-o,--output", options.folder, "The folder for the files"), {"/"})->required();

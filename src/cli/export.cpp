@@ -7,6 +7,7 @@
 #include <pendula/numeric/number_text.hpp>
 #include <span>
 #include <string>
+#include <system_error>
 #include <variant>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "io/generator.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
+#include "io/kernel_maker.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"
 
@@ -68,11 +70,13 @@ void add_start(Words& words, const Motion& start) {
 }
 
 template <class Space>
-Words scenario_words(const io::Scenario<Space>& scenario, const std::string& file) {
+Words scenario_words(const io::Scenario<Space>& scenario, const std::string& file, bool with_runtime) {
   const Chain<Space>& chain = scenario.chain;
   if (scenario.natural) refuse(file, "chain.units: expected \"SI\", got \"natural\"");
   if (!scenario.feedback.empty()) refuse(scenario.feedback.front().place, "a chain's feedback cannot be exported");
-  if (!chain.drives().empty()) refuse(file, "chain.drive: a chain's drives cannot be exported");
+  if (!chain.drives().empty() && !with_runtime) {
+    refuse(file, "chain.drive: a chain's drives can be exported to an FMU that has pendula's library in it alone");
+  }
   Words words = {"--space", Space::dof == 1 ? "planar" : "spatial", "--links", std::to_string(chain.links())};
   std::vector<double> parameters(chain.masses().begin(), chain.masses().end());
   parameters.insert(parameters.end(), chain.lengths().begin(), chain.lengths().end());
@@ -82,6 +86,12 @@ Words scenario_words(const io::Scenario<Space>& scenario, const std::string& fil
   add_numbers(words, "parameters", parameters);
   add_numbers(words, "inputs", std::span(torque.data(), static_cast<std::size_t>(torque.size())));
   add_start(words, scenario.start);
+  for (const Drive<Space>& drive : chain.drives()) {
+    std::vector<double> numbers{static_cast<double>(drive.link)};
+    numbers.insert(numbers.end(), drive.amplitude.begin(), drive.amplitude.end());
+    numbers.insert(numbers.end(), {drive.frequency, drive.phase});
+    add_numbers(words, "drive", numbers);
+  }
   return words;
 }
 
@@ -125,6 +135,26 @@ std::optional<double> step_of(const io::RunPlan& plan) {
   return plan.run.method == Method::gauss && plan.run.step > 0 ? std::optional(plan.run.step) : std::nullopt;
 }
 
+/// What the steps of an FMU err by: the tolerance that is asked for, or the accuracy.
+double tolerance_of(const io::RunPlan& plan) {
+  if (!is_adaptive(plan.run)) return RunOptions{}.tolerance;
+  return plan.accuracy.error > 0 ? plan.accuracy.error : plan.run.tolerance;
+}
+
+/// Whether an FMU has pendula's library in it.
+bool has_runtime(const ExportOptions& options, const io::Toolchain& toolchain) {
+  std::error_code unknown;
+  return options.language == "fmu" && std::filesystem::is_regular_file(toolchain.library, unknown);
+}
+
+/// What the generator is told of that library.
+void add_runtime(Words& words, const io::Toolchain& toolchain) {
+  words.push_back("--library=" + toolchain.library.string());
+  words.push_back("--headers=" + toolchain.headers.string());
+  for (const std::string& flag : io::flags_of_least_set()) words.push_back("--flag=" + flag);
+  for (const std::string& flag : toolchain.flags) words.push_back("--flag=" + flag);
+}
+
 /// What the generator is told of a scenario.
 Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
   toolchain.kernels_by = "interpreter";  // nothing runs
@@ -139,10 +169,11 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
       [&](const auto& found) {
         Words words;
         if constexpr (requires { found.chain; }) {
-          words = scenario_words(found, text.name);
+          words = scenario_words(found, text.name, has_runtime(options, toolchain));
         } else {
           words = scenario_words(found, *model, toolchain);
         }
+        if (options.language == "fmu") add_number(words, "tolerance", tolerance_of(found));
         if (!found.events.empty()) std::cerr << "pendula: warning: events are not exported\n";
         if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
         if (found.run.method == Method::gauss && found.run.step > 0) {
@@ -192,6 +223,14 @@ ExitStatus export_system(const ExportOptions& options) {
     words.insert(words.end(), {"--as", options.language, "--output", options.folder, "--name",
                                options.name.empty() ? default_name(options) : options.name});
     if (options.stages) words.insert(words.end(), {"--stages", std::to_string(*options.stages)});
+    if (has_runtime(options, toolchain)) {
+      add_runtime(words, toolchain);
+    } else if (options.language == "fmu") {
+      std::cerr << "pendula: warning: the FMU takes steps of constant size: adaptive ones take the static library, "
+                << (toolchain.library.empty() ? "which this build has none of"
+                                              : "and there is no " + toolchain.library.string())
+                << '\n';
+    }
     if (options.is_float) words.insert(words.end(), {"--number", "float"});
     std::cout << io::run_generator(words, toolchain);
   } catch (const io::ModelError& error) {

@@ -10,6 +10,7 @@
 #include <pendula/run/no_kernel.hpp>
 #include <pendula/run/quantity.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/c_kernel.hpp>
 #include <pendula/system/interpreted_kernel.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/version.hpp>
@@ -169,6 +170,15 @@ pendula_model* pendula_model_of_table(const void* table, const double* parameter
   return made([&] {
     return make_system(borrowed(*static_cast<const SystemTable*>(table)), {parameters, parameter_count},
                        {inputs, input_count});
+  });
+}
+
+pendula_model* pendula_model_of_kernel(const void* kernel, const double* parameters, size_t count) {
+  return made([&] {
+    if (kernel == nullptr) throw std::invalid_argument("kernel: expected the address of one, got none");
+    std::shared_ptr<const SystemTable> table = table_of(*static_cast<const CKernel*>(kernel), nullptr);
+    const std::vector<double> numbers = numbers_or_defaults(table->info, parameters, count);
+    return make_system(std::move(table), numbers, {});
   });
 }
 

@@ -7,6 +7,7 @@
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/inputs.hpp>
 #include <pendula/run/schedule.hpp>
+#include <pendula/system/stop_sign.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -61,6 +62,7 @@ Outcome Mover::start(const Motion& motion) {
   require_rest("restart");
   const Outcome started = integrator_->start(motion);
   if (!started) return started;
+  seen_since_ = never;
   motion_ = motion;
   origin_ = motion.time;
   watch_.start(motion);
@@ -90,6 +92,7 @@ void Mover::require_rest(const char* what) const {
 void Mover::move_by(std::shared_ptr<const Subject> subject, std::unique_ptr<Integrator> integrator) {
   subject_ = std::move(subject);
   integrator_ = std::move(integrator);
+  seen_since_ = never;
   again_.reset();
   for (Viewer& viewer : viewers_) viewer.show(*subject_);
 }
@@ -112,15 +115,42 @@ Advance Mover::advance_to(double time) {
   stopping_.reset();
   stopped_by_.reset();
   integrator_->remember_steps(!watch_.events().empty() || !viewers_.empty());
+  seen_since_ = never;
   const RunResult result = go_on(
       *integrator_, origin_, schedule, {}, [](const Motion&) {}, stop_, [](const RowPlace&, bool) {},
       [this] { return after_step(); });
   motion_ = integrator_->state();
-  if (stopping_) {
-    stopped_by_ = stopping_->event;
-    restart_after(*std::exchange(stopping_, {}));
+  if (result.outcome && !result.stopped && !result.end) {  // the time since the origin is exact to an ulp or two only
+    motion_.time = time;
+    if (remembers_) history_.end_at(time);
   }
+  stop_where_stopped();
   return {result.outcome, result.stopped, stopped_by_};
+}
+
+Advance Mover::step() {
+  require_rest("step");
+  const Raised advancing(is_advancing_);
+  stopping_.reset();
+  stopped_by_.reset();
+  integrator_->remember_steps(true);
+  seen_since_ = never;
+  const Heeding heeding(*integrator_, stop_sign(stop_));
+  const double begin = integrator_->time();
+  const Outcome outcome = integrator_->step(is_adaptive(options_) ? never : options_.step);
+  if (outcome.status == Status::interrupted) return {.outcome = {}, .stopped = true};
+  if (!outcome) return {outcome};
+  after_step();
+  motion_ = integrator_->state();
+  seen_since_ = begin;
+  stop_where_stopped();
+  return {outcome, stop_(), stopped_by_};
+}
+
+void Mover::stop_where_stopped() {
+  if (!stopping_) return;
+  stopped_by_ = stopping_->event;
+  restart_after(*std::exchange(stopping_, {}));
 }
 
 std::optional<Motion> Mover::after_step() {
@@ -146,6 +176,7 @@ std::optional<Motion> Mover::after_step() {
 void Mover::restart_after(const Occurrence& happened) {
   motion_ = happened.motion;
   integrator_->start(motion_);
+  seen_since_ = never;
   watch_.start_after(happened);
 }
 
@@ -154,6 +185,7 @@ Outcome Mover::at(double time, Motion& motion) {
     motion = motion_;
     return {};
   }
+  if (time >= seen_since_ && time < motion_.time) return integrator_->look(time, motion);
   if (!history_.covers(time)) {
     throw std::invalid_argument("time: expected one since the start that steps were kept of, until " +
                                 shortest(motion_.time) + " s, got " + shortest(time));
@@ -217,6 +249,7 @@ void Mover::resume(const Member& saved) {
     move_by(std::move(subject), std::move(integrator));
   }
   integrator_->resume({{end, saved.numbers.end()}});
+  seen_since_ = never;
   become(*this, {{saved.numbers.begin(), end}});
   held_ = {{-std::numeric_limits<double>::infinity(), inputs()}};
   watch_.resume(motion_);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <pendula/run/event.hpp>
@@ -58,8 +59,11 @@ class Mover {
   /// To `time`, where a step ends. Throws std::invalid_argument where that is past, and what callbacks throw.
   Advance advance_to(double time);
 
+  /// One step of its own size, wherever that ends. Throws what callbacks do.
+  Advance step();
+
   /// The motion at a time since the start, at the full order of the method, by a step from where the step that it lies
-  /// in began. Throws std::invalid_argument where there is none.
+  /// in began; a last one that step() took is looked into. Throws std::invalid_argument where there is none.
   Outcome at(double time, Motion& motion);
 
   /// Asked after every step, and within long ones.
@@ -93,7 +97,10 @@ class Mover {
   const Held& held_at(double time) const;
   void require_rest(const char* what) const;
   std::optional<Motion> after_step();
+  void stop_where_stopped();
   void restart_after(const Occurrence& happened);
+
+  static constexpr double never = std::numeric_limits<double>::infinity();
 
   std::shared_ptr<const Subject> model_, subject_;  // as it was given; with the inputs that are held
   RunOptions options_;
@@ -102,7 +109,8 @@ class Mover {
   std::unique_ptr<Integrator> again_;  // takes steps again, to look into them
   double again_since_ = 0;             // what inputs it has
   Motion motion_;
-  double origin_ = 0;  // where times are counted from
+  double origin_ = 0;          // where times are counted from
+  double seen_since_ = never;  // where the last step began, if the integrator can look into it
   std::size_t steps_ = 0;
   bool is_advancing_ = false;
   bool remembers_;

@@ -116,6 +116,15 @@ pendula_status pendula_advance_to(pendula_simulation* simulation, double time) {
   });
 }
 
+pendula_status pendula_step(pendula_simulation* simulation) {
+  return guarded([&] {
+    simulation->asked_to_stop = false;
+    const Advance advance = simulation->mover.step();
+    require(advance.outcome, simulation->mover.subject());
+    return advance.event ? PENDULA_EVENT : advance.stopped ? PENDULA_STOPPED : PENDULA_OK;
+  });
+}
+
 double pendula_time(const pendula_simulation* simulation) {
   return simulation->mover.motion().time;
 }

@@ -18,6 +18,9 @@ class StepHistory {
     numbers_.insert(numbers_.end(), motion.v.begin(), motion.v.end());
   }
 
+  /// The last one ended at this time, up to rounding.
+  void end_at(double time) { times_.back() = time; }
+
   /// Of the last one nothing is known any more: the run went on from elsewhere, later.
   void clear() {
     times_.clear();

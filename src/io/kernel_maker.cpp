@@ -21,9 +21,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Flags for the instruction set that the library runs with, as in cmake/PendulaLibrary.cmake.
-std::vector<std::string> architecture_flags() {
-  const std::string_view set = library().instruction_set;
+/// Flags for an instruction set, as in cmake/PendulaLibrary.cmake.
+std::vector<std::string> architecture_flags(std::string_view set) {
   if (set == "sse2") return {"-march=x86-64", "-mno-sse3"};
   if (set == "avx2") return {"-march=x86-64", "-mavx2", "-mfma"};
   if (set == "avx512") {
@@ -80,7 +79,7 @@ void run_compilers(const std::vector<std::vector<std::string>>& commands, const 
 fs::path compile(const std::string& name, const fs::path& text, const Toolchain& toolchain) {
   std::vector<std::string> compiler{toolchain.compiler};
   compiler.insert(compiler.end(), std::begin(flags_of_kernels), std::end(flags_of_kernels));
-  for (const std::string& flag : architecture_flags()) compiler.push_back(flag);
+  for (const std::string& flag : architecture_flags(library().instruction_set)) compiler.push_back(flag);
   for (const std::string& flag : toolchain.flags) compiler.push_back(flag);
   const auto with = [&](std::initializer_list<std::string> more) {
     std::vector<std::string> command = compiler;
@@ -118,6 +117,10 @@ fs::path compile_by_llvm(const std::string& name, const fs::path& text, const To
 }
 
 }  // namespace
+
+std::vector<std::string> flags_of_least_set() {
+  return architecture_flags(needed_instruction_set());
+}
 
 const char* kind_of_kernels(const Toolchain& toolchain) {
   const std::string& by = toolchain.kernels_by;

@@ -14,6 +14,9 @@ namespace pendula::io {
 /// The extension of kernels that are made here, as the environment asks. Fails if it asks for something unknown.
 const char* kind_of_kernels(const Toolchain& toolchain);
 
+/// Compiler flags for code that runs on every processor that this build does.
+std::vector<std::string> flags_of_least_set();
+
 /// A description of such kernels.
 std::string how_made(std::string_view kind, const Toolchain& toolchain);
 

@@ -55,12 +55,14 @@ Toolchain Toolchain::of_this_program() {
 Toolchain Toolchain::of(const fs::path& folder) {
   Toolchain toolchain;
   const fs::path prefix = folder.parent_path();
-  // In the build folder this file has lines with the Python, and the folders of generator, plots and scenarios.
+  // In the build folder this file has lines with the Python, and the folders of generator, plots and scenarios,
+  // the static library and the folder of headers.
   std::ifstream beside(folder / "pendula.toolchain");
   if (beside) {
     std::string line;
     std::getline(beside, toolchain.python);
-    for (fs::path* package : {&toolchain.codegen, &toolchain.plotting, &toolchain.examples}) {
+    for (fs::path* package :
+         {&toolchain.codegen, &toolchain.plotting, &toolchain.examples, &toolchain.library, &toolchain.headers}) {
       if (std::getline(beside, line)) *package = line;
     }
   } else {
@@ -69,6 +71,8 @@ Toolchain Toolchain::of(const fs::path& folder) {
     toolchain.codegen = prefix / configured::installed_codegen;
     toolchain.plotting = prefix / configured::installed_plotting;
     toolchain.examples = prefix / configured::installed_examples;
+    toolchain.library = prefix / configured::installed_library;
+    toolchain.headers = prefix / configured::installed_headers;
   }
   toolchain.python = environment("PENDULA_PYTHON", toolchain.python);
   toolchain.compiler = environment("CC", find_compiler());

@@ -33,8 +33,10 @@ struct Toolchain {
   std::filesystem::path codegen;   ///< folder of the Python package pendula_codegen
   std::filesystem::path plotting;  ///< folder of the Python package pendula_plot
   std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
-  std::filesystem::path cache;     ///< folder of kernels; empty if there is none
-  std::function<void()> ask;       ///< called while other programs work, if there is one; what it throws ends them
+  std::filesystem::path library;  ///< the static library of pendula, whether it is there or not; empty if there is none
+  std::filesystem::path headers;  ///< folder of pendula/pendula.h
+  std::filesystem::path cache;    ///< folder of kernels; empty if there is none
+  std::function<void()> ask;      ///< called while other programs work, if there is one; what it throws ends them
 
   /// Runs the generator in this process, if there is one; returns nothing where `python` has to.
   std::function<std::optional<Ended>(const std::vector<std::string>& arguments)> generate;

@@ -70,6 +70,11 @@ pendula_model* pendula_model_named(const char* name, int links, const double* pa
 pendula_model* pendula_model_of_table(const void* table, const double* parameters, size_t parameter_count,
                                       const double* inputs, size_t input_count);
 
+/* A model of a kernel that the program is linked with: the address of `pendula_kernel` in what
+ * `python -m pendula_codegen program --as c` writes, of this very version, which must outlive it. `parameters`: (count)
+ * numbers, concatenated; NULL: the defaults of the model. */
+pendula_model* pendula_model_of_kernel(const void* kernel, const double* parameters, size_t count);
+
 /* A model of a program: the text that `python -m pendula_codegen program --as bytecode` writes, which is interpreted.
  * `parameters`: (count) numbers, concatenated; NULL: the defaults of the model. */
 pendula_model* pendula_model_of_program(const char* text, const double* parameters, size_t count);
@@ -130,12 +135,16 @@ void pendula_simulation_free(pendula_simulation* simulation);
 
 /* Advances to `time`, where a step ends. */
 pendula_status pendula_advance_to(pendula_simulation* simulation, double time);
+/* Takes one step of its own size, which ends where it does: pendula_time(). Within this last step pendula_at() costs
+ * little, and is there whether earlier steps are kept or not. */
+pendula_status pendula_step(pendula_simulation* simulation);
 
 double pendula_time(const pendula_simulation* simulation);
 void pendula_motion(const pendula_simulation* simulation, double* q, double* v);
 /* Writes the row of the current motion, with the inputs held. */
 pendula_status pendula_simulation_row(const pendula_simulation* simulation, double* row);
-/* The motion at any time since the start, at the full order of the method. */
+/* The motion at any time since the start, at the full order of the method; if no steps are kept, from the start of a
+ * last one by pendula_step(). */
 pendula_status pendula_at(pendula_simulation* simulation, double time, double* q, double* v);
 /* Number of steps taken. */
 size_t pendula_steps(const pendula_simulation* simulation);

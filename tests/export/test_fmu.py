@@ -2,6 +2,8 @@
 
 import ctypes
 import json
+import os
+import shutil
 import subprocess
 import zipfile
 from importlib.util import find_spec
@@ -23,29 +25,44 @@ constant = 0.5
 theta = [2.0, 1.0]
 [run]
 duration = 2.0
-accuracy = 1e-12
+tolerance = 1e-12
 """
 
 
-@pytest.fixture(scope="module")
-def folder(pendula, tmp_path_factory):
-    """A folder with the FMU of a cart with two links, unpacked."""
-    place = tmp_path_factory.mktemp("fmu")
-    ended = pendula(
-        "export", "cart_chain", "--links", 2, "--as", "fmu", "--name", "system", "--stages", 4, "-o", place
-    )
+def unpacked(pendula, place, *words):
+    """The folder with an FMU of these words, unpacked, whose name is system."""
+    ended = pendula("export", *words, "--as", "fmu", "--name", "system", "-o", place)
     assert (ended.returncode, ended.stdout) == (0, f"{place}/system.fmu\n"), ended.stderr
+    assert ended.stderr == ""
     with zipfile.ZipFile(place / "system.fmu") as archive:
         archive.extractall(place)
     return place
 
 
+@pytest.fixture(scope="module")
+def folder(pendula, tmp_path_factory):
+    """A folder with the FMU of a cart with two links, unpacked."""
+    return unpacked(pendula, tmp_path_factory.mktemp("fmu"), "cart_chain", "--links", 2, "--stages", 4)
+
+
+@pytest.fixture(scope="module")
+def rebuilt(folder):
+    """What somebody else's compiler makes of the sources: steps of constant size."""
+    sources = sorted((folder / "sources").glob("*.c"))
+    assert [source.name for source in sources] == ["system.c", "system_fmu.c"]
+    binary = folder / "again.so"
+    command = [COMPILER, *FLAGS, "-O1", "-fPIC", "-shared", *sources, "-o", binary, "-lm"]
+    subprocess.run(command, check=True)
+    return binary
+
+
 class Fmu:
     """An instance for co-simulation, or for model exchange; `said` is what it complains of."""
 
-    def __init__(self, folder, token: str | None = None):
+    def __init__(self, folder, token: str | None = None, binary=None):
         description = ElementTree.parse(folder / "modelDescription.xml").getroot()
-        [binary] = (folder / "binaries").glob("*/system.*")
+        if binary is None:
+            [binary] = (folder / "binaries").glob("*/system.*")
         self.library = ctypes.CDLL(str(binary))
         self.said: list[str] = []
         self._log = LOG(lambda _, status, category, message: self.said.append(message.decode()))
@@ -86,13 +103,48 @@ class Fmu:
         arguments = ctypes.c_double(time), ctypes.c_double(duration), ctypes.c_bool(True), *told
         return self.library.fmi3DoStep(self.instance, *arguments, ctypes.byref(last))
 
+    def saved(self) -> bytes:
+        """The state of the FMU, serialised."""
+        kept, size = ctypes.c_void_p(), ctypes.c_size_t()
+        assert self.library.fmi3GetFMUState(self.instance, ctypes.byref(kept)) == OK
+        assert self.library.fmi3SerializedFMUStateSize(self.instance, kept, ctypes.byref(size)) == OK
+        into = (ctypes.c_uint8 * size.value)()
+        assert self.library.fmi3SerializeFMUState(self.instance, kept, into, size) == OK
+        assert self.library.fmi3FreeFMUState(self.instance, ctypes.byref(kept)) == OK and not kept
+        return bytes(into)
+
+    def restore(self, saved: bytes) -> None:
+        kept, given = ctypes.c_void_p(), (ctypes.c_uint8 * len(saved))(*saved)
+        size = ctypes.c_size_t(len(saved))
+        assert self.library.fmi3DeserializeFMUState(self.instance, given, size, ctypes.byref(kept)) == OK
+        assert self.library.fmi3SetFMUState(self.instance, kept) == OK
+        self.library.fmi3FreeFMUState(self.instance, ctypes.byref(kept))
+
+    def run(self, begin: float, count: int, h: float) -> None:
+        for k in range(count):
+            assert self.step(begin + k * h, h) == OK, self.said
+
 
 STATES = ("x", "theta_1", "theta_2", "x_dot", "theta_dot_1", "theta_dot_2")
 
 
-def test_steps_are_those_of_the_exported_c(folder, export, tmp_path):
+def simulated(pendula, place, text: str, *overrides: str) -> dict[str, float]:
+    """Coordinates and rates where a scenario ends, by the command line."""
+    (place / "scenario.toml").write_text(text)
+    words = [word for override in overrides for word in ("--set", override)]
+    ended = pendula("simulate", "scenario.toml", "--json", *words, cwd=place)
+    assert ended.returncode == 0, ended.stderr
+    final = json.loads(ended.stdout)["final"]
+    return final["q"] | final["v"]
+
+
+def distance(fmu: Fmu, theirs: dict[str, float]) -> float:
+    return max(abs(x - y) for x, y in zip(fmu.get(*theirs), theirs.values(), strict=True))
+
+
+def test_steps_of_the_sources_are_those_of_the_exported_c(folder, rebuilt, export, tmp_path):
     exported = export(tmp_path, "cart_chain", "--links", "2", "--stages", "4")
-    fmu = Fmu(folder)
+    fmu = Fmu(folder, binary=rebuilt)
     assert fmu.set(**{"pendula.internal_step": 1.0, "masses_1": 1.0 + 1e-3}) == OK
     assert fmu.step(0.0, 0.01) == OK and fmu.step(0.01, 0.01) == OK
     ours = numbers(consumer(exported), 2, 0.01, "parameters", 0, 1e-3)
@@ -100,17 +152,159 @@ def test_steps_are_those_of_the_exported_c(folder, export, tmp_path):
     assert fmu.get("energy") == pytest.approx(ours["energy"], abs=1e-14)
 
 
-def test_a_saved_state_goes_on_to_the_bit(folder):
-    fmu, kept = Fmu(folder), ctypes.c_void_p()
+@pytest.mark.parametrize("h", [1e-3, 0.5])
+def test_co_simulation_takes_the_steps_of_the_command_line(h, folder, pendula, tmp_path):
+    fmu = Fmu(folder)
+    fmu.set(**{"pendula.tolerance": 1e-12, "theta_1": 2.0, "theta_2": 1.0, "push": 0.5})
+    fmu.run(0.0, round(2.0 / h), h)
+    assert distance(fmu, simulated(pendula, tmp_path, SCENARIO)) < 1e-10  # measured MEASURED_CART
+
+
+def test_a_scenario_says_tolerance_start_and_inputs(pendula, tmp_path):
+    (tmp_path / "cart.toml").write_text(SCENARIO)
+    fmu = Fmu(unpacked(pendula, tmp_path, tmp_path / "cart.toml"))
+    assert fmu.get("pendula.tolerance", "theta_1", "push") == [1e-12, 2.0, 0.5]
+    fmu.run(0.0, 200, 0.01)
+    assert distance(fmu, simulated(pendula, tmp_path, SCENARIO)) < 1e-10  # measured MEASURED_SCENARIO
+
+
+def test_an_input_that_changes_takes_the_step_back(folder, pendula, tmp_path):
+    """Against runs of the command line, each of which begins where the one before ended."""
+    fmu = Fmu(folder)
+    fmu.set(**{"pendula.tolerance": 1e-12, "theta_1": 2.0, "theta_2": 1.0})
+    start = {"theta_1": 2.0, "theta_2": 1.0}
+    for k, (push, mass) in enumerate([(0.5, 1.0), (-2.0, 1.0), (1.5, 1.25)]):
+        fmu.set(push=push, masses_2=mass)
+        fmu.run(0.3 * k, 30, 0.01)
+        q = {name: start.get(name, 0.0) for name in STATES}
+        numbers = [
+            f"start.time={0.3 * k}",
+            "run.duration=0.3",
+            f"system.drive=[{{ input = 'push', constant = {push} }}]",
+            f"system.parameters={{ masses = [1.0, {mass}] }}",
+            f"start.x={q['x']!r}",
+            f"start.theta=[{q['theta_1']!r}, {q['theta_2']!r}]",
+            f"start.x_dot={q['x_dot']!r}",
+            f"start.theta_dot=[{q['theta_dot_1']!r}, {q['theta_dot_2']!r}]",
+        ]
+        start = simulated(pendula, tmp_path, SCENARIO, *numbers)
+        assert distance(fmu, start) < 1e-11  # measured MEASURED_INPUTS
+
+
+@pytest.mark.parametrize("changes", [False, True])
+def test_a_saved_state_goes_on_to_the_bit(changes, folder):
+    """In another instance, too; and where an input was changed just before."""
+    fmu, other = Fmu(folder), Fmu(folder)
     fmu.set(theta_1=2.0, theta_dot_2=1.0)
-    fmu.step(0.0, 0.5)
-    assert fmu.library.fmi3GetFMUState(fmu.instance, ctypes.byref(kept)) == OK
-    fmu.step(0.5, 0.5)
+    fmu.run(0.0, 50, 0.01)
+    if changes:
+        fmu.set(push=1.0)
+        fmu.run(0.5, 1, 0.01)
+        fmu.set(push=2.0, masses_1=1.5)
+    begin = 0.51 if changes else 0.5
+    saved = fmu.saved()
+    fmu.run(begin, 50, 0.01)
     there = fmu.get(*STATES)
-    assert fmu.library.fmi3SetFMUState(fmu.instance, kept) == OK
-    fmu.step(0.5, 0.5)
+    for one in (fmu, other):
+        one.restore(saved)
+        one.run(begin, 50, 0.01)
+        assert one.get(*STATES) == there
+
+
+def test_a_state_that_was_saved_before_the_first_step_is_one_too(folder):
+    fmu = Fmu(folder)
+    fmu.set(theta_1=2.0)
+    saved = fmu.saved()
+    fmu.run(0.0, 10, 0.01)
+    there = fmu.get(*STATES)
+    fmu.restore(saved)
+    assert fmu.get("theta_1") == [2.0]
+    fmu.run(0.0, 10, 0.01)
     assert fmu.get(*STATES) == there
-    assert fmu.library.fmi3FreeFMUState(fmu.instance, ctypes.byref(kept)) == OK and not kept
+
+
+LINKS = 40
+LONG = f"""
+[chain]
+space = "planar"
+masses = {[1.0 / LINKS] * LINKS}
+lengths = {[1.0 / LINKS] * LINKS}
+[start]
+theta = {[1.0] * LINKS}
+[run]
+duration = 0.5
+tolerance = 1e-12
+"""
+DRIVEN = """
+[chain]
+space = "spatial"
+masses = [1.0, 0.5]
+lengths = [1.0, 0.7]
+damping = [0.1, 0.0]
+torque = [[0.0, 0.1, 0.2], [0.0, 0.0, 0.3]]
+[[chain.drive]]
+link = 2
+amplitude = [0.5, 1.0, 0.25]
+frequency = 3.0
+phase = 0.4
+[start]
+theta = [1.0, 2.0]
+phi = [0.3, 0.1]
+[run]
+duration = 2.0
+tolerance = 1e-12
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"),
+    [(LONG, 1e-12), (DRIVEN, 1e-10)],  # measured MEASURED_LONG
+    ids=["40 links", "drives"],
+)
+def test_long_and_driven_chains_are_for_co_simulation_alone(text, bound, pendula, tmp_path):
+    (tmp_path / "chain.toml").write_text(text)
+    place = unpacked(pendula, tmp_path, tmp_path / "chain.toml")
+    description = ElementTree.parse(place / "modelDescription.xml").getroot()
+    assert description.find("ModelExchange") is None and not (place / "sources").exists()
+    assert description.find("CoSimulation").get("providesDirectionalDerivatives") is None
+    fmu = Fmu(place)
+    assert not fmu.states
+    duration = 0.5 if text is LONG else 2.0
+    fmu.run(0.0, round(duration / 0.01), 0.01)
+    theirs = simulated(pendula, tmp_path, text)
+    assert distance(fmu, theirs) < bound
+    saved = fmu.saved()
+    fmu.run(duration, 5, 0.01)
+    there = fmu.get(*theirs, "energy", "bob_2_x")
+    fmu.restore(saved)
+    fmu.run(duration, 5, 0.01)
+    assert fmu.get(*theirs, "energy", "bob_2_x") == there
+
+
+def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, environment, tmp_path):
+    program = os.environ["PENDULA_PROGRAM"]
+    beside = os.path.join(os.path.dirname(program), "pendula.toolchain")
+    with open(beside) as file:
+        lines = file.read().splitlines()
+    (tmp_path / "bin").mkdir()
+    shutil.copy2(program, tmp_path / "bin/pendula")
+    (tmp_path / "bin/pendula.toolchain").write_text("\n".join([*lines[:4], "/no/libpendula.a", "/no"]) + "\n")
+
+    def export(*words):
+        command = [tmp_path / "bin/pendula", "export", *words, "--as", "fmu", "--name", "system", "-o", tmp_path]
+        return subprocess.run(command, capture_output=True, text=True, env=environment)
+
+    ended = export("planar:2")
+    assert ended.returncode == 0
+    assert "the FMU takes steps of constant size" in ended.stderr and "/no/libpendula.a" in ended.stderr
+    with zipfile.ZipFile(tmp_path / "system.fmu") as archive:
+        assert b"pendula.tolerance" not in archive.read("modelDescription.xml")
+        assert "sources/system_fmu.c" in archive.namelist()
+    (tmp_path / "driven.toml").write_text(DRIVEN)
+    ended = export(tmp_path / "driven.toml")
+    assert ended.returncode != 0 and "chain.drive" in ended.stderr
+    ended = export("planar:40")
+    assert ended.returncode != 0 and "at most 16 coordinates" in ended.stderr
 
 
 @pytest.mark.parametrize("known", ["theta_2", "theta_dot_1", "push", "lengths_2", "cart_mass"])
@@ -134,18 +328,27 @@ def test_directional_derivatives_are_slopes(known, folder):
 def test_what_is_wrong_is_told(folder):
     fmu = Fmu(folder)
     assert fmu.set(energy=1.0) == ERROR and "cannot be set" in fmu.said[-1]
-    assert fmu.set(**{"pendula.internal_step": 0.0}) == ERROR and "expected a number > 0" in fmu.said[-1]
+    for name in ("pendula.internal_step", "pendula.tolerance"):
+        assert fmu.set(**{name: 0.0}) == ERROR and fmu.said[-1] == f"{name}: expected a number > 0"
     fmu.set(masses_1=float("nan"))
-    assert fmu.step(0.0, 0.01) == ERROR and "could not be solved" in fmu.said[-1]
+    assert fmu.step(0.0, 0.01) == ERROR and "SAID_OF_NAN" in fmu.said[-1]
+    fmu.set(masses_1=1.0)
+    assert fmu.step(0.0, 0.01) == OK
     stranger = Fmu(folder, token="{0}")
     assert not stranger.instance and "not that of this FMU" in stranger.said[-1]
 
 
-def test_its_sources_compile_without_a_warning(folder):
-    sources = sorted((folder / "sources").glob("*.c"))
-    assert [source.name for source in sources] == ["system.c", "system_fmu.c"]
-    command = [COMPILER, *FLAGS, "-O1", "-fPIC", "-shared", *sources, "-o", folder / "again.so", "-lm"]
-    subprocess.run(command, check=True)
+def test_its_sources_say_what_is_wrong(folder, rebuilt):
+    fmu = Fmu(folder, binary=rebuilt)
+    fmu.set(masses_1=float("nan"))
+    assert fmu.step(0.0, 0.01) == ERROR and "could not be solved" in fmu.said[-1]
+
+
+def test_of_its_binary_the_functions_of_fmi_alone_are_seen(folder):
+    [binary] = (folder / "binaries").glob("*/system.*")
+    listed = subprocess.run(["nm", "-D", "--defined-only", binary], capture_output=True, text=True, check=True)
+    names = [line.split()[-1] for line in listed.stdout.splitlines()]
+    assert len(names) > 60 and not [name for name in names if not name.startswith("fmi3")]
 
 
 needs_fmpy = pytest.mark.skipif(find_spec("fmpy") is None, reason="FMPy is not installed")
@@ -179,7 +382,7 @@ def test_fmpy_simulates_what_the_program_does_where_it_is_installed(
     ended = pendula("simulate", "cart.toml", "--json", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     final = json.loads(ended.stdout)["final"]
-    start = {"theta_1": 2.0, "theta_2": 1.0, "push": 0.5}
+    start = {"theta_1": 2.0, "theta_2": 1.0, "push": 0.5, "pendula.tolerance": 1e-12}
     wanted = [*STATES, "bob_2_x", "bob_2_y"]
     rows = fmpy.simulate_fmu(
         str(folder / "system.fmu"), fmi_type=kind, start_values=start, stop_time=2.0, output=wanted, **options
