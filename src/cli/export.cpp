@@ -75,7 +75,7 @@ Words scenario_words(const io::Scenario<Space>& scenario, const std::string& fil
   if (scenario.natural) refuse(file, "chain.units: expected \"SI\", got \"natural\"");
   if (!scenario.feedback.empty()) refuse(scenario.feedback.front().place, "a chain's feedback cannot be exported");
   if (!chain.drives().empty() && !with_runtime) {
-    refuse(file, "chain.drive: a chain's drives can be exported to an FMU that has pendula's library in it alone");
+    refuse(file, "chain.drive: a chain's drives cannot be exported, but into an FMU with pendula's library in it");
   }
   Words words = {"--space", Space::dof == 1 ? "planar" : "spatial", "--links", std::to_string(chain.links())};
   std::vector<double> parameters(chain.masses().begin(), chain.masses().end());
@@ -152,7 +152,6 @@ void add_runtime(Words& words, const io::Toolchain& toolchain) {
   words.push_back("--library=" + toolchain.library.string());
   words.push_back("--headers=" + toolchain.headers.string());
   for (const std::string& flag : io::flags_of_least_set()) words.push_back("--flag=" + flag);
-  for (const std::string& flag : toolchain.flags) words.push_back("--flag=" + flag);
 }
 
 /// What the generator is told of a scenario.
