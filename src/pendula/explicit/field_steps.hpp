@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <pendula/explicit/forward_dynamics.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
+#include <pendula/numeric/lanes.hpp>
+#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/field_look.hpp>
 #include <pendula/system/outcome.hpp>
 #include <span>
@@ -28,7 +30,11 @@ class FieldSteps {
         rate_(coordinates),
         sums_(coordinates),
         moments_(coordinates),
-        missed_(coordinates) {}
+        missed_(coordinates),
+        times_(1),
+        places_(coordinates),
+        rates_(coordinates),
+        arguments_(dynamics.arguments().size()) {}
 
   bool has_to_look() const { return look_.has_to_look(); }
 
@@ -111,26 +117,44 @@ class FieldSteps {
     }
   }
 
+  using Powers = std::array<double, 6>;
+  template <class Share>
+  static Share place_at(const Powers& c, const Share& share) {
+    Share sum(c[5]);
+    for (std::size_t power = 5; power-- > 0;) sum = sum * share + Share(c[power]);
+    return sum;
+  }
+  template <class Share>
+  static Share rate_at(const Powers& c, const Share& share) {
+    Share sum(5 * c[5]);
+    for (std::size_t power = 5; power-- > 1;) sum = sum * share + Share(static_cast<double>(power) * c[power]);
+    return sum;
+  }
+
   void go_to(double share, double h) {
     for (std::size_t k = 0; k < path_.size(); ++k) {
-      const auto& c = path_[k];
-      place_[k] = c[0] + share * (c[1] + share * (c[2] + share * (c[3] + share * (c[4] + share * c[5]))));
-      rate_[k] = (c[1] + share * (2 * c[2] + share * (3 * c[3] + share * (4 * c[4] + share * 5 * c[5])))) / h;
+      place_[k] = place_at(path_[k], share);
+      rate_[k] = rate_at(path_[k], share) / h;
     }
   }
 
+  // Lanes beyond the last share repeat it.
   void find_arguments(ForwardDynamics& dynamics, double time, double h, std::span<const double> shares, double* found) {
-    const std::size_t count = path_.size();
-    times_.resize(shares.size());
-    places_.resize(shares.size() * count);
-    rates_.resize(shares.size() * count);
-    for (std::size_t i = 0; i < shares.size(); ++i) {
-      times_[i] = time + shares[i] * h;
-      go_to(shares[i], h);
-      std::copy(place_.begin(), place_.end(), places_.data() + i * count);
-      std::copy(rate_.begin(), rate_.end(), rates_.data() + i * count);
+    const std::size_t count = path_.size(), arguments = dynamics.arguments().size();
+    for (std::size_t first = 0; first < shares.size(); first += width) {
+      const std::size_t here = std::min(width, shares.size() - first);
+      for (std::size_t lane = 0; lane < width; ++lane) times_[0][lane] = shares[first + std::min(lane, here - 1)];
+      const Lanes share = Lanes::load(times_[0]);
+      for (std::size_t k = 0; k < count; ++k) {
+        place_at(path_[k], share).store(places_[k]);
+        (rate_at(path_[k], share) / Lanes(h)).store(rates_[k]);
+      }
+      fma(share, Lanes(h), Lanes(time)).store(times_[0]);
+      dynamics.find_arguments(times_[0], places_[0], rates_[0], arguments_[0]);
+      for (std::size_t lane = 0; lane < here; ++lane) {
+        for (std::size_t a = 0; a < arguments; ++a) found[(first + lane) * arguments + a] = arguments_[a][lane];
+      }
     }
-    dynamics.find_arguments(times_.data(), shares.size(), places_.data(), rates_.data(), found);
   }
 
   template <class Accelerations>
@@ -146,15 +170,18 @@ class FieldSteps {
   }
 
   static constexpr double path_error = 100;  // error of the quintic over that of the step, roughly
-  static constexpr int few_samples = 3;
+  static constexpr std::size_t width = 8;
+  static constexpr int few_samples = width;
+  using Lanes = Pack<8, RegisterFor<8>>;
+
   static constexpr double beside = 1e-3;  // of the fastest, for a coordinate at rest
 
   FieldLook look_;
   bool is_blind_, begin_is_known_ = false, end_is_known_ = false;
-  std::vector<std::array<double, 6>> path_;  // coefficients of the powers of share
-  std::vector<double> begin_, end_;          // accelerations, in the second half only
+  std::vector<Powers> path_;         // coefficients of the powers of share
+  std::vector<double> begin_, end_;  // accelerations, in the second half only
   std::vector<double> place_, rate_, sums_, moments_, missed_, found_;
-  std::vector<double> times_, places_, rates_;
+  PackRows<width> times_, places_, rates_, arguments_;  // of eight states
 };
 
 }  // namespace pendula

@@ -28,9 +28,9 @@ class ForwardDynamics {
   /// For each argument of the model's functions that may change fast: whether it is the base of a power
   /// (field_look.hpp).
   virtual std::span<const bool> arguments() const { return {}; }
-  /// Values of these arguments in `count` states, (count, dof·n): (count, arguments).
-  virtual void find_arguments(const double* /*times*/, std::size_t /*count*/, const double* /*q*/, const double* /*v*/,
-                              double* /*found*/) {}
+  /// Values of these arguments in eight states at once, each in a lane of rows (PackRows<8>): q and v (dof·n, 8),
+  /// `found` (arguments, 8).
+  virtual void find_arguments(const double* /*times*/, const double* /*q*/, const double* /*v*/, double* /*found*/) {}
 };
 
 }  // namespace pendula

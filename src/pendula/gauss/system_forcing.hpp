@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/system/forcing_look.hpp>
-#include <pendula/system/many_states.hpp>
+#include <pendula/system/at_times.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
 #include <vector>
@@ -50,7 +50,7 @@ class SystemForcing {
               {tableau.b.data(), static_cast<std::size_t>(tableau.stages())}, model.coordinates()),
         sizes_(model.coordinates()) {}
 
-  ManyStates at_times_;
+  AtTimes at_times_;
   SineTurn turn_;
   ForcingLook look_;
   std::vector<double> sizes_;
