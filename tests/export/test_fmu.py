@@ -170,6 +170,21 @@ def test_a_scenario_says_tolerance_start_and_inputs(pendula, tmp_path):
     assert distance(fmu, simulated(pendula, tmp_path, SCENARIO)) < 1e-10  # measured 3.5e-12
 
 
+def test_the_tighter_tolerance_counts(folder):
+    def ends(of_importer: float | None) -> tuple[float, float]:
+        fmu = Fmu(folder)
+        known = of_importer is not None
+        given = ctypes.c_bool(known), ctypes.c_double(of_importer if known else 0.0), ctypes.c_double(0.0)
+        nothing = ctypes.c_bool(False), ctypes.c_double(0.0)
+        assert fmu.library.fmi3EnterInitializationMode(fmu.instance, *given, *nothing) == OK
+        fmu.run(0, 1, 2.0)
+        return fmu.get("pendula.tolerance", "theta_2")
+
+    own, tight, loose = ends(None), ends(1e-11), ends(1e-3)
+    assert own[0] == loose[0] and own[1] == loose[1]
+    assert tight[0] == 1e-11 and tight[1] != own[1]
+
+
 def test_an_input_that_changes_takes_the_step_back(folder, pendula, tmp_path):
     """Against runs of the command line, each of which begins where the one before ended."""
     fmu = Fmu(folder)
