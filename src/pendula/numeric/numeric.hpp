@@ -1,7 +1,9 @@
 #pragma once
 
+#include <bit>
 #include <cmath>
 #include <concepts>
+#include <cstdint>
 #include <pendula/numeric/fast_fma.hpp>
 
 /// What makes one text serve both a plain number (one motion) and a LanePack (several members): a plain number is
@@ -79,9 +81,9 @@ Num log2_of_mantissa(const Num& m) {
 
 /// log₂ x of a positive normal number, to 7e-4: for the sizes of steps.
 inline double log2_near(double x) {
-  int exponent = 0;
-  const double half = std::frexp(x, &exponent);  // 1/2 to 1
-  return exponent - 1 + detail::log2_of_mantissa(half + half);
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+  const double mantissa = std::bit_cast<double>((bits & ((std::uint64_t{1} << 52) - 1)) | std::uint64_t{1023} << 52);
+  return static_cast<double>(static_cast<int>(bits >> 52) - 1023) + detail::log2_of_mantissa(mantissa);
 }
 
 using std::abs;

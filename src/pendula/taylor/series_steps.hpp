@@ -77,7 +77,8 @@ class SeriesSteps {
         begin_(now_),
         seen_(2 * n_),
         rates_(n_ + 2),
-        scales_(2 * n_),
+        scales_(row_),
+        rate_scales_(row_),
         unit_row_(1) {
     for (int i = 0; i < links(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
   }
@@ -401,12 +402,19 @@ class SeriesSteps {
     };
     if constexpr (is_batch<L>) {
       for (std::size_t k = 0; k < 2 * n_; ++k) add(tau, k, std::type_identity<L>());
-    } else if (row_ == 4) {
-      add(Pack<4, RegisterFor<4>>(tau), 0, std::type_identity<Pack<4, RegisterFor<4>>>());
     } else {
-      for (std::size_t k = 0; k < row_; k += 8) {
-        add(Pack<8, RegisterFor<8>>(tau), k, std::type_identity<Pack<8, RegisterFor<8>>>());
-      }
+      for_each_part(
+          [&]<class Lanes>(std::size_t first, std::type_identity<Lanes> lanes) { add(Lanes(tau), first, lanes); });
+    }
+  }
+
+  /// Calls visit(first, type) for the parts of a row of one motion's state that registers hold.
+  template <class Visit>
+  void for_each_part(Visit visit) const requires(!is_batch<L>) {
+    if (row_ == 4) {
+      visit(0, std::type_identity<Pack<4, RegisterFor<4>>>());
+    } else {
+      for (std::size_t k = 0; k < row_; k += 8) visit(k, std::type_identity<Pack<8, RegisterFor<8>>>());
     }
   }
 
@@ -440,7 +448,7 @@ class SeriesSteps {
       const L by_series =
           info_.has_momenta ? from_row<L>(bent_[i]) * (inverse * inverse) : from_row<L>(turned_[n_ + i]) * inverse;
       const L defect = max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(rounded) * farthest, L(0.0));
-      found = found & (defect * from_row<L>(scales_[n_ + i]) <= L(largest_defect_));
+      found = found & (defect * from_row<L>(rate_scales_[i]) <= L(largest_defect_));
     }
     return found;
   }
@@ -500,19 +508,35 @@ class SeriesSteps {
     const L places = within(max(q, v)), speeds = within(max(max(v, a), L(rounded) * q));
     for (std::size_t i = 0; i < n_; ++i) {
       const L place = abs(coefficient(0, i)), size = systems_.info().is_angle[i] ? min(place, L(1.0)) : place;
+      const L of_rate = L(1.0) / (speeds + abs(rate(0, i)));
       to_row(L(1.0) / (places + size), scales_[i]);
-      to_row(L(1.0) / (speeds + abs(rate(0, i))), scales_[n_ + i]);
+      to_row(of_rate, rate_scales_[i]);
+      if (!info_.has_momenta) to_row(unit_ * of_rate, scales_[n_ + i]);
     }
   }
 
   /// NaN if it is not finite.
-  L size_of_term(std::size_t order) const {
+  L size_of_term(std::size_t order) {
     L largest(0.0), none(0.0);
-    for (std::size_t i = 0; i < n_; ++i) {
-      const L moved = coefficient(order, i) * from_row<L>(scales_[i]),
-              turned = rate(order, i) * from_row<L>(scales_[n_ + i]);
-      none = none + ((moved - moved) + (turned - turned));
-      largest = max(largest, max(abs(moved), abs(turned)));
+    const auto take = [&](const L& term) {
+      none = none + (term - term);
+      largest = max(largest, abs(term));
+    };
+    if constexpr (is_batch<L>) {
+      for (std::size_t i = 0; i < n_; ++i) {
+        take(coefficient(order, i) * from_row<L>(scales_[i]));
+        take(rate(order, i) * from_row<L>(rate_scales_[i]));
+      }
+    } else {
+      const auto take_row = [&](std::size_t row, double weight, std::size_t count, const PackRows<W>& scales) {
+        for_each_part([&]<class Lanes>(std::size_t first, std::type_identity<Lanes>) {
+          const Lanes terms = from_row<Lanes>(state_[row * row_ + first]);
+          to_row(terms * (Lanes(weight) * from_row<Lanes>(scales[first])), moved_[first]);
+        });
+        for (std::size_t k = 0; k < count; ++k) take(*moved_[k]);
+      };
+      take_row(order, 1, info_.has_momenta ? n_ : 2 * n_, scales_);
+      if (info_.has_momenta) take_row(order + 1, static_cast<double>(order + 1), n_, rate_scales_);
     }
     return largest + none;
   }
@@ -536,7 +560,8 @@ class SeriesSteps {
   Place now_, trial_, begin_;  // begin_: of one motion
   PackRows<W> seen_;           // a motion on the way of a step
   PackRows<W> rates_;
-  PackRows<W> scales_;  // of the terms of coordinates, then of rates: what they are multiplied by
+  // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.
+  PackRows<W> scales_, rate_scales_;
   PackRows<W> unit_row_;
   L time_{0.0}, begin_time_{0.0};
   L tried_{0.0}, step_{1.0};  // of the tried step, of the last one
