@@ -1,4 +1,4 @@
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <iomanip>
@@ -152,11 +152,11 @@ ExitStatus linearize(const LinearizeOptions& options) {
         return io::told_at_keys(scenario, options.scenario, [&] { return linear_of(scenario, options, guard); });
       },
       read_scenario(options.scenario, options.overrides, options.json));
-  const Eigen::VectorXcd eigenvalues = Eigen::MatrixXd(linear.a).eigenvalues();
+  const Eigen::VectorXcd rates = eigenvalues(linear.a.data(), linear.a.rows());
   if (options.json)
-    print_json(linear, options, eigenvalues);
+    print_json(linear, options, rates);
   else
-    print_text(linear, options, eigenvalues);
+    print_text(linear, options, rates);
   return done;
 }
 

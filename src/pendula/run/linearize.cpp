@@ -1,3 +1,4 @@
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -76,6 +77,10 @@ void linearize(const Subject& subject, const Motion& motion, double* a, double* 
     find_a(here, motion, a);
   }
   if (b != nullptr && model.inputs() > 0) find_b(model, motion, b);
+}
+
+Eigen::VectorXcd eigenvalues(const double* a, Eigen::Index size) {
+  return Eigen::MatrixXd(Eigen::Map<const RowMajor>(a, size, size)).eigenvalues();
 }
 
 Motion equilibrium(const Subject& subject, const Motion& near) {

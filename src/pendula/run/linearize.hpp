@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 
@@ -9,6 +10,9 @@ namespace pendula {
 /// inputs), exactly, by the kernel's derivatives. Either may be null. Throws NoKernel for a chain without one,
 /// std::invalid_argument where the mass matrix is singular.
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b);
+
+/// Eigenvalues of A (size, size)  [1/s].
+Eigen::VectorXcd eigenvalues(const double* a, Eigen::Index size);
 
 /// A motion at rest that stays where it is, by Newton's method on the accelerations from where one is: of coordinates
 /// that these do not depend on, none changes. Throws NoKernel as linearize, std::invalid_argument where a system

@@ -1,4 +1,4 @@
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -44,7 +44,7 @@ bool is_stiff(const Subject& subject, const Motion& start) {
   linearize(subject, start, a.data(), nullptr);
   if (!a.allFinite()) return true;
   double decay = 0, pace = start.v.cwiseAbs().maxCoeff();
-  for (const std::complex<double>& rate : a.eigenvalues()) {
+  for (const std::complex<double>& rate : eigenvalues(a.data(), n)) {
     decay = std::max(decay, -rate.real());
     pace = std::max({pace, rate.real(), std::abs(rate.imag())});
   }
