@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pendula_codegen.backends.llvm import INSTRUCTION_SETS
 from pendula_codegen.chain import Chain
-from pendula_codegen.chain_kernel import ChainKernel
+from pendula_codegen.chain_kernel import ChainKernel, declared_by
 from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
@@ -21,8 +21,9 @@ from pendula_codegen.export import (
     MOST_COORDINATES,
     Request,
     Values,
-    render_chain_fmu,
+    has_pieces,
     render_export,
+    render_runtime_fmu,
     require_size,
 )
 from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws
@@ -247,7 +248,8 @@ def _exported_chain(options: argparse.Namespace) -> tuple[dict[str, str], Runtim
     request, words = _request(options, [], runtime), _export_words(options)
     command = f"--space {options.space} --links {chain.links} {words} --output ."
     if runtime is not None and (options.drive or len(chain.coordinates) > MOST_COORDINATES):
-        return render_chain_fmu(chain, request, command, options.space), runtime
+        what = f"A chain of {chain.links} links."
+        return render_runtime_fmu(declared_by(chain), request, what, command, chain, options.space), runtime
     require_size(len(chain.coordinates))
     return render_export(ChainKernel(chain), request, command, options.space), runtime
 
@@ -259,10 +261,13 @@ def _exported_model(options: argparse.Namespace) -> tuple[dict[str, str], Runtim
     runtime = _runtime(options)
     request = _request(options, laws, runtime)
     command = f"{what} {_export_words(options)} --output ."
-    texts = render_export(ModelKernel(model), request, command, None, Path(model.file))
+    kernel, file = ModelKernel(model), Path(model.file)
     if runtime is not None:
         runtime = replace(runtime, kernel=render_c(model, Path(options.model).name, "kernel.c"))
-    return texts, runtime
+        if has_pieces(kernel) or len(kernel.declared.coordinates) > MOST_COORDINATES:
+            what = f"The system {kernel.system.name}."
+            return render_runtime_fmu(kernel.declared, request, what, command, file=file), runtime
+    return render_export(kernel, request, command, None, file), runtime
 
 
 def _runtime(options: argparse.Namespace, **more: object) -> Runtime | None:

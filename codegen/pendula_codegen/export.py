@@ -15,7 +15,6 @@ from pathlib import Path
 from pendula_codegen.backends.c99 import NUMBERS, C99Printer
 from pendula_codegen.casadi_face import Side, quoted, shapes, slopes_of
 from pendula_codegen.chain import Chain
-from pendula_codegen.chain_kernel import declared_by
 from pendula_codegen.entry_points import Declared, SystemKernel
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import SampledLaw
@@ -314,6 +313,11 @@ def require_size(coordinates: int) -> None:
         )
 
 
+def has_pieces(kernel: SystemKernel) -> bool:
+    """Whether functions of the model have several pieces, where steps have to end."""
+    return any(function.name == "switches" for function in kernel.functions())
+
+
 def render_export(
     kernel: SystemKernel, request: Request, command: str, space: str | None = None, file: Path | None = None
 ) -> dict[str, str]:
@@ -323,7 +327,7 @@ def render_export(
     """
     request.check()
     require_size(len(kernel.declared.coordinates))
-    if any(function.name == "switches" for function in kernel.functions()):
+    if has_pieces(kernel):
         raise GenerationError(
             "export: expected a smooth model, got one with functions of several pieces (Piecewise, Abs, sign, ...): "
             "steps would have to end where the pieces meet"
@@ -381,12 +385,22 @@ def render_export(
     return _rendered(request, templates, context)
 
 
-def render_chain_fmu(chain: Chain, request: Request, command: str, space: str) -> dict[str, str]:
-    """The same of a chain of any length, with drives or without, as an FMU for co-simulation by its runtime."""
+def render_runtime_fmu(
+    declared: Declared,
+    request: Request,
+    what: str,
+    command: str,
+    chain: Chain | None = None,
+    space: str | None = None,
+    file: Path | None = None,
+) -> dict[str, str]:
+    """The same as an FMU that takes all it does from its runtime, for co-simulation: `what` tells what of.
+
+    Of a chain of any length, with drives or without, or of a model of any size, whose functions may have pieces.
+    """
     request.check()
-    declared = declared_by(chain)
     printer = C99Printer("double", "", {})
-    text = banner(f"A chain of {chain.links} links.", "export", space, command)
+    text = banner(what, "export", space, command, file)
     context = {"banner": text, "name": request.name, "literal": printer.literal, "time": request.values.time}
     context |= _fmu_context(declared, request, text, chain, has_equations=False)
     return _rendered(request, _ADAPTIVE | {"export_fmu.xml.j2": "_fmu.xml"}, context)

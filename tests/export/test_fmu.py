@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import math
 import os
 import re
 import shutil
@@ -177,6 +178,7 @@ def test_the_tighter_tolerance_counts(folder):
         given = ctypes.c_bool(known), ctypes.c_double(of_importer if known else 0.0), ctypes.c_double(0.0)
         nothing = ctypes.c_bool(False), ctypes.c_double(0.0)
         assert fmu.library.fmi3EnterInitializationMode(fmu.instance, *given, *nothing) == OK
+        fmu.set(theta_1=2.0, theta_2=1.0)
         fmu.run(0, 1, 2.0)
         return fmu.get("pendula.tolerance", "theta_2")
 
@@ -295,6 +297,60 @@ def test_long_and_driven_chains_are_for_co_simulation_alone(text, bound, pendula
     fmu.restore(saved)
     fmu.run(duration, 5, 0.01)
     assert fmu.get(*theirs, "energy", "bob_2_x") == there
+
+
+BUMPER = """
+from sympy import Piecewise, cos, sign, sin
+
+
+def define(model, links):
+    x, theta = model.coordinate("x", "m"), model.coordinate("theta", "rad")
+    stiffness = model.parameter("stiffness", "N/m", default=500.0)
+    rub = model.parameter("rub", "N", default=0.2)
+    v, w = model.rate(x), model.rate(theta)
+    beyond = x - 0.2
+    contact = Piecewise((stiffness * beyond**2 / 2, beyond > 0), (0, True))
+    model.lagrangian = v**2 + v * w * cos(theta) + w**2 / 2 + 9.81 * cos(theta) - contact
+    model.force(x, model.input("push", "N") - rub * sign(v))
+    model.point("cart", (x, 0))
+    model.point("bob", (x + sin(theta), -cos(theta)))
+"""
+BUMPED = """
+[system]
+model = "bumper.py"
+drive = [{ input = "push", constant = 1.5 }]
+[start]
+x_dot = 1.0
+theta = 0.4
+[run]
+duration = 2.0
+tolerance = 1e-12
+"""
+
+
+def test_steps_end_where_pieces_of_a_model_meet(pendula, tmp_path):
+    """A cart that rubs and runs against a bumper; for co-simulation alone, since the importer knows of no switches."""
+    (tmp_path / "bumper.py").write_text(BUMPER)
+    (tmp_path / "bumper.toml").write_text(BUMPED)
+    place = unpacked(pendula, tmp_path, tmp_path / "bumper.toml")
+    description = ElementTree.parse(place / "modelDescription.xml").getroot()
+    assert description.find("ModelExchange") is None and not (place / "sources").exists()
+    fmu = Fmu(place)
+    assert fmu.get("push", "x_dot", "theta", "stiffness") == [1.5, 1.0, 0.4, 500.0]
+    begin = fmu.get("energy", "bob_x", "cart_x")
+    assert begin == pytest.approx([1.0 - 9.81 * math.cos(0.4), math.sin(0.4), 0.0], abs=1e-15)
+    farthest = 0.0
+    for k in range(2000):
+        fmu.run(0.001 * k, 1, 0.001)
+        farthest = max(farthest, *fmu.get("cart_x"))
+    assert farthest > 0.21  # it met the bumper
+    assert distance(fmu, simulated(pendula, tmp_path, BUMPED)) < 1e-12  # measured 2.7e-15
+    saved = fmu.saved()
+    fmu.run(2.0, 100, 0.01)
+    there = fmu.get("x", "theta", "x_dot", "theta_dot")
+    fmu.restore(saved)
+    fmu.run(2.0, 100, 0.01)
+    assert fmu.get("x", "theta", "x_dot", "theta_dot") == there
 
 
 def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, environment, tmp_path):
