@@ -51,7 +51,7 @@ int main(int count, char** arguments) {
     std::cerr << "usage: pendula_handout FOLDER\n";
     return 2;
   }
-  pendula::cli::Ranks ranks;
+  pendula::cli::Ranks ranks(false);
   const double claim = claim_microseconds(ranks);
   const std::string folder = std::string(arguments[1]) + "/handout" + std::to_string(ranks.rank());
   const double record = record_microseconds(folder);
