@@ -394,9 +394,10 @@ def render_runtime_fmu(
     space: str | None = None,
     file: Path | None = None,
 ) -> dict[str, str]:
-    """The same as an FMU that takes all it does from its runtime, for co-simulation: `what` tells what of.
+    """Names of files and their text, of an FMU for co-simulation that leaves everything to pendula's library.
 
-    Of a chain of any length, with drives or without, or of a model of any size, whose functions may have pieces.
+    It may be of a chain of any length, with drives or without, or of a model of any size, with functions of several
+    pieces or without. `what` is the first line of the banner; for `command`, `space` and `file` see render_export.
     """
     request.check()
     printer = C99Printer("double", "", {})

@@ -353,6 +353,33 @@ def test_steps_end_where_pieces_of_a_model_meet(pendula, tmp_path):
     assert fmu.get("x", "theta", "x_dot", "theta_dot") == there
 
 
+MASSES = 18
+ROW = f"""
+def define(model, links):
+    x = [model.coordinate(f"x{{k}}", "m") for k in range({MASSES})]
+    k = model.parameter("k", "N/m", default=40.0)
+    stretch = [a - b for a, b in zip([*x, 0], [0, *x])]
+    model.lagrangian = sum(model.rate(one) ** 2 for one in x) / 2 - k * sum(s**2 for s in stretch) / 2
+    model.point("last", (x[-1], 0))
+"""
+
+
+def test_a_model_may_have_more_coordinates_than_its_equations_are_written_out_for(pendula, tmp_path):
+    """Masses in a row between walls, in the slowest of their modes, which is a sine."""
+    (tmp_path / "row.py").write_text(ROW)
+    place = unpacked(pendula, tmp_path, tmp_path / "row.py")
+    description = ElementTree.parse(place / "modelDescription.xml").getroot()
+    assert description.find("ModelExchange") is None and not (place / "sources").exists()
+    fmu = Fmu(place)
+    angle = math.pi / (MASSES + 1)
+    mode = {f"x{k}": math.sin((k + 1) * angle) for k in range(MASSES)}
+    fmu.set(**mode, **{"pendula.tolerance": 1e-12})
+    fmu.run(0.0, 200, 0.01)
+    swing = math.cos(2 * math.sqrt(40.0) * math.sin(angle / 2) * 2.0)
+    assert distance(fmu, {name: swing * x for name, x in mode.items()}) < 1e-12  # measured 1.1e-15
+    assert fmu.get("last_x") == fmu.get(f"x{MASSES - 1}")
+
+
 def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, environment, tmp_path):
     program = os.environ["PENDULA_PROGRAM"]
     beside = os.path.join(os.path.dirname(program), "pendula.toolchain")
