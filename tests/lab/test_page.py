@@ -262,6 +262,21 @@ def test_time_goes_back_and_forth(open_lab):
     until(page, "pendulaLab.shown === 0 && !pendulaLab.isWaiting")
 
 
+def test_a_pause_is_where_the_motion_is_shown(open_lab):
+    page = open_lab(motion="no-preference")
+    until(page, "pendulaLab.shown > 0.1")
+    late = "pendulaLab.clock = pendulaLab.history.end + 0.05;"  # as where a busy machine computes late
+    assert (
+        page.evaluate(
+            f"() => {{ {late} pendulaLab.play(false); return pendulaLab.clock - pendulaLab.shown }}"
+        )
+        == 0
+    )
+    end = shown(page)
+    page.wait_for_timeout(200)
+    assert shown(page) == end
+
+
 def test_fifty_copies_part(open_lab):
     page = open_lab("th=2.2,2.6", motion="no-preference")
     page.get_by_role("button", name="Start").click()

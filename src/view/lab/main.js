@@ -206,6 +206,7 @@ class Lab {
   // --- Time ---
 
   play(on = !this.playing) {
+    if (this.playing && !on) this.clock = this.shown; // where the computing is late, the clock is ahead of it
     this.playing = on;
     this.last = null;
     document.documentElement.classList.toggle("playing", on);
