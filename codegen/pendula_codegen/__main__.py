@@ -21,7 +21,6 @@ from pendula_codegen.export import (
     MOST_COORDINATES,
     Request,
     Values,
-    has_pieces,
     render_export,
     render_runtime_fmu,
     require_size,
@@ -264,7 +263,7 @@ def _exported_model(options: argparse.Namespace) -> tuple[dict[str, str], Runtim
     kernel, file = ModelKernel(model), Path(model.file)
     if runtime is not None:
         runtime = replace(runtime, kernel=render_c(model, Path(options.model).name, "kernel.c"))
-        if has_pieces(kernel) or len(kernel.declared.coordinates) > MOST_COORDINATES:
+        if len(kernel.declared.coordinates) > MOST_COORDINATES:
             what = f"The system {kernel.system.name}."
             return render_runtime_fmu(kernel.declared, request, what, command, file=file), runtime
     return render_export(kernel, request, command, None, file), runtime

@@ -52,7 +52,7 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
         "inputs": [
             {"name": i.symbol.name, "unit": i.unit, "remark": remark(i.symbol.name)} for i in model.inputs
         ],
-        "switches": [{"value": str(switch.value), "remark": ""} for switch in model.switches],
+        "switches": [{"value": switch.text, "remark": ""} for switch in model.switches],
         "points": [
             {
                 "name": point.name,

@@ -120,12 +120,16 @@ class Function:
 
 @dataclass(frozen=True)
 class Declared:
-    """What a system has: `points` by name and number of components."""
+    """What a system has: `points` by name and number of components; `switches` that decide between pieces, as text.
+
+    The last parameters are two indicators for each switch.
+    """
 
     coordinates: list[Coordinate]
     parameters: list[Parameter]
     inputs: list[Input]
     points: list[tuple[str, int]]
+    switches: Sequence[str] = ()
 
 
 V, Q, P, A = (Argument(name, "vector") for name in "vqpa")

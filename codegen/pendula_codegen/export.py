@@ -20,6 +20,7 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import SampledLaw
 from pendula_codegen.fmu import (
     DEFAULT_STEP,
+    OF_EQUATIONS,
     OF_EXCHANGE,
     UNSUPPORTED,
     Runtime,
@@ -45,6 +46,7 @@ LANGUAGES = {
     "fmu": {**_C, "export_fmu.c.j2": "_fmu.c", "export_fmu.xml.j2": "_fmu.xml"},
 }
 _ADAPTIVE = {"export_fmu_adaptive.c.j2": "_adaptive.c"}
+EPSILON, FLOAT_EPSILON = 2.0**-52, 2.0**-23
 MOST_COORDINATES = 16  # everything is written out, and matrices are dense
 
 # What a function is made of: entry points of the kernel, and what it calls what they give.
@@ -99,6 +101,9 @@ _SAID = {
     "points": _Said("Points, one after the other", ("q",), {"positions": (("r", "positions [m]"),)}),
     "point_rates": _Said(
         "Velocities of the points", ("q", "v"), {"velocities": (("r_dot", "velocities [m/s]"),)}
+    ),
+    "switches": _Said(
+        "Switching functions", ("q", "v"), {"switches": (("g", "switching functions"),)}, has_inputs=True
     ),
 }
 _TIME = ("times", 0)
@@ -181,8 +186,9 @@ class ExportedFunctions:
 
     @cached_property
     def depends_on_time(self) -> bool:
-        tape, _, _ = self._recorded("momentum_form", _SAID["momentum_form"].parts)
-        return any(step.row == _TIME for step in tape.steps)
+        moved_by = [name for name in ("momentum_form", "switches") if name in self._recorder.functions]
+        tapes = [self._recorded(name, _SAID[name].parts)[0] for name in moved_by]
+        return any(step.row == _TIME for tape in tapes for step in tape.steps)
 
     def _recorded(self, name: str, parts: Parts) -> tuple[Tape, dict[Row, Value], list[Array]]:
         """Values on a tape, and the arrays that they are."""
@@ -313,9 +319,12 @@ def require_size(coordinates: int) -> None:
         )
 
 
-def has_pieces(kernel: SystemKernel) -> bool:
-    """Whether functions of the model have several pieces, where steps have to end."""
-    return any(function.name == "switches" for function in kernel.functions())
+def _require_smooth(switches: Sequence[str]) -> None:
+    if switches:
+        raise GenerationError(
+            "export: casadi: expected a smooth model, got one with functions of several pieces (Piecewise, Abs, "
+            "sign, ...): steps would have to end where the pieces meet. C and FMUs have functions for that"
+        )
 
 
 def render_export(
@@ -327,16 +336,13 @@ def render_export(
     """
     request.check()
     require_size(len(kernel.declared.coordinates))
-    if has_pieces(kernel):
-        raise GenerationError(
-            "export: expected a smooth model, got one with functions of several pieces (Piecewise, Abs, sign, ...): "
-            "steps would have to end where the pieces meet"
-        )
     functions = ExportedFunctions(kernel)
     sizes = functions.sizes
     printer = C99Printer(request.number, f"{request.name}_", functions.names)
     exported = functions.all() + ([functions.laws(request.laws)] if request.laws else [])
     declared = kernel.declared
+    if request.language == "casadi":
+        _require_smooth(declared.switches)
     tableau = gauss(request.stages)
     context = {
         "banner": banner(f"The system {kernel.system.name} in C99.", "export", space, command, file),
@@ -349,6 +355,8 @@ def render_export(
         "inputs": sizes["inputs"],
         "parameters": sizes["parameters"],
         "points": sizes["points"],
+        "switches": declared.switches,
+        "moment": (FLOAT_EPSILON if request.number == "float" else EPSILON) ** (2 / 3),
         "stages": request.stages,
         "depends_on_time": functions.depends_on_time,
         "a": [[printer.literal(float(x)) for x in row] for row in tableau.a],
@@ -394,7 +402,7 @@ def render_runtime_fmu(
     space: str | None = None,
     file: Path | None = None,
 ) -> dict[str, str]:
-    """Names of files and their text, of an FMU for co-simulation that leaves everything to pendula's library.
+    """Names of files and their text, of an FMU that leaves everything to pendula's library.
 
     It may be of a chain of any length, with drives or without, or of a model of any size, with functions of several
     pieces or without. `what` is the first line of the banner; for `command`, `space` and `file` see render_export.
@@ -420,7 +428,8 @@ def _fmu_context(
     step, runtime = request.values.step or DEFAULT_STEP, request.runtime
     values = _numbers(declared, request.values)
     settings = settings_of(step, runtime, has_equations)
-    variables = variables_of(declared, values, settings, has_equations)
+    exchanges = has_equations or not declared.switches
+    variables = variables_of(declared, values, settings, exchanges)
     n = len(declared.coordinates)
     return {
         "n": n,
@@ -430,7 +439,9 @@ def _fmu_context(
         "points": sum(count for _, count in declared.points),
         "values": values,
         "literals": lambda numbers: ", ".join(map(repr, numbers)),
+        "switches": declared.switches if has_equations else (),
         "equations": has_equations,
+        "exchanges": exchanges,
         "settings": [setting.key for setting in settings],
         "names_of_settings": {setting.key: setting.name for setting in settings},
         "tolerance": runtime.tolerance if runtime is not None else None,
@@ -440,7 +451,11 @@ def _fmu_context(
         "units": sorted({variable.unit for variable in variables} - {""}),
         "internal_step": step,
         "token": token_of([text, repr(replace(request, runtime=None)), repr(variables)]),
-        "unsupported_functions": (*UNSUPPORTED, *(() if has_equations else OF_EXCHANGE)),
+        "unsupported_functions": (
+            *UNSUPPORTED,
+            *(() if has_equations else OF_EQUATIONS),
+            *(() if exchanges else OF_EXCHANGE),
+        ),
     }
 
 

@@ -350,7 +350,7 @@ class Model:
         for switch in self._switches.held_by(said.value):
             if jump(said.value, switch, self.switches, self._rates()):
                 raise GenerationError(
-                    f"{said.where}: lagrangian: it or a momentum jumps where {switch.value} = 0, which would be a "
+                    f"{said.where}: lagrangian: it or a momentum jumps where {switch.text} = 0, which would be a "
                     "blow: expected pieces that meet"
                 )
 

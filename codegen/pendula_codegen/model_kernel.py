@@ -28,7 +28,8 @@ class ModelKernel(SystemKernel):
     def declared(self) -> Declared:
         model = self.model
         points = [(point.name, len(point.components)) for point in model.points]
-        return Declared(model.coordinates, model.ordered_parameters, model.inputs, points)
+        switches = [switch.text for switch in model.switches]
+        return Declared(model.coordinates, model.ordered_parameters, model.inputs, points, switches)
 
     @cached_property
     def points(self) -> tuple[Matrix | None, Matrix | None]:

@@ -29,11 +29,13 @@ from sympy import (
     Not,
     Or,
     Piecewise,
+    Rational,
     Symbol,
     acos,
     asin,
     cosh,
     exp,
+    expand,
     lambdify,
     log,
     sign,
@@ -42,9 +44,11 @@ from sympy import (
 )
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
 from sympy.logic.boolalg import Boolean, BooleanFalse, BooleanTrue
+from sympy.printing.str import StrPrinter
 
 PIECES = (Abs, sign, Heaviside, Min, Max, Piecewise)
 MOST_SWITCHES = 16
+MOST_WHOLE = 10**6
 
 _LESS = (StrictLessThan, LessThan)
 _GREATER = (StrictGreaterThan, GreaterThan)
@@ -59,6 +63,17 @@ class Switch:
     value: Expr
     above: Symbol
     below: Symbol
+
+    @property
+    def text(self) -> str:
+        """The function as somebody would write it: 0.2 is a fraction of large numbers."""
+        return _Text().doprint(self.value)
+
+
+class _Text(StrPrinter):
+    def _print_Rational(self, number: Rational) -> str:
+        is_double = number.q > 1000 and number == Rational(float(number))
+        return repr(float(number)) if is_double else super()._print_Rational(number)
 
 
 @dataclass(frozen=True)
@@ -192,7 +207,7 @@ class Switches:
         """Of value > 0."""
         if value.is_number:
             return TRUE if value > 0 else ~TRUE
-        _, value = value.as_content_primitive()
+        value = _without_factor(value)
         is_negative = value.could_extract_minus_sign()
         if is_negative:
             value = -value
@@ -204,6 +219,13 @@ class Switches:
             self.all.append(switch)
         above = Truth(switch.above, switch.below)
         return ~above if is_negative else above
+
+
+def _without_factor(value: Expr) -> Expr:
+    """One of all multiples of a function: with small whole numbers, or with a term that has no number."""
+    _, value = value.as_content_primitive()
+    largest = max(abs(term.as_coeff_Mul()[0]) for term in Add.make_args(value))
+    return value if largest < MOST_WHOLE else expand(value / largest)
 
 
 def _has_gaps(part: Expr) -> bool:
@@ -245,7 +267,7 @@ def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol], zeros: Sequenc
     args = [_guarded(argument, here, fixed, zeros) for argument in piece.args]
     if _is_root(piece):
         base, power = args
-        size = base.as_content_primitive()[1]
+        size = _without_factor(base)
         if piece.exp.is_Rational and piece.exp.q != 1 and (size in zeros or -size in zeros):
             return (here.yes * base**2 + here.no) ** (power / 2)
         base = base if piece.base.is_positive else here.yes * base + here.no

@@ -270,5 +270,5 @@ def test_what_is_wrong_is_told(request_, words):
 def test_what_cannot_be_exported_is_told(tmp_path):
     with pytest.raises(GenerationError, match="expected at most 16 coordinates, got 17"):
         render_export(chain("planar", 17), Request("too_long"), "")
-    with pytest.raises(GenerationError, match="expected a smooth model"):
-        render_export(ModelKernel(own(PIECES, "pieces", tmp_path)), Request("pieces"), "")
+    with pytest.raises(GenerationError, match="casadi: expected a smooth model"):
+        render_export(ModelKernel(own(PIECES, "pieces", tmp_path)), Request("pieces", "casadi"), "")

@@ -210,8 +210,7 @@ typedef struct pendula_path {
   void* context;
 } pendula_path;
 
-/* Writes d(q, v)/dt of a motion, (2n), while `inputs` are held, (pendula_inputs()); NULL: those of the model. A chain
- * needs a kernel for that. */
+/* Writes d(q, v)/dt of a motion, (2n), while `inputs` are held, (pendula_inputs()); NULL: those of the model. */
 pendula_status pendula_field(const pendula_model* model, double time, const double* q, const double* v,
                              const double* inputs, double* field);
 

@@ -12,6 +12,23 @@ EXAMPLES = ROOT / "examples"
 CONSUMER = Path(__file__).parent / "consumer"
 FLAGS = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror")
 COMPILER = next((name for name in ("gcc", "clang") if shutil.which(name)), None)
+# A cart with a pendulum that rubs and runs against a bumper.
+BUMPER = """
+from sympy import Piecewise, cos, sign, sin
+
+
+def define(model, links):
+    x, theta = model.coordinate("x", "m"), model.coordinate("theta", "rad")
+    stiffness = model.parameter("stiffness", "N/m", default=500.0)
+    rub = model.parameter("rub", "N", default=0.2)
+    v, w = model.rate(x), model.rate(theta)
+    beyond = x - 0.2
+    contact = Piecewise((stiffness * beyond**2 / 2, beyond > 0), (0, True))
+    model.lagrangian = v**2 + v * w * cos(theta) + w**2 / 2 + 9.81 * cos(theta) - contact
+    model.force(x, model.input("push", "N") - rub * sign(v))
+    model.point("cart", (x, 0))
+    model.point("bob", (x + sin(theta), -cos(theta)))
+"""
 
 
 @pytest.fixture(scope="session")
@@ -50,12 +67,12 @@ def export(pendula):
     return run
 
 
-def consumer(folder: Path, number: str = "double", *flags: str) -> Path:
+def consumer(folder: Path, number: str = "double", *flags: str, main: str = "main.c") -> Path:
     """A program that stands on the exported sources alone, in a folder of its own."""
     program = folder / "consumer"
     assert COMPILER, "expected gcc or clang"
     names = [f"-D{name}" for name in ("SYSTEM=system", 'HEADER="system.h"', f"NUMBER={number}")]
-    files = [CONSUMER / "main.c", folder / "system.c"]
+    files = [CONSUMER / main, folder / "system.c"]
     subprocess.run(
         [COMPILER, *FLAGS, "-O1", *flags, *names, f"-I{folder}", *files, "-o", program, "-lm"], check=True
     )

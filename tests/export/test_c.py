@@ -150,7 +150,7 @@ def test_float_is_the_same_to_its_rounding(export, tmp_path, system):
             ("furuta", "--as", "casadi", "--float"),
             "export: number: expected double as casadi has it",
         ),
-        (("pieces.py", "--as", "c"), "export: expected a smooth model"),
+        (("pieces.py", "--as", "casadi"), "export: casadi: expected a smooth model"),
         (
             ("mine.py", "--as", "c"),
             "export: expected a new file, or one that was exported before, got out/mine.c",

@@ -16,7 +16,8 @@ sys.path.insert(0, str(ROOT / "tests/readme"))
 import readme  # noqa: E402
 
 PAGE = ROOT / "docs/reference/export.md"
-BLOCK = re.compile(r"```(console|c)\n(.*?)```", re.DOTALL)
+BLOCK = re.compile(r"```(console|c|python)\n(.*?)```", re.DOTALL)
+SOURCES = {"c": "main.c", "python": "mass.py"}  # what blocks are called
 SECTION = re.compile(r"^## (.*?)\n.*?(?=^## |\Z)", re.DOTALL | re.MULTILINE)
 # What a section takes besides a C compiler.
 TOOLS = {
@@ -32,8 +33,8 @@ def printed(section: str, folder: Path) -> list[tuple[readme.Session, list[str]]
     kept = os.environ.get("XDG_CACHE_HOME", f"{folder}/kernels")
     found = []
     for kind, text in BLOCK.findall(section):
-        if kind == "c":
-            (folder / "main.c").write_text(text)
+        if kind in SOURCES:
+            (folder / SOURCES[kind]).write_text(text)
         else:
             session = readme.Session.parse(text)
             found.append((session, readme.shell(session.commands, folder, PATH=path, XDG_CACHE_HOME=kept)))
@@ -54,7 +55,8 @@ def test_what_the_page_shows_is_what_its_commands_print(title, tmp_path):
 
 def test_the_lines_of_python_are_those_of_the_example():
     example = [line.strip() for line in (ROOT / "examples/swing_up.py").read_text().splitlines()]
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    [section] = [match[0] for match in SECTION.finditer(PAGE.read_text()) if match[1] == "CasADi and acados"]
+    blocks = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
     assert blocks and not [line for block in blocks for line in block.splitlines() if line not in example]
 
 
@@ -72,7 +74,7 @@ def write() -> None:
             return BLOCK.sub(lambda block: shown(block, sessions), match[0])
 
     def shown(block: re.Match[str], sessions) -> str:
-        if block[1] == "c":
+        if block[1] in SOURCES:
             return block[0]
         session, output = next(sessions)
         return f"```console\n{session.text([line for line in output if line])}```"

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from xml.etree import ElementTree
 
 import pytest
-from conftest import COMPILER, FLAGS, consumer, numbers
+from conftest import BUMPER, COMPILER, FLAGS, consumer, numbers
 
 OK, ERROR = 0, 3
 LOG = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
@@ -47,8 +47,7 @@ def folder(pendula, tmp_path_factory):
     return unpacked(pendula, tmp_path_factory.mktemp("fmu"), "cart_chain", "--links", 2, "--stages", 4)
 
 
-@pytest.fixture(scope="module")
-def rebuilt(folder):
+def built(folder):
     """What somebody else's compiler makes of the sources: steps of constant size."""
     sources = sorted((folder / "sources").glob("*.c"))
     assert [source.name for source in sources] == ["system.c", "system_fmu.c"]
@@ -56,6 +55,11 @@ def rebuilt(folder):
     command = [COMPILER, *FLAGS, "-O1", "-fPIC", "-shared", *sources, "-o", binary, "-lm"]
     subprocess.run(command, check=True)
     return binary
+
+
+@pytest.fixture(scope="module")
+def rebuilt(folder):
+    return built(folder)
 
 
 class Fmu:
@@ -121,6 +125,52 @@ class Fmu:
         assert self.library.fmi3DeserializeFMUState(self.instance, given, size, ctypes.byref(kept)) == OK
         assert self.library.fmi3SetFMUState(self.instance, kept) == OK
         self.library.fmi3FreeFMUState(self.instance, ctypes.byref(kept))
+
+    def update(self) -> bool:
+        """Event mode: whether the motion has to end here."""
+        told = [ctypes.c_bool() for _ in range(5)]
+        places = [ctypes.byref(one) for one in told]
+        arguments = *places, ctypes.byref(ctypes.c_double())
+        assert self.library.fmi3UpdateDiscreteStates(self.instance, *arguments) == OK
+        return told[1].value
+
+    def move_to(self, time: float, states: list[float]) -> None:
+        given = (ctypes.c_double * len(states))(*states)
+        assert self.library.fmi3SetTime(self.instance, ctypes.c_double(time)) == OK
+        assert self.library.fmi3SetContinuousStates(self.instance, given, ctypes.c_size_t(len(states))) == OK
+
+    def numbers(self, what: str, count: int) -> list[float]:
+        """What fmi3Get... gives."""
+        found = (ctypes.c_double * count)()
+        assert getattr(self.library, f"fmi3Get{what}")(self.instance, found, ctypes.c_size_t(count)) == OK
+        return [*found]
+
+    def stepped(self, t: float, x: list[float], h: float) -> list[float]:
+        """The states a step of an importer later, by the classical method of Runge and Kutta."""
+
+        def field(t: float, x: list[float]) -> list[float]:
+            self.move_to(t, x)
+            return self.numbers("ContinuousStateDerivatives", len(x))
+
+        k = [field(t, x)]
+        for part in (h / 2, h / 2, h):
+            k.append(field(t + part, [a + part * b for a, b in zip(x, k[-1], strict=True)]))
+        return [a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, *k, strict=True)]
+
+    def slopes(self, unknowns: list[str], known: str) -> tuple[list[float], list[float]]:
+        """Derivatives by one number: as they are told, and from differences of fourth order."""
+        seed, found = (ctypes.c_double * 1)(1.0), (ctypes.c_double * len(unknowns))()
+        rows, row_count, _, _ = self._arrays(unknowns, found)
+        columns, column_count, _, _ = self._arrays([known], seed)
+        sizes = ctypes.c_size_t(1), found, ctypes.c_size_t(len(unknowns))
+        derivative = self.library.fmi3GetDirectionalDerivative
+        assert derivative(self.instance, rows, row_count, columns, column_count, seed, *sizes) == OK
+        [here], step, slope = self.get(known), 1e-3, [0.0] * len(unknowns)
+        for away, weight in ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)):
+            self.set(**{known: here + away * step})
+            slope = [s + weight / step * value for s, value in zip(slope, self.get(*unknowns), strict=True)]
+        self.set(**{known: here})
+        return [*found], slope
 
     def run(self, begin: float, count: int, h: float) -> None:
         for k in range(count):
@@ -279,14 +329,15 @@ tolerance = 1e-12
     [(LONG, 1e-11), (DRIVEN, 1e-11)],  # measured 1.0e-13 and 2.2e-13
     ids=["40 links", "drives"],
 )
-def test_long_and_driven_chains_are_for_co_simulation_alone(text, bound, pendula, tmp_path):
+def test_long_and_driven_chains(text, bound, pendula, tmp_path):
+    """Whose equations nobody writes out: there are no sources, and no derivatives but those of the states."""
     (tmp_path / "chain.toml").write_text(text)
     place = unpacked(pendula, tmp_path, tmp_path / "chain.toml")
     description = ElementTree.parse(place / "modelDescription.xml").getroot()
-    assert description.find("ModelExchange") is None and not (place / "sources").exists()
-    assert description.find("CoSimulation").get("providesDirectionalDerivatives") is None
+    assert not (place / "sources").exists()
+    for kind in ("CoSimulation", "ModelExchange"):
+        assert description.find(kind).get("providesDirectionalDerivatives") is None
     fmu = Fmu(place)
-    assert not fmu.states
     duration = 0.5 if text is LONG else 2.0
     fmu.run(0.0, round(duration / 0.01), 0.01)
     theirs = simulated(pendula, tmp_path, text)
@@ -297,24 +348,16 @@ def test_long_and_driven_chains_are_for_co_simulation_alone(text, bound, pendula
     fmu.restore(saved)
     fmu.run(duration, 5, 0.01)
     assert fmu.get(*theirs, "energy", "bob_2_x") == there
+    moved, exchanged = Fmu(place), Fmu(place)
+    moved.run(0.0, 1, duration / 10)
+    t, x = 0.0, exchanged.numbers("ContinuousStates", len(theirs))
+    while t < duration / 10 - 1e-9:
+        t, x = t + 1e-4, exchanged.stepped(t, x, 1e-4)
+    assert (
+        max(abs(a - b) for a, b in zip(x, moved.get(*theirs), strict=True)) < 1e-7
+    )  # measured 3.0e-9 and 1.8e-15
 
 
-BUMPER = """
-from sympy import Piecewise, cos, sign, sin
-
-
-def define(model, links):
-    x, theta = model.coordinate("x", "m"), model.coordinate("theta", "rad")
-    stiffness = model.parameter("stiffness", "N/m", default=500.0)
-    rub = model.parameter("rub", "N", default=0.2)
-    v, w = model.rate(x), model.rate(theta)
-    beyond = x - 0.2
-    contact = Piecewise((stiffness * beyond**2 / 2, beyond > 0), (0, True))
-    model.lagrangian = v**2 + v * w * cos(theta) + w**2 / 2 + 9.81 * cos(theta) - contact
-    model.force(x, model.input("push", "N") - rub * sign(v))
-    model.point("cart", (x, 0))
-    model.point("bob", (x + sin(theta), -cos(theta)))
-"""
 BUMPED = """
 [system]
 model = "bumper.py"
@@ -328,14 +371,18 @@ tolerance = 1e-12
 """
 
 
-def test_steps_end_where_pieces_of_a_model_meet(pendula, tmp_path):
-    """A cart that rubs and runs against a bumper; for co-simulation alone, since the importer knows of no switches."""
-    (tmp_path / "bumper.py").write_text(BUMPER)
-    (tmp_path / "bumper.toml").write_text(BUMPED)
-    place = unpacked(pendula, tmp_path, tmp_path / "bumper.toml")
-    description = ElementTree.parse(place / "modelDescription.xml").getroot()
-    assert description.find("ModelExchange") is None and not (place / "sources").exists()
-    fmu = Fmu(place)
+@pytest.fixture(scope="module")
+def bumper(pendula, tmp_path_factory):
+    """A folder with the FMU of a cart that rubs and runs against a bumper."""
+    place = tmp_path_factory.mktemp("bumper")
+    (place / "bumper.py").write_text(BUMPER)
+    (place / "bumper.toml").write_text(BUMPED)
+    return unpacked(pendula, place, place / "bumper.toml", "--stages", 4)
+
+
+def test_steps_end_where_pieces_of_a_model_meet(bumper, pendula):
+    fmu = Fmu(bumper)
+    assert not [name for name in fmu.places if name.startswith(("above", "below"))]
     assert fmu.get("push", "x_dot", "theta", "stiffness") == [1.5, 1.0, 0.4, 500.0]
     begin = fmu.get("energy", "bob_x", "cart_x")
     assert begin == pytest.approx([1.0 - 9.81 * math.cos(0.4), math.sin(0.4), 0.0], abs=1e-15)
@@ -344,13 +391,81 @@ def test_steps_end_where_pieces_of_a_model_meet(pendula, tmp_path):
         fmu.run(0.001 * k, 1, 0.001)
         farthest = max(farthest, *fmu.get("cart_x"))
     assert farthest > 0.21  # it met the bumper
-    assert distance(fmu, simulated(pendula, tmp_path, BUMPED)) < 1e-12  # measured 2.7e-15
+    assert distance(fmu, simulated(pendula, bumper, BUMPED)) < 1e-12  # measured 2.7e-15
     saved = fmu.saved()
     fmu.run(2.0, 100, 0.01)
     there = fmu.get("x", "theta", "x_dot", "theta_dot")
     fmu.restore(saved)
     fmu.run(2.0, 100, 0.01)
     assert fmu.get("x", "theta", "x_dot", "theta_dot") == there
+
+
+def test_steps_of_sources_end_there_too(bumper, pendula):
+    fmu = Fmu(bumper, binary=built(bumper))
+    fmu.run(0.0, 200, 0.01)
+    assert distance(fmu, simulated(pendula, bumper, BUMPED)) < 1e-11  # measured 1.4e-13
+
+
+def test_a_motion_that_friction_holds_ends(bumper):
+    """As the program does; by its library, by the sources, and in model exchange."""
+    by_library, by_sources, exchanged = Fmu(bumper), Fmu(bumper, binary=built(bumper)), Fmu(bumper)
+    for fmu in (by_library, by_sources, exchanged):
+        fmu.set(push=0.1, x_dot=0.0, theta=0.0)
+    assert by_library.step(0.0, 0.01) == ERROR and "the motion is held where x_dot = 0" in by_library.said[-1]
+    assert by_sources.step(0.0, 0.01) == ERROR and "the motion is held" in by_sources.said[-1]
+    assert exchanged.update() and "the motion is held" in exchanged.said[-1]
+    exchanged.set(push=0.3)
+    assert not exchanged.update()
+
+
+def test_an_importer_finds_events_by_their_indicators(bumper, pendula):
+    """One of model exchange: Runge-Kutta steps, which bisection ends where an indicator changes its sign."""
+    fmu = Fmu(bumper)
+    count = ctypes.c_size_t()
+    assert fmu.library.fmi3GetNumberOfEventIndicators(fmu.instance, ctypes.byref(count)) == OK
+    assert count.value == 2
+
+    def sides(t: float, x: list[float]) -> list[bool]:
+        fmu.move_to(t, x)
+        found = fmu.numbers("EventIndicators", 2)
+        assert 0.0 not in found
+        return [one > 0 for one in found]
+
+    assert not fmu.update()
+    fmu.library.fmi3EnterContinuousTimeMode(fmu.instance)
+    t, x, events = 0.0, fmu.numbers("ContinuousStates", 4), 0
+    while t < 2.0:
+        h = min(1e-3, 2.0 - t)
+        now, end = sides(t, x), fmu.stepped(t, x, h)
+        if sides(t + h, end) != now:
+            low, high = 0.0, h
+            while high - low > 1e-15:
+                h = (low + high) / 2
+                low, high = (low, h) if sides(t + h, fmu.stepped(t, x, h)) != now else (h, high)
+            h, events = high, events + 1
+            end = fmu.stepped(t, x, h)
+            fmu.move_to(t + h, end)
+            fmu.library.fmi3EnterEventMode(fmu.instance)
+            assert not fmu.update()
+            fmu.library.fmi3EnterContinuousTimeMode(fmu.instance)
+            assert sides(t + h, end) != now
+        t, x = t + h, end
+    fmu.move_to(t, x)
+    assert events == 6
+    assert distance(fmu, simulated(pendula, bumper, BUMPED)) < 1e-8  # measured 1.1e-9
+
+
+@pytest.mark.parametrize("known", ["theta", "x_dot", "push", "stiffness"])
+def test_directional_derivatives_are_those_of_the_piece(known, bumper):
+    fmu = Fmu(bumper)
+    fmu.set(x=0.25, theta=0.7, x_dot=-0.4, theta_dot=0.8)
+    unknowns = ["der(x)", "der(theta_dot)", "der(x_dot)", "bob_x", "energy", "switch_1", "switch_2"]
+    exact, slope = fmu.slopes(unknowns, known)
+    assert exact == pytest.approx(slope, rel=1e-8, abs=1e-8)
+    if known == "stiffness":
+        assert any(exact)
+        fmu.set(x=0.15)  # before the bumper
+        assert not any(fmu.slopes(unknowns, known)[0])
 
 
 MASSES = 18
@@ -368,8 +483,7 @@ def test_a_model_may_have_more_coordinates_than_its_equations_are_written_out_fo
     """Masses in a row between walls, in the slowest of their modes, which is a sine."""
     (tmp_path / "row.py").write_text(ROW)
     place = unpacked(pendula, tmp_path, tmp_path / "row.py")
-    description = ElementTree.parse(place / "modelDescription.xml").getroot()
-    assert description.find("ModelExchange") is None and not (place / "sources").exists()
+    assert not (place / "sources").exists()
     fmu = Fmu(place)
     angle = math.pi / (MASSES + 1)
     mode = {f"x{k}": math.sin((k + 1) * angle) for k in range(MASSES)}
@@ -378,6 +492,9 @@ def test_a_model_may_have_more_coordinates_than_its_equations_are_written_out_fo
     swing = math.cos(2 * math.sqrt(40.0) * math.sin(angle / 2) * 2.0)
     assert distance(fmu, {name: swing * x for name, x in mode.items()}) < 1e-12  # measured 1.1e-15
     assert fmu.get("last_x") == fmu.get(f"x{MASSES - 1}")
+    forces = fmu.numbers("ContinuousStateDerivatives", 2 * MASSES)[MASSES:]
+    slowest = 4 * 40.0 * math.sin(angle / 2) ** 2
+    assert forces == pytest.approx([-slowest * swing * x for x in mode.values()], abs=1e-11)
 
 
 def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, environment, tmp_path):
@@ -421,17 +538,8 @@ def test_directional_derivatives_are_slopes(known, folder):
     fmu = Fmu(folder)
     fmu.set(theta_1=1.0, theta_2=0.3, x_dot=0.4, theta_dot_1=0.8, theta_dot_2=-0.6, push=0.7, lengths_2=0.9)
     unknowns = ["der(x)", "der(theta_dot_2)", "der(x_dot)", "bob_2_x", "energy"]
-    seed, found = (ctypes.c_double * 1)(1.0), (ctypes.c_double * len(unknowns))()
-    rows, row_count, _, _ = fmu._arrays(unknowns, found)
-    columns, column_count, _, _ = fmu._arrays([known], seed)
-    sizes = ctypes.c_size_t(1), found, ctypes.c_size_t(len(unknowns))
-    derivative = fmu.library.fmi3GetDirectionalDerivative
-    assert derivative(fmu.instance, rows, row_count, columns, column_count, seed, *sizes) == OK
-    [here], step, slope = fmu.get(known), 1e-3, [0.0] * len(unknowns)
-    for away, weight in ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)):
-        fmu.set(**{known: here + away * step})
-        slope = [s + weight / step * value for s, value in zip(slope, fmu.get(*unknowns), strict=True)]
-    assert [*found] == pytest.approx(slope, rel=1e-8, abs=1e-8)
+    exact, slope = fmu.slopes(unknowns, known)
+    assert exact == pytest.approx(slope, rel=1e-8, abs=1e-8)
 
 
 def test_what_is_wrong_is_told(folder):
@@ -466,10 +574,22 @@ needs_fmpy = pytest.mark.skipif(find_spec("fmpy") is None, reason="FMPy is not i
 
 
 @needs_fmpy
-def test_fmpy_finds_nothing_wrong_where_it_is_installed(folder):
+def test_fmpy_finds_nothing_wrong_where_it_is_installed(folder, bumper):
     from fmpy.validation import validate_fmu
 
-    assert validate_fmu(str(folder / "system.fmu")) == []
+    for place in (folder, bumper):
+        assert validate_fmu(str(place / "system.fmu")) == []
+
+
+@needs_fmpy
+def test_fmpy_finds_events_where_it_is_installed(bumper, pendula):
+    import fmpy
+
+    file, wanted = str(bumper / "system.fmu"), simulated(pendula, bumper, BUMPED)
+    options = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-12, "output": [*wanted]}
+    rows = fmpy.simulate_fmu(file, stop_time=2.0, **options)
+    theirs = [rows[name][-1] for name in wanted]
+    assert theirs == pytest.approx([*wanted.values()], abs=1e-8)  # measured 1.9e-10, by CVODE
 
 
 @needs_fmpy

@@ -2,6 +2,7 @@
 #include <limits>
 #include <memory>
 #include <pendula/chain/chain_variation.hpp>
+#include <pendula/explicit/chain_forward_dynamics.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/schedule.hpp>
 #include <pendula/run/subject_model.hpp>
@@ -109,6 +110,17 @@ void require_rows(const char* what, const Directions<>& got, Eigen::Index rows, 
                               std::to_string(got.cols()) + ")");
 }
 
+void find_accelerations(const SystemSubject& subject, const Motion& motion, double* found) {
+  SystemAt<1> here(system_model_of(subject, motion));
+  here.set_time(motion.time);
+  here(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), found);
+}
+
+template <class Space>
+void find_accelerations(const ChainSubject<Space>& subject, const Motion& motion, double* found) {
+  ChainForwardDynamics<Space>(subject.chain()).acceleration(motion.time, motion.q.data(), motion.v.data(), found);
+}
+
 }  // namespace
 
 std::vector<Varied> varied_by(const Subject& subject) {
@@ -209,14 +221,10 @@ void require_regular(const Subject& subject, const Motion& motion) {
 }
 
 Eigen::VectorXd field_at(const Subject& subject, const Motion& motion) {
-  const SystemModel model = as_its_kind(subject, [&](const auto& kind) { return system_model_of(kind, motion); });
-  SystemAt<1> here(model);
-  here.set_time(motion.time);
   Eigen::VectorXd field(2 * motion.q.size());
   field.head(motion.q.size()) = motion.v;
-  Eigen::VectorXd rates(motion.q.size());
-  here(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), rates.data());
-  field.tail(motion.q.size()) = rates;
+  double* const found = field.data() + motion.q.size();
+  as_its_kind(subject, [&](const auto& kind) { find_accelerations(kind, motion, found); });
   return field;
 }
 

@@ -60,7 +60,7 @@ Backward move_gradients(const MotionTask& task, const Directions<>& gradients);
 /// Throws std::invalid_argument where a link in space is at a pole: nothing is a derivative by phi there.
 void require_regular(const Subject& subject, const Motion& motion);
 
-/// dq/dt, dv/dt at a motion, (2 coordinates). Throws NoKernel for a chain without one.
+/// dq/dt, dv/dt at a motion, (2 coordinates).
 Eigen::VectorXd field_at(const Subject& subject, const Motion& motion);
 
 }  // namespace pendula
