@@ -411,7 +411,7 @@ def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, 
         assert "sources/system_fmu.c" in archive.namelist()
     (tmp_path / "driven.toml").write_text(DRIVEN)
     ended = export(tmp_path / "driven.toml")
-    assert ended.returncode != 0 and "chain.drive" in ended.stderr
+    assert ended.returncode == 0
     ended = export("planar:40")
     assert ended.returncode != 0 and "at most 16 coordinates" in ended.stderr
 
