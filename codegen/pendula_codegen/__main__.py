@@ -15,6 +15,7 @@ from pendula_codegen.chain_kernel import ChainKernel, declared_by
 from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
+from pendula_codegen.drives import driven
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.export import (
     LANGUAGES,
@@ -25,7 +26,7 @@ from pendula_codegen.export import (
     render_runtime_fmu,
     require_size,
 )
-from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws
+from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws, sampled_laws_of_chain
 from pendula_codegen.fmu import DEFAULT_TOLERANCE, MARK, Drive, Runtime, packed_fmu
 from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
 from pendula_codegen.links import LINKS, find_link
@@ -151,7 +152,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_numbers,
         action="append",
         default=[],
-        help="link from 0, amplitude, frequency, phase of a chain's drive, for an FMU of adaptive steps",
+        help="link from 0, amplitude, frequency, phase of a chain's drive",
     )
     export.add_argument("--output", required=True, type=Path, help="a folder")
     export.set_defaults(run=_run_export)
@@ -244,13 +245,15 @@ def _run_export(options: argparse.Namespace) -> None:
 def _exported_chain(options: argparse.Namespace) -> tuple[dict[str, str], Runtime | None]:
     chain = Chain(find_link(options.space), 1 if options.links is None else options.links)
     runtime = _runtime(options, drives=[Drive.of(numbers) for numbers in options.drive])
-    request, words = _request(options, [], runtime), _export_words(options)
+    laws = sampled_laws_of_chain(chain, options.sampled)
+    request, words = _request(options, laws, runtime), _export_words(options)
     command = f"--space {options.space} --links {chain.links} {words} --output ."
-    if runtime is not None and (options.drive or len(chain.coordinates) > MOST_COORDINATES):
+    if runtime is not None and len(chain.coordinates) > MOST_COORDINATES:
         what = f"A chain of {chain.links} links."
         return render_runtime_fmu(declared_by(chain), request, what, command, chain, options.space), runtime
     require_size(len(chain.coordinates))
-    return render_export(ChainKernel(chain), request, command, options.space), runtime
+    kernel = ChainKernel(driven(chain, map(Drive.of, options.drive)))
+    return render_export(kernel, request, command, options.space), runtime
 
 
 def _exported_model(options: argparse.Namespace) -> tuple[dict[str, str], Runtime | None]:

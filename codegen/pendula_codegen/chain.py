@@ -75,10 +75,14 @@ def _loads(model: LinkModel, direction: Matrix, rate: Matrix) -> list[Expr]:
 
 @dataclass(frozen=True)
 class Chain:
-    """n links of one model. Coordinates are ordered by kind: q = (θ_1..θ_n, φ_1..φ_n)."""
+    """n links of one model. Coordinates are ordered by kind: q = (θ_1..θ_n, φ_1..φ_n).
+
+    drives   torques by their symbols, and functions of time that are added to them
+    """
 
     model: LinkModel
     links: int
+    drives: tuple[tuple[Symbol, Expr], ...] = ()
 
     def __post_init__(self) -> None:
         if self.links < 1:
@@ -133,6 +137,11 @@ class Chain:
 
     def torque(self, i: int) -> tuple[Symbol, ...]:
         return tuple(on_link(component, i) for component in self.model.torque)
+
+    @property
+    def time(self) -> Symbol:
+        """t, s, which drives may hold."""
+        return Symbol("t", real=True)
 
     @cached_property
     def definitions(self) -> dict[Symbol, Expr]:
@@ -230,7 +239,10 @@ class Chain:
     @cached_property
     def forces(self) -> list[Expr]:
         """Q: torque and damping along each coordinate, N m (paper eq. 23)."""
-        return [self._instance(load, i) for load in self.terms.loads for i in self.numbers]
+        driven: dict[Symbol, Expr] = {}
+        for torque, added in self.drives:
+            driven[torque] = driven.get(torque, torque) + added
+        return [self._instance(load, i).xreplace(driven) for load in self.terms.loads for i in self.numbers]
 
     @cached_property
     def system(self) -> LagrangianSystem:
@@ -242,4 +254,5 @@ class Chain:
             inputs=tuple(s for i in self.numbers for s in (self.damping(i), *self.torque(i))),
             lagrangian=self.kinetic_energy - self.potential_energy,
             forces=tuple(self.forces),
+            time=self.time if self.drives else None,
         )

@@ -286,7 +286,9 @@ class ChainKernel(SystemKernel):
             for i in links
             for k, component in enumerate(chain.torque(i))
         ]
-        return [*parameters, Leaf(chain.model.gravity, Place("chain", "gravity"), "parameter"), *torques]
+        gravity = Leaf(chain.model.gravity, Place("chain", "gravity"), "parameter")
+        time = Leaf(chain.time, Place("chain", "time"), "parameter")
+        return [*parameters, gravity, time, *torques]
 
 
 def tail_recursion(chain: Chain) -> dict[Symbol, Expr]:

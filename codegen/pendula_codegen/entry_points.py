@@ -181,6 +181,10 @@ class SystemKernel(ABC):
 
     def vocabularies(self) -> list[Vocabulary]:
         """One per form; shared by all functions, so that what two of them hold is expanded once."""
+        return self.plain_vocabularies()
+
+    def plain_vocabularies(self) -> list[Vocabulary]:
+        """Those of expressions that somebody wrote, whose sums stay as they are."""
         forms = [Form(pair_angles, frozenset()) for pair_angles in (True, False)]
         leaves = [*self.leaves(), *self.motion()]
         return [Vocabulary(leaves, self.angles(), {}, form, keep_sums=True) for form in forms]

@@ -167,7 +167,7 @@ class ExportedFunctions:
         """Values of control laws, without their limits."""
         tape = Tape()
         assignments = [(Place("law", index=(k,)), law.value) for k, law in enumerate(laws)]
-        program = shortest_program([assignments], self._recorder.kernel.shared_vocabularies)
+        program = shortest_program([assignments], self._recorder.kernel.plain_vocabularies())
         found = tape.record(program, self._recorder.row)
         gives = (Array("law", "one for each law, in the unit of its input", len(laws)),)
         return ExportedFunction(
@@ -304,8 +304,8 @@ class Request:
             raise GenerationError(f"export: number: expected double as {self.language} has it, got float")
         if self.language == "fmu" and self.laws:
             raise GenerationError(
-                "export: an FMU has no feedback that is sampled: take it out (--set system.feedback=) and let the "
-                "importer close the loop"
+                "export: an FMU has no feedback that is sampled: take it out (--set system.feedback=, or "
+                "chain.feedback=) and let the importer close the loop"
             )
         if not 1 <= self.stages <= MAX_STAGES:
             raise GenerationError(f"export: stages: expected 1 to {MAX_STAGES}, got {self.stages}")

@@ -1,17 +1,19 @@
-"""Continuous feedback: what a scenario adds to an input of a model, as a function of the motion.
+"""Feedback: what a scenario adds to an input of a model or a chain, as a function of the motion.
 
-It stands in the forces of the kernel, which is as exact with it as without, derivatives included.
+What is continuous stands in the forces of the kernel, which is as exact with it as without, derivatives included.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import sympy
 from sympy import Expr
 
+from pendula_codegen.chain import Chain
+from pendula_codegen.chain_kernel import declared_by
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.exact import MOST_DENOMINATOR, exact
 from pendula_codegen.model import Model, rate_name
@@ -53,12 +55,28 @@ class SampledLaw:
 
 def sampled_laws(model: Model, laws: Iterable[str]) -> list[SampledLaw]:
     """Of LIMIT=INPUT=WORDS each, words as close_loops takes them."""
-    names, found = _columns(model), []
+    inputs = {each.symbol.name: each.symbol.name for each in model.inputs}
+    return _sampled(laws, _columns(model), inputs, "the model")
+
+
+def sampled_laws_of_chain(chain: Chain, laws: Iterable[str]) -> list[SampledLaw]:
+    """The same of a chain, whose inputs scenarios call torque_1, and in space torque_x_1."""
+    inputs = {}
+    for each in declared_by(chain).inputs:
+        kind, link, *axis = each.symbol.name.split("_")
+        inputs["_".join([kind, *axis, link])] = each.symbol.name
+    return _sampled(laws, _columns_of_chain(chain), inputs, "the chain")
+
+
+def _sampled(
+    laws: Iterable[str], columns: Mapping[str, Expr], inputs: Mapping[str, str], system: str
+) -> list[SampledLaw]:
+    found = []
     for law in laws:
         limit, name, words = law.split("=", 2)
-        if name not in {each.symbol.name for each in model.inputs}:
-            raise GenerationError(f"feedback: expected an input of the model, got {name}")
-        found.append(SampledLaw(name, exact(_value(words, names)), float(limit)))
+        if name not in inputs:
+            raise GenerationError(f"feedback: expected an input of {system}, got {name}")
+        found.append(SampledLaw(inputs[name], exact(_value(words, columns)), float(limit)))
     return found
 
 
@@ -77,7 +95,15 @@ def _columns(model: Model) -> dict[str, Expr]:
     return names
 
 
-def _value(words: str, names: dict[str, Expr]) -> Expr:
+def _columns_of_chain(chain: Chain) -> dict[str, Expr]:
+    names: dict[str, Expr] = {"t": chain.time}
+    names |= {symbol.name: symbol for symbol in (*chain.coordinates, *chain.velocities)}
+    for i, position in zip(chain.numbers, chain.positions, strict=True):
+        names |= {f"{axis}_{i}": value for axis, value in zip("xyz", position, strict=False)}
+    return names
+
+
+def _value(words: str, names: Mapping[str, Expr]) -> Expr:
     stack: list[Expr] = []
     for word in words.split():
         if word in _SIGNS:

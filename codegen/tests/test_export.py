@@ -15,6 +15,7 @@ from pendula_codegen.chain_kernel import ChainKernel
 from pendula_codegen.entry_points import SystemKernel
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.export import ExportedFunctions, Request, Values, render_export
+from pendula_codegen.feedback import sampled_laws_of_chain
 from pendula_codegen.links import find_link
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.written import DIGITS
@@ -248,6 +249,20 @@ def test_a_compiler_of_cpp_takes_the_header(tmp_path):
     (tmp_path / "main.cpp").write_text('#include "system.h"\nint main() { return system_done; }\n')
     command = ["g++", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only", str(tmp_path / "main.cpp")]
     subprocess.run(command, check=True)
+
+
+def test_laws_of_chains_keep_the_digits_of_differences(tmp_path):
+    kernel = chain("planar", 2)
+    laws = sampled_laws_of_chain(kernel.chain, ["inf=torque_2=theta_1 3 - 9 ^ t theta_dot_2 * *"])
+    assert [law.input for law in laws] == ["torque_2"]
+    source, shared = write(kernel, tmp_path, laws=laws), tmp_path / "system.so"
+    subprocess.run(["gcc", *FLAGS, "-O1", "-fPIC", "-shared", source, "-o", shared, "-lm"], check=True)
+    numbers, found = ctypes.c_double * 7, ctypes.c_double(0.0)
+    q, v = numbers(3.01, 1.0), numbers(0.0, 2.0)
+    control = ctypes.CDLL(str(shared)).system_laws
+    control(numbers(), ctypes.c_double(5.0), numbers(), q, v, ctypes.byref(found))
+    # Measured 0. Multiplied out, the power is 1e-12 of rounding in place of 1e-18.
+    assert math.isclose(found.value, (3.01 - 3) ** 9 * 10, rel_tol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/chain_subject.hpp>
+#include <pendula/run/subject.hpp>
 #include <span>
 #include <string>
 #include <system_error>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "io/feedback_reader.hpp"
 #include "io/generator.hpp"
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
@@ -69,15 +72,31 @@ void add_start(Words& words, const Motion& start) {
   add_number(words, "time", start.time);
 }
 
+/// The laws of a controller, which has one time from one sample to the next.
+Words sampled_words(const std::vector<io::FeedbackPlan>& feedback, const Subject& subject) {
+  Words words;
+  double sample = 0;
+  for (const io::FeedbackPlan& plan : feedback) {
+    if (plan.sample == 0) continue;
+    if (!words.empty() && plan.sample != sample) {
+      refuse(plan.place,
+             "expected one sample time of all feedback, " + shortest(sample) + ", got " + shortest(plan.sample));
+    }
+    sample = plan.sample;
+    const io::InputLaw law = io::law_in_words(plan, subject);
+    words.push_back("--sampled=" + (std::isfinite(plan.limit) ? shortest(plan.limit) : "inf") + '=' + law.input + '=' +
+                    law.value);
+  }
+  return words;
+}
+
 template <class Space>
-Words scenario_words(const io::Scenario<Space>& scenario, const std::string& file, bool with_runtime) {
+Words scenario_words(const io::Scenario<Space>& scenario, const std::string& file) {
   const Chain<Space>& chain = scenario.chain;
   if (scenario.natural) refuse(file, "chain.units: expected \"SI\", got \"natural\"");
-  if (!scenario.feedback.empty()) refuse(scenario.feedback.front().place, "a chain's feedback cannot be exported");
-  if (!chain.drives().empty() && !with_runtime) {
-    refuse(file, "chain.drive: a chain's drives cannot be exported, but into an FMU with pendula's library in it");
-  }
   Words words = {"--space", Space::dof == 1 ? "planar" : "spatial", "--links", std::to_string(chain.links())};
+  const Words sampled = sampled_words(scenario.feedback, ChainSubject<Space>(chain));
+  words.insert(words.end(), sampled.begin(), sampled.end());
   std::vector<double> parameters(chain.masses().begin(), chain.masses().end());
   parameters.insert(parameters.end(), chain.lengths().begin(), chain.lengths().end());
   parameters.insert(parameters.end(), chain.damping().begin(), chain.damping().end());
@@ -95,32 +114,13 @@ Words scenario_words(const io::Scenario<Space>& scenario, const std::string& fil
   return words;
 }
 
-/// The laws of a controller, which has one time from one sample to the next.
-std::vector<io::FeedbackPlan> sampled_plans(const io::SystemScenario& scenario) {
-  std::vector<io::FeedbackPlan> plans;
-  for (const io::FeedbackPlan& plan : scenario.feedback) {
-    if (plan.sample == 0) continue;
-    if (!plans.empty() && plan.sample != plans.front().sample) {
-      refuse(plan.place, "expected one sample time of all feedback, got another one");
-    }
-    plans.push_back(plan);
-  }
-  return plans;
-}
-
 Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, const io::Toolchain& toolchain) {
-  const std::vector<io::FeedbackPlan> sampled = sampled_plans(scenario);
+  const Words sampled = sampled_words(scenario.feedback, *scenario.system);
   const SystemNumbers& numbers = scenario.system->numbers();
   for (const InputSine& sine : numbers.sines) model.laws.push_back(law_of(sine, scenario.system->info()));
   Words words = io::about("export", model, toolchain);
   words.erase(words.begin());
-  for (const io::FeedbackPlan& plan : sampled) {
-    io::FeedbackPlan law = plan;
-    law.sample = 0;
-    const io::InputLaw read = io::continuous_laws({law}, *scenario.system).front();
-    words.push_back("--sampled=" + (std::isfinite(plan.limit) ? shortest(plan.limit) : "inf") + '=' + read.input + '=' +
-                    read.value);
-  }
+  words.insert(words.end(), sampled.begin(), sampled.end());
   add_numbers(words, "parameters", numbers.parameters);
   add_numbers(words, "inputs", numbers.inputs);
   add_start(words, scenario.start);
@@ -168,7 +168,7 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
       [&](const auto& found) {
         Words words;
         if constexpr (requires { found.chain; }) {
-          words = scenario_words(found, text.name, has_runtime(options, toolchain));
+          words = scenario_words(found, text.name);
         } else {
           words = scenario_words(found, *model, toolchain);
         }

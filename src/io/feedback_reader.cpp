@@ -112,7 +112,7 @@ std::string_view sign_of(Operation operation) {
 }
 
 /// A program as the generator reads it: words, operands before what is done with them. `x 9 * ~` is -(x * 9).
-std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names) {
+std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names, bool is_sampled) {
   std::vector<std::string> words;
   for (const ExpressionProgram::Node& node : program.nodes) {
     const std::string_view sign = sign_of(node.operation);
@@ -125,9 +125,9 @@ std::string postfix_text(const ExpressionProgram& program, const std::vector<std
     } else if (!sign.empty()) {
       words.emplace_back(sign);
     } else {
-      throw ExpressionError(
-          "smooth functions in continuous feedback (+ - * / ^, sqrt, exp, log, trigonometric and hyperbolic ones)",
-          "another one; sample = ... beside it allows all");
+      throw ExpressionError(std::string("smooth functions in ") + (is_sampled ? "exported" : "continuous") +
+                                " feedback (+ - * / ^, sqrt, exp, log, trigonometric and hyperbolic ones)",
+                            std::string("another one") + (is_sampled ? "" : "; sample = ... beside it allows all"));
     }
   }
   std::string text;
@@ -156,14 +156,18 @@ std::vector<FeedbackPlan> read_feedback(const Section& system) {
   return plans;
 }
 
+InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject) {
+  input_of(plan, subject);
+  const std::vector<std::string> names = names_for(subject, true);
+  return {plan.input,
+          told_at(plan, [&] { return postfix_text(read_expression(plan.value, names), names, plan.sample > 0); })};
+}
+
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system) {
   std::vector<InputLaw> laws;
-  const std::vector<std::string> names = names_for(system, true);
   for (const FeedbackPlan& plan : plans) {
     input_of(plan, system);
-    if (plan.sample > 0) continue;
-    laws.push_back(
-        {plan.input, told_at(plan, [&] { return postfix_text(read_expression(plan.value, names), names); })});
+    if (plan.sample == 0) laws.push_back(law_in_words(plan, system));
   }
   return laws;
 }

@@ -23,6 +23,9 @@ struct FeedbackPlan {
 /// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Throws InputError.
 std::vector<FeedbackPlan> read_feedback(const Section& system);
 
+/// One of them, continuous or sampled, as the generator reads it. Throws InputError as continuous_laws.
+InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
+
 /// The continuous ones, as the generator reads them. Throws InputError if an expression cannot be read, names something
 /// unknown, or is not smooth.
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system);

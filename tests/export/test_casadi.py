@@ -60,7 +60,15 @@ def differences(function, arguments, place, casadi):
 
 @needs_casadi
 @pytest.mark.parametrize("name", ["system_next", "system_dynamics"])
-@pytest.mark.parametrize("model", [("cart_chain", "--links", "2"), ("driven_chain",), ("swinging_atwood",)])
+@pytest.mark.parametrize(
+    "model",
+    [
+        ("cart_chain", "--links", "2"),
+        ("driven_chain",),
+        ("swinging_atwood",),
+        (EXAMPLES / "driven_damped.toml",),
+    ],
+)
 def test_casadi_calls_functions_and_their_jacobians_where_it_is_installed(name, model, export, tmp_path):
     import casadi
 

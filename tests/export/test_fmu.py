@@ -330,13 +330,14 @@ tolerance = 1e-12
     ids=["40 links", "drives"],
 )
 def test_long_and_driven_chains(text, bound, pendula, tmp_path):
-    """Whose equations nobody writes out: there are no sources, and no derivatives but those of the states."""
+    """Nobody writes out the equations of many links: there are no sources, and no derivatives but those of the states."""
     (tmp_path / "chain.toml").write_text(text)
     place = unpacked(pendula, tmp_path, tmp_path / "chain.toml")
     description = ElementTree.parse(place / "modelDescription.xml").getroot()
-    assert not (place / "sources").exists()
+    written = text is DRIVEN
+    assert (place / "sources").exists() == written
     for kind in ("CoSimulation", "ModelExchange"):
-        assert description.find(kind).get("providesDirectionalDerivatives") is None
+        assert (description.find(kind).get("providesDirectionalDerivatives") == "true") == written
     fmu = Fmu(place)
     duration = 0.5 if text is LONG else 2.0
     fmu.run(0.0, round(duration / 0.01), 0.01)
@@ -528,7 +529,7 @@ def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, 
         assert "sources/system_fmu.c" in archive.namelist()
     (tmp_path / "driven.toml").write_text(DRIVEN)
     ended = export(tmp_path / "driven.toml")
-    assert ended.returncode != 0 and "chain.drive" in ended.stderr
+    assert ended.returncode == 0
     ended = export("planar:40")
     assert ended.returncode != 0 and "at most 16 coordinates" in ended.stderr
 

@@ -1,7 +1,7 @@
 /* Somebody else's program: it has what was exported, and nothing else of pendula. Built with -DSYSTEM=cart
  * -DHEADER='"cart.h"' (and -DNUMBER=float), called with a number of steps and their size, it prints where they lead,
- * and the derivatives of the last one. -DCONTROLLED lets the exported controller act. Three more words change a number:
- * parameters 2 0.001, t 0 0.001 or h 0 0.001. */
+ * and the derivatives of the last one. -DCONTROLLED=4 lets the exported controller act before every fourth step. Three
+ * more words change a number: parameters 2 0.001, t 0 0.001 or h 0 0.001. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,9 +40,10 @@ int main(int count, char** words) {
     moved[atoi(words[4])] += (NUMBER)atof(words[5]);
   }
   for (int k = 0; k < steps; ++k) {
-    for (int j = 0; j < inputs; ++j) held[j] = of_inputs[j];
 #ifdef CONTROLLED
-    NAME(control)(of_parameters, t, of_inputs, state, held);
+    if (k % CONTROLLED == 0) NAME(control)(of_parameters, t, of_inputs, state, held);
+#else
+    for (int j = 0; j < inputs; ++j) held[j] = of_inputs[j];
 #endif
     const int status = NAME(step_with_sensitivities)(of_parameters, t, h, held, 20, tolerance, state, state, by_state,
                                                      by_inputs, by_parameters, by_times, &work);
