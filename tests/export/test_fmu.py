@@ -330,7 +330,7 @@ tolerance = 1e-12
     ids=["40 links", "drives"],
 )
 def test_long_and_driven_chains(text, bound, pendula, tmp_path):
-    """Nobody writes out the equations of many links: there are no sources, and no derivatives but those of the states."""
+    """Equations of many links are not written out: there are no sources, and no directional derivatives."""
     (tmp_path / "chain.toml").write_text(text)
     place = unpacked(pendula, tmp_path, tmp_path / "chain.toml")
     description = ElementTree.parse(place / "modelDescription.xml").getroot()
