@@ -56,6 +56,12 @@ static void a_chain(void) {
              fabs(held[1] + 9.81 * (2 * cos(2.0) + cos(1.0))) < 1e-14, /* measured 0 */
          "its energies");
   expect(pendula_energies(chain, 0, NULL, v, held) == PENDULA_INVALID, "energies of nothing");
+  held[0] = 0, held[1] = NAN;
+  expect(pendula_simulation_new(chain, 0, q, held, &options) == NULL &&
+             strcmp(pendula_error(), "theta_dot_2: expected a finite number, got nan") == 0 &&
+             pendula_simulation_new(chain, INFINITY, q, v, &options) == NULL &&
+             strcmp(pendula_error(), "t: expected a finite number, got inf") == 0,
+         "a start that is no number");
   expect(pendula_model_of_program("no program", NULL, 0) == NULL && pendula_error_kind() == PENDULA_INVALID,
          "a program that is none");
   expect(

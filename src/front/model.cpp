@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
+#include <pendula/numeric/number_text.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/inputs.hpp>
 #include <pendula/run/library.hpp>
@@ -16,6 +17,7 @@
 #include <pendula/version.hpp>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "front/errors.hpp"
@@ -119,6 +121,23 @@ const SystemTable* find_system(const std::string& name, int links) {
                  " in this build; it has " + (built.empty() ? "none" : built));
 }
 
+[[noreturn]] void refuse(const std::string& name, double number) {
+  throw std::invalid_argument(name + ": expected a finite number, got " + shortest(number));
+}
+
+void require_finite(const pendula_model& model, const Motion& motion) {
+  if (!std::isfinite(motion.time)) refuse("t", motion.time);
+  if (motion.q.allFinite() && motion.v.allFinite()) return;
+  Eigen::Index coordinate = 0, rate = 0;
+  for (const Quantity& quantity : model.subject->quantities()) {
+    if (quantity.role != Role::coordinate && quantity.role != Role::rate) continue;
+    for (std::size_t k = 0; k < quantity.size(); ++k) {
+      const double number = quantity.role == Role::coordinate ? motion.q[coordinate++] : motion.v[rate++];
+      if (!std::isfinite(number)) refuse(model.names[quantity.column(k)], number);
+    }
+  }
+}
+
 }  // namespace
 
 Motion motion_of(const pendula_model& model, double time, const double* q, const double* v) {
@@ -126,7 +145,10 @@ Motion motion_of(const pendula_model& model, double time, const double* q, const
     throw std::invalid_argument("q: expected " + std::to_string(model.coordinates) + " numbers, got none");
   const auto count = static_cast<Eigen::Index>(model.coordinates);
   using Numbers = Eigen::Map<const Eigen::VectorXd>;
-  return {time, Numbers(q, count), v == nullptr ? Eigen::VectorXd(Eigen::VectorXd::Zero(count)) : Numbers(v, count)};
+  Motion motion{time, Numbers(q, count), Numbers(q, count)};
+  motion.v = v == nullptr ? Eigen::VectorXd(Eigen::VectorXd::Zero(count)) : Numbers(v, count);
+  require_finite(model, motion);
+  return motion;
 }
 
 void write(const Motion& motion, double* q, double* v) {

@@ -19,7 +19,7 @@ struct pendula_model {
 
 namespace pendula::front {
 
-/// q and v as they come. Throws std::invalid_argument where one is null.
+/// q and v as they come; without v rates are 0. Throws std::invalid_argument where q is null, or a number not finite.
 Motion motion_of(const pendula_model& model, double time, const double* q, const double* v);
 
 void write(const Motion& motion, double* q, double* v);
