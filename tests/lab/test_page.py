@@ -54,6 +54,30 @@ def shown(page: Page) -> float:
     return page.evaluate("pendulaLab.shown")
 
 
+def swing_and_let_go(page: Page, middle: tuple[float, float], radius: float, enough: str) -> float:
+    """Moves the pointer that holds something round and round until it is fast enough; the clock where it lets go.
+
+    It does so in the page: from here a busy machine would let go late.
+    """
+    return page.evaluate(
+        f"""async ([x, y, radius]) => {{
+          const send = (type, at, buttons) => pendulaLab.stage.canvas.dispatchEvent(new PointerEvent(type, {{
+            pointerId: 1, pointerType: "mouse", clientX: at[0], clientY: at[1], buttons, bubbles: true }}));
+          const {{ size }} = pendulaLab;
+          let at;
+          for (let step = 0; step < 8 || (step < 1000 && !({enough})); ++step) {{
+            at = [x + radius * Math.cos(0.3 * step), y + radius * Math.sin(0.3 * step)];
+            send("pointermove", at, 1);
+            await new Promise(requestAnimationFrame);
+          }}
+          const {{ clock }} = pendulaLab;
+          send("pointerup", at, 0);
+          return clock;
+        }}""",
+        [*middle, radius],
+    )
+
+
 def set_slider(page: Page, name: str, value: str) -> None:
     box = page.get_by_role("spinbutton", name=name, exact=True)
     box.fill(value)
@@ -115,14 +139,9 @@ def test_a_bob_follows_the_hand_and_is_thrown(open_lab, link):
         })()"""
     )
     assert off < 0.05, held  # of the chain's length; measured 0.006 and 0.011
-    # Round and round, until the ball has taken up what the hand does: a busy machine takes longer.
-    for step in range(400):
-        page.mouse.move(x + 40 * math.cos(0.4 * step), y - 40 + 40 * math.sin(0.4 * step))
-        page.wait_for_timeout(16)
-        rates = page.evaluate("pendulaLab.row.slice(1 + pendulaLab.size, 1 + 2 * pendulaLab.size)")
-        if step >= 8 and max(map(abs, rates.values() if isinstance(rates, dict) else rates)) > 1:
-            break
-    page.mouse.up()
+    swing_and_let_go(
+        page, (x, y - 40), 40, "Math.max(...pendulaLab.row.slice(1 + size, 1 + 2 * size).map(Math.abs)) > 1"
+    )
     speed = page.evaluate("Math.max(...pendulaLab.state.v.map(Math.abs))")
     assert speed > 0.5
     until(page, "pendulaLab.shown > pendulaLab.since + 0.5")
@@ -519,13 +538,8 @@ def test_a_point_of_a_model_is_thrown(open_lab, name):
     until(page, "pendulaLab.hand.isHolding && pendulaLab.isPosed")
     page.evaluate("pendulaLab.state.speed = 1")
     began = page.evaluate("pendulaLab.clock")
-    for step in range(400):  # round and round, until the hand has taken up what the pointer does
-        page.mouse.move(x + 30 * math.cos(0.3 * step), y + 30 * math.sin(0.3 * step))
-        page.wait_for_timeout(16)
-        if step >= 8 and page.evaluate("Math.hypot(...pendulaLab.hand.speed)") > 0.5:
-            break
-    assert page.evaluate("pendulaLab.clock") == began  # time waits
-    page.mouse.up()
+    ended = swing_and_let_go(page, (x, y), 30, "Math.hypot(...pendulaLab.hand.speed) > 0.5")
+    assert ended == began  # time waits
     until(page, "!pendulaLab.isPosed && !pendulaLab.isWaiting && pendulaLab.shown > pendulaLab.state.t + 0.1")
     thrown = page.evaluate(
         """(() => {
