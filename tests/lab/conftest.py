@@ -39,7 +39,7 @@ def ends_in_module(cases: list[dict]) -> list[dict]:
     return json.loads(done.stdout)
 
 
-def until(page: Page, condition: str, seconds: float = 20) -> None:
+def until(page: Page, condition: str, seconds: float = 45) -> None:
     """Waits for a condition; playwright's own way is what the page's security policy forbids."""
 
     def holds() -> bool:
