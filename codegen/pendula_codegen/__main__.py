@@ -143,6 +143,7 @@ def _parser() -> argparse.ArgumentParser:
         export.add_argument(f"--{name}", type=_numbers, help="numbers to begin with, with commas")
     export.add_argument("--time", type=float, default=0.0, help="to begin with")
     export.add_argument("--step", type=float, help="to begin with")
+    export.add_argument("--duration", type=float, default=Values.duration, help="of an FMU's run, by default")
     export.add_argument("--library", type=Path, help="pendula's static library, for an FMU of adaptive steps")
     export.add_argument("--headers", type=Path, help="the folder of pendula/pendula.h")
     export.add_argument("--flag", action="append", default=[], help="of the compiler, with that library")
@@ -279,7 +280,9 @@ def _runtime(options: argparse.Namespace, **more: object) -> Runtime | None:
 
 
 def _request(options: argparse.Namespace, laws: list[SampledLaw], runtime: Runtime | None) -> Request:
-    values = Values(options.parameters, options.inputs, options.q, options.v, options.time, options.step)
+    values = Values(
+        options.parameters, options.inputs, options.q, options.v, options.time, options.step, options.duration
+    )
     return Request(options.name, options.language, options.number, options.stages, values, laws, runtime)
 
 
@@ -297,6 +300,7 @@ def _export_words(options: argparse.Namespace) -> str:
     words += [f"--drive={','.join(map(repr, numbers))}" for numbers in options.drive]
     words += [f"--time {options.time!r}"] if options.time else []
     words += [f"--step {options.step!r}"] if options.step else []
+    words += [f"--duration {options.duration!r}"] if options.duration != Values.duration else []
     return " ".join(words)
 
 

@@ -33,7 +33,7 @@ def declared_by(chain: Chain) -> Declared:
     return Declared(
         coordinates=[Coordinate(q, "rad") for q in chain.coordinates],
         parameters=[*parameters, gravity],
-        inputs=[Input(Symbol(f"torque_{i}{axis}"), "N m") for i in links for axis in axes],
+        inputs=[Input(Symbol(f"torque{axis}_{i}"), "N m") for i in links for axis in axes],
         points=[(f"bob_{i}", chain.model.dimension) for i in links],
     )
 

@@ -263,7 +263,7 @@ def _slope(of: str, by: str) -> str:
 
 @dataclass(frozen=True)
 class Values:
-    """Numbers that a program may begin with: all parameters, inputs, the state (q, v), the time."""
+    """Numbers that a program may begin with: all parameters, inputs, the state (q, v), the time; how long a run is."""
 
     parameters: Sequence[float] | None = None
     inputs: Sequence[float] | None = None
@@ -271,6 +271,7 @@ class Values:
     v: Sequence[float] | None = None
     time: float = 0.0
     step: float | None = None
+    duration: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -450,6 +451,7 @@ def _fmu_context(
         "variables": variables,
         "units": sorted({variable.unit for variable in variables} - {""}),
         "internal_step": step,
+        "duration": request.values.duration,
         "token": token_of([text, repr(replace(request, runtime=None)), repr(variables)]),
         "unsupported_functions": (
             *UNSUPPORTED,

@@ -6,7 +6,7 @@ What is continuous stands in the forces of the kernel, which is as exact with it
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy
@@ -16,7 +16,7 @@ from pendula_codegen.chain import Chain
 from pendula_codegen.chain_kernel import declared_by
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.exact import MOST_DENOMINATOR, exact
-from pendula_codegen.model import Model, rate_name
+from pendula_codegen.model import Input, Model, rate_name
 
 _SIGNS: dict[str, Callable[[Expr, Expr], Expr]] = {
     "+": operator.add,
@@ -55,28 +55,23 @@ class SampledLaw:
 
 def sampled_laws(model: Model, laws: Iterable[str]) -> list[SampledLaw]:
     """Of LIMIT=INPUT=WORDS each, words as close_loops takes them."""
-    inputs = {each.symbol.name: each.symbol.name for each in model.inputs}
-    return _sampled(laws, _columns(model), inputs, "the model")
+    return _sampled(laws, _columns(model), model.inputs, "the model")
 
 
 def sampled_laws_of_chain(chain: Chain, laws: Iterable[str]) -> list[SampledLaw]:
-    """The same of a chain, whose inputs scenarios call torque_1, and in space torque_x_1."""
-    inputs = {}
-    for each in declared_by(chain).inputs:
-        kind, link, *axis = each.symbol.name.split("_")
-        inputs["_".join([kind, *axis, link])] = each.symbol.name
-    return _sampled(laws, _columns_of_chain(chain), inputs, "the chain")
+    """The same of a chain."""
+    return _sampled(laws, _columns_of_chain(chain), declared_by(chain).inputs, "the chain")
 
 
 def _sampled(
-    laws: Iterable[str], columns: Mapping[str, Expr], inputs: Mapping[str, str], system: str
+    laws: Iterable[str], columns: Mapping[str, Expr], inputs: Sequence[Input], system: str
 ) -> list[SampledLaw]:
-    found = []
+    known, found = {each.symbol.name for each in inputs}, []
     for law in laws:
         limit, name, words = law.split("=", 2)
-        if name not in inputs:
+        if name not in known:
             raise GenerationError(f"feedback: expected an input of {system}, got {name}")
-        found.append(SampledLaw(inputs[name], exact(_value(words, columns)), float(limit)))
+        found.append(SampledLaw(name, exact(_value(words, columns)), float(limit)))
     return found
 
 

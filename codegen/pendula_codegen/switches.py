@@ -21,6 +21,7 @@ from sympy import (
     Add,
     And,
     Expr,
+    Float,
     Heaviside,
     Integer,
     Max,
@@ -67,13 +68,13 @@ class Switch:
     @property
     def text(self) -> str:
         """The function as somebody would write it: 0.2 is a fraction of large numbers."""
-        return _Text().doprint(self.value)
+        fractions = (number for number in self.value.atoms(Rational) if number.q > MOST_WHOLE)
+        return _Text().doprint(self.value.xreplace({number: Float(float(number)) for number in fractions}))
 
 
 class _Text(StrPrinter):
-    def _print_Rational(self, number: Rational) -> str:
-        is_double = number.q > 1000 and number == Rational(float(number))
-        return repr(float(number)) if is_double else super()._print_Rational(number)
+    def _print_Float(self, number: Float) -> str:
+        return repr(float(number))
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,11 @@ class Switches:
                 first = self.truth(best - other)
                 if isinstance(part, Min):
                     first = ~first
-                best = _times(first.yes, best) + _times(first.no, other)
+                zeros = [switch.value for switch in self.all]
+                best = Add(
+                    _times(first.yes, _guarded(best, first, fixed, zeros)),
+                    _times(first.no, _guarded(other, ~first, fixed, zeros)),
+                )
             return best
         if isinstance(part, PIECES):
             above = self.truth(args[0])
@@ -224,7 +229,7 @@ class Switches:
 def _without_factor(value: Expr) -> Expr:
     """One of all multiples of a function: with small whole numbers, or with a term that has no number."""
     _, value = value.as_content_primitive()
-    largest = max(abs(term.as_coeff_Mul()[0]) for term in Add.make_args(value))
+    largest = max(abs(term.as_coeff_Mul()[0]) for term in Add.make_args(expand(value)))
     return value if largest < MOST_WHOLE else expand(value / largest)
 
 

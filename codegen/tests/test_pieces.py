@@ -100,6 +100,17 @@ def test_equal_switching_functions_are_one():
     assert [parameter.name for parameter in model.parameters] == ["c"]
 
 
+def test_switching_functions_keep_the_size_that_they_are_written_in():
+    """Decimal fractions are ones of large whole numbers, by which nothing is multiplied; they are told as decimals."""
+    model, x, _v = plain()
+    model.force(x, 1.1 * Min(0, Max(x - 0.248, -x - 0.1)) + Max(0, 0.165 * sin(1.872 * model.time) - x))
+    assert [switch.text for switch in model.switches] == [
+        "x - 0.074",
+        "-above_1*x + 0.248*above_1 + below_1*x + 0.1*below_1",
+        "x - 0.165*sin(1.872*t)",
+    ]
+
+
 def test_derivatives_of_pieces():
     model, x, v = plain()
     model.lagrangian = v**2 / 2 - Piecewise((5 * x**2, x < 0), (0, True))

@@ -172,7 +172,10 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
         } else {
           words = scenario_words(found, *model, toolchain);
         }
-        if (options.language == "fmu") add_number(words, "tolerance", tolerance_of(found));
+        if (options.language == "fmu") {
+          add_number(words, "tolerance", tolerance_of(found));
+          if (found.duration > 0) add_number(words, "duration", found.duration);
+        }
         if (!found.events.empty()) std::cerr << "pendula: warning: events are not exported\n";
         if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
         if (found.run.method == Method::gauss && found.run.step > 0) {

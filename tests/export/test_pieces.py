@@ -15,9 +15,10 @@ FORCES = {
     "limited": "Min(Max(-4 * x - v, -push), push)",
     "nested": "-50 * Max(0, Abs(x) - 0.5) * sign(x)",
     "glances": "-40 * Max(0, x - 0.299)",
+    "held_back": "-0.1 * sign(x - 0.5) * sign(v)",
 }
 MASS = """
-from sympy import Abs, Max, Min, Piecewise, sign
+from sympy import Abs, Heaviside, Max, Min, Piecewise, sign
 
 
 def define(model, links):
@@ -26,6 +27,16 @@ def define(model, links):
     model.lagrangian = v**2 / 2 - 9 * x**2 / 2
     model.force(x, {force})
     model.point("mass", (x, 0))
+"""
+ROPE = """
+from sympy import Max, sqrt
+
+
+def define(model, links):
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    pull = Max(0, sqrt(x**2 + y**2) - 1)
+    model.lagrangian = (model.rate(x) ** 2 + model.rate(y) ** 2) / 2 - 9.81 * y - 500 * pull**2 / 2
+    model.point("mass", (x, y))
 """
 SCENARIO = """
 [system]
@@ -37,7 +48,10 @@ drive = [{{ input = "push", constant = {push} }}]
 duration = {duration}
 tolerance = 1e-13
 """
-STARTS = {"glances": "x_dot = 0.9"}  # 0.3 m: one millimetre beyond the wall
+STARTS = {
+    "glances": "x_dot = 0.9",  # 0.3 m: one millimetre beyond the wall
+    "held_back": "x = 0.5",  # where the switching function is zero, and so is its rate
+}
 STUCK = 3
 
 
@@ -92,6 +106,48 @@ def test_friction_holds_it_where_the_program_says(pendula, export, tmp_path):
     at_rest = write(tmp_path, BUMPER, 0.1, "x_dot = 0.0\ntheta = 0.0", 20.0)
     held = ours(consumer(export(tmp_path, at_rest), main="pieces.c"), 0.01, 20.0)
     assert held["status"] == [STUCK] and held["t"] == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("force", "start", "time"),
+    [
+        ("9 * x - sign(x)", "x = 0.0", 0.0),
+        ("9 * x + Heaviside(model.time - 0.5) * (1 - 2 * Heaviside(x))", "x = 0.0", 0.5),
+    ],
+    ids=["from the start", "from a time"],
+)
+def test_a_force_may_hold_it_where_it_rests(force, start, time, pendula, export, tmp_path):
+    """Where the rate of the switching function is zero, too: its acceleration tells."""
+    scenario = write(tmp_path, MASS.format(force=force), 1.2, start, 3.0)
+    found = ours(consumer(export(tmp_path, scenario), main="pieces.c"), 0.01, 3.0)
+    told, _ = theirs(pendula, scenario)
+    assert told["outcome"]["status"] == "stuck_at_switch" and found["status"] == [STUCK]
+    assert found["t"] == pytest.approx([time], abs=1e-9)  # measured 1.1e-16
+
+
+def test_a_step_watches_what_it_begins_beyond_the_zero_of(pendula, export, tmp_path):
+    """By rounding; the mass comes back over the zero within the step."""
+    force = "9 * x + Piecewise((-20, x > 0.3), (140, True))"
+    ends = []
+    for start in (0.3, 0.3 + 5.6e-17, 0.3 - 5.6e-17):
+        scenario = write(tmp_path, MASS.format(force=force), 1.2, f"x = {start!r}\nx_dot = -1.0", 0.1)
+        program = consumer(export(tmp_path, scenario), main="pieces.c")
+        ends.append(ours(program, 0.02, 0.1)["state"][0])
+        _, wanted = theirs(pendula, scenario)
+        assert abs(ends[-1] - wanted[0]) < 1e-12  # measured 1.7e-16
+
+
+def test_a_slack_rope_has_no_direction(pendula, export, tmp_path):
+    """Its length has no derivative at its anchor, where it does not pull."""
+    (tmp_path / "model.py").write_text(ROPE)
+    scenario = tmp_path / "model.toml"
+    scenario.write_text(
+        '[system]\nmodel = "model.py"\n[start]\nx_dot = 1.0\n[run]\nduration = 3.0\ntolerance = 1e-13\n'
+    )
+    found = ours(consumer(export(tmp_path, scenario, "--stages", 4), main="pieces.c"), 0.01, 3.0)
+    told, wanted = theirs(pendula, scenario)
+    assert told["outcome"]["status"] == "ok" and not told["warnings"]
+    assert distance(found["state"], wanted) < 1e-10  # measured 2.2e-12
 
 
 @pytest.mark.parametrize("name", FORCES)

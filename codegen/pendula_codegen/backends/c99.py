@@ -35,8 +35,10 @@ class C99Printer:
         return _Body(self, tape.written_out(UNROLLED)).lines()
 
     def read_by(self, tape: Tape) -> set[str]:
-        """Arrays that it reads."""
-        return {step.row[0] for step in tape.steps if step.operation == "read"}
+        """Arrays that its body reads: writing it out may leave nothing of what it took from one."""
+        written = tape.written_out(UNROLLED)
+        used = {value for step in written.steps for value in step.operands} | {*written.outputs.values()}
+        return {step.row[0] for step in written.steps if step.operation == "read" and step.first in used}
 
 
 class _Body:
