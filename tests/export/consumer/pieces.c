@@ -1,5 +1,5 @@
-/* Somebody else's program, for a model with functions of several pieces. Built as main.c is, called with a step size and
- * a duration, it prints the state and the time where it ends, how, and when pieces changed. */
+/* Somebody else's program, for a model with functions of several pieces. Built as main.c is, called with a step size
+ * and a duration, it prints the state and the time where it ends, how, and when pieces changed. */
 #include <stdio.h>
 #include <stdlib.h>
 #include HEADER
