@@ -163,6 +163,15 @@ def test_chains_are_what_a_model_file_says(space, links, tmp_path):
     assert error(Loaded(chain(space, links), tmp_path), Truth(model), 4) < 1e-14  # measured 1.3e-15
 
 
+# Derivatives by the input hold the coordinate as long as they are not written out.
+CANCELS = """
+def define(model, links):
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    model.lagrangian = model.rate(x) ** 2 * (1 + y**2) / 2 + model.rate(y) ** 2 / 2
+    model.force(y, model.input("push", "N"))
+"""
+
+
 @pytest.fixture(scope="module", params=["double", "float"])
 def sources(request, tmp_path_factory) -> tuple[str, list[Path]]:
     """The type of numbers, and systems of all kinds in it."""
@@ -172,6 +181,8 @@ def sources(request, tmp_path_factory) -> tuple[str, list[Path]]:
         ModelKernel(own(EVERYTHING, "everything", folder)),
         ModelKernel(own(MANY, "many", folder, links=11)),
         ModelKernel(own(NAMES, "double", folder)),
+        ModelKernel(own(CANCELS, "cancels", folder)),
+        ModelKernel(own(PIECES, "pieces", folder)),
     ]
     found = []
     for k, kernel in enumerate(kernels):
