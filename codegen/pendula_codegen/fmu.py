@@ -48,8 +48,9 @@ UNSUPPORTED = (
     "fmi3GetOutputDerivatives",
     "fmi3ActivateModelPartition",
 )
-# What an FMU has none of whose equations are not written out; that is for co-simulation alone.
+# What takes equations that are written out.
 OF_EQUATIONS = ("fmi3GetDirectionalDerivative",)
+# What an FMU has none of that is for co-simulation alone.
 OF_EXCHANGE = (
     "fmi3UpdateDiscreteStates",
     "fmi3CompletedIntegratorStep",
@@ -146,7 +147,7 @@ def variables_of(
     settings: Sequence[Setting],
     exchanges: bool,
 ) -> list[Variable]:
-    """In the order of their value references, of which indicators of pieces have some that nobody is told."""
+    """In the order of their value references. Indicators of pieces have references, too, but are no variables."""
     rows = _rows(declared, values, settings, exchanges)
     return [
         Variable(name, reference, kind, attributes, unit, more)
@@ -203,7 +204,13 @@ def _rows(
             yield f"{name}_{axis}", "output", output, "m", ""
     yield "energy", "output", output, "J", ""
     for k, switch in enumerate(declared.switches if exchanges else (), start=1):
-        yield f"switch_{k}", "switch", local, "", f' description="{escape(switch)}, whose zeros are events"'
+        yield (
+            f"pendula.switch_{k}",
+            "switch",
+            local,
+            "",
+            f' description="{escape(switch)}, whose zeros are events"',
+        )
 
 
 def _start(value: float | None) -> str:
