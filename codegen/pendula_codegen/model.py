@@ -347,8 +347,11 @@ class Model:
                 f"{said.where}: lagrangian: the input {name} may stand in forces only: model.force(q, {name})"
             )
         self._check(said.value, "lagrangian", (*self._positions(), *self._rates(), self.time), said.where)
+        fixed = {symbol for p in self.parameters for symbol in p.symbols}
         for switch in self._switches.held_by(said.value):
-            if jump(said.value, switch, self.switches, self._rates()):
+            moves = self._switches.behind(switch.value) - fixed
+            by_place = bool(moves - {self.time})  # else a jump has no slope in space: there is no blow
+            if moves and jump(said.value, switch, self.switches, self._rates(), by_place):
                 raise GenerationError(
                     f"{said.where}: lagrangian: it or a momentum jumps where {switch.text} = 0, which would be a "
                     "blow: expected pieces that meet"
@@ -497,7 +500,7 @@ def read_model(file: Path, links: int | None = None) -> Model:
         define(model, links or 1)
     except GenerationError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise GenerationError(_said_by(error, file)) from error
     model.system  # noqa: B018  the checks of the whole
     return model
@@ -514,7 +517,7 @@ def _define_of(file: Path) -> Callable[[Model, int], None]:
         exec(compile(text, str(file), "exec"), names)
     except SyntaxError as error:
         raise GenerationError(f"{file}:{error.lineno}: {error.msg}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise GenerationError(_said_by(error, file)) from error
     define = names.get("define")
     if not callable(define):
@@ -522,11 +525,13 @@ def _define_of(file: Path) -> Callable[[Model, int], None]:
     return define
 
 
-def _said_by(error: Exception, file: Path) -> str:
+def _said_by(error: Exception | SystemExit, file: Path) -> str:
     """An exception of the model file, with the line of the file that it came through last."""
     lines = [
         entry.lineno for entry in traceback.extract_tb(error.__traceback__) if entry.filename == str(file)
     ]
     where = f"{file}:{lines[-1]}" if lines else str(file)
+    if isinstance(error, SystemExit):
+        return f"{where}: expected a model that lets Python go on, got one that calls exit"
     text = " ".join(str(error).split())
     return f"{where}: {type(error).__name__}{': ' + text if text else ''}"

@@ -284,12 +284,19 @@ def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol], zeros: Sequenc
     return piece.func(*args)
 
 
-def jump(value: Expr, switch: Switch, switches: Sequence[Switch], slopes_by: Iterable[Symbol]) -> bool:
-    """Whether `value`, or a derivative of it, jumps where a switching function is zero, as far as numbers tell."""
+def jump(
+    value: Expr,
+    switch: Switch,
+    switches: Sequence[Switch],
+    slopes_by: Iterable[Symbol],
+    itself: bool = True,
+) -> bool:
+    """Whether a derivative of `value`, or `value` itself, jumps where a switching function is zero, as far as numbers
+    tell."""
     above, below = {switch.above: 1, switch.below: 0}, {switch.above: 0, switch.below: 1}
     indicators = {symbol for s in switches for symbol in (s.above, s.below)}
     difference = value.xreplace(_integers(above)) - value.xreplace(_integers(below))
-    wanted = [difference, *(difference.diff(symbol) for symbol in slopes_by), value]
+    wanted = [*[difference] * itself, *(difference.diff(symbol) for symbol in slopes_by), value]
     symbols = sorted(
         {s for e in (*wanted, *(s.value for s in switches)) for s in e.free_symbols} - indicators, key=str
     )

@@ -157,6 +157,18 @@ def test_lagrangians_whose_pieces_meet_are_taken(lagrangian):
     assert model.switches and model.system
 
 
+def test_a_potential_may_switch_in_time():
+    """There is no slope in space, so no blow; a mass that switches is one."""
+    model, x, v = plain()
+    k = model.parameter("k", "N/m", default=1.0)
+    model.lagrangian = v**2 / 2 - (1 + Heaviside(model.time - 0.5)) * x**2 / 2 - Heaviside(k - 2) * x
+    assert model.switches and model.system
+    model, x, v = plain()
+    model.lagrangian = (1 + Heaviside(model.time - 0.5)) * v**2 / 2
+    with pytest.raises(GenerationError, match="a momentum jumps where 2\\*t - 1 = 0"):
+        model.system  # noqa: B018
+
+
 @pytest.mark.parametrize(
     ("value", "message"),
     [

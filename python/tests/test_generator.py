@@ -99,9 +99,9 @@ print("done")
 
 def test_a_model_that_ends_the_process_does_not(tmp_path):
     file = tmp_path / "own.py"
-    for end, told in (("raise SystemExit(3)", "packages"), ("import sys; sys.exit('no more')", "no more")):
+    for end in ("raise SystemExit(3)", "import sys; sys.exit('no more')"):
         file.write_text(f"{end}\n{MODEL}")
-        with pytest.raises(pendula.InputError, match=told):
+        with pytest.raises(pendula.InputError, match=r"own.py:1: expected a model that lets Python go on"):
             _ = pendula.Model(file).coordinates
 
 

@@ -45,6 +45,7 @@ WRONG = {
         "    x = model.coordinate('x', 'm')\n    model.lagrangian = model.rate(x)**2 / 2\n    links / 0\n",
         "wrong.py:7: ZeroDivisionError: division by zero",
     ),
+    "exit": ("    import sys\n    sys.exit(0)\n", "wrong.py:6: expected a model that lets Python go on"),
     "syntax error": ("    x = = 1\n", "wrong.py:5: invalid syntax"),
     "input in the Lagrangian": (
         "    x, f = two(model)[0], model.input('f', 'N')\n    model.lagrangian = model.rate(x)**2 / 2 + f * x\n",
