@@ -207,8 +207,8 @@ def test_a_pivot_is_driven_under_some_links(open_lab):
     page = open_lab("model=driven_chain&level=all")
     begin_anew(page, lambda: set_slider(page, "Links", "3"))
     assert page.evaluate("[pendulaLab.size, pendulaLab.stage.count]") == [3, 4]
-    set_slider(page, "y_amplitude", "0.2")
-    set_slider(page, "frequency", "10")
+    set_slider(page, "Amplitude up and down", "0.2")
+    set_slider(page, "Frequency of shaking", "10")
     until(page, "!pendulaLab.isWaiting && !pendulaLab.isSending")
     page.evaluate("pendulaLab.play(true)")
     until(page, "pendulaLab.history.end > 0.5")
@@ -220,6 +220,47 @@ def test_a_pivot_is_driven_under_some_links(open_lab):
         })()"""
     )
     assert abs(off) < 1e-15  # measured 0: it is a row
+
+
+@pytest.mark.parametrize(
+    ("name", "typed"), [("Ball 1", "-3"), ("Ball 1", "0"), ("Damping", "-1"), ("Links", "")]
+)
+def test_a_field_shows_what_is_taken_of_it(open_lab, name, typed):
+    page = open_lab("m=2,2&d=0&n=2")
+    box = page.get_by_role("spinbutton", name=name, exact=True)
+    before = box.input_value()
+    box.fill(typed)
+    box.press("Enter")  # it keeps the focus
+    assert box.input_value() == before
+    assert page.evaluate("[pendulaLab.state.m, pendulaLab.state.d, pendulaLab.state.n]") == [[2, 2], 0, 2]
+
+
+def test_fields_look_as_what_they_are(open_lab):
+    page = open_lab()
+    edges = page.evaluate(
+        """[...document.querySelectorAll(".slider input[type=number]")].map((each) => {
+             const { borderColor, borderWidth } = getComputedStyle(each);
+             return [borderColor, borderWidth];
+           })"""
+    )
+    assert edges and all(edge == ["rgb(218, 220, 216)", "1px"] for edge in edges)
+
+
+def test_parameters_of_built_in_models_have_words_in_every_language(open_lab):
+    page = open_lab("model=driven_chain", locale="ja-JP")
+    assert page.get_by_role("spinbutton", name="横方向の振幅", exact=True).count() == 1
+    page.select_option("#language", "en")
+    assert page.get_by_role("spinbutton", name="Amplitude to the side", exact=True).count() == 1
+    missing = page.evaluate(
+        """(() => {
+          const of = (id) => JSON.parse(document.getElementById(id).textContent);
+          const names = Object.values(of("models")).flatMap(({ made }) => Object.values(made))
+            .flatMap(({ model }) => model.parameters.map(({ name }) => name));
+          return Object.entries(of("texts")).flatMap(([language, texts]) =>
+            names.filter((name) => !texts[`parameter.${name}`]).map((name) => `${language}: ${name}`));
+        })()"""
+    )
+    assert missing == []
 
 
 def test_damping_takes_energy(open_lab):
@@ -303,12 +344,49 @@ def test_fifty_copies_part(open_lab):
     until(page, "pendulaLab.panels.some((panel) => panel.distances?.some(([, far]) => far > 1e-3))")
 
 
+def test_what_runs_can_be_stopped_at_every_level(open_lab):
+    page = open_lab("th=2.2,2.6", motion="no-preference")
+    page.get_by_role("button", name="Start").click()
+    page.select_option("#level", "first")
+    stop = page.get_by_role("button", name="Stop", exact=True)
+    until(page, "pendulaLab.copies?.count === 50")
+    assert stop.is_visible()
+    stop.click()
+    assert page.evaluate("pendulaLab.state.copies") == 0
+    assert stop.is_hidden()
+    sent = open_lab("th=2.2,2.6&copies=50&level=first")
+    assert sent.get_by_role("button", name="Stop", exact=True).is_visible()
+
+
 def test_the_exponent_converges(open_lab):
     page = open_lab("th=2.2,2.6&level=all&speed=4", motion="no-preference")
     page.get_by_role("button", name="Measure").click()
     until(page, "pendulaLab.panels.some((panel) => panel.values?.length > 20)")
     value = page.evaluate("pendulaLab.panels.find((panel) => panel.values).values.at(-1)[1]")
     assert 0.3 < value < 8  # 1/s; measured 1.6 after 10 s
+
+
+def test_a_press_where_a_fast_ball_was_takes_it(open_lab):
+    page = open_lab("n=1&th=3", motion="no-preference")
+    # In one piece, when the ball has gone far in a fifth of a second: a press there is beside it by now.
+    held = page.evaluate(
+        """async () => {
+          const { stage, history, state } = pendulaLab;
+          const box = stage.canvas.getBoundingClientRect();
+          for (;;) {
+            await new Promise(requestAnimationFrame);
+            if (pendulaLab.shown < 0.3) continue;
+            const row = history.at(pendulaLab.shown - 0.2, 1, new Float64Array(history.rowSize));
+            const [x, y] = stage.project(Math.sin(row[1]), 0, -Math.cos(row[1]));
+            const [now, there] = stage.project(...stage.places);
+            if (Math.hypot(now - x, there - y) < 80) continue;
+            stage.canvas.dispatchEvent(new PointerEvent("pointerdown", {
+              pointerId: 1, pointerType: "mouse", clientX: box.x + x, clientY: box.y + y, buttons: 1, bubbles: true }));
+            return pendulaLab.hand.bob;
+          }
+        }"""
+    )
+    assert held == 0
 
 
 def test_by_keyboard_alone(open_lab):
@@ -461,6 +539,83 @@ def test_levels_and_languages(open_lab):
         })()"""
     )
     assert english == japanese
+
+
+def test_first_look_has_what_the_first_lesson_uses(open_lab):
+    """Docs, how-to/teach: the period by the stopwatch, for small and large angles."""
+    page = open_lab("n=1&th=0.1&level=first", motion="no-preference")
+    set_slider(page, "θ₁", "90")
+    until(page, "!pendulaLab.isWaiting && !pendulaLab.isSending")
+    page.get_by_role("button", name="Angles").click()
+    page.get_by_role("button", name="Stopwatch").click()
+    page.select_option("#speed", "4")
+    until(page, "pendulaLab.watch.period > 0")
+    assert page.locator("#watch").is_visible()
+    # 4 √(l/g) K(sin²(θ/2)).
+    assert page.evaluate("pendulaLab.watch.period") == pytest.approx(2.36784, abs=2e-4)
+
+
+@pytest.mark.parametrize("size", [PROJECTOR, WIDE, (1280, 720)])
+def test_the_stopwatch_is_one_line(open_lab, size):
+    page = open_lab(size=size, locale="ja-JP")
+    lines = page.evaluate(
+        """[...document.querySelectorAll(".buttons button, .corner button, .tools button")].map((each) => {
+             const range = document.createRange();
+             range.selectNodeContents(each);
+             return [each.textContent, range.getClientRects().length];
+           }).filter(([, lines]) => lines > 1)"""
+    )
+    assert lines == []
+
+
+@pytest.mark.parametrize(("level", "part"), [("first", 0.6), ("student", 0.95)])
+def test_panels_grow_on_a_large_screen(open_lab, level, part):
+    page = open_lab(f"level={level}", size=PROJECTOR)
+    filled = page.evaluate(
+        """(() => {
+          const { top, bottom } = document.getElementById("panels").getBoundingClientRect();
+          const seen = [...document.querySelectorAll("#panels .panel")].filter((each) => each.offsetParent);
+          return (seen.at(-1).getBoundingClientRect().bottom - top) / (bottom - top);
+        })()"""
+    )
+    assert filled > part  # measured 0.68 and 1
+
+
+def test_a_shaken_energy_is_a_band(open_lab):
+    """Twenty times a second is no line on some hundred pixels."""
+    page = open_lab("model=driven_chain&speed=4", size=WIDE, motion="no-preference")
+    page.evaluate(
+        """(() => {
+          const pen = CanvasRenderingContext2D.prototype;
+          const before = pen.fill;
+          window.bands = 0;
+          pen.fill = function (...all) {
+            if (this.globalAlpha < 1) ++window.bands;
+            return before.apply(this, all);
+          };
+        })()"""
+    )
+    until(page, "pendulaLab.history.end > 4 && window.bands > 2")
+
+
+@pytest.mark.parametrize(
+    ("link", "is_shown"), [("n=1&s=0,2,3,0", True), ("n=2&u=0.5,0", True), ("n=1", False)]
+)
+def test_what_acts_has_a_panel(open_lab, link, is_shown):
+    page = open_lab(link)
+    assert page.get_by_text("What acts").is_visible() == is_shown
+
+
+def test_the_axes_of_what_rests_are_not_those_of_rounding(open_lab):
+    page = open_lab("model=swinging_atwood&p=1,1,9.81&q=1,0&v=0&speed=4", size=WIDE, motion="no-preference")
+    until(page, "pendulaLab.shown > 1")
+    page.keyboard.press("Space")
+    await_frame(page)
+    axes = page.evaluate(
+        """pendulaLab.panels.filter((panel) => panel.isSeen).map(({ axes: { x, y } }) =>
+               [x.high - x.low, y.high - y.low])"""
+    )
+    assert axes and all(min(each) > 0.1 for each in axes)
 
 
 def test_the_stopwatch_tells_the_period(open_lab):

@@ -1,20 +1,21 @@
 // Sliders and buttons.
 
-/// A slider with a number beside it: {key, unit, low, high, step, get, set, level, logarithmic}. `names`: of its text.
+/// A slider with a number beside it: {key, unit, low, high, step, get, set, level, logarithmic}. `names`: of its text;
+/// `label`: what gives its text, in place of a key.
 class Slider {
   constructor({ key, names = {}, unit, low, high, step, get, set, level = "", logarithmic = false, label }) {
-    Object.assign(this, { get, set, logarithmic, low, high, step, key, names });
+    Object.assign(this, { get, set, logarithmic, low, high, step });
     this.name = element("span");
     this.number = element("input", { type: "number", step: "any" });
     this.range = element("input", { type: "range", min: 0, max: 1, step: "any" });
-    this.fixed = label;
+    this.words = label ?? (() => text(key, names));
     const value = element("span", { className: "value" }, this.number, element("i", { textContent: unit }));
     this.node = element("label", { className: `slider ${level}` }, this.name, value, this.range);
     this.range.addEventListener("input", () => this.#change(this.#of(Number(this.range.value))));
     this.number.addEventListener("change", () => {
       const typed = Number(this.number.value.replace("−", "-"));
-      if (Number.isFinite(typed) && (!this.logarithmic || typed > 0)) this.#change(typed);
-      else this.refresh();
+      if (this.number.value !== "" && Number.isFinite(typed) && (!this.logarithmic || typed > 0)) this.#change(typed);
+      this.#write(this.get()); // what was taken of it
     });
     // The arrows of a slider without steps would be too fine, or too coarse.
     this.range.addEventListener("keydown", (event) => {
@@ -44,13 +45,17 @@ class Slider {
 
   refresh() {
     const x = this.get();
-    this.name.textContent = this.fixed ?? text(this.key, this.names);
+    this.name.textContent = this.words();
     const said = this.name.textContent;
     this.range.setAttribute("aria-label", said);
     this.number.setAttribute("aria-label", said);
     this.range.value = this.#placeOf(x);
     this.range.setAttribute("aria-valuetext", `${readable(x)}`);
-    if (document.activeElement !== this.number) this.number.value = Number(x.toPrecision(5));
+    if (document.activeElement !== this.number) this.#write(x);
+  }
+
+  #write(x) {
+    this.number.value = Number(x.toPrecision(5));
   }
 }
 
@@ -175,7 +180,7 @@ class Controls {
       const now = this.#state.p[k] || each.default || 0;
       const size = Math.abs(now) || 1;
       this.#slider({
-        label: each.label, key: "", unit: unitWords(each.unit), logarithmic: each.positive,
+        label: each.label, unit: unitWords(each.unit), logarithmic: each.positive,
         low: each.positive ? size / 20 : Math.min(0, 2.5 * now), high: each.positive ? size * 20 : now > 0 ? 2.5 * now : 1, step: 0.01 * size,
         get: () => this.#state.p[k],
         set: (x) => {
@@ -225,21 +230,21 @@ class Controls {
   #makeStart() {
     const { lab } = this;
     const { n, space } = this.#state;
-    this.#title("settings.start", "student");
+    this.#title("settings.start");
     const set = (part, k, x) => {
       const numbers = Array.from(this.#state[part]);
       if (k < 0) for (let i = 0; i < n; ++i) numbers[i] = x;
       else numbers[k] = x;
       lab.startFrom({ [part]: numbers });
     };
-    const angle = (label, k, level = "student") => this.#slider({
-      label, key: "", unit: "°", low: -180, high: 180, step: 1, level,
+    const angle = (label, k, level = "") => this.#slider({
+      label: () => label, unit: "°", low: -180, high: 180, step: 1, level,
       get: () => (this.#state.q[Math.max(k, 0)] * 180) / Math.PI, set: (x) => set("q", k, (x * Math.PI) / 180),
     });
     if (model) {
       lab.coordinates.forEach((name, k) => {
         if (lab.isAngle[k]) angle(symbol(name), k);
-        else this.#slider({ label: symbol(name), key: "", unit: unitWords(lab.units[k]), low: -3, high: 3, step: 0.01, level: "student", get: () => this.#state.q[k], set: (x) => set("q", k, x) });
+        else this.#slider({ label: () => symbol(name), unit: unitWords(lab.units[k]), low: -3, high: 3, step: 0.01, get: () => this.#state.q[k], set: (x) => set("q", k, x) });
       });
       return;
     }
@@ -248,7 +253,7 @@ class Controls {
     for (let k = 0; space === 3 && k < Math.min(n, listed); ++k) angle(symbol(`phi_${k + 1}`), n + k, "all");
     for (let k = 0; k < Math.min(n, listed); ++k) {
       this.#slider({
-        label: `${symbol(`theta_${k + 1}`)} ′`, key: "", unit: "°/s", low: -720, high: 720, step: 1, level: "all",
+        label: () => `${symbol(`theta_${k + 1}`)} ′`, unit: "°/s", low: -720, high: 720, step: 1, level: "all",
         get: () => (this.#state.v[k] * 180) / Math.PI, set: (x) => set("v", k, (x * Math.PI) / 180),
       });
     }

@@ -78,8 +78,8 @@ class Hand {
   }
 }
 
-/// Pointers on the stage: of a bob the hand's, of a ruler's end, otherwise the view's.
-function watchStage(stage, { take, drag, drop, changed }) {
+/// Pointers on the stage: of a bob the hand's, of a ruler's end, otherwise the view's. `before()`: places of some moments ago.
+function watchStage(stage, { take, drag, drop, changed, before }) {
   const { canvas } = stage;
   const fingers = new Map();
   let holder = null; // the pointer that holds something
@@ -96,7 +96,7 @@ function watchStage(stage, { take, drag, drop, changed }) {
     fingers.set(event.pointerId, [x, y]);
     if (holder !== null || event.button > 0 || event.shiftKey || fingers.size > 1) return;
     ruler = document.documentElement.dataset.ruler ? stage.rulerAt(x, y) ?? null : null;
-    const bob = ruler ? -1 : stage.pointAt(x, y, event.pointerType === "touch" ? 40 : 26);
+    const bob = ruler ? -1 : stage.pointAt(x, y, event.pointerType === "touch" ? 40 : 26, before());
     if (!ruler && bob < 0) return;
     holder = event.pointerId;
     if (bob >= 0) take(bob, x, y);
@@ -104,8 +104,8 @@ function watchStage(stage, { take, drag, drop, changed }) {
   });
   canvas.addEventListener("pointermove", (event) => {
     const [x, y] = place(event);
-    const before = fingers.get(event.pointerId);
-    if (!before) {
+    const last = fingers.get(event.pointerId);
+    if (!last) {
       canvas.classList.toggle("near", event.pointerType === "mouse" && stage.pointAt(x, y) >= 0);
       return;
     }
@@ -115,10 +115,10 @@ function watchStage(stage, { take, drag, drop, changed }) {
     } else if (fingers.size === 2) {
       const other = [...fingers].find(([id]) => id !== event.pointerId)[1];
       const spread = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
-      if (spread(before) > 0) stage.zoom(spread([x, y]) / spread(before));
+      if (spread(last) > 0) stage.zoom(spread([x, y]) / spread(last));
     } else if (holder === null) {
       const turns = stage.space === 3 && !event.shiftKey && !(event.buttons & 6);
-      stage[turns ? "turn" : "move"](x - before[0], y - before[1]);
+      stage[turns ? "turn" : "move"](x - last[0], y - last[1]);
     }
     fingers.set(event.pointerId, [x, y]);
     changed();

@@ -24,7 +24,7 @@ class Lab {
     this.#look();
     this.controls = new Controls(this);
     this.#begin();
-    this.panels = [new EnergyPanel(this), new PhasePanel(this), new CopiesPanel(this), new ErrorPanel(this), new SectionPanel(this), new ExponentPanel(this)];
+    this.panels = [new EnergyPanel(this), new InputsPanel(this), new PhasePanel(this), new CopiesPanel(this), new ErrorPanel(this), new SectionPanel(this), new ExponentPanel(this)];
     for (const panel of this.panels) panel.begin?.();
     writeTexts(language);
     this.controls.make();
@@ -64,7 +64,7 @@ class Lab {
       const space = Math.max(2, ...model.points.map((point) => point.columns.length));
       const count = model.points.length;
       const spread = Math.max(...(this.#points ?? [0.8]).map(Math.abs), 1e-3);
-      stage.shape({ space, count, ...shapeOf(model, this.#shape), masses: model.points.map(() => 1), reach: 1.5 * spread });
+      stage.shape({ space, count, ...shapeOf(model, this.#shape), masses: model.points.map(() => 1), reach: (model.points.some(({ kind }) => kind === "floor") ? 1.1 : 1.5) * spread });
       this.row = new Float64Array(3 + 2 * this.size);
     } else {
       const reach = state.l.reduce((sum, length) => sum + length, 0);
@@ -97,7 +97,7 @@ class Lab {
       this.row = answer.rows.slice();
       this.clock = this.shown = start.time;
       this.copies = null;
-      for (const panel of this.panels) if (panel instanceof CopiesPanel || panel instanceof ExponentPanel) panel.begin();
+      for (const panel of this.panels) if (panel instanceof CopiesPanel || panel instanceof ExponentPanel || panel instanceof InputsPanel) panel.begin();
       if (model && !this.#points) {
         this.#points = answer.rows.subarray(3 + 2 * this.size, 3 + 2 * this.size + pointColumns);
         this.#shape = answer.shape;
@@ -117,7 +117,7 @@ class Lab {
     const { m, l, g, n } = this.state;
     let [below, sum] = [0, 0];
     for (let k = n - 1; k >= 0 && !model; --k) sum += (below += m[k]) * Math.abs(g) * l[k];
-    return sum || Math.max(Math.abs(kinetic), Math.abs(potential), 1e-12);
+    return sum || [Math.abs(kinetic), Math.abs(potential)].filter((each) => each > 1e-12).sort((a, b) => b - a)[0] || 1;
   }
 
   /// Changes numbers of what moves; the motion goes on from where it is shown.
@@ -293,6 +293,19 @@ class Lab {
   }
 
   // --- The hand ---
+
+  /// Places of the points in the last quarter of a second of the clock on the wall, the newest first; none when paused.
+  placesBefore() {
+    const { history, stage, state, size } = this;
+    if (!this.playing || history.rows === 0) return [];
+    return Array.from({ length: 10 }, (_, k) => {
+      const row = history.at(Math.max(this.shown - 0.025 * (k + 1) * state.speed, history.start), size, new Float64Array(history.rowSize));
+      const places = new Float64Array(3 * stage.count);
+      if (model) this.#placePoints(row.subarray(3 + 2 * size), places);
+      else placesOfChain(state, row.subarray(1, 1 + size), places);
+      return places;
+    });
+  }
 
   take(bob, x, y) {
     const place = Array.from(this.stage.places.subarray(3 * bob, 3 * bob + 3));
@@ -625,6 +638,7 @@ class Lab {
       drag: (x, y) => this.drag(x, y),
       drop: () => this.drop(),
       changed: () => this.changed(),
+      before: () => this.placesBefore(),
     });
     addEventListener("hashchange", () => this.#follow());
     addEventListener("keydown", (event) => this.#key(event));

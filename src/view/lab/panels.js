@@ -11,7 +11,7 @@ function labPanel(key, level, options = [], kind = "") {
   const head = element("header", {}, heading, element("div", { className: "options" }, ...options));
   const section = element("section", { className: `panel ${level} ${kind}` }, head, plot, keys);
   at("panels").append(section);
-  return { section, plot, keys, axes: new Axes(plot, text(key)) };
+  return { section, plot, keys, level, axes: new Axes(plot, text(key)) };
 }
 
 /// A list of names to choose from.
@@ -43,6 +43,15 @@ class Panel {
     return bottom > 0 && top < innerHeight;
   }
 
+  /// What runs is to be seen, and can be stopped, at every level.
+  run(on) {
+    const { button, box, key } = this;
+    box.section.classList.toggle(box.level, !on);
+    button.dataset.text = `${key}.${on ? "end" : "start"}`;
+    button.textContent = text(button.dataset.text);
+    button.setAttribute("aria-pressed", on);
+  }
+
   describe(words) {
     if (words !== this.said) this.axes.describe((this.said = words));
   }
@@ -72,26 +81,38 @@ class Panel {
     const { shown, history } = this.lab;
     const high = Math.max(shown, history.start + windowOfTime);
     this.axes.x = { low: high - windowOfTime, high };
-    return niceTicks(this.axes.x.low, high, this.axes.width / 80).map((t) => ({ at: t, text: readable(t, 6) }));
+    return niceTicks(this.axes.x.low, high, this.axes.mostTicks).map((t) => ({ at: t, text: readable(t, 6) }));
   }
 
+  /// A line, or where it would go up and down too fast to be seen the band that it stays in, and its mean.
   curve(pen, colour, value, width = 1.5) {
-    const { from, to, stride } = this.rows();
-    pen.strokeStyle = colour;
-    pen.lineWidth = width;
-    pen.beginPath();
-    let open = false;
+    const { from, to, stride } = this.rows(2400);
+    const points = [];
     for (let row = from; row <= to; row += stride) {
       const y = value(row);
-      if (Number.isFinite(y)) pen[open ? "lineTo" : "moveTo"](this.axes.atX(this.lab.history.time(row)), this.axes.atY(y));
-      open = Number.isFinite(y);
+      if (Number.isFinite(y)) points.push([this.axes.atX(this.lab.history.time(row)), this.axes.atY(y)]);
+      else if (points.length) points.length = 0; // what is not known is before what is
     }
+    const band = bandOf(points);
+    pen.strokeStyle = pen.fillStyle = colour;
+    if (band.length) {
+      pen.globalAlpha = 0.3;
+      pen.beginPath();
+      for (const { x, low } of band) pen.lineTo(x, low);
+      for (const { x, high } of band.slice().reverse()) pen.lineTo(x, high);
+      pen.fill();
+      pen.globalAlpha = 1;
+    }
+    pen.lineWidth = width;
+    pen.beginPath();
+    for (const [x, y] of band.length ? band.map(({ x, mean }) => [x, mean]) : points) pen.lineTo(x, y);
     pen.stroke();
   }
 
-  range(values) {
+  /// `scale`: with what rounding of the values compares.
+  range(values, scale) {
     let [low, high] = [Infinity, -Infinity];
-    const { from, to, stride } = this.rows(200);
+    const { from, to, stride } = this.rows(2400);
     for (let row = from; row <= to; row += stride) {
       for (const value of values) {
         const y = value(row);
@@ -99,8 +120,27 @@ class Panel {
         if (y > high) high = y;
       }
     }
-    return low <= high ? rangeOf([[low, high]]) : { low: 0, high: 1 };
+    return low <= high ? rangeOf([[low, high]], undefined, scale) : { low: 0, high: 1 };
   }
+}
+
+const closest = 4; // pixels from one turn of a line to the one after the next that are told apart
+
+/// The envelope of a line that goes up and down faster than that: {x, low, high, mean} in pixels; else nothing.
+function bandOf(points) {
+  let turns = 0;
+  for (let k = 2; k < points.length; ++k) {
+    if ((points[k][1] - points[k - 1][1]) * (points[k - 1][1] - points[k - 2][1]) < 0) ++turns;
+  }
+  const width = points.length ? points.at(-1)[0] - points[0][0] : 0;
+  if (turns < 8 || (2 * width) / turns > closest) return [];
+  const band = [];
+  for (const [x, y] of points) {
+    const last = band.at(-1);
+    if (!last || x >= last.begin + closest) band.push({ begin: x, x, low: y, high: y, sum: y, count: 1 });
+    else Object.assign(last, { low: Math.max(last.low, y), high: Math.min(last.high, y), sum: last.sum + y, count: last.count + 1, x: (last.begin + x) / 2 });
+  }
+  return band.map(({ x, low, high, sum, count }) => ({ x, low, high, mean: sum / count }));
 }
 
 /// Kinetic, potential and total energy.
@@ -117,8 +157,8 @@ class EnergyPanel extends Panel {
       (row) => history.get(row, kinetic) + history.get(row, potential)];
     const pen = axes.begin();
     axes.beginMoving();
-    axes.y = this.range(values);
-    axes.drawGrid(pen, this.timeAxis(), linearTicks(axes.y, axes.height / 30, false), "s");
+    axes.y = this.range(values, lab.energyScale);
+    axes.drawGrid(pen, this.timeAxis(), linearTicks(axes.y, axes.height / 30, false, 3), "s");
     const colours = [1, 0, 5].map((k) => rgba(palette.curves[k]));
     values.forEach((value, k) => this.curve(pen, colours[k], value, k === 2 ? 2.2 : 1.6));
     pen.restore();
@@ -126,6 +166,37 @@ class EnergyPanel extends Panel {
     const names = ["kinetic", "potential", "total"].map((key, k) => `${text(key)} ${now[k]}`);
     this.name(...names.map((name, k) => [colours[k], name]));
     this.describe(`${text("panel.energy")}: ${names.join(", ")}`);
+  }
+}
+
+/// What acts from outside: what is held and sines, since they were last changed.
+class InputsPanel extends Panel {
+  constructor(lab) {
+    super(lab, labPanel("panel.inputs", "student"));
+  }
+
+  begin() {
+    const { state } = this.lab;
+    this.acting = state.u.map((_, k) => k).filter((k) => state.u[k] !== 0 || actingSines(state).some(([input]) => input === k)).slice(0, 6);
+    this.box.section.hidden = this.acting.length === 0;
+  }
+
+  draw() {
+    const { lab, axes, acting } = this;
+    const { state, history } = lab;
+    const sines = actingSines(state);
+    const value = (k, time) => sines.reduce((sum, [input, amplitude, frequency, phase]) => sum + (input === k ? amplitude * Math.sin(frequency * time + phase) : 0), state.u[k]);
+    const since = (k) => (row) => (history.time(row) < lab.since - 1e-9 ? NaN : value(k, history.time(row)));
+    const inputs = model?.inputs ?? torquesOf(state);
+    const pen = axes.begin();
+    axes.beginMoving();
+    axes.y = this.range(acting.map(since));
+    axes.drawGrid(pen, this.timeAxis(), linearTicks(axes.y, axes.height / 30, false, 3), "s");
+    acting.forEach((k, place) => this.curve(pen, rgba(palette.curves[place]), since(k)));
+    pen.restore();
+    const names = acting.map((k) => `${symbol(inputs[k].name)} ${value(k, lab.shown).toFixed(2).replace("-", "−")} ${unitWords(inputs[k].unit)}`);
+    this.name(...names.map((name, place) => [rgba(palette.curves[place]), name]));
+    this.describe(`${text("panel.inputs")}: ${names.join(", ")}`);
   }
 }
 
@@ -180,9 +251,10 @@ class PhasePanel extends Panel {
     axes.beginMoving();
     const place = (row) => (wrapped ? wrap(history.get(row, 1 + k)) : history.get(row, 1 + k));
     const rate = (row) => history.get(row, 1 + size + k);
-    axes.x = wrapped ? turnOfAngles : this.range([place]);
-    axes.y = this.range([rate]);
-    axes.drawGrid(pen, degreeTicks(axes.x, axes.width / 70, wrapped), linearTicks(axes.y, axes.height / 30, false), "");
+    const scale = wrapped ? 1 : lab.stage.reach;
+    axes.x = wrapped ? turnOfAngles : this.range([place], scale);
+    axes.y = this.range([rate], scale);
+    axes.drawGrid(pen, degreeTicks(axes.x, axes.mostTicks, wrapped), linearTicks(axes.y, axes.height / 30, false, 3), "");
     const { from, to, stride } = this.rows(900);
     const pieces = 6;
     for (let piece = 0; piece < pieces; ++piece) {
@@ -259,7 +331,7 @@ class SectionPanel extends Panel {
     const [xs, ys] = [points.filter((_, k) => k % 2 === 0), points.filter((_, k) => k % 2 === 1)];
     axes.x = wrapped ? turnOfAngles : rangeOf([xs]);
     axes.y = rangeOf([ys]);
-    axes.drawGrid(pen, degreeTicks(axes.x, axes.width / 70, wrapped), linearTicks(axes.y, axes.height / 30, false), "");
+    axes.drawGrid(pen, degreeTicks(axes.x, axes.mostTicks, wrapped), linearTicks(axes.y, axes.height / 30, false, 3), "");
     pen.fillStyle = rgba(palette.curves[2], 0.85);
     for (let k = 0; k < points.length; k += 2) pen.fillRect(axes.atX(points[k]) - 1.2, axes.atY(points[k + 1]) - 1.2, 2.4, 2.4);
     pen.restore();
@@ -273,17 +345,17 @@ class SectionPanel extends Panel {
 class CopiesPanel extends Panel {
   constructor(lab) {
     const button = element("button", { type: "button", id: "copies" });
-    button.dataset.text = "copies.start";
     const apart = picker("copies.apart", () => lab.setCopies(lab.state.copies, 10 ** -Number(apart.value)));
     for (const power of [3, 6, 9, 12]) apart.append(element("option", { value: power, textContent: `${powerOfTen(-power)}${model ? "" : " rad"}`, selected: power === 6 }));
     super(lab, labPanel("panel.copies", "student", [apart, button]));
     button.addEventListener("click", () => lab.setCopies(lab.state.copies ? 0 : 50, 10 ** -Number(apart.value)));
-    this.button = button;
+    Object.assign(this, { button, key: "copies" });
     this.distances = [];
   }
 
   begin() {
     this.distances = [];
+    this.run(this.lab.state.copies > 0);
   }
 
   add(time, distance) {
@@ -295,8 +367,6 @@ class CopiesPanel extends Panel {
     const { lab, axes, distances } = this;
     this.box.section.classList.toggle("off", lab.state.copies === 0);
     this.box.plot.hidden = lab.state.copies === 0;
-    this.button.textContent = text(lab.state.copies ? "copies.end" : "copies.start");
-    this.button.setAttribute("aria-pressed", lab.state.copies > 0);
     if (lab.state.copies === 0) {
       this.name(["", text("copies.key")]);
       return;
@@ -310,7 +380,7 @@ class CopiesPanel extends Panel {
     const ticks = [];
     const step = Math.max(1, Math.ceil((axes.y.high - axes.y.low) / 5));
     for (let k = axes.y.low; k <= axes.y.high; k += step) ticks.push({ at: k, text: powerOfTen(k) });
-    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.width / 80).map((t) => ({ at: t, text: readable(t, 6) })), ticks, "s");
+    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.mostTicks).map((t) => ({ at: t, text: readable(t, 6) })), ticks, "s");
     pen.strokeStyle = palette.css("trace");
     pen.lineWidth = 1.6;
     pen.beginPath();
@@ -325,15 +395,15 @@ class CopiesPanel extends Panel {
 class ExponentPanel extends Panel {
   constructor(lab) {
     const button = element("button", { type: "button", id: "measure" });
-    button.dataset.text = "exponent.start";
     super(lab, labPanel("panel.exponent", "all", [button]));
-    this.button = button;
+    Object.assign(this, { button, key: "exponent" });
     button.addEventListener("click", () => lab.measure(!lab.isMeasuring));
     this.values = [];
   }
 
   begin() {
     this.values = [];
+    this.run(this.lab.isMeasuring);
   }
 
   add(time, value) {
@@ -346,8 +416,6 @@ class ExponentPanel extends Panel {
     const { lab, axes, values } = this;
     this.box.section.classList.toggle("off", !lab.isMeasuring);
     this.box.plot.hidden = !lab.isMeasuring;
-    this.button.textContent = text(lab.isMeasuring ? "exponent.end" : "exponent.start");
-    this.button.setAttribute("aria-pressed", lab.isMeasuring);
     if (!lab.isMeasuring) {
       this.name(["", text("exponent.key")]);
       return;
@@ -357,7 +425,7 @@ class ExponentPanel extends Panel {
     axes.x = { low: values[0]?.[0] ?? 0, high: Math.max(values.at(-1)?.[0] ?? 0, (values[0]?.[0] ?? 0) + 10) };
     const range = rangeOf([values.map(([, value]) => value)]);
     axes.y = { low: Math.min(0, range.low), high: range.high };
-    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.width / 80).map((t) => ({ at: t, text: readable(t, 6) })), linearTicks(axes.y, axes.height / 30, false), "s");
+    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.mostTicks).map((t) => ({ at: t, text: readable(t, 6) })), linearTicks(axes.y, axes.height / 30, false, 3), "s");
     pen.strokeStyle = rgba(palette.curves[3]);
     pen.lineWidth = 1.8;
     pen.beginPath();

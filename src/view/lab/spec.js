@@ -8,8 +8,15 @@ const listed = 4; // links whose numbers have sliders of their own
 /// Numbers of a model that is no chain, as describe tells them, link by link.
 const modelParameters = (model?.parameters ?? []).flatMap((each) => {
   const count = each.per_link ? model.links : 1;
-  return Array.from({ length: count }, (_, k) => ({ ...each, label: each.per_link ? `${each.name} ${k + 1}` : each.name }));
+  return Array.from({ length: count }, (_, k) => ({ ...each, label: () => parameterWords(each, k) }));
 });
+
+/// What a parameter is called: those of built-in models by words, others as their file has them.
+function parameterWords({ name, per_link }, k) {
+  const key = `parameter.${name}`;
+  const words = models[named] && key in texts.en ? text(key) : name;
+  return per_link ? `${words} ${k + 1}` : words;
+}
 
 const pointColumns = (model?.points ?? []).reduce((sum, each) => sum + each.columns.length, 0);
 
@@ -149,7 +156,7 @@ function linkOf(state) {
 function specOf(state) {
   const acting = { inputs: state.u, sines: actingSines(state) };
   if (model) {
-    const [components, connections] = [model.points.map(({ columns }) => columns.length), model.connections.map(({ ends }) => ends)];
+    const [components, connections] = [model.points.map(({ columns }) => columns.length), model.connections.filter(({ kind }) => kind !== "pulleys").map(({ ends }) => ends)];
     return { program: moved.program, parameters: state.p, components, connections, ...acting };
   }
   return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d), ...acting };

@@ -86,15 +86,19 @@ class Stage {
     return [0, 1, 2].map((axis) => a * right[axis] + b * up[axis] + (this.space === 2 ? 0 : depth * eye[axis]));
   }
 
-  /// The point that is nearest to a pixel, -1 where none is near.
-  pointAt(pixelX, pixelY, most = 26) {
-    let [found, nearest] = [-1, most];
-    for (let i = 0; i < this.count; ++i) {
-      const [x, y] = this.#shown(this.places, i);
-      const distance = Math.hypot(x - pixelX, y - pixelY) - 0.6 * this.radii[i] * this.pixels;
-      if (distance < nearest) [found, nearest] = [i, distance];
+  /// The point that is nearest to a pixel, -1 where none is near. `before`: places of some moments ago, the newest first:
+  /// whoever reaches for a fast ball presses where it was.
+  pointAt(pixelX, pixelY, most = 26, before = []) {
+    for (const places of [this.places, ...before]) {
+      let [found, nearest] = [-1, most];
+      for (let i = 0; i < this.count; ++i) {
+        const [x, y] = this.#shown(places, i);
+        const distance = Math.hypot(x - pixelX, y - pixelY) - 0.6 * this.radii[i] * this.pixels;
+        if (distance < nearest) [found, nearest] = [i, distance];
+      }
+      if (found >= 0) return found;
     }
-    return found;
+    return -1;
   }
 
   #shown(places, i) {
@@ -195,7 +199,8 @@ class Stage {
     }
   }
 
-  // In pieces of one brightness each. `trace`: places of the last point, one after the other, oldest first.
+  // In pieces of one brightness each; of pieces that go to and fro too closely to be seen what they cover. `trace`: places of
+  // the last point, one after the other, oldest first.
   #drawTrace(trace) {
     const { pen } = this;
     const samples = trace.length / 3;
@@ -205,13 +210,14 @@ class Stage {
     for (let piece = 0; piece < pieces; ++piece) {
       const [from, to] = [piece, piece + 1].map((k) => Math.floor(((samples - 1) * k) / pieces));
       if (to <= from) continue;
-      pen.strokeStyle = palette.css("trace", 0.85 * ((piece + 1) / pieces) ** 1.5);
+      const strength = 0.85 * ((piece + 1) / pieces) ** 1.5;
+      const way = Array.from({ length: to - from + 1 }, (_, k) => this.project(...trace.subarray(3 * (from + k), 3 * (from + k) + 3)));
+      const cover = coverOf(way);
+      pen.strokeStyle = palette.css("trace", strength);
+      pen.fillStyle = palette.css("trace", 0.4 * strength);
       pen.beginPath();
-      for (let k = from; k <= to; ++k) {
-        const [x, y] = this.project(trace[3 * k], trace[3 * k + 1], trace[3 * k + 2]);
-        pen.lineTo(x, y);
-      }
-      pen.stroke();
+      for (const [x, y] of cover ?? way) pen.lineTo(x, y);
+      cover ? pen.fill() : pen.stroke();
     }
     pen.lineCap = "round";
   }
@@ -247,7 +253,8 @@ class Stage {
     pen.lineWidth = 2;
     for (const { kind, ends } of this.connections) {
       const [from, to] = ends.map((end) => (end < 0 ? pivot : points[end]));
-      drawConnection(pen, kind, from, to, 0.045 * this.reach * this.pixels);
+      if (kind === "pulleys") drawPulleys(pen, from, to, this.#cartSize);
+      else drawConnection(pen, kind, from, to, 0.045 * this.reach * this.pixels);
     }
     const thick = clamp((0.014 * this.reach * this.pixels) / Math.sqrt(count / 3 + 1), 1.3, 5);
     pen.lineWidth = thick;
@@ -263,6 +270,8 @@ class Stage {
     for (const i of order) {
       if (this.kinds[i] === "cart") this.#drawCart(places, i);
       else if (this.kinds[i] === "pivot") drawPivot(pen, points[i]);
+      else if (this.kinds[i] === "weight") drawWeight(pen, points[i], this.#cartSize, palette.css("bob"));
+      else if (this.kinds[i] === "floor") drawFloor(pen, points[i], this.#cartSize);
       else this.#drawBall(points[i], i, i === held?.bob);
     }
   }
@@ -427,6 +436,28 @@ class Stage {
   }
 }
 
+/// The convex hull of a way on the screen that runs to and fro with less than a few pixels between; null of any other.
+function coverOf(way) {
+  const lengthOf = (a, b) => Math.hypot(b[0] - a[0], b[1] - a[1]);
+  const length = way.reduce((sum, place, k) => sum + (k ? lengthOf(way[k - 1], place) : 0), 0);
+  const [xs, ys] = [0, 1].map((axis) => way.map((place) => place[axis]));
+  const across = Math.hypot(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys));
+  if (length < 3 * across || length < 12) return null;
+  const side = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const half = (places) => {
+    const kept = [];
+    for (const place of places) {
+      while (kept.length > 1 && side(kept.at(-2), kept.at(-1), place) <= 0) kept.pop();
+      kept.push(place);
+    }
+    return kept.slice(0, -1);
+  };
+  const sorted = way.slice().sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const hull = [...half(sorted), ...half(sorted.reverse())];
+  const area = hull.reduce((sum, [x, y], k) => sum + x * hull.at(k - 1)[1] - hull.at(k - 1)[0] * y, 0) / 2;
+  return Math.abs(area) < 4 * length ? hull : null;
+}
+
 /// Where each arm begins, its angle from the downward vertical, and in space the direction of the plane of both.
 function anglesOf(space, arms, places) {
   const place = (i) => (i < 0 ? [0, 0, 0] : [0, 1, 2].map((axis) => places[3 * i + axis]));
@@ -444,7 +475,8 @@ function shapeOf(model, seen) {
   const isConnected = (i, on) => connections.some(({ ends }) => ends.includes(i) && ends.includes(on));
   const hangs = kinds.map((kind, i) => {
     const on = seen?.hangs[i] ?? -2;
-    return kind === "cart" || isConnected(i, on) ? -2 : on;
+    const isAlone = [kind, kinds[on]].some((each) => ["weight", "floor"].includes(each));
+    return kind === "cart" || isAlone || isConnected(i, on) ? -2 : on;
   });
   const inSpace = (along) => along && (along.length === 2 ? [along[0], 0, along[1]] : along);
   const arms = (seen?.arms ?? []).filter(([on, i]) => hangs[i] === on || isConnected(i, on));

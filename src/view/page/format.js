@@ -60,15 +60,20 @@ function unitText(unit) {
   return unit.replaceAll("sqrt", "√").replace(/_(\d+)/g, (_, digits) => lowered(digits));
 }
 
-/// Steps of 1, 2 or 5 powers of ten that divide a range in about `count`.
-function niceTicks(low, high, count) {
+/// Steps of 1, 2 or 5 powers of ten that divide a range in about `count`; finer ones where fewer than `least` lie in it.
+function niceTicks(low, high, count, least = 0) {
   const rough = (high - low) / Math.max(count, 1);
   if (!(rough > 0) || !Number.isFinite(rough)) return [low];
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((m) => m * power >= rough * 0.999);
-  const ticks = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; ++k) ticks.push(k * step);
-  return ticks;
+  const steps = [0.5, 1, 2, 5, 10];
+  const coarse = steps.findIndex((m, k) => k > 0 && m * power >= rough * 0.999);
+  const of = (step) => {
+    const ticks = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; ++k) ticks.push(k * step);
+    return ticks;
+  };
+  const ticks = of(steps[coarse] * power);
+  return ticks.length < least ? of(steps[coarse - 1] * power) : ticks;
 }
 
 /// An element with properties and children.

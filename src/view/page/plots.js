@@ -63,6 +63,11 @@ class Axes {
     return this.x.low + ((pixel - left) / (this.width - left - right)) * (this.x.high - this.x.low);
   }
 
+  /// So many numbers have room below.
+  get mostTicks() {
+    return Math.max(2, (this.width - plotMargin.left - plotMargin.right) / 48);
+  }
+
   /// Lines and numbers of the ticks; each tick is {at, text}.
   drawGrid(pen, xTicks, yTicks, xName) {
     const { left, right, top, bottom } = plotMargin;
@@ -115,16 +120,18 @@ function wrap(angle) {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }
 
-/// Ticks of an axis of ordinary numbers; angles that are wrapped have theirs in parts of π.
-function linearTicks(axis, count, wrapped) {
+/// Ticks of an axis of ordinary numbers, about `count`, and not fewer than `least` if it can be; angles that are wrapped have
+/// theirs in parts of π.
+function linearTicks(axis, count, wrapped, least = 0) {
   if (wrapped) {
     return [[-1, "−π"], [-0.5, "−π/2"], [0, "0"], [0.5, "π/2"], [1, "π"]].map(([k, text]) => ({ at: k * Math.PI, text }));
   }
-  return niceTicks(axis.low, axis.high, count).map((at) => ({ at, text: readable(at, 6) }));
+  return niceTicks(axis.low, axis.high, count, least).map((at) => ({ at, text: readable(at, 6) }));
 }
 
-/// Least and largest finite number of several arrays, and some room; apart even where all are one.
-function rangeOf(arrays, change = (x) => x) {
+/// Least and largest finite number of several arrays, and some room; apart even where all are one. What changes by less than
+/// rounding does, of numbers of a `scale`, rests.
+function rangeOf(arrays, change = (x) => x, scale = 0) {
   let [low, high] = [Infinity, -Infinity];
   for (const numbers of arrays) {
     for (const number of numbers) {
@@ -134,13 +141,17 @@ function rangeOf(arrays, change = (x) => x) {
     }
   }
   if (!(low <= high)) return { low: 0, high: 1 };
+  if (high - low <= 1e-12 * scale) {
+    const middle = Math.max(Math.abs(low), Math.abs(high)) <= 1e-12 * scale ? 0 : (low + high) / 2;
+    return { low: middle - 0.5 * scale, high: middle + 0.5 * scale };
+  }
   const size = Math.max(Math.abs(low), Math.abs(high));
   if (high - low <= 2e-5 * size) return { low: low - 0.1 * size, high: high + 0.1 * size }; // constant, but for rounding
   const room = (high - low) * 0.04 || 1;
   return { low: low - room, high: high + room };
 }
 
-/// Curves over time. A curve is {run, numbers, colour(), alpha}; `kind` is "linear", "wrapped" or "log".
+/// Curves over time. A curve is {run, numbers, colour(), alpha}, of linear ones {scale} too; `kind` is "linear", "wrapped" or "log".
 class TimePlot {
   constructor(host, description, player) {
     this.axes = new Axes(host, description);
@@ -161,7 +172,7 @@ class TimePlot {
     const pen = axes.begin();
     axes.x = { low: player.start, high: player.end > player.start ? player.end : player.start + 1 };
     const yTicks = this.kind === "log" ? this.#logAxis() : this.#linearAxis();
-    const xTicks = niceTicks(axes.x.low, axes.x.high, axes.width / 80);
+    const xTicks = niceTicks(axes.x.low, axes.x.high, axes.mostTicks);
     axes.drawGrid(pen, xTicks.map((at) => ({ at, text: readable(at, 6) })), yTicks, scene.timeUnit);
     pen.lineWidth = 1.3;
     for (const curve of this.curves) this.#draw(pen, curve);
@@ -186,8 +197,8 @@ class TimePlot {
   #linearAxis() {
     const { axes } = this;
     const wrapped = this.kind === "wrapped";
-    axes.y = wrapped ? { low: -Math.PI, high: Math.PI } : rangeOf(this.curves.map((curve) => curve.numbers));
-    return linearTicks(axes.y, axes.height / 28, wrapped);
+    axes.y = wrapped ? { low: -Math.PI, high: Math.PI } : rangeOf(this.curves.map((curve) => curve.numbers), undefined, this.curves[0]?.scale);
+    return linearTicks(axes.y, axes.height / 28, wrapped, 3);
   }
 
   // Zeros, where there are any, are drawn at the bottom, a tick below the least.
@@ -272,6 +283,7 @@ class PhasePlot {
   /// wrapped: as an angle within a half turn
   show(member, wrapped) {
     this.wrapped = wrapped;
+    this.member = member;
     this.curves = runs.map((run, k) => ({
       run, colour: () => palette.run(k), q: run.column(member.column), rate: run.column(member.rate),
     }));
@@ -281,11 +293,11 @@ class PhasePlot {
   redraw() {
     const { axes } = this;
     const pen = axes.begin();
-    const turned = this.wrapped ? { low: -Math.PI, high: Math.PI } : rangeOf(this.curves.map((curve) => curve.q));
+    const turned = this.wrapped ? { low: -Math.PI, high: Math.PI } : rangeOf(this.curves.map((curve) => curve.q), undefined, this.member.scale);
     axes.x = turned;
-    axes.y = rangeOf(this.curves.map((curve) => curve.rate));
-    const xTicks = linearTicks(axes.x, axes.width / 70, this.wrapped);
-    axes.drawGrid(pen, xTicks, linearTicks(axes.y, axes.height / 28, false), "");
+    axes.y = rangeOf(this.curves.map((curve) => curve.rate), undefined, this.member.rateScale);
+    const xTicks = linearTicks(axes.x, axes.mostTicks, this.wrapped);
+    axes.drawGrid(pen, xTicks, linearTicks(axes.y, axes.height / 28, false, 3), "");
     pen.lineWidth = 1.1;
     const alpha = runs.length > 1 ? Math.max(0.12, 0.6 / Math.sqrt(runs.length)) : 0.4;
     for (const curve of this.curves) {
