@@ -1,7 +1,7 @@
 # The Python that generates kernels: one that has its packages.
 include_guard(GLOBAL)
 
-set(PENDULA_PYTHON "" CACHE FILEPATH "Python with the generator's packages (empty: .venv of pendula, else python3)")
+set(PENDULA_PYTHON "" CACHE FILEPATH "Python with the generator's packages (empty: that of pendula's own setup, else python3)")
 
 # Sets OUT_COMPLAINT to what PYTHON lacks of REQUIREMENTS, empty where it lacks nothing.
 function(_pendula_python_complaint python requirements out_complaint)
@@ -22,10 +22,12 @@ function(pendula_find_python requirements out_python out_problem)
   set(candidates "${PENDULA_PYTHON}")
   if(PENDULA_PYTHON STREQUAL "")
     set(candidates "")
-    if(EXISTS "${codegen}/../.venv/bin/python")
-      get_filename_component(root "${codegen}/.." ABSOLUTE)
-      list(APPEND candidates "${root}/.venv/bin/python")
-    endif()
+    get_filename_component(root "${codegen}/.." ABSOLUTE)
+    foreach(own IN ITEMS .venv venv)  # scripts/setup makes the one, setup of an installed pendula the other
+      if(EXISTS "${root}/${own}/bin/python")
+        list(APPEND candidates "${root}/${own}/bin/python")
+      endif()
+    endforeach()
     find_package(Python3 QUIET COMPONENTS Interpreter)
     if(Python3_EXECUTABLE)
       list(APPEND candidates "${Python3_EXECUTABLE}")
@@ -45,8 +47,11 @@ function(pendula_find_python requirements out_python out_problem)
   if(tried STREQUAL "")
     set(tried "\n  none found")
   endif()
+  get_filename_component(own_setup "${codegen}/../setup" ABSOLUTE)  # of an installed pendula
+  if(NOT EXISTS "${own_setup}")
+    get_filename_component(own_setup "${codegen}/../scripts/setup" ABSOLUTE)
+  endif()
   set(${out_python} "" PARENT_SCOPE)
   set(${out_problem} "no Python has the packages of ${requirements}. Tried:${tried}\nRun\n  \
-python3 -m venv pendula-venv && pendula-venv/bin/pip install -r ${requirements}\nand configure with \
--DPENDULA_PYTHON=<that folder>/pendula-venv/bin/python (in pendula's own checkout: scripts/setup makes .venv)" PARENT_SCOPE)
+${own_setup}\nor configure with -DPENDULA_PYTHON=<a Python that has them>" PARENT_SCOPE)
 endfunction()

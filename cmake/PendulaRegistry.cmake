@@ -104,7 +104,7 @@ endfunction()
 
 # What to run to write generated/ afresh; a build never does it by itself.
 function(pendula_add_refresh_target)
-  pendula_find_python("${PENDULA_CODEGEN_DIR}/requirements.txt" python problem)
+  pendula_find_python("${PENDULA_CODEGEN_DIR}/requirements-dev.txt" python problem)  # SymPy of one version
   if(problem)
     add_custom_target(refresh-generated COMMAND "${CMAKE_COMMAND}" -E echo "refresh-generated: ${problem}"
                                         COMMAND "${CMAKE_COMMAND}" -E false VERBATIM)

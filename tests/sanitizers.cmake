@@ -14,10 +14,9 @@ if(CLANG)
 elseif(DEFINED CXX)
   set(compiler -D "CMAKE_CXX_COMPILER=${CXX}")
 endif()
-# Sanitized code is compiled once, for this machine: what the library around it is compiled for is another matter, and so
-# is the laboratory's module, which is compiled without sanitizers.
+# Sanitized code is compiled once, for this machine: what the library around it is compiled for is another matter.
 unset(ENV{PENDULA_ARCHS})
-execute_process(COMMAND "${CMAKE_COMMAND}" --preset asan -B "${BUILD}" ${compiler} -D PENDULA_LAB=OFF
+execute_process(COMMAND "${CMAKE_COMMAND}" --preset asan -B "${BUILD}" ${compiler}
                         -D "PENDULA_KERNELS=planar:1\\;planar:2\\;planar:3\\;spatial:2"
                 WORKING_DIRECTORY "${source}" COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" --target cpp_tests --parallel 2

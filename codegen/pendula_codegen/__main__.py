@@ -155,7 +155,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="link from 0, amplitude, frequency, phase of a chain's drive",
     )
-    export.add_argument("--output", required=True, type=Path, help="a folder")
+    export.add_argument("--output", required=True, type=Path, help="a folder; of an FMU, or a .fmu file")
     export.set_defaults(run=_run_export)
 
     what = commands.add_parser("describe", help="what a model has, as JSON")
@@ -236,8 +236,9 @@ def _run_export(options: argparse.Namespace) -> None:
     files: dict[str, str | bytes] = {**texts}
     if options.language == "fmu":
         files = {f"{options.name}.fmu": packed_fmu(options.name, texts, runtime)}
+    is_file = options.language == "fmu" and options.output.suffix == ".fmu"
     for name, content in files.items():
-        path = options.output / name
+        path = options.output if is_file else options.output / name
         _require_own(path)
         write_atomically(path, content)
         print(path)
@@ -306,7 +307,7 @@ def _export_words(options: argparse.Namespace) -> str:
 
 def _require_own(path: Path) -> None:
     """Only what was generated is written over."""
-    if path.exists() and MARK not in path.read_bytes():
+    if path.is_dir() or (path.exists() and MARK not in path.read_bytes()):
         raise GenerationError(f"export: expected a new file, or one that was exported before, got {path}")
 
 

@@ -3,7 +3,7 @@
 from conftest import REPOSITORY
 from pendula_codegen import __version__
 
-REFRESH = "refresh with: PYTHONPATH=codegen python -m pendula_codegen refresh --output generated"
+REFRESH = "refresh with: cmake --build build/release --target refresh-generated"
 
 
 def test_generated_headers_are_up_to_date(fresh_headers):

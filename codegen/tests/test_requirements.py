@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 
 import jinja2
 import pytest
@@ -59,6 +60,13 @@ def test_a_line_that_is_not_understood_is_said(line, tmp_path):
 def lines(file: str) -> set[str]:
     """The requirements of a file, without its comments and inclusions."""
     return set(re.findall(r"^[\w-]+[=>]=\S+$", (REPOSITORY / file).read_text(), re.MULTILINE))
+
+
+def test_the_package_asks_for_what_the_generator_needs():
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    asked = set(project["dependencies"])
+    assert lines("codegen/requirements.txt") <= asked
+    assert not [one for one in asked if "==" in one]  # of whatever environment it enters
 
 
 @pytest.mark.parametrize(

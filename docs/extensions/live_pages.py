@@ -29,15 +29,6 @@ def folder_of(app: Sphinx) -> Path:
     return Path(app.doctreedir) / "extra"
 
 
-def write_lab(folder: Path) -> bool:
-    """The laboratory; where this build has none, the page of a run in its place. Whether it is the laboratory."""
-    page = str(folder / "lab.html")
-    if pendula("lab", "-o", page).returncode == 0:
-        return True
-    require(pendula("simulate", "examples/double_pendulum.toml", "--quiet", "--view", page))
-    return False
-
-
 def require(done: subprocess.CompletedProcess) -> None:
     if done.returncode != 0:
         raise ExtensionError(f"{' '.join(done.args)}: {done.stderr.strip()}")
@@ -54,7 +45,7 @@ def write_case(folder: Path, case: Case) -> None:
 
 def write_pages(app: Sphinx) -> None:
     folder = folder_of(app) / "live"
-    app.config.has_lab = write_lab(folder)
+    require(pendula("lab", "-o", str(folder / "lab.html")))
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda case: write_case(folder, case), CASES))
 
@@ -73,9 +64,6 @@ class Laboratory(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         up = "../" * self.env.docname.count("/")
-        if not self.config.has_lab:
-            note = "A recorded motion: this site was built without the laboratory."
-            return [frame(f"{up}live/lab.html", "A double pendulum"), nodes.paragraph("", note)]
         link = self.options.get("link", "")
         shown = frame(f"{up}live/lab.html#{link}" if link else f"{up}live/lab.html", "The laboratory")
         return [shown, *self.parse_content_to_nodes()]
@@ -96,7 +84,6 @@ class Gallery(SphinxDirective):
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:
-    app.add_config_value("has_lab", False, "env", bool)
     app.add_directive("laboratory", Laboratory)
     app.add_directive("gallery", Gallery)
     app.connect("builder-inited", write_pages)

@@ -47,12 +47,19 @@ def _main_of(codegen: Path) -> Callable[[list[str]], int] | None:
 
 
 def _has_packages(requirements: Path) -> bool:
-    """Whether those that decide what is generated are of the right version here."""
+    """Whether those that decide what is generated are new enough here."""
     try:
-        needed = re.findall(r"^(\w+)==(\S+)", requirements.read_text(encoding="utf-8"), re.MULTILINE)
-        return all(importlib.import_module(name).__version__ == version for name, version in needed)
+        text = requirements.read_text(encoding="utf-8")
+        needed = re.findall(r"^(mpmath|sympy)>=(\S+)", text, re.MULTILINE)
+        found = [(importlib.import_module(name).__version__, version) for name, version in needed]
+        return bool(found) and all(_numbers(here) >= _numbers(version) for here, version in found)
     except Exception:  # whatever is called so, and is found first
         return False
+
+
+def _numbers(version: str) -> list[int]:
+    """1.13 of 1.13rc2."""
+    return [int(part) for part in re.findall(r"\d+", version)[:2]]
 
 
 def _import_package(folder: Path) -> bool:

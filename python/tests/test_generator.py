@@ -57,6 +57,16 @@ print("done")
     assert run(tmp_path, code) == "done\n"
 
 
+def test_it_runs_here_by_any_sympy_of_the_range(tmp_path):
+    code = """
+import mpmath, sympy
+sympy.__version__, mpmath.__version__ = "1.11.1", "1.10.0a1"
+assert maker(file) == os.getpid()
+print("done")
+"""
+    assert run(tmp_path, code) == "done\n"
+
+
 def test_it_runs_in_the_python_that_is_asked_for(tmp_path):
     other = tmp_path / "python"
     other.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')

@@ -322,7 +322,9 @@ void CommandLine::add_export() {
                                   "NAME.fmu, for simulators that know FMI 3.0, with pendula's adaptive steps"),
               "LANGUAGE", {"c", "casadi", "fmu"})
       ->required();
-  takes_file(exports->add_option("-o,--output", options.folder, "The folder for the files"), {"/"})->required();
+  takes_file(exports->add_option("-o,--output", options.output, "The folder for the files, or the FMU: NAME.fmu"),
+             {"/", ".fmu"})
+      ->required();
   exports->add_option("--name", options.name, "What names in it begin with; else that of the model")->type_name("NAME");
   exports
       ->add_option("--stages", options.stages,

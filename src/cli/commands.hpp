@@ -107,7 +107,7 @@ struct LabOptions {
   std::string output;                  ///< the page
 };
 
-/// Writes a page in which the motion is computed. Throws io::InputError, too, where this build has none.
+/// Writes a page in which the motion is computed. Throws io::InputError.
 ExitStatus lab(const LabOptions& options);
 
 struct ExportOptions {
@@ -115,7 +115,7 @@ struct ExportOptions {
   std::vector<std::string> overrides;  ///< `key.path=value`, of a scenario
   std::optional<int> links;            ///< of a model that has links
   std::string language;                ///< "c", "casadi" or "fmu"
-  std::string folder;                  ///< where files go
+  std::string output;                  ///< the folder for files, or the file of an FMU
   std::string name;                    ///< what names begin with; empty for that of the model
   std::optional<int> stages;           ///< of the Gauss step; else those of the scenario, or 2
   bool is_float = false;               ///< numbers are float

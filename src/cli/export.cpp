@@ -222,7 +222,7 @@ ExitStatus export_system(const ExportOptions& options) {
       words.erase(words.begin());
     }
     words.insert(words.begin(), "export");
-    words.insert(words.end(), {"--as", options.language, "--output", options.folder, "--name",
+    words.insert(words.end(), {"--as", options.language, "--output", options.output, "--name",
                                options.name.empty() ? default_name(options) : options.name});
     if (options.stages) words.insert(words.end(), {"--stages", std::to_string(*options.stages)});
     if (has_runtime(options, toolchain)) {

@@ -87,10 +87,6 @@ json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
 }  // namespace
 
 ExitStatus lab(const LabOptions& options) {
-  if (!view::has_lab()) {
-    throw io::InputError(
-        "this build has no laboratory: it takes emscripten, which scripts/setup --web installs; then configure again");
-  }
   io::WholeFile page(options.output);
   io::Toolchain toolchain = io::Toolchain::of_this_program();
   toolchain.kernels_by = "interpreter";  // as in the page

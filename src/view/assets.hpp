@@ -16,13 +16,6 @@ extern const std::string_view three;          ///< three.js, gzip
 extern const std::string_view three_version;  ///< "111"
 extern const std::string_view three_licence;
 
-// Of src/view/lab, by cmake/embed_lab.cmake.
-extern const std::string_view lab_page;    ///< lab.html, with {{names}}
-extern const std::string_view lab_style;   ///< page.css and lab.css
-extern const std::string_view lab_script;  ///< one module
-extern const std::string_view lab_worker;  ///< a classic script, for a worker
-extern const std::string_view lab_texts;   ///< JSON: texts by language
-extern const std::string_view lab_models;  ///< JSON: built-in models by name
-extern const std::string_view lab_module;  ///< WebAssembly, gzip; empty where this build has none
+extern const std::string_view lab_page;  ///< by cmake/lab_page.cmake, with {{title}} and {{start}}
 
 }  // namespace pendula::view::assets

@@ -81,9 +81,6 @@ LabLink lab_link(const SystemSubject& system);
 /// What a laboratory begins with that moves a model by its program: "model" and "program".
 nlohmann::json lab_model(const SystemInfo& info, std::string program);
 
-/// Whether this build has the laboratory: it takes emscripten.
-bool has_lab();
-
 /// The page of a laboratory, in which motion is computed: one HTML file that needs nothing else. `start` is what it
 /// begins with (docs/reference/laboratory.md): "title", and "state", the words of a link; of a model besides
 /// "program" and "model".

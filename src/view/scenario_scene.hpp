@@ -56,11 +56,10 @@ std::vector<std::string> laboratory_leaves_out(const Scenario& scenario) {
   return words;
 }
 
-/// The laboratory's link of what is moved, in SI, if the laboratory has all of it; empty for all else, and where this
-/// build has none.
+/// The laboratory's link of what is moved, in SI, if the laboratory has all of it; empty for all else.
 template <class Scenario>
 std::string laboratory_of(const Scenario& scenario) {
-  if (!has_lab() || !laboratory_leaves_out(scenario).empty()) return {};
+  if (!laboratory_leaves_out(scenario).empty()) return {};
   if constexpr (requires { scenario.chain; }) {
     return lab_link(scenario.chain).text();
   } else {

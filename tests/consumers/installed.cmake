@@ -9,6 +9,18 @@ step("${project}-build/swing")
 message(STATUS "${output}")
 require_no_path_of_checkout("${project}-build")
 
+# As the tutorial says it, in a home with that install, and the Python of its setup.
+file(STRINGS "${SOURCE}/docs/tutorials/cpp.md" line REGEX "^cmake -B build ")
+cmake_path(GET python PARENT_PATH environment)
+cmake_path(GET environment PARENT_PATH environment)
+if(EXISTS "${environment}/pyvenv.cfg")
+  file(MAKE_DIRECTORY "${WORK}/home")
+  file(CREATE_LINK "${prefix}" "${WORK}/home/.local" SYMBOLIC)
+  file(CREATE_LINK "${environment}" "${prefix}/share/pendula/venv" SYMBOLIC)
+  step("${CMAKE_COMMAND}" -E env "HOME=${WORK}/home" "CXX=${CXX}" sh -c "cd '${project}' && ${line}")
+  file(REMOVE "${prefix}/share/pendula/venv")
+endif()
+
 if(NOT EXISTS "${project}-build/pendula_kernels/pendula/kernels/spatial_4.hpp")
   message(FATAL_ERROR "spatial_4.hpp was not generated into the consumer's build")
 elseif(EXISTS "${project}-build/pendula_kernels/pendula/kernels/planar_2.hpp")

@@ -41,6 +41,13 @@ def unpacked(pendula, place, *words):
     return place
 
 
+def test_its_file_may_be_named(pendula, tmp_path):
+    ended = pendula("export", "planar:1", "--as", "fmu", "-o", tmp_path / "new/slide.fmu")
+    assert (ended.returncode, ended.stdout) == (0, f"{tmp_path}/new/slide.fmu\n"), ended.stderr
+    with zipfile.ZipFile(tmp_path / "new/slide.fmu") as archive:
+        assert b'modelName="planar_1"' in archive.read("modelDescription.xml")
+
+
 @pytest.fixture(scope="module")
 def folder(pendula, tmp_path_factory):
     """A folder with the FMU of a cart with two links, unpacked."""

@@ -3,6 +3,8 @@
 import json
 import os
 import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,7 +12,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Error, Page, sync_playwright
 
-SOURCE = Path(__file__).parents[2] / "src/view/lab"
+ROOT = Path(__file__).parents[2]
+SOURCE = ROOT / "src/view/lab"
+COMMITTED = ROOT / "generated/laboratory.html"
+sys.path.insert(0, str(ROOT / "cmake"))
+from refresh_lab import module_of  # noqa: E402
+
 SMALL = (1000, 700)
 
 
@@ -21,20 +28,17 @@ def program(*arguments: str, text: str = "") -> subprocess.CompletedProcess:
 
 
 def ends_in_module(cases: list[dict]) -> list[dict]:
-    """Where the module brings motions to."""
-    done = subprocess.run(
-        [
-            os.environ["PENDULA_NODE"],
-            Path(__file__).parent / "ends.js",
-            os.environ["PENDULA_LAB_MODULE"],
-            SOURCE,
-        ],
-        input=json.dumps(cases),
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=True,
-    )
+    """Where the committed module brings motions to."""
+    with tempfile.NamedTemporaryFile(suffix=".wasm") as module:
+        Path(module.name).write_bytes(module_of(COMMITTED.read_text(encoding="utf-8")))
+        done = subprocess.run(
+            [os.environ["PENDULA_NODE"], Path(__file__).parent / "ends.js", module.name, SOURCE],
+            input=json.dumps(cases),
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=True,
+        )
     assert not done.stderr
     return json.loads(done.stdout)
 

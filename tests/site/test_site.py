@@ -169,7 +169,6 @@ def test_everybody_can_read_it(open_page, name, size, scheme):
 
 
 def test_the_laboratory_moves(open_page):
-    """Or the run in its place."""
     page, _ = open_page("index")
     frame = page.frame_locator("iframe.live")
     frame.locator("canvas").first.wait_for()

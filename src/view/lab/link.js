@@ -5,7 +5,7 @@ class Computer {
   #count = 0;
 
   constructor() {
-    const source = JSON.parse(document.getElementById("worker").textContent);
+    const source = document.getElementById("worker").textContent;
     const address = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
     this.worker = new Worker(address);
     this.worker.onmessage = ({ data }) => {
