@@ -10,6 +10,7 @@ Everything that is wrong raises GenerationError with the file and the line of th
 
 from __future__ import annotations
 
+import builtins
 import keyword
 import random
 import re
@@ -17,12 +18,14 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from numbers import Real
 from pathlib import Path
 from typing import NoReturn
 
 import mpmath
+import sympy
 from sympy import Add, Expr, Integer, Symbol, expand, lambdify, sympify
 
 from pendula_codegen.errors import GenerationError
@@ -527,11 +530,29 @@ def _define_of(file: Path) -> Callable[[Model, int], None]:
 
 def _said_by(error: Exception | SystemExit, file: Path) -> str:
     """An exception of the model file, with the line of the file that it came through last."""
-    lines = [
-        entry.lineno for entry in traceback.extract_tb(error.__traceback__) if entry.filename == str(file)
+    steps = [
+        (frame, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        if frame.f_code.co_filename == str(file)
     ]
-    where = f"{file}:{lines[-1]}" if lines else str(file)
+    where = f"{file}:{steps[-1][1]}" if steps else str(file)
     if isinstance(error, SystemExit):
         return f"{where}: expected a model that lets Python go on, got one that calls exit"
     text = " ".join(str(error).split())
-    return f"{where}: {type(error).__name__}{': ' + text if text else ''}"
+    near = _near(error, {**steps[-1][0].f_globals, **steps[-1][0].f_locals}) if steps else ""
+    return f"{where}: {type(error).__name__}{': ' + text if text else ''}{near}"
+
+
+def _near(error: Exception, names: dict[str, object]) -> str:
+    """What may have been meant by a name that nobody knows."""
+    name = getattr(error, "name", None)
+    if isinstance(error, NameError):
+        if name is not None and hasattr(sympy, name):
+            return f"; SymPy has it: from sympy import {name}"
+        known = [*names, *dir(builtins)]
+    elif isinstance(error, AttributeError):
+        known = [one for one in dir(error.obj) if not one.startswith("_")]
+    else:
+        return ""
+    found = get_close_matches(name, known, 3) if name is not None else []
+    return f"; did you mean {' or '.join(found)}?" if found else ""

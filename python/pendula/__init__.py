@@ -16,6 +16,7 @@ from ._core import version as _version
 from ._derivatives import Derivatives, Gradient, differentiate, linearize
 from ._ensemble import ensemble
 from ._ensemble_data import merge, open_ensemble
+from ._linear import LinearSystem
 from ._map import map as map  # not in __all__: `from pendula import *` leaves Python its own
 from ._models import Kernel, Model, models
 from ._runs import RunFailed, TrustWarning
@@ -37,6 +38,11 @@ def __getattr__(name: str) -> object:
     return getattr(_functions, name)
 
 
+def __dir__() -> list[str]:
+    """What is public."""
+    return [*__all__, "map"]
+
+
 __version__ = _version()
 InputError.__doc__ = (
     "An argument is wrong: the message names it, what was expected and what was got. A ValueError."
@@ -48,6 +54,7 @@ __all__ = [
     "Gradient",
     "InputError",
     "Kernel",
+    "LinearSystem",
     "Lyapunov",
     "Model",
     "ModelFunction",

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _core
 from ._core import InputError
-from ._ensemble_data import missing
 from ._functions import kept_model
-from ._runs import RunFailed, places, plainly, tell
+from ._runs import RunFailed, missing, places, plainly, tell
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

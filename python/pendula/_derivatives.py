@@ -9,12 +9,15 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._runs import mapping, number, numbers, plainly, warn
-from ._simulation import RUN_OPTIONS, Beginning, Simulation
-from ._systems import System, system_of
+from ._linear import LinearSystem
+from ._runs import number, numbers, plainly, warn
+from ._simulation import Beginning, Simulation, split
+from ._systems import System, starts_of, system_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from ._linear import Outputs
 
 
 class Derivatives(NamedTuple):
@@ -80,10 +83,11 @@ def differentiate(
     t : array_like, optional
         Times of the rows, in s, from 0 on, at which steps end; if left out, the duration alone.
     start : mapping, optional
-        As for :meth:`Chain.simulate`. Coordinates and rates are what is held where parameters vary, also where momenta
-        are given.
+        As for :meth:`Chain.simulate`, as keyword arguments, too. Coordinates and rates are what is held where
+        parameters vary, also where momenta are given.
     until : str, optional
-        An expression of ``t``, coordinates and rates that does not jump. The last row is where it first crosses zero.
+        An expression of ``t``, coordinates, rates and points that does not jump. The last row is where it first crosses
+        zero.
     direction : {"both", "up", "down"}
         How it crosses zero.
     tolerance, step : float, optional
@@ -116,13 +120,10 @@ def differentiate(
     True
     """
     times = _times(duration, t)
-    given = mapping("start", start)
-    for name in options:
-        if name not in RUN_OPTIONS:
-            raise InputError(f"differentiate: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
+    given, runs = split(differentiate, system, start, options)
     if direction not in ("both", "up", "down"):
         raise InputError(f'direction: expected "both", "up" or "down", got {direction!r}')
-    made = Beginning.of(system, given, tolerance=tolerance, step=step, options=options).prepare()
+    made = Beginning.of(system, given, tolerance=tolerance, step=step, options=runs).prepare()
     varied = Varied(made)
     warn(made.warnings, stacklevel=3)
     if until is not None:
@@ -135,7 +136,7 @@ def differentiate(
             tolerance=1e-9 if tolerance is None and step is None else tolerance,
             step=step,
             estimate=False,
-            **options,  # type: ignore[arg-type]
+            **runs,  # type: ignore[arg-type]
         )
         if found.status != 1:
             raise InputError(
@@ -169,29 +170,32 @@ def differentiate(
 
 def linearize(
     system: System,
-    at: Mapping[str, object] | None = None,
+    start: Mapping[str, object] | None = None,
     *,
     step: float | None = None,
     tolerance: float | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    outputs: Outputs | None = None,
+    **starts: object,
+) -> LinearSystem:
     """The linear system beside a state, exactly.
 
     Parameters
     ----------
     system : Chain or Model
-    at : mapping, optional
-        Coordinates and rates, as for :meth:`Chain.simulate`; what is left out is 0.
+    start : mapping, optional
+        Coordinates and rates, as for :meth:`Chain.simulate`, as keyword arguments, too; what is left out is 0.
     step : float, optional
         In s: the discrete system, from one time to the next, while inputs are held.
     tolerance : float, optional
         Of the steps inside one, as for :class:`Simulation`.
+    outputs : sequence of str or mapping, optional
+        What is measured: columns of a row or expressions of them, ``["x_2", "theta_2 - theta_1"]``, or these by name,
+        ``{"bend": "theta_2 - theta_1"}``. Left out, all points.
 
     Returns
     -------
-    A : (2n, 2n) array
-    B : (2n, inputs) array
-        Of deviations x from the state, in the order of :attr:`Simulation.names` and :attr:`Simulation.inputs`:
-        dx/dt = A x + B inputs, or with ``step`` x(t + step) = A x(t) + B inputs.
+    LinearSystem
+        Of deviations from the state: ``A, B = pendula.linearize(…)``, with C and D, frequencies and damping besides.
 
     Raises
     ------
@@ -204,18 +208,25 @@ def linearize(
     >>> A, B = pendula.linearize(pendula.Chain(links=1), {"theta": 0.0}, step=0.1)
     >>> A.shape, B.shape
     ((2, 2), (2, 1))
+    >>> hanging = pendula.linearize(pendula.Chain(links=1))
+    >>> hanging.outputs, hanging.C.tolist()
+    (['x_1', 'y_1'], [[1.0, 0.0], [0.0, 0.0]])
+    >>> hanging.frequencies.round(4).tolist()  # in Hz
+    [0.4985, 0.4985]
     """
     system = system_of(system)
-    start = {**system.at_zero(), **mapping("at", at)}
+    given = starts_of("linearize", system, start, starts, linearize.__kwdefaults__ or ())
+    simulation = Simulation(system, {**system.at_zero(), **given})
     if step is None:
         if tolerance is not None:
             raise InputError("tolerance: expected none without step, got one")
-        return Simulation(system, start).linearize()
+        return simulation.linearize(outputs)
     if number("step", step) <= 0:
         raise InputError(f"step: expected a positive number, got {step!r}")
-    moved = differentiate(system, step, start=start, tolerance=tolerance)
-    inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
-    return moved.by_start[0], np.hstack([np.empty((moved.y.shape[0], 0)), *inputs])
+    moved = differentiate(system, step, start={**system.at_zero(), **given}, tolerance=tolerance)
+    by_inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
+    b = np.hstack([np.empty((moved.y.shape[0], 0)), *by_inputs])
+    return LinearSystem(moved.by_start[0], b, step=float(step), **simulation._seen(outputs))
 
 
 def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:

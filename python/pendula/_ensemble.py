@@ -6,27 +6,28 @@ from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from . import _core
+from . import _core, _toml
 from ._core import InputError
 from ._ensemble_data import dataset_of, open_ensemble
+from ._ensemble_rows import rows_of_members, threads_of
 from ._ensemble_text import Design, ensemble_text, some_start
 from ._events import event_tables
 from ._progress import progress_line
 from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
-from ._simulation import RUN_OPTIONS, Beginning
-from ._systems import System, system_of
+from ._simulation import Beginning, split
+from ._systems import System, system_of, times_of
 
 if TYPE_CHECKING:
     import xarray
+    from numpy.typing import ArrayLike
 
 
 def ensemble(
     system: System,
-    duration: float,
+    duration: float | None = None,
     start: Mapping[str, object] | None = None,
     *,
+    t: ArrayLike | None = None,
     axes: Mapping[str, object] | None = None,
     random: Mapping[str, object] | None = None,
     members: int | None = None,
@@ -50,14 +51,18 @@ def ensemble(
     Parameters
     ----------
     system : Chain or Model
-    duration : float
-        In s.
+    duration : float, optional
+        In s; left out, the last of the times ``t``.
+    t : array_like, optional
+        Times of rows, in s: with them the dataset has what ``keep`` names of every member over ``t``. Members are moved
+        one by one, as :meth:`Chain.simulate` moves them, into memory: without ``file``, ``shard`` and ``client``.
     start : mapping, optional
-        Coordinates and rates (or momenta, ``p_theta``) by name, in rad, m and their rates. What is left out is 0.
+        Coordinates and rates (or momenta, ``p_theta``) by name, in rad, m and their rates, as keyword arguments, too.
+        What is left out is 0.
 
-        A number, or a text such as ``"90 deg"``: that of all members. An array lists them: (members,), of all links
-        of a chain (members, links). A tuple has a number or an axis of a grid for each link: ``{"theta": (grid_1,
-        grid_2)}`` is the outer product of two vectors.
+        A number, or a text such as ``"90 deg"``: that of all members; of several links also (links,). An array lists
+        members: (members,), of several links (members, links). A tuple has a number or an axis of a grid for each link:
+        ``{"theta": (grid_1, grid_2)}`` is the outer product of two vectors.
     axes : mapping, optional
         Further axes of the grid: values of any key of the scenario that takes a number, elements from 1:
         ``{"chain.lengths[1]": array, "run.duration": array}``.
@@ -68,7 +73,8 @@ def ensemble(
         Of what is drawn.
     keep : str or sequence of str, optional
         As in a scenario: "final", "points", "energy", "energy_error", "steps", "lyapunov", "ftle", "megno",
-        "event:NAME". Left out: final, energy_error, steps and all events.
+        "event:NAME". Left out: final, energy_error, steps and all events. With ``t`` columns of rows, "theta", "x_2";
+        left out, all.
     events : mapping, optional
         As for :meth:`Chain.simulate`.
     tolerance, step, accuracy, method, stages, form, solver, iteration, estimate
@@ -119,16 +125,20 @@ def ensemble(
     >>> data = pendula.ensemble(double, 1.0, {"theta": numpy.zeros((4, 2))})
     >>> data.sizes["member"], int(data["trusted"].sum())
     (4, 4)
+    >>> data = pendula.ensemble(double, theta=numpy.zeros((4, 2)), t=numpy.linspace(0, 1, 11))
+    >>> data["theta_2"].dims, data["theta_2"].shape
+    (('member', 't'), (4, 11))
     """
-    how_long = number("duration", duration)
+    times = None if t is None else times_of(t)
+    if duration is None and times is None:
+        raise TypeError("ensemble: expected duration= or t=, got neither")
+    how_long = float(times[-1]) if duration is None and times is not None else number("duration", duration)
     if how_long < 0:
         raise InputError(f"duration: expected a number, not negative, got {duration!r}")
-    for name in options:
-        if name not in RUN_OPTIONS:
-            raise InputError(f"ensemble: expected options among {', '.join(RUN_OPTIONS)}, got {name}")
+    starts, runs = split(ensemble, system, start, options)
     kept = [keep] if isinstance(keep, str) else keep
-    method = options.pop("method", None)
-    starts, keys, drawn = mapping("start", start), mapping("axes", axes), mapping("random", random)
+    method = runs.pop("method", None)
+    keys, drawn = mapping("axes", axes), mapping("random", random)
     # A model may have no start where all is zero.
     begin = system_of(system).at_zero() or some_start(starts, keys, drawn)
     # Names alone are asked for, which feedback does not change; a program cannot step what is sampled.
@@ -146,9 +156,16 @@ def ensemble(
         "step": step,
         "accuracy": accuracy,
         "estimate": estimate,
-        **options,
+        **runs,
     }
     tables = {**design.tables(), "run": run, "event": event_tables(events)}
+    if times is not None:
+        if file is not None or shard is not None or resume or client is not None:
+            raise InputError("t: expected neither file, shard, resume nor client beside it, got one")
+        text = ensemble_text(tables, method=None, members=members, seed=seed, keep=["steps"])
+        alone = {key: one for key, one in tables.items() if not key.startswith("ensemble.")}
+        alone["output"] = {"times": times.tolist()}
+        return rows_of_members(text, _toml.document(alone), times, kept, threads, progress)
     text = ensemble_text(tables, method=method, members=members, seed=seed, keep=kept)
     return move_members(
         text,
@@ -176,7 +193,7 @@ def move_members(
     progress: bool,
 ) -> xarray.Dataset:
     """Moves the members of a scenario's text, for whoever was called from outside."""
-    how_many = _threads(threads)
+    how_many = threads_of(threads)
     part = None if shard is None else _shard(shard)
     if file is None and (part or resume):
         raise InputError("file: expected the file that shards share, or that is resumed, got none")
@@ -204,12 +221,6 @@ def move_members(
     if made.has_failed:
         raise RunFailed(f"all {made.members} members failed; {made.warnings[-1]}", data)
     return data
-
-
-def _threads(given: object) -> int:
-    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and 0 <= given <= 1024:
-        return int(given)
-    raise InputError(f"threads: expected how many up to 1024, 0 for all processors, got {given!r}")
 
 
 def _shard(given: object) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._core import InputError
+from ._runs import missing
 
 if TYPE_CHECKING:
     import xarray
@@ -17,13 +18,6 @@ if TYPE_CHECKING:
 
 # Attributes of a data set that are its own, not those by which HDF5 ties it to its scales.
 OWN = ("long_name", "units", "natural_unit", "flag_values", "flag_meanings")
-
-
-def missing(extra: str, error: ImportError) -> ImportError:
-    """What to say where an optional package is not installed."""
-    return ImportError(
-        f'pendula: expected {error.name}, which pip install "pendula[{extra}]" brings, got none'
-    )
 
 
 def dataset_of(made: _core.Ensemble) -> xarray.Dataset:
@@ -42,10 +36,10 @@ def dataset_of(made: _core.Ensemble) -> xarray.Dataset:
     if failures := made.failures:
         scales["failed_member"] = ("failed_member", np.array([float(member) for member, _ in failures]))
         data["message"] = ("failed_member", np.array([text for _, text in failures], dtype=object))
-    return _dataset(data, scales, dict(made.attributes))
+    return dataset(data, scales, dict(made.attributes))
 
 
-def _dataset(data: dict[str, Any], scales: dict[str, Any], attrs: dict[str, Any]) -> xarray.Dataset:
+def dataset(data: dict[str, Any], scales: dict[str, Any], attrs: dict[str, Any]) -> xarray.Dataset:
     try:
         import xarray
     except ImportError as error:
@@ -86,7 +80,7 @@ def open_ensemble(file: str | PathLike[str]) -> xarray.Dataset:
         raise
     except (OSError, LookupError, RuntimeError, ValueError) as error:
         raise InputError(f"{name}: expected a file of an ensemble that can be read, got: {error}") from None
-    return _dataset(data, scales, attrs)
+    return dataset(data, scales, attrs)
 
 
 def _plain(value: Any) -> Any:
@@ -149,4 +143,4 @@ def _joined(whole: xarray.Dataset, part: xarray.Dataset) -> xarray.Dataset:
     if told:
         scales["failed_member"] = ("failed_member", np.array(sorted(told)))
         data["message"] = ("failed_member", np.array([told[one] for one in sorted(told)], dtype=object))
-    return _dataset(data, scales, whole.attrs)
+    return dataset(data, scales, whole.attrs)

@@ -105,6 +105,8 @@ class Design:
         array = numbers(f"start: {name}", given)
         if array.ndim == 0 or (array.ndim == 1 and len(links) == 1):
             return [(column, array if array.ndim else float(array)) for column in links]
+        if array.shape == (len(links),):  # one of each link, for all members
+            return list(zip(links, array.tolist(), strict=True))
         if array.ndim != 2 or array.shape[1] != len(links):
             members = "(members,)" if name in self._columns else f"(members, {len(links)})"
             raise InputError(f"start: expected {members} for {name}, got shape {array.shape}")

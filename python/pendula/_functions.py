@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import ast
+import base64
 import builtins
 import dis
 import functools
 import hashlib
+import importlib.util
 import inspect
+import marshal
 import math
 import os
 import re
+import sys
 import textwrap
 import types
 from collections.abc import Callable, Mapping, Sequence
@@ -19,32 +23,122 @@ from typing import Any
 
 from ._core import InputError
 from ._models import Model
+from ._runs import did_you_mean, written_from
+
+
+class _NoText(Exception):  # noqa: N818  (nobody sees it)
+    """The text of a function is not known."""
+
+
+# What a file begins with that has functions as they were compiled.
+COMPILED = """import base64
+import importlib.util
+import marshal
+import types
+
+if importlib.util.MAGIC_NUMBER.hex() != "{magic}":
+    raise ImportError("expected Python {version}, which compiled this model; in a file it would have a text")
+
+
+def _here(code):
+    inside = tuple(_here(one) if isinstance(one, types.CodeType) else one for one in code.co_consts)
+    return code.replace(co_filename=__file__, co_consts=inside)
+
+
+def _function(name, code, defaults, keywords, cells):
+    code = _here(marshal.loads(base64.b64decode(code)))
+    made = types.FunctionType(code, globals(), name, defaults, tuple(map(types.CellType, cells)))
+    made.__kwdefaults__ = keywords
+    return made"""
 
 
 class _Text:
-    """The text of a function and of all that it uses, as one that stands alone."""
+    """The text of a function and of all that it uses, as one that stands alone.
 
-    def __init__(self, function: types.FunctionType) -> None:
-        self.imports: set[str] = set()
-        self.parts: list[str] = []
+    Where the text of one of them is not known, as in a plain interpreter, all are there as they were compiled.
+    """
+
+    def __init__(self, function: types.FunctionType, *, compiled: bool = False) -> None:
+        self._compiled = compiled
+        self._imports: set[str] = set()
+        self._parts: list[
+            tuple[str, dict[int, str]]
+        ] = []  # and where lines come from, of a text counted in it
         self._known: dict[str, object] = {}
+        if compiled:
+            magic, version = importlib.util.MAGIC_NUMBER.hex(), "{}.{}".format(*sys.version_info)
+            self._parts.append((COMPILED.replace("{magic}", magic).replace("{version}", version), {}))
         self._add(function, "define", is_model=True)
 
     def text(self) -> str:
-        return "\n".join([*sorted(self.imports), "", "", "\n\n\n".join(self.parts), ""])
+        return "\n".join([*sorted(self._imports), "", "", "\n\n\n".join(part for part, _ in self._parts), ""])
+
+    def lines(self) -> dict[int, str]:
+        """Of lines of the text, where they come from; of what was compiled the lines are its own."""
+        found: dict[int, str] = {}
+        first = len(self._imports) + 3
+        for part, lines in self._parts:
+            found |= {line + (0 if self._compiled else first - 1): where for line, where in lines.items()}
+            first += part.count("\n") + 3
+        return found
 
     def _add(self, function: types.FunctionType, name: str, is_model: bool = False) -> None:
         self._require_one(function.__name__, name, function)
+        if hasattr(function, "__wrapped__"):
+            raise InputError(
+                f"{function.__name__}: expected a function without decorators, got one that wraps another"
+            )
+        if self._compiled:
+            self._add_compiled(function, name)
+            return
         definition = _definition(function, is_model)
         definition.name = name
         surroundings = {**function.__globals__, **_cells(function)}
-        own = {*function.__code__.co_varnames, *function.__code__.co_cellvars}
-        for used in sorted({node.id for node in ast.walk(definition) if isinstance(node, ast.Name)} - own):
+        code = function.__code__
+        own = {*code.co_varnames, *code.co_cellvars}
+        lines: dict[str, int] = {}
+        for node in ast.walk(definition):
+            if isinstance(node, ast.Name) and node.id not in own:
+                lines[node.id] = min(node.lineno, lines.get(node.id, node.lineno))
+        for used, line in sorted(lines.items()):
             if used in surroundings:
                 self._use(function.__name__, used, surroundings[used])
-            elif not hasattr(builtins, used) and used in function.__code__.co_names:
-                raise InputError(f"{function.__name__}: expected to use names that are known, got {used}")
-        self.parts.append(ast.unparse(definition))
+            elif not hasattr(builtins, used) and used in code.co_names:
+                raise _unknown_name(function, used, code.co_firstlineno + line - 1)
+        text = ast.unparse(definition)
+        statements = (
+            [node for node in ast.walk(tree) if isinstance(node, ast.stmt)]
+            for tree in (definition, ast.parse(text).body[0])
+        )
+        where = {
+            here.lineno: f"{code.co_filename}:{code.co_firstlineno + there.lineno - 1}"
+            for there, here in zip(*statements, strict=True)
+        }
+        self._parts.append((text, where))
+
+    def _add_compiled(self, function: types.FunctionType, name: str) -> None:
+        surroundings = {**function.__globals__, **_cells(function)}
+        for used in sorted(_names_in(function.__code__)):
+            if used in surroundings:
+                self._use(function.__name__, used, surroundings[used])
+            elif not hasattr(builtins, used):
+                raise _unknown_name(function, used, function.__code__.co_firstlineno)
+        defaults = [self._value(function.__name__, "a default", one) for one in function.__defaults__ or ()]
+        keywords = {
+            key: self._value(function.__name__, key, one)
+            for key, one in (function.__kwdefaults__ or {}).items()
+        }
+        code = base64.b64encode(marshal.dumps(_nowhere(function.__code__), 2)).decode()
+        arguments = [
+            repr(name),
+            repr(code),
+            f"({''.join(f'{one}, ' for one in defaults)})",
+            f"{{{', '.join(f'{key!r}: {one}' for key, one in keywords.items())}}}",
+            f"({''.join(f'{one}, ' for one in function.__code__.co_freevars)})",
+        ]
+        lines = {line for _, _, line in function.__code__.co_lines() if line is not None}
+        where = {line: f"{function.__code__.co_filename}:{line}" for line in lines}
+        self._parts.append((f"{name} = _function({', '.join(arguments)})", where))
 
     def _require_one(self, where: str, name: str, what: object) -> bool:
         """Whether a name is new. Raises InputError where it means something else elsewhere."""
@@ -65,21 +159,57 @@ class _Text:
         if not self._require_one(where, name, what):
             return
         if isinstance(what, types.ModuleType):
-            self.imports.add(f"import {what.__name__} as {name}")
-        elif _is_plain(what):
-            self.parts.append(f"{name} = {_literal(what)}")
+            self._imports.add(f"import {what.__name__} as {name}")
         elif hasattr(what, "__module__") and hasattr(what, "__name__") and _comes_from(what, "sympy"):
-            self.imports.add(f"from {what.__module__} import {getattr(what, '__name__')} as {name}")  # noqa: B009
-        elif _comes_from(type(what), "sympy"):
+            self._imports.add(f"from {what.__module__} import {getattr(what, '__name__')} as {name}")  # noqa: B009
+        else:
+            self._parts.append((f"{name} = {self._value(where, name, what)}", {}))
+
+    def _value(self, where: str, name: str, what: object) -> str:
+        """A number, a text or an expression of SymPy as text."""
+        if _is_plain(what) or what is None:
+            return _literal(what)
+        if _comes_from(type(what), "sympy"):
             import sympy  # type: ignore[import-untyped]
 
-            self.imports.add("from sympy import *")
-            self.parts.append(f"{name} = {sympy.srepr(what)}")
-        else:
-            raise InputError(
-                f"{where}: expected to use SymPy, numbers, texts and functions, "
-                f"got {name}, of type {type(what).__name__}"
-            )
+            self._imports.add("from sympy import *")
+            return str(sympy.srepr(what))
+        raise InputError(
+            f"{where}: expected to use SymPy, numbers, texts and functions, "
+            f"got {name}, of type {type(what).__name__}"
+        )
+
+
+def _unknown_name(function: types.FunctionType, name: str, line: int) -> InputError:
+    """With its line, and names that are near."""
+    import sympy
+
+    code = function.__code__
+    known = [*function.__globals__, *code.co_freevars, *code.co_varnames, *dir(builtins)]
+    near = did_you_mean(name, known)
+    if hasattr(sympy, name):
+        near = f"; SymPy has it: from sympy import {name}"
+    return InputError(
+        f"{code.co_filename}:{line}: {function.__name__}: expected to use names that are known, got {name}{near}"
+    )
+
+
+def _names_in(code: types.CodeType) -> set[str]:
+    """What it uses from around it."""
+    found = {*code.co_freevars}
+    for one in dis.get_instructions(code):
+        if one.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            found.add(one.argval)
+    for inside in code.co_consts:
+        if isinstance(inside, types.CodeType):
+            found |= _names_in(inside) - {*code.co_cellvars}
+    return found
+
+
+def _nowhere(code: types.CodeType) -> types.CodeType:
+    """The same in no file, so that one model is one wherever it was typed."""
+    inside = tuple(_nowhere(one) if isinstance(one, types.CodeType) else one for one in code.co_consts)
+    return code.replace(co_filename="", co_consts=inside)
 
 
 def _is_plain(what: object) -> bool:
@@ -95,19 +225,19 @@ def _literal(what: object) -> str:
         return repr(what)
     if isinstance(what, int):
         return repr(int(what))
-    return repr(complex(what)) if isinstance(what, complex) else repr(str(what))
+    if what is None or isinstance(what, complex):
+        return repr(what)
+    return repr(str(what))
 
 
 def _definition(function: types.FunctionType, is_model: bool) -> ast.FunctionDef:
-    """The text of a function, which is compiled to what the function is. Raises InputError."""
+    """The text of a function, which is compiled to what the function is. Raises InputError, and _NoText."""
     name = function.__name__
-    if hasattr(function, "__wrapped__"):
-        raise InputError(f"{name}: expected a function without decorators, got one that wraps another")
     try:
         source = textwrap.dedent(inspect.getsource(function))
         tree = ast.parse(source)
     except (OSError, TypeError, SyntaxError):
-        raise InputError(f"{name}: expected a function whose text is known, got none") from None
+        raise _NoText from None
     definition = tree.body[0] if tree.body else None
     if not isinstance(definition, ast.FunctionDef) or definition.name != name:
         raise InputError(
@@ -233,7 +363,12 @@ class ModelFunction:
             )
         given = list(arguments.values())[1].default
         self._links = given if isinstance(given, int) else None
-        self.file: Path = kept_model(name, _Text(function).text())
+        try:
+            written = _Text(function)
+        except _NoText:
+            written = _Text(function, compiled=True)
+        self.file: Path = kept_model(name, written.text())
+        written_from[str(self.file)] = written.lines()
         functools.update_wrapper(self, function)
 
     def __call__(
@@ -246,10 +381,12 @@ class ModelFunction:
         **parameters: object,
     ) -> Model:
         how_many = self._links if links is None else links
-        return Model(self.file, how_many, inputs=inputs, drives=drives, feedback=feedback, **parameters)
+        made = Model(self.file, how_many, inputs=inputs, drives=drives, feedback=feedback, **parameters)
+        made._made_by = self.__name__  # type: ignore[attr-defined]
+        return made
 
     def __repr__(self) -> str:
-        return f"<model {self.__name__}: {self.file}>"  # type: ignore[attr-defined]
+        return f"<model {self.__name__}>"  # type: ignore[attr-defined]
 
 
 def model(function: Callable[[Any, int], None]) -> ModelFunction:
@@ -257,12 +394,13 @@ def model(function: Callable[[Any, int], None]) -> ModelFunction:
 
     The function may use SymPy, numbers, texts, and functions like it, which are kept as they are now: what changes
     later has no effect. Its kernel is derived and compiled once (or interpreted where there is no C compiler), and
-    kept.
+    kept. In a plain interpreter, where the text of functions is not known, it is kept as it was compiled, for this
+    version of Python.
 
     Raises
     ------
     InputError
-        It uses something else, or its text is not known.
+        It uses something else.
 
     Examples
     --------

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _core
 from ._core import InputError
-from ._ensemble_data import missing
-from ._runs import places
+from ._runs import missing, places
 
 if TYPE_CHECKING:
     import xarray

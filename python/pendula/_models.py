@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import math
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
@@ -13,8 +15,8 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._runs import mapping, number, places, plainly, tell
-from ._systems import System, Tables, tables_of
+from ._runs import did_you_mean, mapping, number, places, plainly, tell
+from ._systems import System, Tables, rate_of, tables_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,6 +68,11 @@ class Model(System):
     parameters
         By name; the model has defaults.
 
+    Raises
+    ------
+    InputError
+        An argument is wrong, or the model: its kernel is made here, if it was not made before.
+
     Examples
     --------
     >>> import pendula
@@ -93,6 +100,18 @@ class Model(System):
         self._drives = tables_of("drives", drives)
         self._feedback = tables_of("feedback", feedback)
         self._inputs = _inputs(mapping("inputs", inputs))
+        self._made_by = ""
+        self._require_arguments()
+
+    def _require_arguments(self) -> None:
+        """Raises InputError; parameters without a default need not be there before the model moves."""
+        tables = self.tables()
+        later = {name: 1.0 for name, _, default in self._info.parameters if math.isnan(default)}
+        tables["system"] = {**tables["system"], "parameters": {**later, **self._parameters} or None}  # type: ignore[dict-item]
+        first = len(self._drives) + 1
+        self._require_right(
+            tables, {f"drive[{first + k}]": f"inputs.{name}" for k, name in enumerate(self._inputs)}
+        )
 
     def __repr__(self) -> str:
         given = {
@@ -103,7 +122,7 @@ class Model(System):
             "feedback": self._feedback,
         }
         told = "".join(f", {key}={one!r}" for key, one in given.items() if one not in (None, {}, []))
-        return f"Model({self._name!r}{told})"
+        return f"{self._made_by}({told[2:]})" if self._made_by else f"Model({self._name!r}{told})"
 
     @cached_property
     def _info(self) -> _core.ModelInfo:
@@ -119,11 +138,6 @@ class Model(System):
     def coordinates(self) -> list[str]:
         """Names of the coordinates."""
         return [name for name, _ in self._info.coordinates]
-
-    @property
-    def rates(self) -> list[str]:
-        """Names of their rates."""
-        return [name for name, _ in self._info.rates]
 
     @property
     def inputs(self) -> list[str]:
@@ -160,6 +174,10 @@ class Model(System):
             by[self._info.kernel_by], Path(self._info.kernel_file) if self._info.kernel_file else None
         )
 
+    def start_names(self) -> list[str]:
+        names = dict.fromkeys([*self.coordinates, *(re.sub(r"_\d+$", "", one) for one in self.coordinates)])
+        return [form(name) for form in (str, rate_of, "{}_dot".format, "p_{}".format) for name in names]
+
     def model_file(self) -> Path | None:
         return Path(self._name) if self._name.endswith(".py") else None
 
@@ -189,4 +207,11 @@ class Model(System):
         }
 
     def held(self, inputs: Mapping[str, object]) -> Model:
-        return self.replaced({}, {name: np.array([one]) for name, one in _inputs(inputs).items()})
+        given = _inputs(inputs)
+        for name in given:
+            if name not in self.inputs:
+                known = ", ".join(self.inputs) or "none"
+                raise InputError(
+                    f"inputs: expected some of {known}, got {name}{did_you_mean(name, self.inputs)}"
+                )
+        return self.replaced({}, {name: np.array([one]) for name, one in given.items()})

@@ -10,7 +10,7 @@ import numpy as np
 from . import _core
 from ._core import InputError
 from ._derivatives import Gradient, Varied, gradient
-from ._runs import numbers, plainly
+from ._runs import numbers, plainly, unknown
 from ._simulation import RUN_OPTIONS, Beginning
 from ._systems import System
 
@@ -33,8 +33,7 @@ class Moved:
             raise InputError(f"t: expected a vector of times from 0 on, ascending, got {t!r}")
         for name in options:
             if name not in ("tolerance", "step", *RUN_OPTIONS):
-                known = ", ".join(("tolerance", "step", *RUN_OPTIONS))
-                raise InputError(f"simulate: expected options among {known}, got {name}")
+                raise unknown("simulate", name, ("tolerance", "step", *RUN_OPTIONS))
         self.system, self.times, self.options = system, times, options
         self.made = self._prepared(system)
         self.varied = Varied(self.made)

@@ -7,12 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._core import InputError
-from ._runs import number
+from ._runs import missing, number
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+
+def _new_figure() -> Figure:
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise missing("pictures", error) from None
+    return plt.figure()
 
 
 def plot(
@@ -20,9 +29,7 @@ def plot(
 ) -> Axes:
     """Columns of rows over the first one."""
     if axes is None:
-        import matplotlib.pyplot as plt
-
-        axes = plt.figure().add_subplot()
+        axes = _new_figure().add_subplot()
     for column in columns:
         axes.plot(rows[:, 0], rows[:, column], label=f"{names[column]} [{units[column]}]")
     axes.set_xlabel(f"t [{units[0]}]")
@@ -59,16 +66,15 @@ def animation(
     interval: float,
 ) -> FuncAnimation:
     """``points`` are the columns of the components of each; they are joined in order, from the origin on."""
-    import matplotlib.pyplot as plt
-    from matplotlib.animation import FuncAnimation
-
     dimension = max((len(point) for point in points), default=0)
     if dimension == 0:
         raise InputError("animate: expected a system with points, got one without")
     places = np.zeros((len(rows), len(points) + 1, max(dimension, 2)))
     for k, point in enumerate(points):
         places[:, k + 1, : len(point)] = rows[:, point]
-    figure = plt.figure()
+    figure = _new_figure()
+    from matplotlib.animation import FuncAnimation
+
     axes: Any = figure.add_subplot(projection="3d" if dimension == 3 else None)  # of two classes
     for axis, name in zip("xyz", range(places.shape[2]), strict=False):
         low, high = places[:, :, name].min(), places[:, :, name].max()

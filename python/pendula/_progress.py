@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ._runs import missing
+
 
 def _is_watched() -> bool:
     """Whether somebody looks: at a terminal, or at a notebook."""
@@ -36,8 +38,8 @@ def bar(duration: object, wanted: bool | None) -> Iterator[Callable[[float], Non
         return
     try:
         tqdm = _tqdm()
-    except ImportError:
-        raise ImportError("progress: expected tqdm, got none (pip install pendula[progress])") from None
+    except ImportError as error:
+        raise missing("progress", error) from None
     total = duration if isinstance(duration, (int, float)) else None
     shown: list[Any] = []
 

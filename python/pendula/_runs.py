@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 import re
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +37,22 @@ class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
         return RunFailed, (str(self), self.partial)
 
 
+# Of files that were made of functions: where each line comes from, "page.py:12".
+written_from: dict[str, dict[int, str]] = {}
+
+
+def _where_written(sentence: str) -> str:
+    """Lines of functions in place of those of files that were made of them."""
+    for file, lines in written_from.items():
+        for told in re.findall(re.escape(file) + r":(\d+)", sentence):
+            before = max((line for line in lines if line <= int(told)), default=min(lines))
+            sentence = re.sub(
+                re.escape(f"{file}:{told}") + r"\b", lines[before].replace("\\", r"\\"), sentence
+            )
+        sentence = sentence.replace(file, lines[min(lines)])
+    return sentence
+
+
 class Raised(Exception):  # noqa: N818  (nobody sees it)
     """What a function of the user has raised, on its way through C++: its first argument."""
 
@@ -53,7 +70,7 @@ def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
     except _core.StepFailed as error:
         raise RunFailed(str(error)) from None
     except ValueError as error:
-        sentence = str(error).replace("--resume", "resume=True")
+        sentence = _where_written(str(error)).replace("--resume", "resume=True")
         made = sentence.startswith(("pendula:", "run."))
         raise _core.InputError(in_arguments(sentence, names) if made else sentence) from None
 
@@ -103,6 +120,42 @@ def merged(name: str, given: object, more: Mapping[str, object]) -> dict[str, An
     return {**found, **more}
 
 
+SCIPY = {  # words of SciPy, and ours
+    "args": "parameters of the system",
+    "atol": "accuracy= (of every row) or tolerance= (of each step)",
+    "dense_output": "run.sol(t), which every run has",
+    "first_step": "step=, constant steps",
+    "max_step": "step=, constant steps; events and rows need none",
+    "rtol": "accuracy= (of every row) or tolerance= (of each step)",
+    "t_eval": "t=",
+    "t_span": "duration=",
+    "tol": "accuracy= (of every row) or tolerance= (of each step)",
+    "y0": "start=",
+}
+
+
+def unknown(where: str, given: str, known: Iterable[str]) -> _core.InputError:
+    """What to say of a keyword that nobody knows."""
+    told = f"{where}: unknown keyword {given}"
+    if given in SCIPY:
+        return _core.InputError(f"{told}: here it is {SCIPY[given]}")
+    names = list(known)
+    return _core.InputError(told + (did_you_mean(given, names) or f", expected some of {', '.join(names)}"))
+
+
+def did_you_mean(given: str, names: Iterable[str]) -> str:
+    """The nearest names; empty where none is near."""
+    near = difflib.get_close_matches(given, list(names), 2)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
+
+
+def missing(extra: str, error: ImportError) -> ImportError:
+    """What to say where an optional package is not installed."""
+    return ImportError(
+        f'pendula: expected {error.name}, which pip install "pendula[{extra}]" brings, got none'
+    )
+
+
 def number(name: str, given: object) -> float:
     """A finite number that is one. Raises InputError."""
     if isinstance(given, (int, float, np.integer, np.floating)) and not isinstance(given, bool):
@@ -131,5 +184,11 @@ def numbers(name: str, given: object) -> NDArray[np.float64]:
     return array.astype(float)
 
 
+def in_order(columns: list[str], state: Sequence[int]) -> list[int]:
+    """Places of the time, of coordinates and rates in the order of all states, and of what else a row has."""
+    first = dict.fromkeys([0, *state])
+    return [*first, *(k for k in range(len(columns)) if k not in first)]
+
+
 def tell(what: str) -> None:
-    print(f"pendula: {what}", file=sys.stderr)
+    print(f"pendula: {_where_written(what)}", file=sys.stderr)

@@ -13,11 +13,14 @@ import numpy as np
 
 from . import _core, _toml
 from ._core import InputError
-from ._runs import mapping, merged, number, places, plainly, tell, warn
-from ._systems import System, system_of
+from ._linear import LinearSystem, seen
+from ._runs import in_order, mapping, merged, number, places, plainly, tell, warn
+from ._systems import System, starts_of, system_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ._linear import Outputs
 
     Controller = Callable[[float, NDArray[np.float64]], Mapping[str, float]]
 
@@ -75,9 +78,15 @@ def _hash(file: object) -> str | None:
         return None  # the reader of scenarios says what is wrong
 
 
-def _split(start: object, given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, object]]:
+def split(
+    where: Callable[..., object], system: System, start: object, given: Mapping[str, object]
+) -> tuple[dict[str, object], dict[str, object]]:
+    """A start, and options of a run, from keywords of ``where``. Raises InputError on one that is neither."""
     runs = {name: one for name, one in given.items() if name in RUN_OPTIONS}
-    return merged("start", start, {name: one for name, one in given.items() if name not in runs}), runs
+    more = {name: one for name, one in given.items() if name not in runs}
+    options = [*RUN_OPTIONS, *(where.__kwdefaults__ or ())]
+    name = where.__qualname__.removesuffix(".__init__")
+    return starts_of(name, system, start, more, options), runs
 
 
 class Simulation:
@@ -126,7 +135,7 @@ class Simulation:
         remember: bool = True,
         **options: object,
     ) -> None:
-        starts, runs = _split(start, options)
+        starts, runs = split(Simulation.__init__, system, start, options)
         self._text = Beginning.of(
             system, starts, tolerance=tolerance, step=step, options=runs, remember=bool(remember)
         )
@@ -182,8 +191,9 @@ class Simulation:
 
     @property
     def columns(self) -> list[str]:
-        """Names that ``simulation[name]`` knows."""
-        return self._made.columns
+        """Names that ``simulation[name]`` knows, in the order of :attr:`Solution.columns`."""
+        columns = self._made.columns
+        return [columns[k] for k in in_order(columns, self._made.state)]
 
     def __getitem__(self, column: str) -> float:
         """A number of the row where it is: ``simulation["x_2"]``, ``simulation["energy"]``."""
@@ -249,8 +259,9 @@ class Simulation:
         with self._alone():
             return self._core.at(when)
 
-    def linearize(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A and B of d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly.
+    def linearize(self, outputs: Outputs | None = None) -> LinearSystem:
+        """The linear system d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly; ``outputs`` are those of
+        :func:`linearize`.
 
         Raises InputError where the equations are singular, as in space at a pole, where phi has no meaning; and
         RuntimeError for a chain of more links than this build has kernels for.
@@ -262,7 +273,11 @@ class Simulation:
                 "linearize: expected a state where the equations are regular, got one where they are not "
                 "(in space phi has no meaning where sin(theta) is 0)"
             )
-        return found
+        return LinearSystem(*found, step=None, **self._seen(outputs))
+
+    def _seen(self, outputs: Outputs | None) -> dict[str, Any]:
+        """C and D where it is, and what all numbers of a linear system are."""
+        return seen(self._made, outputs, self.time, self.state, list(self.inputs.values()))
 
     def copy(self) -> Simulation:
         """One that goes on as this one does, to the bit."""
@@ -324,7 +339,7 @@ def lyapunov(
         raise InputError(f"duration: expected a number, not negative, got {duration!r}")
     if not isinstance(count, (int, np.integer)) or isinstance(count, bool):
         raise InputError(f"count: expected how many exponents, got {count!r}")
-    given, runs = _split(start, starts)
+    given, runs = split(lyapunov, system, start, starts)
     made = Beginning.of(system, given, tolerance=tolerance, step=step, options=runs).prepare()
     warn(made.warnings, stacklevel=3)
     with plainly():

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _core
 from ._progress import bar
-from ._runs import RunFailed, number, numbers, places, plainly, tell, warn
+from ._runs import RunFailed, in_order, missing, number, numbers, places, plainly, tell, warn
 
 if TYPE_CHECKING:
     import xarray
@@ -45,7 +45,8 @@ class Solution:
     summary : dict
         As ``pendula simulate --json``: method, steps, energy error, warnings and more.
     columns, units : list of str
-        Of all numbers that a row has: ``run["theta_1"]``; ``run["theta"]`` of all links is (links, rows).
+        Of all numbers that a row has, the time first, then those of ``names``: ``run["theta_1"]``; ``run["theta"]`` of
+        all links is (links, rows). Chains have another order in files, link by link.
 
     Notes
     -----
@@ -54,12 +55,14 @@ class Solution:
 
     def __init__(self, result: _core.Result, summary: dict[str, Any] | None = None) -> None:
         self._result = result
-        self.columns: list[str] = result.columns
-        self.units: list[str] = result.units
+        order = in_order(result.columns, result.state)
+        self.columns: list[str] = [result.columns[k] for k in order]
+        self.units: list[str] = [result.units[k] for k in order]
+        self._places = dict(zip(self.columns, order, strict=True))  # among the columns of a row
         self.summary: dict[str, Any] = summary or json.loads(result.summary or "{}")
         self._rows: NDArray[np.float64] = result.rows
         self._state = np.array(result.state)
-        self.names: list[str] = [self.columns[k] for k in self._state]
+        self.names: list[str] = self.columns[1 : 1 + len(self._state)]
         self.t: NDArray[np.float64] = self._rows[:, 0]
         self.y: NDArray[np.float64] = self._rows[:, self._state].T
         self.y.flags.writeable = False
@@ -81,15 +84,13 @@ class Solution:
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """A column by its name; without an index, of all links, (links, rows)."""
-        found = self._columns(name)
-        return self._rows[:, found[0]] if name in self.columns else self._rows[:, found].T
+        found = [self._places[column] for column in self._columns(name)]
+        return self._rows[:, found[0]] if name in self._places else self._rows[:, found].T
 
-    def _columns(self, name: str) -> list[int]:
-        if name in self.columns:
-            return [self.columns.index(name)]
-        links = [
-            k for k, column in enumerate(self.columns) if re.fullmatch(re.escape(name) + r"_\d+", column)
-        ]
+    def _columns(self, name: str) -> list[str]:
+        if name in self._places:
+            return [name]
+        links = [column for column in self.columns if re.fullmatch(re.escape(name) + r"_\d+", column)]
         if not links:
             raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
         return links
@@ -97,7 +98,7 @@ class Solution:
     def sol(self, t: ArrayLike) -> NDArray[np.float64]:
         """The motion at any times of the run, in any order, at the full order of the method.
 
-        The run is made again for it, by the same steps.
+        The run is made again for it, by the same steps: from its start to its end, also where rows are fewer.
 
         Parameters
         ----------
@@ -110,8 +111,9 @@ class Solution:
             In the order of ``names``.
         """
         when = numbers("t", t)
-        if when.ndim > 1 or self.t.size == 0 or not np.all((when >= self.t[0]) & (when <= self.t[-1])):
-            there = f"times from {self.t[0]} to {self.t[-1]} s" if self.t.size else "a solution with rows"
+        begin, end = self._span()
+        if when.ndim > 1 or self.t.size == 0 or not np.all((when >= begin) & (when <= end)):
+            there = f"times from {begin} to {end} s" if self.t.size else "a solution with rows"
             raise _core.InputError(f"t: expected {there}, got {t!r}")
         times, order = np.unique(when, return_inverse=True)
         return self._rows_at(times)[:, self._state].T[:, order.reshape(when.shape)]
@@ -119,7 +121,12 @@ class Solution:
     def _rows_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows of the same run, made again, at ascending times."""
         with plainly():
-            return _core.rows_at(self._result, (times - self.t[0]).tolist(), *places(), tell)
+            return _core.rows_at(self._result, (times - self._result.begin).tolist(), *places(), tell)
+
+    def _span(self) -> tuple[float, float]:
+        """From the start of the motion to its end, which rows at times need not reach."""
+        last = float(self.t[-1]) if self.t.size else self._result.begin
+        return self._result.begin, max(last, self.summary.get("final", {}).get("t", last))
 
     def go_on(self, duration: float, *, progress: bool | None = None) -> Solution:
         """The same run to a later end, as if it had never stopped, to the bit.
@@ -293,8 +300,8 @@ class Solution:
 
         if not names:
             names = tuple(self.names[: len(self.names) // 2])
-        columns = [column for name in names for column in self._columns(name)]
-        return plot(self._rows, columns, self.columns, self.units, axes)
+        columns = [self._places[column] for name in names for column in self._columns(name)]
+        return plot(self._rows, columns, self._result.columns, self._result.units, axes)
 
     def animate(self, *, seconds: float | None = None, fps: int = 30) -> FuncAnimation:
         """A matplotlib animation of the points, in the plane or in space, in a figure of its own.
@@ -317,18 +324,49 @@ class Solution:
         from ._pictures import animation, frames
 
         times = frames(self.t, seconds, fps)
-        return animation(times, self._rows_at(times), self._result.points, self.units, 1000 / fps)
+        return animation(times, self._rows_at(times), self._result.points, self._result.units, 1000 / fps)
 
     def to_xarray(self) -> xarray.Dataset:
-        """All columns by name over ``t``, with their units."""
-        import xarray
+        """All columns by name over ``t``, with their units: those of links over ``link``, too, counted from 1.
 
-        data = {
-            name: ("t", self._rows[:, k], {"units": self.units[k]})
-            for k, name in enumerate(self.columns)
-            if name != "t"
+        >>> import pendula
+        >>> run = pendula.Chain(links=2).simulate(1.0, theta=1.0).to_xarray()
+        >>> run["theta"].dims, run["energy"].dims, run["theta"].sel(link=2).attrs["units"]
+        (('t', 'link'), ('t',), 'rad')
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise missing("data", error) from None
+        units = dict(zip(self.columns, self.units, strict=True))
+        of_links = self._columns_of_links()
+        joined = {column for columns in of_links.values() for column in columns}
+        data: dict[str, Any] = {}
+        for name in self.columns[1:]:
+            stem = re.sub(r"_\d+$", "", name)
+            if name not in joined:
+                data[name] = ("t", self[name], {"units": units[name]})
+            elif stem not in data:
+                data[stem] = (("t", "link"), self[stem].T, {"units": units[name]})
+        scales: dict[str, Any] = {"t": ("t", self.t, {"units": self.units[0]})}
+        if of_links:
+            scales["link"] = np.arange(1, 1 + max(map(len, of_links.values())))
+        return xarray.Dataset(data, coords=scales)
+
+    def _columns_of_links(self) -> dict[str, list[str]]:
+        """theta_1, theta_2, … by theta; only of names that go through all links."""
+        found: dict[str, list[str]] = {}
+        for name in self.columns:
+            stem = re.sub(r"_\d+$", "", name)
+            if stem not in self._places:
+                found.setdefault(stem, []).append(name)
+        whole = {
+            stem: names
+            for stem, names in found.items()
+            if names == [f"{stem}_{k + 1}" for k in range(len(names))]
         }
-        return xarray.Dataset(data, coords={"t": ("t", self.t, {"units": self.units[0]})})
+        links = max(map(len, whole.values()), default=0)
+        return {stem: names for stem, names in whole.items() if len(names) == links}
 
 
 def concluded(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import copy
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from . import _core, _toml
 from ._core import InputError
 from ._events import events_of
 from ._progress import bar
-from ._runs import mapping, merged, numbers, places, plainly, tell
+from ._runs import mapping, merged, numbers, places, plainly, tell, unknown
 from ._solution import Solution, concluded
 
 if TYPE_CHECKING:
@@ -41,12 +43,94 @@ def system_of(given: object) -> System:
     raise InputError(f"system: expected a Chain or a Model, got {got}")
 
 
+def times_of(given: object) -> NDArray[np.float64]:
+    """Times of rows. Raises InputError."""
+    times = numbers("t", given)
+    if times.ndim != 1 or times.size == 0:
+        raise InputError(f"t: expected a vector of times, got an array of shape {times.shape}")
+    return times
+
+
+def rate_of(coordinate: str) -> str:
+    """x_dot of x, theta_dot_1 of theta_1: an index stays last."""
+    return re.sub(r"(_\d+)?$", r"_dot\1", coordinate, count=1)
+
+
+def starts_of(
+    where: str,
+    system: System,
+    start: object,
+    more: Mapping[str, object],
+    options: Iterable[str] = (),
+) -> dict[str, Any]:
+    """A start by a mapping, by keywords, or both. Raises InputError on a keyword that is none of it; ``options`` are
+    further keywords, which may have been meant."""
+    if more:
+        known = system_of(system).start_names()
+        for name in more:
+            if name not in known:
+                raise unknown(where, name, [*known, *options])
+    return merged("start", start, more)
+
+
 class System(ABC):
-    """What chains and models have in common: how they are run."""
+    """What chains and models have in common: how they are run.
+
+    Systems are equal that move alike: those of the same kind, with the same numbers.
+    """
 
     @abstractmethod
     def tables(self) -> Tables:
         """Those of a scenario that say what moves."""
+
+    @property
+    @abstractmethod
+    def coordinates(self) -> list[str]:
+        """Names of the coordinates."""
+
+    @property
+    @abstractmethod
+    def inputs(self) -> list[str]:
+        """Names of the inputs."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> dict[str, object]:
+        """Parameters by name."""
+
+    @property
+    @abstractmethod
+    def units(self) -> dict[str, str]:
+        """Of coordinates, rates, inputs and parameters, by name."""
+
+    @property
+    def rates(self) -> list[str]:
+        """Names of the rates of the coordinates."""
+        return [rate_of(name) for name in self.coordinates]
+
+    @abstractmethod
+    def start_names(self) -> list[str]:
+        """What a start may name."""
+
+    def _require_right(self, tables: Tables, names: Mapping[str, str] | None = None) -> None:
+        """Raises InputError where arguments are wrong: here, where they are given."""
+        text = _toml.document({**tables, "start": self.at_zero(), "run": {"duration": 1.0}})
+        try:
+            with plainly(names):
+                _core.check(text, *places(), tell)
+        except InputError as error:
+            if not str(error).startswith("start:"):  # a system may have no start where all is zero
+                raise
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and other._told == self._told
+
+    def __hash__(self) -> int:
+        return hash(self._told)
+
+    @property
+    def _told(self) -> str:
+        return _toml.document(self.tables())
 
     def at_zero(self) -> dict[str, object]:
         """The start where all coordinates are 0."""
@@ -135,9 +219,7 @@ class System(ABC):
         TrustWarning
             How far the rows can be trusted, where that is less than was asked for.
         """
-        times = None if t is None else numbers("t", t)
-        if times is not None and (times.ndim != 1 or times.size == 0):
-            raise InputError(f"t: expected a vector of times, got an array of shape {times.shape}")
+        times = None if t is None else times_of(t)
         if duration is None:
             if times is None:
                 raise TypeError("simulate: expected duration= or t=, got neither")
@@ -145,7 +227,7 @@ class System(ABC):
         if step is None and tolerance is None and accuracy is None:
             accuracy = 1e-9
         tables = self.held(mapping("inputs", inputs)).tables()
-        tables["start"] = merged("start", start, starts)
+        tables["start"] = starts_of("simulate", self, start, starts, System.simulate.__kwdefaults__ or ())
         tables["run"] = {
             "duration": duration,
             "method": method,
@@ -172,6 +254,14 @@ class System(ABC):
         with bar(duration, progress) as told, plainly(names):
             result = _core.simulate(text, "pendula", [], functions, told, *places(), tell)
         return concluded(result, names)
+
+
+def _depth(given: object) -> int:
+    """Axes of an array, which need not be a right one: 1 of a list that is ragged."""
+    try:
+        return np.ndim(given)  # type: ignore[arg-type]
+    except ValueError:
+        return 1
 
 
 class Chain(System):
@@ -224,10 +314,92 @@ class Chain(System):
         )
         self._drives = tables_of("drives", drives)
         self._feedback = tables_of("feedback", feedback)
+        if self._tells_links():
+            self._require_right(self.tables())
+        else:  # a start tells how many there are
+            self._require_right({"chain": {**self._numbers, "links": 1}})
+
+    def _tells_links(self) -> bool:
+        depth = {
+            "masses": 1,
+            "lengths": 1,
+            "damping": 1,
+            "torque": 2 if self._numbers["space"] == "spatial" else 1,
+        }
+        arrays = (_depth(self._numbers[key]) >= least for key, least in depth.items())
+        return self._numbers["links"] is not None or any(arrays)
 
     def __repr__(self) -> str:
-        given = ", ".join(f"{key}={one!r}" for key, one in self._numbers.items() if one is not None)
-        return f"Chain({given})"
+        given = {**self._numbers, "drives": self._drives, "feedback": self._feedback}
+        told = ", ".join(f"{key}={one!r}" for key, one in given.items() if one is not None and one != [])
+        return f"Chain({told})"
+
+    @cached_property
+    def _info(self) -> _core.Prepared:
+        tables = {key: one for key, one in self.tables().items() if key != "chain.feedback"}
+        text = _toml.document({**tables, "start": self.at_zero(), "run": {"duration": 1.0}})
+        with plainly():
+            return _core.prepare(text, "pendula", [], *places(), tell, False)
+
+    @property
+    def links(self) -> int:
+        """How many. Raises InputError, as all that follows, where only a start would tell."""
+        return len(self.coordinates) // (2 if self._numbers["space"] == "spatial" else 1)
+
+    @property
+    def masses(self) -> NDArray[np.float64]:
+        """Of each link, in kg."""
+        return self._per_link("masses")
+
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """Of each link, in m."""
+        return self._per_link("lengths")
+
+    @property
+    def coordinates(self) -> list[str]:
+        """Names of the coordinates: all theta, then all phi."""
+        columns, state = self._info.columns, self._info.state
+        return [columns[k] for k in state[: len(state) // 2]]
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the inputs: torques."""
+        return self._info.inputs
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """Parameters by name; of each link an array."""
+        return {
+            "gravity": self._numbers["gravity"],
+            **{name: self._per_link(name) for name in ("masses", "lengths", "damping")},
+        }
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of coordinates, rates, inputs and parameters, by name."""
+        known = self._info.units
+        return {
+            name: known[name] for name in (*self.coordinates, *self.rates, *self.inputs, *self.parameters)
+        }
+
+    def _per_link(self, name: str) -> NDArray[np.float64]:
+        given = self._numbers[name]
+        return np.array(np.broadcast_to(numbers(name, 0.0 if given is None else given), self.links))
+
+    @property
+    def _told(self) -> str:
+        tables = self.tables()
+        if self._tells_links():
+            tables["chain"] = {**self._numbers, **self.parameters, "links": None}
+        return _toml.document(tables)
+
+    def start_names(self) -> list[str]:
+        return [
+            form.format(angle)
+            for form in ("{}", "{}_dot", "p_{}")
+            for angle in (("theta", "phi") if self._numbers["space"] == "spatial" else ("theta",))
+        ]
 
     def tables(self) -> Tables:
         return {

@@ -5,13 +5,12 @@
 #include <nanobind/stl/vector.h>
 
 #include <Eigen/Core>
-#include <algorithm>
-#include <cstddef>
-#include <pendula/numeric/dual.hpp>
+#include <array>
 #include <pendula/pendula.hpp>
 #include <pendula/run/derivatives.hpp>
-#include <pendula/run/state_columns.hpp>
+#include <pendula/run/inputs.hpp>
 #include <pendula/system/outcome.hpp>
+#include <stdexcept>
 #include <stop_token>
 #include <string>
 #include <tuple>
@@ -22,6 +21,8 @@
 #include "bindings.hpp"
 #include "interruption.hpp"
 #include "io/expression.hpp"
+#include "io/input_error.hpp"
+#include "io/row_slopes.hpp"
 #include "prepared.hpp"
 
 namespace pendula::python {
@@ -94,28 +95,27 @@ nb::typed<nb::tuple, Array, Vector, Vector> backward(const Prepared& made, doubl
 
 /// The gradient of an expression by the time, then by the state, (1 + 2 coordinates).
 Vector gradient(const Prepared& made, const std::string& text, double time, const Numbers& state) {
-  const std::vector<std::string> names = made.subject->columns();
-  const std::vector<std::size_t> columns_of_state = state_columns(*made.subject);
-  io::Expression expression(text, names);
-  if (expression.may_jump()) throw std::invalid_argument("expected an expression that does not jump, got " + text);
-  std::vector<double> numbers, slopes(columns_of_state.size() + 1);
-  made.subject->append_row(motion_of(made, time, state), {}, numbers);
-  std::vector<Dual<double>> given;
-  std::vector<std::size_t> varied;  // places in `slopes`
-  for (const std::size_t column : expression.columns()) {
-    const auto place = std::ranges::find(columns_of_state, column);
-    if (column != 0 && place == columns_of_state.end()) {
-      throw std::invalid_argument("expected an expression in t, coordinates and rates, got " + names[column]);
-    }
-    given.emplace_back(numbers[column]);
-    varied.push_back(column == 0 ? 0 : static_cast<std::size_t>(place - columns_of_state.begin()) + 1);
+  const io::RowSlopes slopes = io::row_slopes(*made.subject, motion_of(made, time, state), std::array{text});
+  if (!slopes.by_inputs.isZero(0)) {
+    throw std::invalid_argument("expected an expression in t, coordinates, rates and points, got inputs in " + text);
   }
-  for (std::size_t k = 0; k < given.size(); ++k) {
-    given[k].slope = 1;
-    slopes[varied[k]] = expression(std::span<const Dual<double>>(given)).slope;
-    given[k].slope = 0;
+  Eigen::VectorXd found(1 + slopes.by_state.cols());
+  found << slopes.by_time, slopes.by_state.row(0).transpose();
+  return vector_of(found);
+}
+
+/// What expressions change by beside a state while inputs are held: by the state, and by inputs.
+nb::typed<nb::tuple, Array, Array> output_slopes(const Prepared& made, const std::vector<std::string>& expressions,
+                                                 double time, const Numbers& state, const std::vector<double>& held) {
+  try {
+    const io::RowSlopes slopes =
+        io::row_slopes(*with_inputs(made.subject, held), motion_of(made, time, state), expressions);
+    return nb::make_tuple(array_of(slopes.by_state), array_of(slopes.by_inputs));
+  } catch (const io::ExpressionError& error) {
+    throw io::InputError("outputs: expected " + error.expected + ", got " + error.got);
+  } catch (const std::invalid_argument& error) {
+    throw io::InputError(std::string("outputs: ") + error.what());
   }
-  return vector_of(std::move(slopes));
 }
 
 }  // namespace
@@ -129,6 +129,8 @@ void define_derivatives(nb::module_& module) {
   module.def("forward", &forward);
   module.def("backward", &backward);
   module.def("gradient", &gradient);
+  module.def("output_slopes", &output_slopes);
+  module.def("point_columns", [](const Prepared& made) { return io::point_columns(*made.subject); });
   module.def("field", [](const Prepared& made, double time, const Numbers& state) {
     return vector_of(field_at(*made.subject, motion_of(made, time, state)));
   });

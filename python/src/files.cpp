@@ -102,7 +102,7 @@ std::unique_ptr<Result> open(const std::string& file, const std::string& program
         [&](const auto& scenario) {
           const RunSetup setup = io::setup_of(scenario);
           const view::Scene scene = view::scene_of(scenario, source);
-          describe(*setup.subject, io::contents_of(setup, scenario), scene, *result);
+          describe(setup, io::contents_of(setup, scenario), scene, *result);
           result->saved.origin.title = scene.title + ": " + scene.subject;
           result->saved.origin.command = saved_by;
         },

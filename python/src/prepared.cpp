@@ -1,9 +1,14 @@
 #include "prepared.hpp"
 
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <map>
+#include <optional>
+#include <pendula/run/inputs.hpp>
+#include <pendula/run/quantity.hpp>
 #include <pendula/run/state_columns.hpp>
 #include <stdexcept>
 #include <utility>
@@ -12,6 +17,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "io/kernel_cache.hpp"
+#include "io/natural_units.hpp"
 #include "io/scenario_run.hpp"
 #include "toolchain.hpp"
 
@@ -41,6 +47,28 @@ std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& na
   const nb::gil_scoped_release others_may_go_on;
   Models models(program, python, tell);
   return prepared(io::parse_scenario(text, name, overrides, models.finder()), remembers);
+}
+
+/// Throws io::InputError where a scenario is wrong.
+void check(const std::string& text, const std::string& program, const std::string& python, const Tell& tell) {
+  const nb::gil_scoped_release others_may_go_on;
+  Models models(program, python, tell);
+  io::parse_scenario(text, "pendula", {}, models.finder());
+}
+
+/// Units of coordinates, rates, inputs and parameters, by name.
+std::map<std::string, std::string> units_of(const Prepared& made) {
+  const std::optional<io::NaturalUnits> natural =
+      std::visit([](const auto& scenario) { return scenario.natural; }, made.scenario);
+  std::map<std::string, std::string> units;
+  for (const Constant& one : made.subject->constants()) units[one.name] = io::in_units(natural, one.unit);
+  for (const std::string& input : input_names(*made.subject)) units[input] = io::in_units(natural, "N m");
+  const std::vector<std::string> columns = made.subject->columns();
+  for (const Quantity& quantity : made.subject->quantities()) {
+    for (std::size_t k = 0; k < quantity.size(); ++k)
+      units[columns[quantity.column(k)]] = io::in_units(natural, quantity.unit);
+  }
+  return units;
 }
 
 void require_continuous(const io::RunPlan& plan) {
@@ -101,6 +129,7 @@ void define_prepared(nb::module_& module) {
       .def_prop_ro("inputs", [](const Prepared& made) { return model_of(made).input_names(); })
       .def_prop_ro(
           "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
+      .def_prop_ro("units", &units_of)
       .def_prop_ro("is_natural",
                    [](const Prepared& made) {
                      return std::visit([](const auto& scenario) { return scenario.natural.has_value(); },
@@ -108,6 +137,7 @@ void define_prepared(nb::module_& module) {
                    })
       .def_prop_ro("time", [](const Prepared& made) { return made.start.time; })
       .def_ro("warnings", &Prepared::warnings);
+  module.def("check", &check, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"));
   module.def("prepare", &prepare, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
              nb::arg("python"), nb::arg("tell"), nb::arg("remembers"));
 }

@@ -26,6 +26,7 @@ struct Result {
   std::vector<std::string> columns, units;
   std::vector<std::vector<std::size_t>> points;  ///< columns of the components of each
   std::vector<std::size_t> state;                ///< columns of the coordinates, then of their rates
+  double begin = 0;                              ///< of the motion, where rows may begin later  [s]
   std::vector<double> rows, event_rows;          ///< one after the other
   std::vector<std::string> events;               ///< names, one for each of event_rows
   std::vector<char> went_up;                     ///< the same
@@ -36,8 +37,8 @@ struct Result {
   std::size_t count_rows() const { return columns.empty() ? 0 : rows.size() / columns.size(); }
 };
 
-/// Fills in what rows are.
-void describe(const Subject& subject, io::RunContents contents, const view::Scene& scene, Result& result);
+/// Fills in what rows are, and where the motion begins.
+void describe(const RunSetup& setup, io::RunContents contents, const view::Scene& scene, Result& result);
 
 /// Keeps rows and events of a run, and where it can go on.
 class Recorder : public Observer {

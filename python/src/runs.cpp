@@ -135,7 +135,7 @@ std::unique_ptr<Result> make_run(const io::RunSource& source, RunModel model, Py
   result->asked = std::move(asked);
   with_scenario(source, std::move(model), result->asked,
                 [&](const auto& scenario, RunSetup setup, RunModel& found, const auto& stop) {
-                  describe(*setup.subject, io::contents_of(setup, scenario), view::subject_scene(scenario), *result);
+                  describe(setup, io::contents_of(setup, scenario), view::subject_scene(scenario), *result);
                   const std::optional<Checkpoint> from = io::checkpoint_of(source, setup.start.time + setup.duration);
                   Run run = io::told_at_keys(scenario, source.text.name, [&] { return Run(setup); });
                   const view::Scene scene = view::scene_of(scenario, source);
@@ -252,7 +252,9 @@ Table table_of(const Result& result, const std::vector<double>& numbers) {
 
 }  // namespace
 
-void describe(const Subject& subject, io::RunContents contents, const view::Scene& scene, Result& result) {
+void describe(const RunSetup& setup, io::RunContents contents, const view::Scene& scene, Result& result) {
+  const Subject& subject = *setup.subject;
+  result.begin = setup.start.time;
   contents.drawing = view::drawing_of(scene);
   for (const view::Point& point : scene.points) {
     std::vector<std::size_t>& columns = result.points.emplace_back();
@@ -290,6 +292,7 @@ void define_runs(nb::module_& module) {
       .def_ro("units", &Result::units)
       .def_ro("state", &Result::state)
       .def_ro("points", &Result::points)
+      .def_ro("begin", &Result::begin)
       .def_ro("summary", &Result::summary)
       .def_ro("events", &Result::events)
       .def_prop_ro("event_names", [](const Result& result) { return result.contents.events; })

@@ -254,7 +254,7 @@ def test_wrong_starts_are_named(start, message):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"steps": 3}, "ensemble: expected options among method, .*, got steps"),
+        ({"steps": 3}, r"ensemble: unknown keyword steps; did you mean step\b"),
         ({"duration": -1.0}, r"duration: expected a number, not negative, got -1\.0"),
         ({"duration": float("nan")}, "duration: expected a finite number, got nan"),
         ({"duration": "1"}, "duration: expected a finite number, got '1'"),
@@ -422,6 +422,48 @@ def test_progress_is_shown(capsys, monkeypatch):
     assert "200 of 200 members" in capsys.readouterr().err
     pendula.ensemble(DOUBLE, 5.0, start)
     assert capsys.readouterr().err == ""
+
+
+# Members over time are runs by themselves, on grids, in lists and drawn.
+def test_members_have_rows():
+    times = np.linspace(0, 1, 6)
+    data = pendula.ensemble(DOUBLE, t=times, theta=(GRID, 0.3), threads=2)
+    assert data["theta_2"].dims == ("start_theta_1", "t") and data["theta_2"].shape == (GRID.size, 6)
+    assert data["energy"].attrs["units"] == "J" and [*data.data_vars][:2] == ["status", "trusted"]
+    for k, theta in enumerate(GRID):
+        run = DOUBLE.simulate(t=times, theta=[theta, 0.3], tolerance=1e-9)
+        for name in run.columns[1:]:
+            assert np.array_equal(data[name].values[k], run[name]), name
+    assert (data["status"] == 0).all() and (data["trusted"] == 1).all()
+    event = {"low": {"when": "theta_1 - 0.05", "stop": True}}
+    data = pendula.ensemble(
+        DOUBLE, 2.0, {"theta": [[0.1, 0.0], [-0.04, 0.01]]}, t=times, events=event, keep="theta"
+    )
+    assert data["theta_1"].dims == ("member", "t") and "theta_dot_1" not in data
+    assert data["status"].values.tolist() == [1, 0]
+    assert np.isnan(data["theta_1"].values[0, -1]) and np.isfinite(data["theta_1"].values[1]).all()
+    assert data["start_theta_2"].values.tolist() == [0.0, 0.01]
+    drawn = pendula.ensemble(
+        DOUBLE, t=times, theta=0.1, random={"chain.lengths[2]": ("uniform", 0.5, 2.0)}, members=3, seed=1
+    )
+    for k, length in enumerate(drawn["chain_lengths_2"].values):
+        run = pendula.Chain(masses=[1, 1], lengths=[1, length]).simulate(t=times, theta=0.1, tolerance=1e-9)
+        assert np.array_equal(drawn["x_2"].values[k], run["x_2"])
+    with pytest.raises(pendula.InputError, match="t: expected neither file"):
+        pendula.ensemble(DOUBLE, t=times, theta=[[0.1, 0.0]], file="a.h5")
+    with pytest.raises(
+        pendula.InputError, match="keep: expected columns of rows beside t, got thetas; did you mean"
+    ):
+        pendula.ensemble(DOUBLE, t=times, theta=[[0.1, 0.0]], keep="thetas")
+    with pytest.raises(pendula.RunFailed, match="all 1 members failed"):
+        pendula.ensemble(DOUBLE, t=times, theta=[[0.1, np.pi / 2]], theta_dot=[[1e200, 0]])
+
+
+# As many numbers as links, as simulate takes them, are those of all members.
+def test_a_start_of_each_link_is_that_of_all_members():
+    axes = {"chain.lengths[1]": [1.0, 2.0]}
+    data = pendula.ensemble(DOUBLE, 0.0, theta=[0.1, 0.2], axes=axes)
+    assert data["theta_2"].values.tolist() == [0.2, 0.2]
 
 
 def test_what_is_missing_is_named(monkeypatch, tmp_path):

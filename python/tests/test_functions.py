@@ -1,6 +1,13 @@
 """Lagrangians that are written as functions."""
 
+import linecache
 import math
+import os
+import re
+import runpy
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pendula
@@ -81,8 +88,10 @@ def test_wrong_functions_are_named():
     def nothing(model, links):
         model.coordinate("x", "m")
 
-    with pytest.raises(pendula.InputError, match="lagrangian"):
-        nothing().simulate(1.0)
+    with pytest.raises(
+        pendula.InputError, match=r"test_functions\.py:\d+: expected model\.lagrangian to be set"
+    ):
+        nothing()
 
 
 def test_a_name_has_one_meaning(tmp_path):
@@ -105,6 +114,88 @@ def test_a_name_has_one_meaning(tmp_path):
 
 def twice(function):
     return lambda x: 2 * function(x)
+
+
+# Where the text of functions is not known: by itself, with a function that it uses, with a default and a value.
+TYPED = """
+import pendula
+from sympy import cos
+size = 2.0
+def height(theta, factor=1.0):
+    return -factor * cos(theta)
+@pendula.model
+def swing(model, links):
+    theta = model.coordinate("theta", "rad")
+    g = model.parameter("gravity", "m/s^2", default=9.81)
+    inside = [size * height(theta) for _ in range(1)]
+    model.lagrangian = size**2 * model.rate(theta) ** 2 / 2 - g * inside[0]
+
+run = swing().simulate(1.0, theta=0.7)
+print(repr(swing()), repr(run.sol(0.9)[0]))
+"""
+
+
+@pytest.mark.parametrize("how", ["-c", "stdin", "typed"])
+def test_a_function_without_a_text_is_a_model(how, tmp_path):
+    words = {"-c": ["-c", TYPED], "stdin": ["-"], "typed": ["-i", "-q"]}[how]
+    typed = TYPED.replace("    model.lagrangian", "    model.lagrangian")
+    typed = typed.replace("cos(theta)\n@", "cos(theta)\n\n@")
+    found = {
+        **os.environ,
+        "PYTHONPATH": str(Path(pendula.__file__).parents[1]),
+        "XDG_CACHE_HOME": str(tmp_path),
+    }
+    done = subprocess.run(
+        [sys.executable, *words], input=typed, env=found, capture_output=True, text=True, check=False
+    )
+    chain = pendula.Chain(links=1, lengths=2.0).simulate(1.0, theta=0.7)
+    told, number = done.stdout.split("swing() ")[0], done.stdout.split("swing() ")[-1]
+    assert told.strip(">. \n") == "", done.stderr
+    number = float(re.search(r"-?[\d.]+", number.removeprefix("np.float64("))[0])
+    assert abs(number - chain.sol(0.9)[0]) < 1e-8, done.stderr  # measured 5e-12
+    # Whoever has the file needs no function.
+    [file] = tmp_path.glob("pendula/functions/*/swing.py")
+    again = pendula.Model(file).simulate(1.0, theta=0.7)
+    assert abs(again.sol(0.9)[0] - number) < 1e-12  # measured 0
+
+
+def test_errors_name_the_line_of_the_function_and_near_names(tmp_path, monkeypatch):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import pendula\n"
+        "from sympy import cos\n"
+        "\n"
+        "@pendula.model\n"
+        "def swing(model, links):\n"
+        '    """A comment."""\n'
+        "    # Another one.\n"
+        "    theta = model.coordinate(\n"
+        '        "theta", "rad"\n'
+        "    )\n"
+        "    model.lagrangian = model.rate(theta) ** 2 / 2 + {}\n"
+    )
+    text = file.read_text()
+    for wrong, told in (
+        (
+            "cos(thet)",
+            r"mine\.py:11: swing: expected to use names that are known, got thet; did you mean theta",
+        ),
+        ("sin(theta)", r"mine\.py:11: .* got sin; SymPy has it: from sympy import sin$"),
+        ("model.parametr('a', '1')", r"mine\.py:11: AttributeError: .*; did you mean parameter "),
+        ("1 / 0", r"mine\.py:11: ZeroDivisionError"),
+        ("theta * 'a'", r"mine\.py:11: "),
+    ):
+        file.write_text(text.replace("{}", wrong))
+        linecache.clearcache()
+        with pytest.raises(pendula.InputError, match=told) as raised:
+            runpy.run_path(str(file))["swing"]()
+        assert "functions" not in str(raised.value), raised.value
+
+
+def test_a_model_is_called_as_it_was_made():
+    made = bob(length=2.0)
+    assert repr(made) == "bob(length=2.0)" and repr(bob) == "<model bob>"
+    assert made == bob(length=2.0) != bob(length=3.0) and hash(made) == hash(bob(length=2.0))
 
 
 def test_decorators_and_changed_texts_are_refused(tmp_path, monkeypatch):

@@ -32,7 +32,7 @@ def test_every_example_is_that_of_the_command_line(name, command_line, tmp_path)
         warnings.simplefilter("always")
         run = pendula.Scenario(EXAMPLES / name, few).run()
     header, rows = rows_of(tmp_path / "rows.csv")
-    assert run.columns == header
+    assert sorted(run.columns) == sorted(header)
     assert run.t.size == len(rows) > 1
     for k, column in enumerate(header):
         assert np.array_equal(run[column], rows[:, k]), column
@@ -54,7 +54,9 @@ def test_a_solution_has_scipys_names():
     assert run.t_events["low"].size == run.y_events["low"].shape[0] > 0
     assert run.y_events["low"].shape[1] == 4
     data = run.to_xarray()
-    assert data["theta_1"].attrs["units"] == "rad" and data["t"].attrs["units"] == "s"
+    assert data["theta"].attrs["units"] == "rad" and data["t"].attrs["units"] == "s"
+    assert data["theta"].dims == ("t", "link") and np.array_equal(data["theta"].sel(link=2), run["theta_2"])
+    assert data["energy"].dims == ("t",) and data["y"].shape == (21, 2)
     assert "taylor" in repr(run)
     with pytest.raises(KeyError, match="thetas: expected one of t, theta_1"):
         run["thetas"]
@@ -73,6 +75,49 @@ def test_a_solution_is_known_at_any_time():
     for wrong in (2.5, -0.1, [[0.1]], float("nan"), "0.1"):
         with pytest.raises(pendula.InputError, match="t: expected"):
             run.sol(wrong)
+
+
+def test_a_motion_is_known_beyond_its_rows():
+    chain = pendula.Chain(masses=[1, 2])
+    run = chain.simulate(10.0, t=[1, 2], theta=[0.5, -0.2])
+    whole = chain.simulate(10.0, theta=[0.5, -0.2])
+    assert np.abs(run.sol([0.0, 1.0, 9.9]) - whole.sol([0.0, 1.0, 9.9])).max() < 1e-8  # measured 0
+    assert np.abs(run.sol(2.0) - run.y[:, list(run.t).index(2.0)]).max() < 1e-12
+    with pytest.raises(pendula.InputError, match=r"t: expected times from 0\.0 to 10\.0 s"):
+        run.sol(10.1)
+
+
+# Of chains and of models: the time, coordinates, rates, and what else there is.
+@pytest.mark.parametrize(
+    "system",
+    [pendula.Chain(links=2), pendula.Model("cart_chain", links=2), pendula.Chain(links=2, space="spatial")],
+)
+def test_columns_have_one_order(system):
+    start = {name: 0.1 for name in system.start_names() if "dot" not in name and name[:2] != "p_"}
+    run, simulation = system.simulate(0.1, start=start), pendula.Simulation(system, start)
+    first = ["t", *system.coordinates, *system.rates]
+    assert run.columns[: len(first)] == first and run.names == simulation.names == first[1:]
+    assert simulation.columns == run.columns and run.units[1] == system.units[first[1]]
+
+
+def test_links_of_a_model_are_a_dimension():
+    data = pendula.Model("cart_chain", links=2).simulate(0.1, theta=0.1).to_xarray()
+    assert data["theta"].dims == ("t", "link") and data["x"].dims == ("t",) and data.sizes["link"] == 2
+
+
+def test_what_an_extra_brings_is_named(monkeypatch):
+    run = pendula.Chain(links=1).simulate(0.1, theta=0.1)
+    for module, extra, work in (
+        ("xarray", "data", run.to_xarray),
+        ("matplotlib.pyplot", "pictures", run.plot),
+        ("matplotlib.pyplot", "pictures", run.animate),
+    ):
+        with monkeypatch.context() as without:
+            without.setitem(__import__("sys").modules, module, None)
+            with pytest.raises(
+                ImportError, match=rf'expected {module}, which pip install "pendula\[{extra}\]"'
+            ):
+                work()
 
 
 def test_columns_of_a_model_have_their_names():
@@ -112,7 +157,7 @@ REFUSED = [
     ({"theta": "90 miles"}, "start.theta"),
     ({"theta": float("nan")}, "start.theta: expected a finite number.* got nan"),
     ({"theta": [0.1, float("inf")]}, "start.theta"),
-    ({"thet": 1.0}, "unknown key .*did you mean theta"),
+    ({"thet": 1.0}, "unknown keyword thet.*did you mean theta"),
     ({"theta": 1.0, "step": -1.0}, "^step: expected"),
     ({"theta": 1.0, "method": "euler"}, '^method: expected .* got "euler"'),
     ({"theta": 1.0, "stages": 99}, "^stages: expected"),

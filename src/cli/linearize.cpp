@@ -1,10 +1,14 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <complex>
 #include <iomanip>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/derivatives.hpp>
@@ -19,6 +23,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/read_scenario.hpp"
 #include "io/input_error.hpp"
+#include "io/row_slopes.hpp"
 #include "io/scenario_run.hpp"
 
 namespace pendula::cli {
@@ -27,9 +32,20 @@ namespace {
 /// A linear system beside a motion, and what its numbers are.
 struct Linear {
   Motion at;
-  std::vector<std::string> names, inputs;
-  Directions<> a, b;
+  std::vector<std::string> names, inputs, outputs;
+  Directions<> a, b, c, d;
 };
+
+/// How an eigenvalue swings, as exp((-damping w + i …) t) does: w in Hz, undamped, and the damping ratio.
+struct Swing {
+  double frequency, damping;
+};
+
+Swing swing_of(std::complex<double> eigenvalue, std::optional<double> step) {
+  if (step) eigenvalue = std::log(eigenvalue) / *step;
+  const double pace = std::abs(eigenvalue);
+  return {pace / (2 * std::numbers::pi), -eigenvalue.real() / pace};
+}
 
 std::vector<std::string> state_names(const Subject& subject) {
   const std::vector<std::string> columns = subject.columns();
@@ -66,8 +82,11 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
   Linear linear{.at = options.at == "equilibrium" ? equilibrium(*subject, start) : start,
                 .names = state_names(*subject),
                 .inputs = input_names(*subject),
+                .outputs = io::point_columns(*subject),
                 .a = {},
-                .b = {}};
+                .b = {},
+                .c = {},
+                .d = {}};
   const Eigen::Index n = 2 * linear.at.q.size();
   linear.a.resize(n, n);
   linear.b.resize(n, static_cast<Eigen::Index>(linear.inputs.size()));
@@ -80,6 +99,9 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
     throw io::InputError(options.scenario +
                          ": expected a state where the equations are regular, got one where they are not");
   }
+  const io::RowSlopes slopes = io::row_slopes(*subject, linear.at, linear.outputs);
+  linear.c = slopes.by_state;
+  linear.d = slopes.by_inputs;
   return linear;
 }
 
@@ -98,9 +120,15 @@ std::vector<std::vector<double>> rows_of(const Directions<>& matrix) {
 void print_json(const Linear& linear, const LinearizeOptions& options, const Eigen::VectorXcd& eigenvalues) {
   nlohmann::ordered_json json{{"scenario", options.scenario}, {"at", options.at},       {"step", nullptr},
                               {"t", linear.at.time},          {"names", linear.names},  {"inputs", linear.inputs},
-                              {"state", state_of(linear.at)}, {"A", rows_of(linear.a)}, {"B", rows_of(linear.b)}};
+                              {"state", state_of(linear.at)}, {"A", rows_of(linear.a)}, {"B", rows_of(linear.b)},
+                              {"outputs", linear.outputs},    {"C", rows_of(linear.c)}, {"D", rows_of(linear.d)}};
   if (options.step) json["step"] = *options.step;
-  for (const std::complex<double>& one : eigenvalues) json["eigenvalues"].push_back({one.real(), one.imag()});
+  for (const std::complex<double>& one : eigenvalues) {
+    const Swing swing = swing_of(one, options.step);
+    json["eigenvalues"].push_back({one.real(), one.imag()});
+    json["frequencies"].push_back(swing.frequency);
+    json["damping"].push_back(swing.damping);
+  }
   std::cout << json.dump(2) << '\n';
 }
 
@@ -133,12 +161,21 @@ void print_text(const Linear& linear, const LinearizeOptions& options, const Eig
     std::cout << "\nB\n";
     print_matrix(linear.b, linear.names, linear.inputs);
   }
-  std::cout << "\neigenvalues of A\n";
+  if (linear.c.rows() > 0) {
+    std::cout << "\nC, of y = C x\n";
+    print_matrix(linear.c, linear.outputs, linear.names);
+  }
+  std::cout << "\neigenvalues of A                      frequency  damping ratio\n";
   const double smallest = 1e-13 * eigenvalues.cwiseAbs().maxCoeff();  // less is rounding
   for (const std::complex<double>& one : eigenvalues) {
     std::cout << std::setw(15) << (std::abs(one.real()) < smallest ? "0" : rounded(one.real(), 6));
-    if (std::abs(one.imag()) >= smallest)
-      std::cout << (one.imag() < 0 ? " - " : " + ") << rounded(std::abs(one.imag()), 6) << " i";
+    if (std::abs(one.imag()) >= smallest) {
+      const Swing swing = swing_of(one, options.step);
+      const double damping = std::abs(swing.damping) < 1e-12 ? 0 : swing.damping;
+      const std::string imaginary = (one.imag() < 0 ? " - " : " + ") + rounded(std::abs(one.imag()), 6) + " i";
+      std::cout << std::left << std::setw(17) << imaginary << std::right << std::setw(13) << rounded(swing.frequency, 6)
+                << " Hz" << std::setw(12) << rounded(damping, 6);
+    }
     std::cout << '\n';
   }
 }

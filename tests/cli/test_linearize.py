@@ -18,6 +18,26 @@ def test_a_double_pendulum_swings_by_its_two_frequencies(pendula, double):
     assert [row[:2] for row in run.json["B"]] == [[0, 0], [0, 0], [1, -1], [-1, 2]]
 
 
+def test_points_are_measured_and_eigenvalues_have_frequencies_and_damping(pendula, double):
+    run = pendula("linearize", double, "--at", "equilibrium", "--json")
+    assert run.json["outputs"] == ["x_1", "y_1", "x_2", "y_2"]
+    assert run.json["C"] == [[1, 0, 0, 0], [0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]]
+    assert run.json["D"] == [[0, 0]] * 4
+    wanted = [math.sqrt(9.81 * (2 + sign * math.sqrt(2))) / (2 * math.pi) for sign in (-1, 1)]
+    found = sorted({round(one, 12) for one in run.json["frequencies"]})
+    assert found == pytest.approx(wanted, rel=1e-12)  # measured 1e-13
+    assert run.json["damping"] == pytest.approx([0] * 4, abs=1e-14)  # measured 2e-16
+    damped = pendula("linearize", double, "--at", "equilibrium", "--set", "chain.damping=0.5", "--json").json
+    discrete = pendula(
+        "linearize", double, "--at", "equilibrium", "--set", "chain.damping=0.5", "--json", "--step", "0.05"
+    ).json
+    for key in ("frequencies", "damping"):
+        assert sorted(discrete[key]) == pytest.approx(sorted(damped[key]), rel=1e-8)
+    assert 0.01 < min(damped["damping"]) < max(damped["damping"]) < 1
+    text = pendula("linearize", double, "--at", "equilibrium").out
+    assert "C, of y = C x" in text and f"{wanted[0]:.6g} Hz" in text
+
+
 def test_the_discrete_system_has_the_exponentials_of_its_eigenvalues(pendula, double):
     continuous, discrete = (
         pendula("linearize", double, "--at", "equilibrium", "--json", *step).json

@@ -1,0 +1,119 @@
+"""Linear systems beside a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+from ._core import InputError
+from ._runs import mapping, plainly
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Outputs = Sequence[str] | Mapping[str, str]
+
+
+class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
+    """How a system moves beside a state: dx/dt = A x + B u, y = C x + D u; ``A, B = linear`` takes two of them.
+
+    From one time to the next by a ``step`` it is x(t + step) = A x(t) + B u.
+
+    Attributes
+    ----------
+    C, D : (outputs, 2n) and (outputs, inputs) arrays
+    names, inputs, outputs : list of str
+        What x, u and y are.
+    step : float or None
+        In s.
+    """
+
+    C: NDArray[np.float64]
+    D: NDArray[np.float64]
+    names: list[str]
+    inputs: list[str]
+    outputs: list[str]
+    step: float | None
+
+    def __new__(cls, a: NDArray[np.float64], b: NDArray[np.float64], **told: Any) -> LinearSystem:
+        made = super().__new__(cls, (a, b))
+        vars(made).update(told)
+        return made
+
+    @property
+    def A(self) -> NDArray[np.float64]:
+        """(2n, 2n)"""
+        return self[0]
+
+    @property
+    def B(self) -> NDArray[np.float64]:
+        """(2n, inputs)"""
+        return self[1]
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """Of A: the slowest first; in 1/s, of a step without unit."""
+        found: Any = np.linalg.eigvals(self.A).astype(complex)
+        order = np.lexsort((-found.imag, np.abs(self._exponents(found)).round(12)))
+        ordered: NDArray[np.complex128] = found[order]
+        return ordered
+
+    @property
+    def frequencies(self) -> NDArray[np.float64]:
+        """Of each eigenvalue its undamped natural frequency, in Hz."""
+        return np.abs(self._exponents(self.eigenvalues)) / (2 * np.pi)
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """Of each eigenvalue its damping ratio: 0 swings for ever, 1 and more no longer swings, less than 0 grows;
+        NaN where nothing pulls back."""
+        found = self._exponents(self.eigenvalues)
+        with np.errstate(invalid="ignore"):
+            return (0.0 - found.real) / np.abs(found)
+
+    def _exponents(self, eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        if self.step is None:
+            return eigenvalues
+        return np.asarray(np.log(eigenvalues) / self.step, dtype=complex)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (*self, vars(self))
+
+    def __repr__(self) -> str:
+        step = "" if self.step is None else f", step={self.step!r}"
+        return f"<LinearSystem: {self.names} by {self.inputs}, seen as {self.outputs}{step}>"
+
+
+def _again(a: NDArray[np.float64], b: NDArray[np.float64], told: Mapping[str, Any]) -> LinearSystem:
+    return LinearSystem(a, b, **told)
+
+
+def seen(
+    made: _core.Prepared,
+    outputs: Outputs | None,
+    time: float,
+    state: NDArray[np.float64],
+    held: Sequence[float],
+) -> dict[str, Any]:
+    """C and D of what is measured, and what all numbers are. Raises InputError."""
+    if isinstance(outputs, str) or not isinstance(outputs, (Mapping, Sequence, type(None))):
+        raise InputError(f"outputs: expected columns or expressions, got {outputs!r}")
+    if outputs is None:
+        outputs = _core.point_columns(made)
+    texts = mapping("outputs", outputs) if isinstance(outputs, Mapping) else {one: one for one in outputs}
+    for text in texts.values():
+        if not isinstance(text, str):
+            raise InputError(f"outputs: expected columns or expressions, got {text!r}")
+    with plainly():
+        c, d = _core.output_slopes(made, list(texts.values()), time, state, list(held))
+    columns = made.columns
+    return {
+        "C": c,
+        "D": d,
+        "names": [columns[k] for k in made.state],
+        "inputs": made.inputs,
+        "outputs": list(texts),
+    }

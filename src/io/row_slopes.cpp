@@ -1,0 +1,136 @@
+#include "io/row_slopes.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <pendula/chain/invariants.hpp>
+#include <pendula/numeric/dual.hpp>
+#include <pendula/run/inputs.hpp>
+#include <pendula/run/quantity.hpp>
+#include <pendula/run/state_columns.hpp>
+#include <pendula/run/subject_kinds.hpp>
+#include <pendula/system/system_table.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "io/expression.hpp"
+
+namespace pendula::io {
+namespace {
+
+/// Velocities of the components of all points  [m/s].
+Eigen::VectorXd point_velocities(const SystemSubject& subject, const Motion& motion) {
+  const SystemTable& table = subject.table();
+  const std::vector<int> sizes(table.info.point_sizes.begin(), table.info.point_sizes.end());
+  Eigen::VectorXd velocities(std::accumulate(sizes.begin(), sizes.end(), 0));
+  const SystemNumbers numbers = subject.numbers_at(motion);
+  const Conditions at{table.context, numbers.parameters.data(), &motion.time, numbers.inputs.data()};
+  if (velocities.size() > 0) table.plain.velocities(at, motion.q.data(), motion.v.data(), velocities.data());
+  return velocities;
+}
+template <class Space>
+Eigen::VectorXd point_velocities(const ChainSubject<Space>& subject, const Motion& motion) {
+  return bob_velocities(subject.chain(), motion).reshaped();
+}
+
+/// Points change by a coordinate as fast as they move by its rate: their velocities are linear in rates.
+/// (components x (1 + coordinates)): by time, then by coordinates.
+Eigen::MatrixXd point_slopes(const Subject& subject, Motion motion) {
+  const Eigen::Index count = motion.q.size();
+  const auto velocities = [&] {
+    return as_its_kind(subject, [&](const auto& kind) { return point_velocities(kind, motion); });
+  };
+  motion.v.setZero();
+  const Eigen::VectorXd by_time = velocities();
+  Eigen::MatrixXd slopes(by_time.size(), 1 + count);
+  slopes.col(0) = by_time;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    motion.v.setZero();
+    motion.v[k] = 1;
+    slopes.col(1 + k) = velocities() - by_time;
+  }
+  return slopes;
+}
+
+/// How each column of a row changes, (columns x (1 + state + inputs)); energies are left out.
+Eigen::MatrixXd column_slopes(const Subject& subject, const Motion& motion, std::size_t inputs) {
+  const std::vector<std::size_t> state = state_columns(subject);
+  const Eigen::Index size = static_cast<Eigen::Index>(state.size());
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(subject.columns().size()),
+                                                 1 + size + static_cast<Eigen::Index>(inputs));
+  slopes(0, 0) = 1;
+  for (Eigen::Index k = 0; k < size; ++k)
+    slopes(static_cast<Eigen::Index>(state[static_cast<std::size_t>(k)]), 1 + k) = 1;
+  const Eigen::MatrixXd of_points = point_slopes(subject, motion);
+  const std::vector<std::string> names = input_names(subject);
+  Eigen::Index point = 0;
+  std::vector<std::size_t> point_places;
+  for (const Quantity& quantity : subject.quantities()) {
+    for (std::size_t k = 0; k < quantity.size(); ++k) {
+      if (quantity.role == Role::point) point_places.push_back(quantity.column(k));
+    }
+    if (quantity.role != Role::input) continue;
+    const auto input = std::ranges::find(names, quantity.name) - names.begin();
+    slopes(static_cast<Eigen::Index>(quantity.first), 1 + size + input) = 1;
+  }
+  std::ranges::sort(point_places);  // as points are observed
+  for (const std::size_t place : point_places) {
+    slopes.row(static_cast<Eigen::Index>(place)).head(of_points.cols()) = of_points.row(point++);
+  }
+  return slopes;
+}
+
+void require_slopes(const Subject& subject, const Expression& expression, const std::string& text) {
+  if (expression.may_jump()) throw std::invalid_argument("expected an expression that does not jump, got " + text);
+  const std::vector<std::size_t> fed = subject.fed_columns();
+  const std::vector<std::string> names = subject.columns();
+  for (const Quantity& quantity : subject.quantities()) {
+    for (const std::size_t column : expression.columns()) {
+      const bool is_fed = std::ranges::find(fed, column) != fed.end();
+      if (!quantity.holds(column) || (quantity.role != Role::energy && !is_fed)) continue;
+      throw std::invalid_argument(
+          "expected an expression in t, coordinates, rates, points and inputs without feedback, got " + names[column]);
+    }
+  }
+}
+
+}  // namespace
+
+RowSlopes row_slopes(const Subject& subject, const Motion& motion, std::span<const std::string> expressions) {
+  const std::size_t inputs = input_names(subject).size();
+  const Eigen::MatrixXd of_columns = column_slopes(subject, motion, inputs);
+  const std::vector<std::string> names = subject.columns();
+  std::vector<double> row;
+  subject.append_row(motion, subject.observe(motion), row);
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(expressions.size()), of_columns.cols());
+  for (std::size_t k = 0; k < expressions.size(); ++k) {
+    Expression expression(expressions[k], names);
+    require_slopes(subject, expression, expressions[k]);
+    std::vector<Dual<double>> numbers;
+    for (const std::size_t column : expression.columns()) numbers.emplace_back(row[column]);
+    for (std::size_t j = 0; j < numbers.size(); ++j) {
+      numbers[j].slope = 1;
+      const double slope = expression(std::span<const Dual<double>>(numbers)).slope;
+      numbers[j].slope = 0;
+      slopes.row(static_cast<Eigen::Index>(k)) +=
+          slope * of_columns.row(static_cast<Eigen::Index>(expression.columns()[j]));
+    }
+  }
+  const Eigen::Index size = 2 * motion.q.size();
+  return {slopes.col(0), slopes.middleCols(1, size), slopes.rightCols(static_cast<Eigen::Index>(inputs))};
+}
+
+std::vector<std::string> point_columns(const Subject& subject) {
+  const std::vector<std::string> names = subject.columns();
+  std::vector<std::size_t> places;
+  for (const Quantity& quantity : subject.quantities()) {
+    for (std::size_t k = 0; quantity.role == Role::point && k < quantity.size(); ++k)
+      places.push_back(quantity.column(k));
+  }
+  std::ranges::sort(places);
+  std::vector<std::string> found;
+  for (const std::size_t place : places) found.push_back(names[place]);
+  return found;
+}
+
+}  // namespace pendula::io

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace pendula::io {
+
+/// What expressions in the columns of a row change by beside a motion, exactly: an expression a row.
+struct RowSlopes {
+  Eigen::VectorXd by_time;
+  Eigen::MatrixXd by_state, by_inputs;  ///< coordinates, then rates, in the order of state_columns; inputs
+};
+
+/// Throws ExpressionError, and std::invalid_argument for an expression that may jump, that holds the energy, or an
+/// input to which feedback adds.
+RowSlopes row_slopes(const Subject& subject, const Motion& motion, std::span<const std::string> expressions);
+
+/// Names of the components of points, which are what is measured where nothing else is asked for.
+std::vector<std::string> point_columns(const Subject& subject);
+
+}  // namespace pendula::io
