@@ -126,8 +126,11 @@ class Model(System):
 
     @cached_property
     def _info(self) -> _core.ModelInfo:
-        with plainly({"model": "model"}):
-            return _core.describe_model(self._name, self._links, *places(), tell)
+        try:
+            with plainly():
+                return _core.describe_model(self._name, self._links, *places(), tell)
+        except InputError as error:
+            raise InputError(f"model: {error}") from None
 
     @property
     def links(self) -> int:

@@ -122,6 +122,10 @@ class System(ABC):
             if not str(error).startswith("start:"):  # a system may have no start where all is zero
                 raise
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is found out again: for pickles, and for copies, which get other numbers."""
+        return {name: one for name, one in vars(self).items() if name != "_info"}
+
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and other._told == self._told
 
