@@ -56,6 +56,16 @@ fs::path require_cache(const fs::path& folder) {
   return found.path;
 }
 
+[[noreturn]] void reject_kept(const fs::path& kept, const std::string& got) {
+  throw ModelError("expected to keep the compiled kernel in " + kept.string() + ", got: " + got);
+}
+
+void put(const fs::path& made, const fs::path& kept) {
+  std::error_code error;
+  fs::rename(made, kept, error);
+  if (error) reject_kept(kept, error.message());
+}
+
 /// A temporary folder, removed by the destructor.
 class Workshop {
  public:
@@ -107,15 +117,16 @@ ModelKernel kept_kernel(const ModelName& model, const Toolchain& toolchain,
   std::string problem;
   std::shared_ptr<const SystemTable> table = load_kernel(kept, toolchain, problem);
   const bool was_there = table != nullptr;
+  if (fs::is_directory(fs::symlink_status(kept, none))) reject_kept(kept, "a folder in its place");
   if (was_there) {
     fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // marks it as used
   } else {
     const Workshop workshop(cache);
     tell("deriving the kernel of " + name + (model.laws.empty() ? "" : " with feedback") + ", once; " +
-         how_made(kind, toolchain));
+         how_made(kind, toolchain) + (problem.empty() ? "" : " (not loaded: " + problem + ")"));
     const fs::path made = make_kernel(kind, name, arguments, workshop.folder(), toolchain);
     seal_kernel(made);
-    fs::rename(made, kept);
+    put(made, kept);
     table = load_kernel(kept, toolchain, problem);
     if (!table) throw ModelError("the kernel cannot be loaded: " + problem);
   }

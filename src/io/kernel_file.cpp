@@ -26,6 +26,7 @@
 #include "io/fingerprint.hpp"
 #include "io/input_error.hpp"
 #include "io/input_file.hpp"
+#include "io/trusted_folder.hpp"
 
 namespace pendula::io {
 
@@ -87,9 +88,14 @@ void seal_kernel(const fs::path& file) {
   std::ofstream stream(file, std::ios::binary | std::ios::app);
   stream << seal_of(made.text);
   stream.close();
-  if (!made.problem.empty() || !stream) {
-    throw ModelError("expected to write the kernel " + file.string() +
-                     ", got: " + (made.problem.empty() ? std::strerror(errno) : made.problem));
+  // Compilers and linkers leave the mode to the umask, which may let others write.
+  std::error_code unchanged;
+  fs::permissions(file, fs::perms::group_write | fs::perms::others_write, fs::perm_options::remove, unchanged);
+  if (!made.problem.empty() || !stream || unchanged) {
+    throw ModelError("expected to write the kernel " + file.string() + ", got: " +
+                     (!made.problem.empty() ? made.problem
+                      : unchanged           ? unchanged.message()
+                                            : std::strerror(errno)));
   }
 }
 
@@ -110,8 +116,10 @@ std::shared_ptr<const SystemTable> load_kernel(const fs::path& kept, const Toolc
     problem = kept.string() + ": " + why;
     return nullptr;
   };
+  if (opened.get() < 0 && errno == ENOENT) return nullptr;
   if (opened.get() < 0 || fstat(opened.get(), &status) != 0) return none(std::strerror(errno));
   if (status.st_uid != geteuid() && status.st_uid != 0) return none("it belongs to somebody else");
+  if (others_may_write(status)) return none("others may write to it");
   InputFile file = read_input_file("/proc/self/fd/" + std::to_string(opened.get()), largest_kernel);
   if (!file.problem.empty()) return none(file.problem);
   if (!is_sealed(file.text)) return none("it is not what was written");

@@ -26,6 +26,15 @@ bool is_group_of_one(gid_t id) {
   return true;
 }
 
+}  // namespace
+
+bool others_may_write(const struct stat& status) {
+  const bool by_all = (status.st_mode & S_IWOTH) != 0;
+  return by_all || ((status.st_mode & S_IWGRP) != 0 && !is_group_of_one(status.st_gid));
+}
+
+namespace {
+
 /// `is_on_way` is true for all but the last folder of a path.
 std::string problem_of(const fs::path& folder, bool is_on_way) {
   struct stat status {};
@@ -36,9 +45,7 @@ std::string problem_of(const fs::path& folder, bool is_on_way) {
     return folder.string() + ", which belongs to " + (owner == nullptr ? "the user " + id : owner->pw_name);
   }
   if (is_on_way && (status.st_mode & S_ISVTX) != 0) return "";
-  const bool by_all = (status.st_mode & S_IWOTH) != 0;
-  const bool by_some = (status.st_mode & S_IWGRP) != 0 && !is_group_of_one(status.st_gid);
-  return by_all || by_some ? folder.string() + ", which others may write to" : "";
+  return others_may_write(status) ? folder.string() + ", which others may write to" : "";
 }
 
 /// Returns the errno of the folder that could not be made; 0 if all exist.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/stat.h>
+
 #include <filesystem>
 #include <string>
 
@@ -15,5 +17,8 @@ struct TrustedFolder {
 /// root or to the user of this program, and nobody else may write there, except in sticky folders such as /tmp. The
 /// checked path has no symbolic links, so that nobody can redirect it.
 TrustedFolder trusted_folder(const std::filesystem::path& folder);
+
+/// Whether anybody but the owner, or a group of the user alone, may write to a file or folder.
+bool others_may_write(const struct stat& status);
 
 }  // namespace pendula::io

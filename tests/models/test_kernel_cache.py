@@ -21,8 +21,8 @@ def kept(pendula, tmp_path):
     return cache, Path(shutil.copy(kernel, cache / "pendula"))
 
 
-def makes_it_anew(cache: Path, environment: dict[str, str]) -> bool:
-    """Whether a build begins to make the kernel; it is not awaited."""
+def makes_it_anew(cache: Path, environment: dict[str, str], why: str = "") -> bool:
+    """Whether a build begins to make the kernel, and says `why`; it is not awaited."""
     command = [os.environ["PENDULA_PROGRAM"], "build", "spring_pendulum"]
     with subprocess.Popen(
         command,
@@ -38,7 +38,9 @@ def makes_it_anew(cache: Path, environment: dict[str, str]) -> bool:
     assert (told == "") == out.endswith(
         f"kept in {cache}/pendula/{next((cache / 'pendula').glob('*.so')).name}\n"
     )
-    return told.startswith("pendula: deriving the kernel of spring_pendulum, once; compiled by ")
+    return (
+        told.startswith("pendula: deriving the kernel of spring_pendulum, once; compiled by ") and why in told
+    )
 
 
 def flipped(data: bytes) -> bytes:
@@ -63,13 +65,19 @@ def test_a_kernel_that_is_not_what_was_written_is_made_anew(name, kept, environm
     assert makes_it_anew(cache, environment)
 
 
-def test_a_kernel_is_whole_again_after_that(kept, pendula):
-    """The one test here that compiles."""
+def test_a_kernel_is_whole_again_after_that_and_the_owners(kept, pendula):
+    """The one test here that compiles. The umask lets everybody write."""
     cache, kernel = kept
     whole = kernel.read_bytes()
     kernel.write_bytes(whole[:8192])
-    made = pendula("build", "spring_pendulum", XDG_CACHE_HOME=str(cache))
+    before = os.umask(0)
+    try:
+        made = pendula("build", "spring_pendulum", XDG_CACHE_HOME=str(cache))
+    finally:
+        os.umask(before)
     assert made.stdout.endswith(f"made as {kernel}\n") and kernel.read_bytes() == whole
+    assert f"(not loaded: {kernel}: it is not what was written)" in made.stderr
+    assert kernel.stat().st_mode & 0o022 == 0
     assert "kept in" in pendula("build", "spring_pendulum", XDG_CACHE_HOME=str(cache)).stdout
 
 
@@ -85,6 +93,21 @@ def test_a_kernel_of_somebody_else_is_not_run(kept, environment):
     cache, kernel = kept
     os.chown(kernel, OTHER_USER, OTHER_USER)
     assert makes_it_anew(cache, environment)
+
+
+def test_a_kernel_that_others_may_write_to_is_not_run(kept, environment):
+    cache, kernel = kept
+    kernel.chmod(0o757)
+    assert makes_it_anew(cache, environment, f"(not loaded: {kernel}: others may write to it)")
+
+
+def test_a_folder_in_place_of_a_kernel_is_told(kept, pendula):
+    cache, kernel = kept
+    kernel.unlink()
+    kernel.mkdir()
+    ended = pendula("build", "spring_pendulum", XDG_CACHE_HOME=str(cache))
+    told = f"pendula: expected to keep the compiled kernel in {kernel}, got: a folder in its place\n"
+    assert (ended.returncode, ended.stdout, ended.stderr) == (2, "", told)
 
 
 def refused(pendula, cache: Path | str, **variables) -> str:
