@@ -519,6 +519,35 @@ TEST(Run, SaysWhichAccuracyCannotBeReached) {
       << lost.warnings[0];
 }
 
+/// A motion along a line that hurries once, for a step of 1/1000.
+struct HurryingMover {
+  int steps = 0;
+  double time() const { return steps; }
+  Motion state() const { return {time(), Eigen::VectorXd::Constant(1, steps + (steps >= 777 ? 500 : 0)), {}}; }
+  bool look(double /*time*/, Motion& /*there*/) const { return false; }
+  Motion glance(double time) const { return {time, Eigen::VectorXd::Zero(1), {}}; }
+};
+
+// Of thousand steps, up to 64 are kept evenly.
+TEST(Run, TracksKeepWhereAMotionIsFastest) {
+  HurryingMover mover;
+  Track track = Track(1).with_fast_places();
+  track.begin(mover.state());
+  for (mover.steps = 1; mover.steps <= 1000; ++mover.steps) track.follow(mover, {});
+  mover.steps = 1000;
+  track.finish(mover.state(), true);
+  const auto has = [](const Track& of, double time) {
+    return std::ranges::any_of(of.states(), [&](const Motion& state) { return state.time == time; });
+  };
+  EXPECT_TRUE(has(track, 777));
+  EXPECT_LT(track.states().size(), 64 + 12 + 48);  // measured 92
+  Track beside = Track::beside(track);
+  beside.begin(mover.state());
+  beside.follow(mover, {});
+  beside.finish(mover.state(), true);
+  EXPECT_TRUE(has(beside, 777));
+}
+
 // Trials may part from each other, and the run not part from the finest of them.
 TEST(Run, SaysOfNoTimeThatItIsInfinite) {
   RunSetup setup = double_pendulum(10);

@@ -1,6 +1,7 @@
 """Runs that once went wrong: each is right now, or says that it is not.
 
-The scenarios are tests/trials/*.toml; trials/ends.json has where the reference finds their chains at the end:
+The scenarios are tests/trials/*.toml, and of models tests/trials/models/*.toml; trials/ends.json has where the
+reference finds the chains at the end:
 
     python3 tests/campaign/reference.py tests/trials/[!c]*.toml > tests/trials/ends.json
 """
@@ -86,3 +87,44 @@ def test_energy_does_not_drift_over_a_million_steps(trial, tmp_path):
     errors = [abs(energy - energies[0]) for energy in energies]
     tenth = len(errors) // 10
     assert max(errors[-tenth:]) < 1.5 * max(errors[:tenth])
+
+
+# --- models
+
+
+def ended(run: Result, name: str) -> tuple[float, float]:
+    return run.json["final"]["q"][name], run.json["final"]["v"][name]
+
+
+def test_switchings_that_pile_up_end(trial):
+    """A detent's n-th swing lasts 1/n as long: after a thousand of them the run ends, near where it switches."""
+    run = trial("models/detent")
+    assert (run.status, run.json["outcome"]["status"]) == (1, "stuck_at_switch"), run.err
+    assert 5 < run.json["outcome"]["t"] < 12
+    assert abs(ended(run, "x")[0]) < 1e-6
+    assert run.json["steps"] < 20000
+
+
+def test_a_kinetic_energy_may_be_negative(trial):
+    """x'' = x. A warning said that energy was off by 0.13."""
+    run = trial("models/negative_mass")
+    assert (run.status, run.json["warnings"]) == (0, []), run.err
+    assert ended(run, "x") == pytest.approx((math.cosh(2), math.sinh(2)), rel=1e-9)
+
+
+def test_a_potential_that_switches_in_time_is_no_blow(trial):
+    run = trial("models/switched_spring")
+    assert (run.status, run.json["warnings"]) == (0, []), run.err
+    x, v, w = math.cos(0.5), -math.sin(0.5), math.sqrt(2)
+    c, s = math.cos(w * 1.5), math.sin(w * 1.5)
+    assert ended(run, "x") == pytest.approx((x * c + v / w * s, v * c - w * x * s), rel=1e-9)
+
+
+def test_a_start_that_is_driven_away_on_both_sides_is_told(trial):
+    run = trial("models/repelled")
+    assert run.status == 0, run.err
+    assert (run.json["expected_error"], run.json["trusted_until"]) == (None, 0)
+    (told,) = run.json["warnings"]
+    assert told.startswith(
+        "the run starts where x = 0, and is driven away on both sides: it goes one way of several"
+    )

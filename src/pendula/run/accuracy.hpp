@@ -25,6 +25,9 @@ struct AccuracyAim {
   std::optional<Track> finest = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   /// Up to when that trial is as accurate as wanted  [s].
   double trusted_until = std::numeric_limits<double>::infinity();
+  /// How far a trial by steps of another kind is from it, where that does not come closer with its tolerance; since
+  /// when.
+  double disputed = 0, disputed_from = std::numeric_limits<double>::infinity();
 
   template <class Numbers>
   void member(Numbers& numbers) {
@@ -158,6 +161,53 @@ std::optional<AccuracyAim> coarsen_while_enough(double wanted, double coarsest, 
     if (tolerance <= low || tolerance >= high) tolerance = std::sqrt(low * high);
   }
   return best;
+}
+
+/// A trial by steps of another kind, which err elsewhere and by other amounts: what all steps of one kind get wrong
+/// alike, their trials do not show. Series are told from Gauss steps; those with another number of stages, whose last
+/// one damps what it does not resolve with the other sign.
+inline RunOptions of_other_kind(RunOptions run, double wanted) {
+  switch (run.method) {
+    case Method::gauss:
+      run.stages += run.stages < 8 ? 1 : -1;
+      return run;
+    case Method::dopri5:
+    case Method::bulirsch_stoer:
+      run.method = Method::fehlberg78;
+      return run;
+    case Method::fehlberg78:
+      run.method = Method::bulirsch_stoer;
+      return run;
+    default:
+      run.method = Method::gauss;
+      run.stages = stages_for(run.method, 0.01 * wanted);
+      run.step = 0;
+      return run;
+  }
+}
+
+/// Compares the finest trial with others by steps of another kind, `run(tolerance)`, which is nothing where one does
+/// not come to its end in time: then it says nothing. They have to come closer to the finest trial with their
+/// tolerance.
+template <class RunTrial, class Apart>
+void hear_another(double wanted, double start, AccuracyAim& aim, double tolerance, RunTrial run, Apart apart) {
+  constexpr double far = 10, closer = 0.3, finest = 1e-16;  // times the wanted error; the distance before
+  constexpr int most_trials = 3;
+  double before = std::numeric_limits<double>::infinity();
+  for (int trial = 0; trial < most_trials && tolerance >= finest; ++trial) {
+    const std::optional<Track> there = run(tolerance);
+    if (!there) return;
+    const Separation parted = apart(*there, *aim.finest);
+    const double off = parted.largest();
+    if (off <= close_to_wanted * wanted) return;
+    if (off > far * wanted && off > closer * before) {
+      aim.disputed = off;
+      aim.disputed_from = parted.within(close_to_wanted * wanted, start);
+      return;
+    }
+    before = off;
+    tolerance *= off <= together ? std::max(aimed_at * wanted / off, 1e-3) : 1e-3;
+  }
 }
 
 /// Refines the tolerance by trials of `run` until it is good enough, then coarsens it by trials of `run_alike` as far

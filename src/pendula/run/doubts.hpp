@@ -79,15 +79,31 @@ inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trus
          smaller_step_advice(setup.options);
 }
 
+/// A start from which the equations lead on in more than one way.
+inline Doubt of_fork(const RunSetup& setup, Trust& trust) {
+  const std::optional<std::size_t> at = setup.subject->fork(setup.start);
+  if (!at) return {};
+  trust.until = setup.start.time;
+  trust.expected_error = std::numeric_limits<double>::quiet_NaN();
+  return "the run starts where " + std::string(setup.subject->switches()[*at]) +
+         " = 0, and is driven away on both sides: it goes one way of several, " +
+         untrusted_after(setup.start.time, setup.start.time);
+}
+
 /// Reports what the trials before the run found. `parted` is the distance of the run from the finest trial, if
 /// compared.
 inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& parted, const AccuracyAim& aim,
                     Trust& trust) {
   const double wanted = setup.accuracy.error, trusted = close_to_wanted * wanted, start = setup.start.time;
-  const double error = std::max(aim.error, parted ? parted->largest() : 0);
+  const double error = std::max({aim.error, parted ? parted->largest() : 0, aim.disputed});
   if (std::isfinite(aim.error) && error <= together) trust.expected_error = error;
   if (error <= trusted) return {};
-  trust.until = std::min(aim.trusted_until, parted ? parted->within(trusted, start) : aim.trusted_until);
+  trust.until = std::min(aim.trusted_until, aim.disputed_from);
+  if (parted) trust.until = std::min(trust.until, parted->within(trusted, start));
+  if (aim.disputed > 0) {
+    return "steps of another kind find another motion: " + rows_after(trust.until, start) +
+           " may be off by up to about " + pendula::rounded(error, 1) + " of the size of the motion";
+  }
   const std::string of_wanted = "an accuracy of " + pendula::rounded(wanted, 2) + " is not reached: ";
   if (std::isfinite(trust.expected_error)) {
     return of_wanted + rows_after(trust.until, start) + " are off by up to about " + pendula::rounded(error, 1) +
@@ -128,14 +144,14 @@ inline std::optional<SecondLook> finer(const RunOptions& run, double duration) {
 }
 
 /// A comparison run that errs more and takes less time: with a hundred times the tolerance, or longer steps. If some
-/// steps were divided, doubled steps would be divided into the same parts, so the step is tripled. Fewer stages are
-/// used with a tolerance because steps as long as the method allows would be the same with both tolerances. One step
-/// that is the whole run cannot be longer: then it is the finer run.
+/// steps were divided, doubled steps would be divided into the same parts, so the step is tripled. One stage less is
+/// used with a tolerance because steps as long as the method allows would be the same with both tolerances, and what is
+/// not damped would end with the same sign. One step that is the whole run cannot be longer: then it is the finer run.
 inline SecondLook coarser(const RunOptions& run, const Statistics& statistics, double duration) {
   SecondLook look{run, "with a hundred times the tolerance", 0.2, 0.2};
   if (is_adaptive(run)) {
     look.options.tolerance *= 100;
-    if (run.method == Method::gauss && run.stages > 2) look.options.stages -= run.stages >= 6 ? 2 : 1;
+    if (run.method == Method::gauss && run.stages > 2) --look.options.stages;
     return look;
   }
   if (run.step >= duration) return *finer(run, duration);
@@ -146,6 +162,21 @@ inline SecondLook coarser(const RunOptions& run, const Statistics& statistics, d
   const double less = std::pow(longer, run.method == Method::rk4 ? 4 : order_of(run)) - 1;
   look.factor = 1 / std::min(5.0, less);
   look.trusted = 1 / std::min(2.5, less / 2);
+  return look;
+}
+
+/// A comparison run by Gauss steps, of a run by series, whose coefficients may all miss the same: by the tolerance that
+/// was asked of the motion, over `finer`.
+inline SecondLook by_gauss_steps(const RunSetup& setup, const RunOptions& run, double finer = 1) {
+  const bool was_chosen = setup.options.method != run.method;
+  const double of_motion = was_chosen                   ? setup.options.tolerance
+                           : setup.motion_tolerance > 0 ? setup.motion_tolerance
+                                                        : run.tolerance;
+  SecondLook look{run, "by Gauss steps", 0.2, 1};
+  look.options.method = Method::gauss;
+  look.options.step = 0;
+  look.options.tolerance = std::max(1e-16, of_motion / finer);
+  look.options.stages = stages_for(Method::gauss, look.options.tolerance);
   return look;
 }
 

@@ -13,6 +13,9 @@ namespace pendula {
 
 namespace {
 
+// Most steps of a trial of another kind: more than those of the finest trial.
+constexpr std::int64_t few_steps = 1000, times_as_many = 10;
+
 // Distance of rows in time; 0 if it depends on the steps.
 double row_spacing(const RunSetup& setup) {
   if (setup.rows.any()) return setup.rows.interval;
@@ -103,7 +106,7 @@ bool Run::aim(const std::function<bool()>& stop) {
   bool stopped = false;
   const auto stops = [&](const Track&) { return stopped = stopped || stop(); };
   double share = -1;
-  std::optional<Track> alike;  // gives all trials the times of the first one
+  std::optional<Track> alike;  // gives trials the times of the first one, and the fastest of the finest one so far
   const auto run_alike = [&](double tolerance) -> std::optional<Track> {
     if (stopped) return {};
     RunOptions options = setup_.options;
@@ -111,12 +114,13 @@ bool Run::aim(const std::function<bool()>& stop) {
     choose_stages(options);
     Track track = try_out(options, share, alike.value_or(own_track()), stops);
     if (!track.is_complete()) return {};
-    if (!alike) alike = Track::at_times_of(track);
     return track;
   };
   const auto run = [&](double tolerance) {
     share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
-    return run_alike(tolerance);  // no two trials start alike
+    std::optional<Track> track = run_alike(tolerance);  // no two trials start alike
+    if (track) alike = Track::beside(*track);
+    return track;
   };
   const auto apart = [&](const Track& a, const Track& b) { return Separation(*setup_.subject, a, b); };
   const double wanted = setup_.accuracy.error;
@@ -124,6 +128,19 @@ bool Run::aim(const std::function<bool()>& stop) {
   const double coarsest = setup_.subject->damped() ? 1e-3 : 1;  // rest hides earlier errors
   const double start = setup_.start.time;
   kept_.aim = detail::find_aim(wanted, coarsest, finest, start, run, run_alike, apart);
+  if (!stopped && kept_.aim.finest && kept_.aim.error <= detail::close_to_wanted * wanted) {
+    const std::int64_t most_steps = few_steps + times_as_many * kept_.aim.finest->steps();
+    const auto is_long = [&](const Track& track) { return track.steps() > most_steps || stops(track); };
+    RunOptions other = detail::of_other_kind(setup_.options, wanted);
+    const auto run_other = [&](double tolerance) -> std::optional<Track> {
+      other.tolerance = tolerance;
+      Track track = try_out(other, std::copysign(0.01 * tolerance, -share), *alike, is_long);
+      if (!track.is_complete()) return {};
+      return track;
+    };
+    const double first = other.method == setup_.options.method ? kept_.aim.tolerance : detail::aimed_at * wanted;
+    detail::hear_another(wanted, start, kept_.aim, first, run_other, apart);
+  }
   if (!stopped) follow_aim();
   return !stopped;
 }
@@ -310,6 +327,7 @@ void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& st
   }
   add(detail::of_defect(setup_, report.statistics.largest_defect, missed_, report.trust));
   add(detail::of_unseen(setup_, report.statistics, report.trust));
+  if (!went_on) add(detail::of_fork(setup_, report.trust));
 }
 
 // Compares with a run that takes less time. If that says that this run cannot be trusted, compares with one that takes
@@ -332,7 +350,9 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   std::string unknown = "it was interrupted while it ran again to see how far it can be trusted: that is not known";
   const bool ends_between =
       !setup_.subject->switches().empty() && !is_adaptive(setup_.options) && !is_explicit(setup_.options.method);
+  const bool is_series = setup_.options.method == Method::taylor;
   const detail::SecondLook coarser = ends_between ? detail::by_other_stages(setup_.options)
+                                     : is_series  ? detail::by_gauss_steps(setup_, setup_.options)
                                                   : detail::coarser(setup_.options, report.statistics, setup_.duration);
   const Separation first = compare(coarser);
   if (stopped) return unknown;
@@ -340,7 +360,8 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   if (!doubt) return doubt;
   const double begin = setup_.start.time, end = report.last.time;
   const bool is_soon = first.within(detail::visible / coarser.trusted, begin) < begin + (end - begin) / 2;
-  const std::optional<detail::SecondLook> finer = detail::finer(setup_.options, setup_.duration);
+  const std::optional<detail::SecondLook> finer =
+      is_series ? detail::by_gauss_steps(setup_, setup_.options, 100) : detail::finer(setup_.options, setup_.duration);
   if (!finer || ends_between || !(is_adaptive(setup_.options) || is_soon)) return doubt;
   const Separation second = compare(*finer);
   return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);

@@ -64,7 +64,9 @@ class Run {
   RunReport go(const Checkpoint* from, const std::function<bool()>& stop);
   Track try_out(const RunOptions& options, double share, Track track,
                 const std::function<bool(const Track&)>& stop) const;
-  Track own_track() const { return Track(is_adaptive(setup_.options) ? Track::apart / 2 : Track::apart); }
+  Track own_track() const {
+    return Track(is_adaptive(setup_.options) ? Track::apart / 2 : Track::apart).with_fast_places();
+  }
   void go_by_series(double tolerance);
   void choose_stages(RunOptions& options) const;
   bool aim(const std::function<bool()>& stop);

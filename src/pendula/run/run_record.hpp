@@ -134,7 +134,7 @@ class RunRecord {
   void start(const Observation& seen, double work) {
     initial_ = seen.energy;
     brought_before_ = work;
-    whole_ = scale_.value_or(0) + seen.kinetic;
+    whole_ = scale_.value_or(0) + std::abs(seen.kinetic);
   }
 
   void follow(const Observation& seen, double work) {
@@ -145,7 +145,7 @@ class RunRecord {
     const double brought = work - brought_before_, off = energy_ - initial_ - brought;
     // All energy involved: for a chain the initial kinetic energy and what gravity can give; for other systems the
     // largest kinetic energy seen, which is known only at the end.
-    if (!scale_) whole_ = std::max(whole_, seen.kinetic + std::abs(brought));
+    if (!scale_) whole_ = std::max(whole_, std::abs(seen.kinetic) + std::abs(brought));
     const double whole = scale_ ? whole_ + std::abs(brought) : 1;
     if (off == 0 || !(whole > 0)) return;
     balance_.most = std::max(balance_.most, off / whole);

@@ -67,6 +67,8 @@ class Subject {
 
   /// Switching functions of a system with functions of several pieces.
   virtual std::span<const std::string_view> switches() const { return {}; }
+  /// The one that drives a motion away on both sides where it starts.
+  virtual std::optional<std::size_t> fork(const Motion& /*start*/) const { return {}; }
 
   /// The columns of a short table: index of the first, and how many.
   virtual std::pair<std::size_t, std::size_t> shown_columns() const = 0;

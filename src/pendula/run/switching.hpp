@@ -44,6 +44,10 @@ class SwitchingSystem {
   };
   Way way(const Motion& motion) const;
 
+  /// A switching function at whose zero a motion stands that is driven away from it on both sides: where it goes is not
+  /// told.
+  std::optional<std::size_t> fork(const Motion& motion) const;
+
   /// A time in which the motion changes  [s].
   double pace(const Sides& sides, const Motion& motion) const;
 
@@ -53,6 +57,8 @@ class SwitchingSystem {
  private:
   template <class Function>
   std::vector<double> at(Function function, std::size_t count, const Sides& sides, const Motion& motion) const;
+  Sides sides_at(const Motion& motion) const;
+  std::vector<std::size_t> zeros(const Sides& sides, const Motion& motion) const;
   int drift(std::size_t k, const Sides& sides, const Motion& motion) const;
   Motion ahead(const Sides& sides, const Motion& motion, double time) const;
   std::vector<double> accelerations(const Sides& sides, const Motion& motion) const;
@@ -101,27 +107,36 @@ inline std::vector<double> SwitchingSystem::fast_arguments(const Sides& sides, c
   return found;
 }
 
-inline SwitchingSystem::Way SwitchingSystem::way(const Motion& motion) const {
-  constexpr std::size_t most_at_once = 8;
-  const std::size_t count = switches();
-  Sides sides(count, 1);
-  std::vector<double> found;
-  for (std::size_t pass = 0; pass <= count; ++pass) {  // one may depend on another
-    found = values(sides, motion);
-    for (std::size_t k = 0; k < count; ++k) sides[k] = found[k] < 0 ? -1 : 1;
+/// The sides of the values there.
+inline Sides SwitchingSystem::sides_at(const Motion& motion) const {
+  Sides sides(switches(), 1);
+  for (std::size_t pass = 0; pass <= sides.size(); ++pass) {  // one may depend on another
+    const std::vector<double> found = values(sides, motion);
+    for (std::size_t k = 0; k < sides.size(); ++k) sides[k] = found[k] < 0 ? -1 : 1;
   }
-  // Those that are zero but for rounding: a moment ago or later they are of another size.
+  return sides;
+}
+
+/// Those that are zero but for rounding: a moment ago or later they are of another size.
+inline std::vector<std::size_t> SwitchingSystem::zeros(const Sides& sides, const Motion& motion) const {
+  constexpr std::size_t most_at_once = 8;
   constexpr double moment = 1e-10;
   const double soon = moment * pace(sides, motion);
+  const std::vector<double> found = values(sides, motion);
   const std::vector<double> later = values(sides, ahead(sides, motion, soon));
   const std::vector<double> before = values(sides, ahead(sides, motion, -soon));
   std::vector<std::size_t> open;
-  for (std::size_t k = 0; k < count; ++k) {
+  for (std::size_t k = 0; k < found.size() && open.size() < most_at_once; ++k) {
     const double change = std::max(std::abs(later[k] - found[k]), std::abs(before[k] - found[k]));
     if (std::abs(found[k]) <= change || found[k] == 0) open.push_back(k);
   }
+  return open;
+}
+
+inline SwitchingSystem::Way SwitchingSystem::way(const Motion& motion) const {
+  Sides sides = sides_at(motion);
+  const std::vector<std::size_t> open = zeros(sides, motion);
   if (open.empty()) return {sides, {}};
-  if (open.size() > most_at_once) open.resize(most_at_once);
   const Sides first = sides;
   std::optional<std::size_t> stuck;
   for (unsigned turned = 0; turned < 1U << open.size(); ++turned) {
@@ -135,6 +150,16 @@ inline SwitchingSystem::Way SwitchingSystem::way(const Motion& motion) const {
     if (!stuck) stuck = *back;
   }
   return {first, stuck};
+}
+
+inline std::optional<std::size_t> SwitchingSystem::fork(const Motion& motion) const {
+  const Sides sides = sides_at(motion);
+  for (const std::size_t k : zeros(sides, motion)) {
+    Sides other = sides;
+    other[k] *= -1;
+    if (drift(k, sides, motion) * sides[k] > 0 && drift(k, other, motion) * other[k] > 0) return k;
+  }
+  return {};
 }
 
 /// The sign that g soon changes by; 0 if it does not.

@@ -13,6 +13,7 @@
 #include <pendula/numeric/sampled_polynomial.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/run/pile_up.hpp>
 #include <pendula/run/relay.hpp>
 #include <pendula/run/switching.hpp>
 #include <stdexcept>
@@ -36,6 +37,7 @@ class SwitchingIntegrator : public Relay {
         sides_(system_.switches(), 1),
         made_for_(sides_),
         watch_(events(), detail::glance_degree(options)) {
+    pile_.begin(0, system_.switches());
     use(make());
   }
 
@@ -43,6 +45,7 @@ class SwitchingIntegrator : public Relay {
     const Motion motion = motion_of(time, q, v);
     choose(motion);
     switchings_ = 0;
+    pile_.begin(time, system_.switches());
     is_of_end_ = false;
     limit_ = first_limit(motion);
     if (sides_ != made_for_) use(make());
@@ -73,10 +76,11 @@ class SwitchingIntegrator : public Relay {
       }
       limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
       // Where a function is zero is known to rounding, which is another in another step.
-      const bool is_on_zero = !first && ends_on_zero();
-      if ((first || is_on_zero) && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
-      if (is_on_zero) return go_on(stepped);
-      return finish(first ? cut(before, begin, time(), *first) : stepped);
+      const std::optional<std::size_t> zero = first ? std::nullopt : zero_at_end();
+      if ((first || zero) && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
+      if (first) return finish(cut(before, begin, time(), *first));
+      see_reach(begin);
+      return zero ? go_on(stepped, *zero) : finish(stepped);
     }
   }
 
@@ -88,7 +92,7 @@ class SwitchingIntegrator : public Relay {
   }
 
   void member(MemberNumbers& numbers) override {
-    numbers(sides_, stuck_at_, switchings_, burst_, limit_, is_of_end_, done_, all_, watch_);
+    numbers(sides_, stuck_at_, switchings_, burst_, pile_, limit_, is_of_end_, done_, all_, watch_);
     if (sides_ != made_for_) use(make());
     own_member(numbers);
     watch_.resume(now().state());
@@ -198,10 +202,16 @@ class SwitchingIntegrator : public Relay {
     return std::move(found.front());
   }
 
-  /// Whether a switching function is zero where the last step ended.
-  bool ends_on_zero() const {
-    return std::ranges::any_of(system_.values(sides_, now().state()), [](double g) { return g == 0; });
+  /// The switching function that is zero where the last step ended, if one is.
+  std::optional<std::size_t> zero_at_end() const {
+    const std::vector<double> values = system_.values(sides_, now().state());
+    const auto zero = std::ranges::find(values, 0.0);
+    if (zero == values.end()) return {};
+    return static_cast<std::size_t>(zero - values.begin());
   }
+
+  /// Half way through the last step.
+  void see_reach(double begin) { pile_.reach(system_.values(sides_, now().glance((begin + time()) / 2))); }
 
   /// Takes the step again, to where a switching function is zero, and some roundings on, so that it has its new sign.
   Outcome cut(const Member& before, double begin, double end, const Occurrence& first) {
@@ -219,17 +229,18 @@ class SwitchingIntegrator : public Relay {
       if (h >= end - begin) break;
       more = more == 0 ? rounding : 2 * more;
     }
-    if (time() >= std::min(at, end) - 4 * rounding) return go_on(stepped);
+    see_reach(begin);
+    if (time() >= std::min(at, end) - 4 * rounding) return go_on(stepped, first.event);
     watch_.start(now().state(), sides_);
     return stepped;
   }
 
   /// By the pieces that the motion goes on by, after a step to a zero.
-  Outcome go_on(const Outcome& stepped) {
+  Outcome go_on(const Outcome& stepped, std::size_t switched) {
     count();
     const Motion motion = now().state();
     choose(motion);
-    watch_bursts();
+    if (stuck_at_ < 0 && is_endless(switched)) stuck_at_ = static_cast<int>(switched);
     watch_.start(motion, sides_);
     if (stuck_at_ >= 0) return stepped;
     if (sides_ == made_for_) return stepped;
@@ -239,17 +250,17 @@ class SwitchingIntegrator : public Relay {
     return begun ? stepped : begun;
   }
 
-  /// Switchings that follow one another within no time never end.
-  void watch_bursts() {
+  /// Whether switchings, the last one by this function, follow one another within no time, or pile up.
+  bool is_endless(std::size_t switched) {
     constexpr int most = 100;
     constexpr double no_time = 1e-9;
+    bool is_burst = false;
     if (switchings_ % most == 0) {
-      if (switchings_ > 0 && time() - burst_ <= no_time * (std::abs(time()) + longest_)) {
-        stuck_at_ = std::max(stuck_at_, 0);
-      }
+      is_burst = switchings_ > 0 && time() - burst_ <= no_time * (std::abs(time()) + longest_);
       burst_ = time();
     }
     ++switchings_;
+    return pile_.count(time(), switched) || is_burst;
   }
 
   static constexpr int most_tries = 40;
@@ -267,6 +278,7 @@ class SwitchingIntegrator : public Relay {
   double limit_ = unlimited;  // of the next step  [s]
   bool is_of_end_ = false;    // whether the end of the run has affected the state
   double burst_ = 0;          // when the last hundred of them began
+  PileUp pile_;
   EventWatch watch_;
 };
 

@@ -60,6 +60,9 @@ class SystemSubject : public Subject {
   const std::vector<InputFunction>& feedback() const { return feedback_; }
 
   std::span<const std::string_view> switches() const override { return info().switches; }
+  std::optional<std::size_t> fork(const Motion& start) const override {
+    return switches().empty() ? std::nullopt : switching().fork(start);
+  }
 
   /// The same numbers with those of the pieces that a motion takes.
   SystemNumbers numbers_at(const Motion& motion) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -14,8 +15,74 @@
 
 namespace pendula {
 
-/// States of a run along its motion, kept for comparison with another run: at the ends of some of its steps, or at the
-/// times of another track.
+/// The ends of the steps in which a motion changes fastest, one of each stretch of a run: there an error in time shows
+/// most.
+class FastPlaces {
+ public:
+  void begin(const Motion& start, std::size_t most) {
+    most_ = std::max<std::size_t>(2, most);
+    before_ = start;
+    size_of_q_ = start.q.cwiseAbs();
+    size_of_v_ = start.v.cwiseAbs();
+  }
+
+  /// Call after every step, with its end.
+  void follow(const Motion& now) {
+    size_of_q_ = size_of_q_.cwiseMax(now.q.cwiseAbs());
+    size_of_v_ = size_of_v_.cwiseMax(now.v.cwiseAbs());
+    const double h = now.time - before_.time;
+    const double change = std::max(largest(now.q, before_.q, size_of_q_), largest(now.v, before_.v, size_of_v_));
+    const double speed = h > 0 ? change / h : 0;
+    before_ = now;
+    if (steps_++ % stretch_ == 0) {
+      places_.push_back({now, speed});
+    } else if (speed > places_.back().speed) {
+      places_.back() = {now, speed};
+    }
+    if (places_.size() == most_ && steps_ % stretch_ == 0) join_pairs();
+  }
+
+  std::vector<Motion> take() {
+    std::vector<Motion> states;
+    states.reserve(places_.size());
+    for (Place& place : places_) states.push_back(std::move(place.state));
+    places_.clear();
+    return states;
+  }
+
+ private:
+  struct Place {
+    Motion state;
+    double speed;
+  };
+
+  static double largest(const Eigen::VectorXd& now, const Eigen::VectorXd& before, const Eigen::VectorXd& size) {
+    double largest = 0;
+    for (Eigen::Index k = 0; k < now.size(); ++k) {
+      if (size[k] > 0) largest = std::max(largest, std::abs(now[k] - before[k]) / size[k]);
+    }
+    return largest;
+  }
+
+  void join_pairs() {
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < places_.size(); k += 2) {
+      const bool second = k + 1 < places_.size() && places_[k + 1].speed > places_[k].speed;
+      std::swap(places_[kept++], places_[second ? k + 1 : k]);
+    }
+    places_.resize(kept);
+    stretch_ *= 2;
+  }
+
+  std::size_t most_ = 2;
+  std::int64_t steps_ = 0, stretch_ = 1;
+  Motion before_;
+  Eigen::VectorXd size_of_q_, size_of_v_;
+  std::vector<Place> places_;
+};
+
+/// States of a run along its motion, kept for comparison with another run: at the ends of some of its steps, among them
+/// the fastest, or at the times of another track.
 class Track {
  public:
   /// Number of steps between kept states of a long run. It is even, and a multiple of three, so that steps of twice or
@@ -27,15 +94,29 @@ class Track {
   explicit Track(std::int64_t every, std::size_t most_numbers = std::size_t{1} << 23)
       : most_numbers_(most_numbers), every_(every) {}
 
-  /// A track at the times of `other`.
+  /// Also keeps its own fastest places, so that they are among the times of tracks that are made of this one.
+  Track&& with_fast_places() && {
+    has_fast_places_ = true;
+    return std::move(*this);
+  }
+
+  /// A track at the times of `other`, which is finished.
   static Track at_times_of(const Track& other) {
     Track track(0);
-    if (other.looks()) {
-      track.times_ = other.times_;
-    } else {
-      for (const Motion& state : other.states_) track.times_.push_back(state.time);
-    }
+    for (const Motion& state : other.states_) track.times_.push_back(state.time);
     return track;
+  }
+
+  /// The same with fastest places of its own, without those of the tracks that `other` was made of: there are never
+  /// more than of two tracks.
+  static Track beside(const Track& other) {
+    Track track(0);
+    track.common_ = other.common_;
+    track.times_ = other.common_;
+    track.times_.insert(track.times_.end(), other.fast_.begin(), other.fast_.end());
+    std::ranges::sort(track.times_);
+    track.times_.erase(std::unique(track.times_.begin(), track.times_.end()), track.times_.end());
+    return std::move(track).with_fast_places();
   }
 
   /// Whether it uses the times of another track, which needs looks into steps (Integrator::remember_steps).
@@ -43,8 +124,9 @@ class Track {
 
   /// Starts at this state.
   void begin(const Motion& start) {
+    if (has_fast_places_) places_.begin(start, std::min(most_fast, most_for(start) / 2));
     if (looks()) return;
-    most_ = std::max(least, most_numbers_ / (2 * static_cast<std::size_t>(start.q.size()) + numbers_besides));
+    most_ = most_for(start);
     first_ = std::min(first_, static_cast<std::int64_t>(most_ / 2));
     states_.push_back(start);
     numbers_.push_back(0);
@@ -54,6 +136,8 @@ class Track {
   /// state at which the run ended within the step, if it did.
   template <class Mover>
   void follow(Mover& mover, const std::optional<Motion>& end) {
+    ++steps_;
+    if (has_fast_places_ && !end) places_.follow(mover.state());
     if (!looks()) return count_step(mover);
     const double last = end ? end->time : mover.time();
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {
@@ -78,25 +162,42 @@ class Track {
   void finish(Motion last, bool is_complete) {
     last_ = std::move(last);
     is_complete_ = is_complete;
-    if (rows_.empty()) return;
-    std::ranges::move(rows_, std::back_inserter(states_));
+    add(std::move(rows_));
     rows_.clear();
-    std::ranges::sort(states_, {}, &Motion::time);
-    const auto is_same = [](const Motion& a, const Motion& b) { return a.time == b.time; };
-    states_.erase(std::unique(states_.begin(), states_.end(), is_same), states_.end());
+    if (common_.empty()) {
+      for (const Motion& state : states_) common_.push_back(state.time);
+    }
+    std::vector<Motion> fast = places_.take();
+    for (const Motion& state : fast) fast_.push_back(state.time);
+    add(std::move(fast));
   }
+
+  /// Steps so far.
+  std::int64_t steps() const { return steps_; }
 
   bool is_complete() const { return is_complete_; }
   const std::vector<Motion>& states() const { return states_; }
   const Motion& last() const { return last_; }
 
  private:
-  // Most rows, states of a run of few steps, states of any run at least; numbers that a state takes besides its own.
-  static constexpr std::size_t most_rows = 256, few = 64, least = 12, numbers_besides = 24;
+  // Most rows, states of a run of few steps, states of any run at least, fastest places; numbers that a state takes
+  // besides its own.
+  static constexpr std::size_t most_rows = 256, few = 64, least = 12, most_fast = 48, numbers_besides = 24;
+
+  std::size_t most_for(const Motion& start) const {
+    return std::max(least, most_numbers_ / (2 * static_cast<std::size_t>(start.q.size()) + numbers_besides));
+  }
+
+  void add(std::vector<Motion> more) {
+    if (more.empty()) return;
+    std::ranges::move(more, std::back_inserter(states_));
+    std::ranges::stable_sort(states_, {}, &Motion::time);
+    const auto is_same = [](const Motion& a, const Motion& b) { return a.time == b.time; };
+    states_.erase(std::unique(states_.begin(), states_.end(), is_same), states_.end());
+  }
 
   template <class Mover>
   void count_step(const Mover& mover) {
-    ++steps_;
     if (!is_kept(steps_)) return;
     states_.push_back(mover.state());
     numbers_.push_back(steps_);
@@ -117,7 +218,9 @@ class Track {
   std::size_t most_numbers_;
   std::int64_t every_, steps_ = 0, first_ = 12;
   std::size_t most_ = few;
-  std::vector<double> times_;
+  bool has_fast_places_ = false;
+  FastPlaces places_;
+  std::vector<double> times_, common_, fast_;  // to look at; of tracks alike; of the own fastest places
   std::vector<Motion> states_;
   std::vector<std::int64_t> numbers_;  // of the steps that ended at the states
   std::int64_t all_rows_ = 0, every_row_ = 1;
@@ -141,19 +244,24 @@ inline Motion size_of(const Track& track) {
 /// Distances of two runs of one system along their motion.
 class Separation {
  public:
-  /// Of two tracks: one of them at the times of the other, or both at those of a third.
+  /// Of two tracks, at their common times.
   Separation(const Subject& subject, const Track& a, const Track& b) {
-    const std::size_t common = std::min(a.states().size(), b.states().size());
     Motion size = size_of(a);
     const Motion other_size = size_of(b);
     size.q = size.q.cwiseMax(other_size.q);
     size.v = size.v.cwiseMax(other_size.v);
-    places_.reserve(common + 1);
+    places_.reserve(std::min(a.states().size(), b.states().size()) + 1);
     const auto add = [&](const Motion& one, const Motion& other) {
       const double off = subject.distance(one, other, size);
       places_.push_back({std::min(one.time, other.time), std::isnan(off) ? infinity : off});
     };
-    for (std::size_t k = 0; k < common; ++k) add(a.states()[k], b.states()[k]);
+    for (auto one = a.states().begin(), other = b.states().begin();
+         one != a.states().end() && other != b.states().end();) {
+      if (one->time == other->time)
+        add(*one++, *other++);
+      else
+        ++(one->time < other->time ? one : other);
+    }
     if (a.is_complete() && b.is_complete()) {
       add(a.last(), b.last());
     } else {
@@ -199,7 +307,7 @@ class Divergence {
   /// `track` must outlive this object.
   Divergence(const Subject& subject, const Track& track) : subject_(subject), track_(track), size_(size_of(track)) {}
 
-  /// Whether a state added since the last call is further off than `limit`.
+  /// Whether a state added since the last call is further off than `limit`. `growing` has no fastest places of its own.
   bool exceeds(const Track& growing, double limit) {
     for (; next_ < growing.states().size(); ++next_) {
       if (!(subject_.distance(track_.states()[next_], growing.states()[next_], size_) <= limit)) return true;
