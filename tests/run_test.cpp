@@ -528,7 +528,7 @@ struct HurryingMover {
   Motion glance(double time) const { return {time, Eigen::VectorXd::Zero(1), {}}; }
 };
 
-// Of thousand steps, up to 64 are kept evenly.
+// Of thousand steps every eighth is kept besides.
 TEST(Run, TracksKeepWhereAMotionIsFastest) {
   HurryingMover mover;
   Track track = Track(1).with_fast_places();
@@ -540,7 +540,7 @@ TEST(Run, TracksKeepWhereAMotionIsFastest) {
     return std::ranges::any_of(of.states(), [&](const Motion& state) { return state.time == time; });
   };
   EXPECT_TRUE(has(track, 777));
-  EXPECT_LT(track.states().size(), 64 + 12 + 48);  // measured 92
+  EXPECT_LT(track.states().size(), 200U);  // measured 168
   Track beside = Track::beside(track);
   beside.begin(mover.state());
   beside.follow(mover, {});

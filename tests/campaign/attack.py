@@ -1,6 +1,6 @@
 """Tries to find runs of pendula that are wrong without a word.
 
-usage: python tests/campaign/attack.py chains|models|events|ensembles --seed 1 --from 0 --count 1000
+usage: python tests/campaign/attack.py chains|models|events|ensembles|aimed --seed 1 --from 0 --count 1000
 
 Each number is a case (drawing.py). The program moves it, references that it has no part in do too (truth.py), and each
 row and event that it writes is compared (judging.py says what is right). What is silently wrong is kept, to be run
@@ -25,6 +25,7 @@ import judging
 import truth
 
 BAD = ("SILENT", "crash", "harness")
+JUDGED = ("right", "false doubt", "said", "SILENT")
 
 
 def known(file: Path) -> dict[str, dict]:
@@ -57,6 +58,25 @@ def try_case(case: drawing.Case, given: argparse.Namespace, room: truth.Room) ->
     return verdict
 
 
+def ratios(verdicts: list[dict]) -> list[float]:
+    """True errors over those that runs expected, where both are known."""
+    return sorted(v["error"] / v["expected"] for v in verdicts if v.get("expected") and v["kind"] in JUDGED)
+
+
+def quantiles(verdicts: list[dict]) -> str:
+    """What expected_error is worth."""
+    found = ratios(verdicts)
+    if not found:
+        return "no run told an expected error"
+    above = {limit: sum(ratio > limit for ratio in found) for limit in (1, 2, 10)}
+    below = sum(ratio < 1e-3 for ratio in found)
+    return (
+        f"true error over expected_error, {len(found)} runs: median {found[len(found) // 2]:.2g}, "
+        + ", ".join(f"above {limit} in {count}" for limit, count in above.items())
+        + f", below a thousandth in {below}, largest {found[-1]:.2g}"
+    )
+
+
 def table(verdicts: list[dict]) -> None:
     kinds = Counter(v["kind"] for v in verdicts)
     print(", ".join(f"{count} {kind}" for kind, count in kinds.most_common()))
@@ -69,6 +89,7 @@ def table(verdicts: list[dict]) -> None:
         for name, counts in sorted(groups.items()):
             print(f"{name:40}" + ", ".join(f"{count} {kind}" for kind, count in counts.most_common()))
     print()
+    print(quantiles(verdicts))
     for v in verdicts:
         if v["kind"] in BAD:
             what = (v["wrong"] or v["words"] or [""])[0].strip().splitlines()[-1]

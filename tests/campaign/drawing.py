@@ -13,10 +13,11 @@ import random
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import aimed
 import model_drawing
 from random_chains import Draw
 
-FIRST = {"chains": 1000, "models": 400, "events": 3000, "ensembles": 300}
+FIRST = {"chains": 1000, "models": 400, "events": 3000, "ensembles": 300, "aimed": 400}
 KINDS = tuple(FIRST)
 BROUGHT = Path(__file__).parents[2] / "codegen" / "pendula_codegen" / "models"
 
@@ -66,7 +67,13 @@ def draw(kind: str, seed: int, number: int) -> Case:
         "models": a_model,
         "events": an_event,
         "ensembles": an_ensemble,
+        "aimed": an_aimed_one,
     }[kind](seed, number)
+
+
+def an_aimed_one(seed: int, number: int) -> Case:
+    family, tables, text = aimed.draw(seed, number)
+    return Case("aimed", seed, number, family, tables, text)
 
 
 # --- how a run is moved, and what is written of it

@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+import aimed
 import crossings
 import numpy as np
 import truth
@@ -63,6 +64,7 @@ class Verdict:
     settings: str
     kind: str
     error: float = 0.0  # the largest, relative to sizes
+    expected: float | None = None  # by the run itself
     ratio: float = 0.0  # of an error to what it may be, the largest
     by: str = "step"  # accuracy, tolerance or step
     asked: float = 0.0
@@ -120,6 +122,8 @@ def subject_of(case: Case, room: truth.Room, tables: dict | None = None) -> trut
     tables = tables or case.tables
     if "chain" in tables:
         return truth.ChainSubject(room, tables)
+    if case.family in aimed.MOTIONS:
+        return truth.PieceSubject(room, tables, case.model, case.family)
     return truth.ModelSubject(room, tables, case.model, case.narrow)
 
 
@@ -315,12 +319,12 @@ class RowErrors:
 
 
 def some(times: np.ndarray) -> np.ndarray:
-    """Which rows to look at: all, or early ones, the last, and others evenly."""
+    """Which rows to look at: all, or early ones, the last, those of the shortest steps, and others evenly."""
     if len(times) <= MOST_ROWS:
         return np.arange(len(times))
-    return np.unique(
-        np.concatenate([np.arange(10), np.linspace(0, len(times) - 1, MOST_ROWS - 10).astype(int)])
-    )
+    evenly = np.linspace(0, len(times) - 1, MOST_ROWS - 30).astype(int)
+    fast = 1 + np.argsort(np.diff(times), kind="stable")[:20]
+    return np.unique(np.concatenate([np.arange(10), fast, evenly]))
 
 
 def row_errors(
@@ -442,6 +446,7 @@ def judge_run(case: Case, room: truth.Room, program: Program) -> Verdict:
     verdict.error = float(errors.error[sure].max(initial=0))
     verdict.ratio = float(errors.ratio[sure].max(initial=0))
     verdict.growth = float(errors.growth[sure].max(initial=1))
+    verdict.expected = done.summary.get("expected_error")
     wrong += column_faults(subject, done.columns)
     if motion is not None:
         wrong += event_faults(case, tables, subject, motion, ends, done, errors, duration)

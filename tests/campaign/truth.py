@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import aimed
 import model_equations
 import numpy as np
 import reference
@@ -251,6 +252,22 @@ class ModelSubject(Subject):
         for name, unit in zip(self.model.names, units + rates, strict=True):
             largest[unit] = max(largest.get(unit, 1e-300), np.abs(columns[name]).max())
         return np.array([largest[unit] for unit in units + rates], dtype=Real)
+
+
+class PieceSubject(ModelSubject):
+    """A model with pieces whose motion is known in closed form."""
+
+    def __init__(self, room: Room, scenario: dict, text: str, family: str) -> None:
+        super().__init__(room, scenario, text, [])
+        self.family = family
+        self.start = [Real(scenario["start"].get(name, 0.0)) for name in self.model.names]
+        self.methods = [("closed form", 0.0, 0.0)]
+
+    def ask(self, method, tolerance, disturbance, telling, times):
+        del method, tolerance, telling
+        x, v = (number * (1 + Real(disturbance)) for number in self.start)
+        given = dict(zip(map(str, self.model.said.parameters), self.parameters, strict=True))
+        return aimed.rows(self.family, (x, v), given, times)
 
 
 def other_spelling(name: str) -> str:
