@@ -80,7 +80,7 @@ class Input:
     unit: str
 
 
-POINT_KINDS = ("bob", "cart", "pivot")
+POINT_KINDS = ("bob", "cart", "pivot", "weight", "floor")
 ORIGIN = "origin"  # where springs and threads may end, too
 
 
@@ -95,7 +95,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Connection:
-    """Something drawn between two points, by number, -1 for the origin. kind: "spring" or "thread"."""
+    """Something drawn between two points, by number, -1 for the origin. kind: "spring", "thread" or "pulleys"."""
 
     kind: str
     ends: tuple[int, int]
@@ -226,7 +226,7 @@ class Model:
         """A point for files and pictures: 2 or 3 components, m.
 
         kind: what it is drawn as. A "bob" is a ball, a "cart" a box with wheels on the line along which it runs, a
-        "pivot" a ring: what others hang on.
+        "pivot" a ring: what others hang on, a "weight" a box, a "floor" a level line below.
         """
         if kind not in POINT_KINDS:
             self._fail(f"point {name}: kind: expected {_listed(POINT_KINDS)}, got {kind!r}")
@@ -249,6 +249,10 @@ class Model:
     def thread(self, start: Point | str, end: Point | str) -> None:
         """Draws a thread between two points, or a point and "origin", whose length may change."""
         self._connect("thread", start, end)
+
+    def pulleys(self, start: Point | str, end: Point | str) -> None:
+        """Draws a thread up from a point, over a pulley there, to a pulley at another point that is as high."""
+        self._connect("pulleys", start, end)
 
     def _connect(self, kind: str, start: Point | str, end: Point | str) -> None:
         ends = self._end(kind, start), self._end(kind, end)

@@ -47,8 +47,8 @@ REFUSED = {
     "model.force(x, x * oo)": "is no finite real number",
     "model.force(x, (1e-200 * x)**2)": "force: the number 1.00E-400 is out of the range",
     "model.force(x, 1e200 * x * 1e200)": "force: the number 1.00E+400 is out of the range",
-    "model.point('bob', (x, y), kind='wagon')": "point bob: kind: expected 'bob', 'cart' or 'pivot', got 'wagon'",
-    "model.point('bob', (x, y), kind=1)": "point bob: kind: expected 'bob', 'cart' or 'pivot', got 1",
+    "model.point('bob', (x, y), kind='wagon')": "'pivot', 'weight' or 'floor', got 'wagon'",
+    "model.point('bob', (x, y), kind=1)": "'pivot', 'weight' or 'floor', got 1",
     "model.spring('origin', 'bob')": "spring: expected a point that the model has by now, one of origin; got 'bob'",
     "model.thread(model.point('bob', (x, y)), 'origin_1')": "by now, one of bob, origin; got 'origin_1'",
     "model.spring('origin', (x, y))": "spring: expected a point that the model has by now, one of origin; got (x, y)",
@@ -62,16 +62,21 @@ def test_points_say_what_they_are_drawn_as(tmp_path):
     model = read(
         tmp_path,
         "wall = model.point('wall', (0, 1), kind='pivot'); model.point('cart', (x, 0), kind='cart'); "
-        "model.point('ball', (x, y)); model.spring(wall, 'cart'); model.thread('origin', 'ball')",
+        "model.point('ball', (x, y)); model.spring(wall, 'cart'); model.thread('origin', 'ball'); "
+        "model.point('ground', (0, -1), kind='floor'); block = model.point('block', (1, x), kind='weight'); "
+        "model.pulleys(block, wall)",
     )
-    assert [point.kind for point in model.points] == ["pivot", "cart", "bob"]
-    assert [(each.kind, each.ends) for each in model.connections] == [("spring", (0, 1)), ("thread", (-1, 2))]
+    assert [point.kind for point in model.points] == ["pivot", "cart", "bob", "floor", "weight"]
+    connections = [("spring", (0, 1)), ("thread", (-1, 2)), ("pulleys", (4, 0))]
+    assert [(each.kind, each.ends) for each in model.connections] == connections
     lines = [
         "point wall 2 pivot",
         "point cart 2 cart",
         "point ball 2 bob",
         "connection spring 0 1",
         "connection thread -1 2",
+        "point block 2 weight",
+        "connection pulleys 4 0",
     ]
     c = render_c(model, "said.py", "said.c").replace("\\t", " ")
     program = render_bytecode(model).replace("\t", " ")
@@ -81,9 +86,9 @@ def test_points_say_what_they_are_drawn_as(tmp_path):
         assert line in program.splitlines()
         assert line in llvm
     header = render_model(model, "said.py").text
-    assert 'point_kinds = {"pivot", "cart", "bob"};' in header
-    assert 'connection_kinds = {"spring", "thread"};' in header
-    assert "connection_ends = {0, 1, -1, 2};" in header
+    assert 'point_kinds = {"pivot", "cart", "bob", "floor", "weight"};' in header
+    assert 'connection_kinds = {"spring", "thread", "pulleys"};' in header
+    assert "connection_ends = {0, 1, -1, 2, 4, 0};" in header
 
 
 @pytest.mark.parametrize("line", REFUSED)

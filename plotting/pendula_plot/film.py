@@ -105,7 +105,7 @@ class Body:
 
 def body_of(run: Run) -> Body:
     """Of a chain all rods; of a model those between neighbours, from the origin on, that keep their length, where
-    nothing else is between them and carts are on rails."""
+    nothing else is between them, carts are on rails, weights hang on threads and floors lie."""
     if run.dimension < 2:
         raise PlotError(f"{run.name}: expected points to film, got a run without any")
     bobs = run.positions()
@@ -120,7 +120,7 @@ def body_of(run: Run) -> Body:
     def is_rod(k: int) -> bool:
         if run.is_chain:
             return True
-        if kinds[k + 1] == "cart" or {k, k + 1} in joined:
+        if kinds[k + 1] == "cart" or {"weight", "floor"} & {*kinds[k : k + 2]} or {k, k + 1} in joined:
             return False
         if k == 0 and kinds[1] == "pivot" and not np.ptp(places[:, 1], axis=0).any():
             return False
@@ -253,12 +253,18 @@ class Film:
             ends = pixels[[each.start, each.end]]
             is_spring = each.kind == "spring"
             path = shapes.spring(*ends, share * SPRING * self.stage.size) if is_spring else ends
+            if each.kind == "pulleys":
+                path = shapes.over_pulleys(*ends)
+                self.canvas.discs(path[1:], np.full(2, shapes.PROPORTIONS["pulley"] * size), rod)
             self.canvas.lines([path], rod, 2 * share)
         self.canvas.lines([pixels[[*ends]] for ends in body.rods], rod, width)
         for middle, axes in carts:
             self.canvas.polygon(shapes.cart_box(middle, axes, size), bob)
             radius = shapes.PROPORTIONS["wheel"] * size
             self.canvas.discs(shapes.wheels(middle, axes, size), np.full(2, radius), rod)
+        for k in body.of_kind("weight"):
+            self.canvas.polygon(shapes.weight(pixels[k], size), bob)
+        self.canvas.lines([shapes.floor(pixels[k], size) for k in body.of_kind("floor")], RAIL, 2)
         bobs = body.of_kind("bob")
         radii = share * self.stage.size * body.radii[np.array(bobs, dtype=int) - 1]
         self.canvas.discs(pixels[bobs], radii, bob)

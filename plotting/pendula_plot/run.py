@@ -47,7 +47,8 @@ class Connection:
 
 @dataclass
 class Run:
-    """Rows of one run. `kinds` say what points are drawn as, "bob", "cart" or "pivot"; none where no file says so."""
+    """Rows of one run. `kinds` say what points are drawn as, "bob", "cart", "pivot", "weight" or "floor"; none where no
+    file says so."""
 
     name: str
     columns: dict[str, np.ndarray]

@@ -8,6 +8,10 @@ import numpy as np
 PROPORTIONS = {
     "springTurns": 10,
     "springEnd": 0.1,
+    "pulley": 0.6,
+    "weightWide": 0.8,
+    "weightHigh": 1.1,
+    "floorWide": 14,
     "cartLong": 1.6,
     "cartHigh": 0.62,
     "wheelAside": 0.95,
@@ -36,6 +40,22 @@ def wheels(middle: np.ndarray, axes: np.ndarray, size: float) -> np.ndarray:
     """Their middles, (2, 2)."""
     aside, below = PROPORTIONS["wheelAside"], PROPORTIONS["wheelBelow"]
     return middle + size * np.array([(-aside, -below), (aside, -below)]) @ axes
+
+
+def weight(top: np.ndarray, size: float) -> np.ndarray:
+    """Corners of a box whose upper edge hangs at a place, (4, 2)."""
+    wide, high = PROPORTIONS["weightWide"] * size, 2 * PROPORTIONS["weightHigh"] * size
+    return top + np.array([(-wide, 0), (wide, 0), (wide, -high), (-wide, -high)])
+
+
+def floor(middle: np.ndarray, size: float) -> np.ndarray:
+    """Its ends, (2, 2)."""
+    return middle + PROPORTIONS["floorWide"] * size * np.array([(-1, 0), (1, 0)])
+
+
+def over_pulleys(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """A thread up from a place, over a wheel there, to a wheel at another, (3, 2)."""
+    return np.array([start, (start[0], end[1]), end])
 
 
 def rail(middle: np.ndarray, axes: np.ndarray, size: float, reach: float) -> np.ndarray:

@@ -202,7 +202,8 @@ class RunSession {
     setup.options = by;
     setup.accuracy.error = 0;
     setup.doubted = false;
-    page_->begin_run("start + " + rounded(copy * options_.apart));
+    const view::Coordinate& first = page_->scene().coordinates.front();
+    page_->begin_run(first.name + " + " + rounded(copy * options_.apart) + ' ' + first.unit);
     Run run(setup);
     run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));
     const RunReport report = run.go(interrupted);

@@ -45,6 +45,7 @@ std::vector<std::size_t> drawn_columns(const Scene& scene) {
     columns.push_back(coordinate.column);
     columns.push_back(coordinate.rate_column);
   }
+  for (const ActingInput& input : scene.inputs) columns.push_back(input.column);
   for (const Point& point : scene.lengths.empty() ? scene.points : std::vector<Point>()) {
     for (int axis = 0; axis < point.components; ++axis) {
       columns.push_back(point.column + static_cast<std::size_t>(axis));
@@ -255,10 +256,12 @@ json Page::described(const Run& run) const {
 }
 
 json Page::described() const {
-  json coordinates = json::array(), points = json::array(), runs = json::array(), connections = json::array();
+  json coordinates = json::array(), inputs = json::array(), points = json::array(), runs = json::array(),
+       connections = json::array();
   for (const Coordinate& each : scene_.coordinates) {
     coordinates.push_back({each.name, each.unit, each.is_angle, each.column, each.rate_column});
   }
+  for (const ActingInput& each : scene_.inputs) inputs.push_back({each.name, each.unit, each.column});
   for (const Point& each : scene_.points) {
     points.push_back({each.name, each.column, each.components, each.mass, each.kind});
   }
@@ -271,6 +274,7 @@ json Page::described() const {
           {"columns", scene_.columns},
           {"dimension", scene_.dimension()},
           {"coordinates", coordinates},
+          {"inputs", inputs},
           {"points", points},
           {"connections", connections},
           {"rods", name_of(scene_.rods)},

@@ -39,6 +39,9 @@ class Page : public Observer {
   /// but no more than serve to be looked at  [s]. `run` is its number, from 0 on.
   RowTimes times(double duration, std::size_t run = 0) const;
 
+  /// What it shows.
+  const Scene& scene() const { return scene_; }
+
   /// Rows that follow are those of a run that the page calls `label`.
   void begin_run(const std::string& label);
 

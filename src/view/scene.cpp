@@ -74,7 +74,10 @@ Scene scene_of(const SystemSubject& subject) {
     scene.coordinates.push_back({std::string(info.coordinates[k]), std::string(info.coordinate_units[k]),
                                  info.is_angle[k], 1 + k, 1 + count + k});
   }
-  std::size_t column = 1 + 2 * count + info.inputs.size();
+  std::size_t column = 1 + 2 * count;
+  for (std::size_t k = 0; k < info.inputs.size(); ++k) {
+    scene.inputs.push_back({std::string(info.inputs[k]), std::string(info.input_units[k]), column++});
+  }
   for (std::size_t k = 0; k < info.points.size(); ++k) {
     scene.points.push_back({std::string(info.points[k]), column, info.point_sizes[k], 0, point_kind(info, k)});
     column += static_cast<std::size_t>(info.point_sizes[k]);

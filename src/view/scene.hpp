@@ -22,12 +22,18 @@ struct Point {
   std::size_t column = 0;
   int components = 2;
   double mass = 0;           ///< kg; 0 where it is not known
-  std::string kind = "bob";  ///< what it is drawn as: "bob", "cart" or "pivot"
+  std::string kind = "bob";  ///< what it is drawn as, a kind of SystemInfo::point_kinds
+};
+
+/// What acts on it from outside, and where a row has it.
+struct ActingInput {
+  std::string name, unit;
+  std::size_t column = 0;
 };
 
 /// Something drawn between two points, by number; -1 is the origin.
 struct Connection {
-  std::string kind;  ///< "spring" or "thread"
+  std::string kind;  ///< "spring", "thread" or "pulleys"
   int from = -1, to = -1;
 };
 
@@ -46,6 +52,7 @@ struct Scene {
   std::string version;   ///< of pendula
   std::vector<std::string> columns;
   std::vector<Coordinate> coordinates;
+  std::vector<ActingInput> inputs;
   std::vector<Point> points;
   std::vector<Connection> connections;
   Rods rods = Rods::none;

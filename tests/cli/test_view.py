@@ -23,7 +23,7 @@ def test_a_page_shows_every_run(pendula, double, tmp_path):
     assert result.status == 0, result.err
     assert result.json["view"] == "out.html"
     labels = [run["label"] for run in about(tmp_path / "out.html")["runs"]]
-    assert labels == ["start", "start + 5e-09", "start + 1e-08", "start + 1.5e-08"]
+    assert labels == ["start", *(f"theta_1 + {by} rad" for by in ("5e-09", "1e-08", "1.5e-08"))]
 
 
 def test_a_page_has_rows_of_its_own_and_changes_nothing(pendula, double, tmp_path):

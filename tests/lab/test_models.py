@@ -353,5 +353,5 @@ def test_built_in_models_say_what_they_are(open_lab):
         "joint_springs": ("bob,bob,bob", ""),
         "rods": ("bob", ""),
         "spring_pendulum": ("bob", "spring"),
-        "swinging_atwood": ("bob", "thread"),
+        "swinging_atwood": ("floor,weight,bob", "pulleys,thread"),
     }

@@ -82,7 +82,7 @@ def open_page(pages: Pages, browser: Browser) -> Iterator[Callable[..., Page]]:
         page = context.new_page()
         page.add_init_script(FRAME_WATCH)
         page.on("pageerror", lambda error: wrong.append(f"{name}: {error}"))
-        page.on("console", lambda said: said.type == "error" and wrong.append(f"{name}: {said.text}"))
+        page.on("console", lambda said: _complaint(said) and wrong.append(f"{name}: {said.text}"))
         address = f"file://{pages.folder}/{name}.html"
         page.on(
             "request", lambda request: request.url.startswith(("file:", "http")) and _only(request, address)
@@ -90,6 +90,10 @@ def open_page(pages: Pages, browser: Browser) -> Iterator[Callable[..., Page]]:
         page.goto(address)
         until(page, "performance.getEntriesByName('pendula first frame').length === 1")
         return page
+
+    # Warnings of the browser's own, of how fast it can draw here, are not the page's.
+    def _complaint(said) -> bool:
+        return said.type == "error" or said.text.startswith("THREE")
 
     def _only(request, address: str) -> None:
         if request.url != address:

@@ -151,6 +151,14 @@ def test_the_view_changes_and_comes_back(open_page, name):
         assert picture(page) == first, f"back from {what}"
 
 
+@pytest.mark.parametrize("name", ["demo", "hundred_in_space"])
+def test_turning_says_nothing_to_the_console(open_page, name):
+    page = open_page(name)
+    for key in ["d"] * 12 + ["w"] * 6:  # 29 and 17 complaints of three.js, once
+        page.keyboard.press(key)
+        picture(page)
+
+
 @pytest.mark.parametrize("name", ["demo", "cart"])
 def test_two_fingers_zoom(open_page, name):
     page = open_page(name, NARROW, touch=True)
@@ -254,7 +262,7 @@ def test_runs_that_differ_by_1e_9_part(open_page):
     described = page.evaluate("() => JSON.parse(document.getElementById('scene').textContent).runs.length")
     assert described == 50
     assert "50 runs" in page.inner_text("#subtitle")
-    assert "every 2nd of 1001 rows" in page.inner_text("#subtitle")
+    assert "the other runs: every 2nd of 1001 rows" in page.inner_text("#subtitle")
     least, largest = page.evaluate(
         """() => {
           const run = JSON.parse(document.getElementById('scene').textContent).runs[1];

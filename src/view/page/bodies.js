@@ -81,8 +81,9 @@ class RoundBodies {
   }
 }
 
-/// Makes a mesh a shadow.
+/// Makes a mesh a shadow. It is flat, so that three.js finds no inverse for its normals, which nobody asks for, and says so.
 function onFloor(mesh, matrix) {
+  mesh.normalMatrix.getNormalMatrix = () => mesh.normalMatrix;
   mesh.matrixAutoUpdate = false;
   mesh.matrix.copy(matrix);
   mesh.renderOrder = 1;

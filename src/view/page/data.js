@@ -9,6 +9,7 @@ class Run {
 
   constructor(described, base64) {
     Object.assign(this, described);
+    this.label = described.label.replace(/^\w+(?= \+ )/, symbol); // a copy: where it starts
     const bytes = bytesOfBase64(base64);
     let offset = 0;
     const take = (Kind) => {
@@ -77,6 +78,16 @@ const groups = (() => {
     if (!byKind.has(stem)) byKind.set(stem, { unit, isAngle, isLink: scene.lengths.length > 0, stem, members: [] });
     byKind.get(stem).members.push({ name, column, rate });
   });
+  // With what rounding of a coordinate compares: what those of its kind get to, of lengths points too.
+  const largest = (columns) => columns.reduce((most, column) => (runs[0].column(column) ?? []).reduce((m, x) => Math.max(m, Math.abs(x) || 0), most), 0);
+  const farthest = largest(scene.points.flatMap(([, first, components]) => Array.from({ length: components }, (_, axis) => first + axis)));
+  const duration = runs[0].end - runs[0].start || 1;
+  for (const { unit, isAngle, members } of byKind.values()) {
+    const least = isAngle ? 1 : unit === "m" ? farthest : 0;
+    const scale = Math.max(largest(members.map(({ column }) => column)), least) || 1;
+    const rateScale = Math.max(largest(members.map(({ rate }) => rate)), scale / duration);
+    for (const member of members) Object.assign(member, { scale, rateScale });
+  }
   for (const group of byKind.values()) {
     const names = group.members.length <= 3 ? group.members.map((m) => symbol(m.name)).join(", ") : "";
     group.label = group.isLink ? symbol(group.stem) : names || `in ${group.unit}`;

@@ -5,7 +5,9 @@ class Stage {
     this.canvas = host.appendChild(element("canvas", { tabIndex: 0, className: "still" }));
     this.pen = this.canvas.getContext("2d");
     this.shown = scene.coordinates.slice(0, 12);
-    this.ranges = this.shown.map(([, , , column]) => rangeOf(runs.map((run) => run.column(column))));
+    const members = groups.flatMap((group) => group.members);
+    const scaleOf = (column) => members.find((member) => member.column === column).scale;
+    this.ranges = this.shown.map(([, , , column]) => rangeOf(runs.map((run) => run.column(column)), undefined, scaleOf(column)));
     this.onChange = () => {};
   }
 

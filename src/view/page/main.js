@@ -22,7 +22,7 @@ function describePage() {
   const rows = (run) => (run.stride > 1 ? `every ${ordinal(run.stride)} of ${run.seen} rows` : `${run.rows} ${run.rows === 1 ? "row" : "rows"}`);
   const [first, second] = runs;
   const parts = [scene.subject, ...(second ? [`${runs.length} runs`] : []), rows(first)];
-  if (second && rows(second) !== rows(first)) parts.push(`of the others ${rows(second)}`);
+  if (second && rows(second) !== rows(first)) parts.push(`the other runs: ${rows(second)}`);
   at("subtitle").textContent = [...parts, `pendula ${scene.version}`].join(" · ");
 }
 

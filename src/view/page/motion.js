@@ -109,9 +109,10 @@ class Motion {
     }
   }
 
-  // Whether a rod is between point i and the one before it: nothing else is, and it moves. Carts are on rails.
+  // Whether a rod is between point i and the one before it: nothing else is, and it moves. Carts are on rails, weights hang on
+  // threads, floors lie.
   #isRod(i, on) {
-    if (kindOf(i) === "cart") return false;
+    if (kindOf(i) === "cart" || [i, on].some((each) => each >= 0 && ["weight", "floor"].includes(kindOf(each)))) return false;
     if (scene.connections.some(([, a, b]) => (a === i && b === on) || (a === on && b === i))) return false;
     if (on === origin && kindOf(i) === "pivot" && this.#span(i).every((span) => span === 0)) return false;
     return this.#isRigid(i, on);
@@ -223,12 +224,13 @@ class Motion {
     const size = this.reach * Math.min(0.055, Math.max(0.005, 0.07 / Math.sqrt(this.count)));
     return masses.map((mass, i) => {
       if (kindOf(i) === "pivot") return 0.4 * size;
+      if (kindOf(i) === "floor") return dimension === 2 ? size : 0.1 * size;
       return largest > 0 && mass > 0 ? size * Math.max(Math.cbrt(mass / largest), 0.2) : 0.7 * size;
     });
   }
 }
 
-/// What a point is drawn as: "bob", "cart" or "pivot".
+/// What a point is drawn as: "bob", "cart", "pivot", "weight" or "floor".
 function kindOf(i) {
   return scene.points[i][4];
 }
@@ -256,9 +258,9 @@ function sampleAt(times, time) {
   return low;
 }
 
-/// Points whose paths are traced: the last of a chain; of a model all, if they are few and move.
+/// Points whose paths are traced: the last of a chain; of a model all bobs and carts, if there are few.
 const traced = (() => {
   const last = scene.points.length - 1;
   if (last < 0 || scene.rods !== "rigid" || last > 3) return last < 0 ? [] : [last];
-  return scene.points.map((_, i) => i).filter((i) => i === last || i > 0);
+  return scene.points.map((_, i) => i).filter((i) => i === last || (i > 0 && ["bob", "cart"].includes(kindOf(i))));
 })();

@@ -62,6 +62,7 @@ class CoordinatesPanel {
     const curves = members.flatMap((member, m) => runs.map((run, k) => ({
       run,
       numbers: run.column(member.column),
+      scale: member.scale,
       colour: () => (runs.length > 1 ? palette.run(k) : palette.curves[m]),
       alpha: runs.length > 8 ? 0.4 : 1,
       name: runs.length > 1 ? run.label : symbol(member.name),
@@ -97,6 +98,39 @@ class CoordinatesPanel {
   #turns() {
     const { members } = groups[0];
     return members.some(({ column }) => runs[0].column(column).some((angle) => Math.abs(angle) > 2 * Math.PI));
+  }
+}
+
+/// What acts from outside over time, of one unit: of several runs one after the other.
+class InputsPanel {
+  constructor(player, unit, inputs) {
+    this.box = panel("Inputs");
+    this.plot = new TimePlot(this.box.plot, "Inputs over time", player);
+    const several = runs.length > 1;
+    this.curves = inputs.flatMap(([name, , column], m) => runs.map((run, k) => ({
+      run, numbers: run.column(column), name: symbol(name),
+      colour: () => (several ? palette.run(k) : palette.curves[m % palette.curves.length]), alpha: runs.length > 8 ? 0.4 : 1,
+    })));
+    const chips = several ? [] : this.curves.map(({ name }) => element("span", {}, element("i"), name));
+    const names = inputs.map(([name]) => symbol(name)).join(", ");
+    this.box.keys.append(...chips, `${several ? names : ""} in ${unitText(unit)}`.trim());
+    this.plot.axes.describe(`${inputs.map(([name]) => name).join(", ")} over time, in ${unit}`);
+  }
+
+  refresh() {
+    this.plot.show(this.curves, "linear");
+    this.#colourKeys();
+  }
+  redraw() {
+    this.plot.redraw();
+    this.#colourKeys();
+  }
+  drawCursor() {
+    this.plot.drawCursor();
+  }
+
+  #colourKeys() {
+    this.box.keys.querySelectorAll("i").forEach((mark, k) => (mark.style.background = rgba(this.curves[k].colour())));
   }
 }
 
@@ -139,6 +173,10 @@ function makePanels(player) {
     const least = Math.min(...runs.map((run) => run.stepSizes?.reduce((m, x) => (x < m ? x : m), Infinity) ?? Infinity));
     made.push(new LogPanel("Step size", player, (run) => run.stepSizes,
       (largest) => `From ${readable(least, 3)} to ${largest} ${scene.timeUnit}`));
+  }
+  for (const unit of new Set(scene.inputs.map(([, each]) => each))) {
+    const inputs = scene.inputs.filter(([, each, column]) => each === unit && runs.some((run) => run.column(column).some((x) => x !== 0)));
+    if (inputs.length > 0) made.push(new InputsPanel(player, unit, inputs));
   }
   if (groups.length > 0) {
     const angles = new CoordinatesPanel(player);

@@ -192,7 +192,8 @@ class Stage {
   #drawConnections(places) {
     const wide = Math.max(0.04 * this.motion.reach * this.scale, 3);
     for (const [kind, from, to] of scene.connections) {
-      drawConnection(this.pen, kind, this.#shown(places, from), this.#shown(places, to), wide);
+      if (kind === "pulleys") drawPulleys(this.pen, this.#shown(places, from), this.#shown(places, to), this.#cartSize(from));
+      else drawConnection(this.pen, kind, this.#shown(places, from), this.#shown(places, to), wide);
     }
   }
 
@@ -225,6 +226,8 @@ class Stage {
     const draw = (points, colour) => {
       for (const i of points.filter((each) => kindOf(each) !== "bob")) {
         if (kindOf(i) === "cart") this.#drawCart(i, places, colour);
+        else if (kindOf(i) === "weight") drawWeight(pen, this.#shown(places, i), this.#cartSize(i), colour);
+        else if (kindOf(i) === "floor") drawFloor(pen, this.#shown(places, i), this.#cartSize(i));
         else drawPivot(pen, this.#shown(places, i));
       }
       pen.fillStyle = colour;

@@ -3,6 +3,7 @@
 /// Lengths in the size of a cart, or parts of a spring; films have the same (plotting/pendula_plot/shapes.py).
 const proportions = {
   "springTurns": 10, "springEnd": 0.1,
+  "pulley": 0.6, "weightWide": 0.8, "weightHigh": 1.1, "floorWide": 14,
   "cartLong": 1.6, "cartHigh": 0.62, "wheelAside": 0.95, "wheelBelow": 0.66, "wheel": 0.36, "railBelow": 1.02
 };
 
@@ -61,6 +62,44 @@ function drawConnection(pen, kind, [x0, y0], [x1, y1], wide) {
   }
   pen.lineTo(x1, y1);
   pen.stroke();
+}
+
+/// A thread straight up from [x0, y0], over a wheel there, to a wheel at [x1, y1]; wheels in the size of a cart.
+function drawPulleys(pen, [x0, y0], [x1, y1], size) {
+  pen.beginPath();
+  pen.moveTo(x0, y0);
+  pen.lineTo(x0, y1);
+  pen.lineTo(x1, y1);
+  pen.stroke();
+  const rod = pen.strokeStyle;
+  for (const x of [x0, x1]) {
+    pen.beginPath();
+    pen.arc(x, y1, proportions.pulley * size, 0, 2 * Math.PI);
+    pen.fillStyle = palette.css("panel");
+    pen.fill();
+    pen.stroke();
+    pen.beginPath();
+    pen.arc(x, y1, 0.15 * size, 0, 2 * Math.PI);
+    pen.fillStyle = rod;
+    pen.fill();
+  }
+}
+
+/// A box whose upper edge hangs at [x, y].
+function drawWeight(pen, [x, y], size, colour) {
+  const { weightWide, weightHigh } = proportions;
+  pen.fillStyle = colour;
+  pen.fillRect(x - weightWide * size, y, 2 * weightWide * size, 2 * weightHigh * size);
+}
+
+/// A level line, and strokes below.
+function drawFloor(pen, [x, y], size) {
+  const wide = proportions.floorWide * size;
+  pen.strokeStyle = palette.css("edge");
+  pen.lineWidth = 2;
+  line(pen, x - wide, y, x + wide, y);
+  pen.lineWidth = 1;
+  for (let k = -wide; k < wide; k += 0.7 * size) line(pen, x + k + 0.5 * size, y, x + k, y + 0.5 * size);
 }
 
 function drawPivot(pen, [x, y]) {
