@@ -555,9 +555,13 @@ def test_first_look_has_what_the_first_lesson_uses(open_lab):
     assert page.evaluate("pendulaLab.watch.period") == pytest.approx(2.36784, abs=2e-4)
 
 
-@pytest.mark.parametrize("size", [PROJECTOR, WIDE, (1280, 720)])
+@pytest.mark.parametrize("size", [(1280, 720), TABLET, PHONE])
 def test_the_stopwatch_is_one_line(open_lab, size):
     page = open_lab(size=size, locale="ja-JP")
+    page.evaluate("document.getElementById('now').hidden = false")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    bar, last = (page.locator(each).bounding_box() for each in (".bar", "#speed"))
+    assert last["x"] + last["width"] <= bar["x"] + bar["width"]
     lines = page.evaluate(
         """[...document.querySelectorAll(".buttons button, .corner button, .tools button")].map((each) => {
              const range = document.createRange();
