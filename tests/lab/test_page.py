@@ -585,21 +585,22 @@ def test_panels_grow_on_a_large_screen(open_lab, level, part):
     assert filled > part  # measured 0.68 and 1
 
 
-def test_a_shaken_energy_is_a_band(open_lab):
-    """Twenty times a second is no line on some hundred pixels."""
+def test_what_shakes_is_a_band(open_lab):
+    """Energies go up and down twenty times a second, on some hundred pixels; so does the ball: its trace is an area."""
     page = open_lab("model=driven_chain&speed=4", size=WIDE, motion="no-preference")
     page.evaluate(
         """(() => {
           const pen = CanvasRenderingContext2D.prototype;
           const before = pen.fill;
-          window.bands = 0;
+          window.bands = window.areas = 0;
           pen.fill = function (...all) {
             if (this.globalAlpha < 1) ++window.bands;
+            if (this.canvas.id === "canvas" && String(this.fillStyle).startsWith("rgba(200, 80, 10,")) ++window.areas;
             return before.apply(this, all);
           };
         })()"""
     )
-    until(page, "pendulaLab.history.end > 4 && window.bands > 2")
+    until(page, "pendulaLab.history.end > 4 && window.bands > 2 && window.areas > 2")
 
 
 @pytest.mark.parametrize(
