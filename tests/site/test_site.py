@@ -61,10 +61,9 @@ def read(page: Path) -> Reader:
 
 
 def pages(site: Path) -> list[Path]:
-    """Those that Sphinx wrote; live pages are tested where they are made."""
-    return [
-        page for page in site.rglob("*.html") if page.relative_to(site).parts[0] not in ("live", "_static")
-    ]
+    """Those that Sphinx wrote; live pages and the laboratory are tested where they are made."""
+    others = ("live", "_static", "_downloads")
+    return [page for page in site.rglob("*.html") if page.relative_to(site).parts[0] not in others]
 
 
 def inner_links(site: Path, page: Path) -> Iterator[tuple[str, Path, str]]:
