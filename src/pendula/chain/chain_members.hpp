@@ -185,6 +185,21 @@ class ChainMembers
     return largest;
   }
 
+  /// The most that the polynomials through the stages' rates miss the rate of a rod at the start of the step, times h,
+  /// relative to its length, squared.
+  L missed_at_start() {
+    L largest(0.0);
+    for_each_rate([&](int i, const Vector& rate, const L&) {
+      L squared(0.0);
+      for (std::size_t d = 0; d < D; ++d) {
+        const L missed = this->columns_.at_start(detail::values_of(past(i).advance[d])) - this->columns_.h() * rate[d];
+        squared = fma(missed, missed, squared);
+      }
+      largest = max(largest, squared * constants_[i].inverse_square);
+    });
+    return largest;
+  }
+
   /// Moves the members that are `accepted` to the end of the step; the others stay where they are.
   void accept(const Mask& accepted) {
     Motion::move(accepted);

@@ -221,7 +221,9 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
       furthest = std::max(furthest, dot(missed, missed));
       fastest_ = std::max({fastest_, static_cast<double>(dot(bob, bob)), static_cast<double>(dot(last, last))});
     });
-    return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / fastest_) : 0;
+    const double fall = std::abs(static_cast<double>(this->gravity_ * constants_[0].length));
+    return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / std::max(fastest_, StepShape::slow_squared * fall))
+                        : 0;
   }
   /// How much larger the error of the prediction is than that defect.
   double predictor_gain() const {
@@ -255,7 +257,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
       decay = max(decay, coefficients * inverse_square);
     }
     StepShape shape = shape_of(quartic, decay);
-    if (S == StepShape::few_stages && loaded()) shape.beyond = missed_at_start();
+    if (loaded()) shape.beyond = missed_at_start();
     return shape;
   }
 

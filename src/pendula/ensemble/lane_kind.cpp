@@ -2,7 +2,6 @@
 #include <functional>
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/ensemble/lane_kind.hpp>
-#include <pendula/gauss/step_shape.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/system_subject.hpp>
@@ -10,11 +9,6 @@
 namespace pendula {
 
 namespace {
-
-// With loads, error estimates of few stages need what lanes do not look at.
-bool misses_loads(const RunSetup& setup, const RunOptions& options) {
-  return is_adaptive(options) && options.stages == StepShape::few_stages && setup.subject->loaded();
-}
 
 // Names the chain or kernel in `kind`; false if there are no lanes for it.
 template <class Space>
@@ -30,7 +24,7 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tang
     return kind.kernel != nullptr || !is_loaded;
   }
   if (!is_explicit(options.method)) {
-    if (options.solver == Solver::dense || misses_loads(setup, options)) return false;
+    if (options.solver == Solver::dense) return false;
     // Fixed points hardly converge by steps that do not resolve a chain; chosen steps become shorter.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
@@ -43,7 +37,6 @@ bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tan
   if ((with_tangents ? lanes.system_tangent_lanes : lanes.system_lanes)(options) == nullptr) return false;
   const bool by_series = options.method == Method::taylor;
   if (by_series && system->table().of_1.series_next == nullptr) return false;
-  if (!is_explicit(options.method) && misses_loads(setup, options)) return false;
   if (!is_explicit(options.method) && system->info().depends_on_time) return false;
   if (!system->switches().empty()) return false;  // each member ends its steps elsewhere
   if (system->may_be_narrow()) return false;      // lanes do not look between their stages

@@ -246,7 +246,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     }
     fastest_ = std::max({fastest_, speed, later});
     const double missed = missed_at_start();
-    return missed > 0 ? std::sqrt(missed / fastest_) : 0;
+    return missed > 0 ? std::sqrt(missed / std::max(fastest_, StepShape::slow_squared * pace_.natural_speed_squared()))
+                      : 0;
   }
   /// How much larger the error of the prediction is than that defect.
   double predictor_gain() const {
@@ -271,7 +272,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
       const double size = std::sqrt(squares[k]);
       shape.decay[static_cast<std::size_t>(k)] = size > rounding ? scale * size : 0;
     }
-    if (stages() == StepShape::few_stages && model().loaded()) {
+    if (model().loaded()) {
       find_rates(time_);
       const double size = std::abs(h()) * std::sqrt(missed_at_start());
       if (size > rounding) shape.beyond = scale * size;

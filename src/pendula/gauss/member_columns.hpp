@@ -48,6 +48,7 @@ class MemberColumns {
       inverse_b_[k] = 1 / b_[k];
       for (int j = 0; j < S; ++j) m_[k][j] = tableau_.m(k, j);
     }
+    at_start_ = polynomials_.lagrange(0.0);
     prepare(L(0.0));
     predict_at(L(1.0), L(1.0), L(1.0));
   }
@@ -155,6 +156,13 @@ class MemberColumns {
     return sum;
   }
 
+  /// The polynomial through stage values at the start of their step.
+  L at_start(const Stages& x) const {
+    L sum = at_start_[0] * x[0];
+    for (int j = 1; j < S; ++j) sum = fma(L(at_start_[at(j)]), x[at(j)], sum);
+    return sum;
+  }
+
   /// What stage values, times h, are weighed with when a share of the step is done.
   struct Shares {
     double share = -1;
@@ -225,6 +233,7 @@ class MemberColumns {
   detail::NodePolynomials<S, double> polynomials_;
   double even_[halves + 1][halves + 1] = {}, middle_[halves + 1] = {};
   double legendre_[count][count] = {}, m_[count][count] = {}, b_[count] = {}, c_[count] = {}, inverse_b_[count] = {};
+  std::array<double, count> at_start_;
   L h_{-1.0}, from_{-1.0}, ratio_{-1.0}, depth_{-1.0};
   Stages hb_, hc_, hc_low_;
   std::array<Stages, static_cast<std::size_t>(S)> within_;

@@ -160,6 +160,7 @@ class MembersStepper {
     }
     decay.moved = chain_.pace_squared();
     if constexpr (requires { chain_.imbalance(); }) decay.imbalance = chain_.imbalance();
+    if (any(chain_.loaded())) decay.beyond = select(chain_.loaded(), chain_.missed_at_start(), L(0.0));
     return decay;
   }
 

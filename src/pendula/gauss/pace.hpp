@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/width.hpp>
@@ -70,14 +71,21 @@ class Pace {
  private:
   static constexpr std::size_t width = width_of<Num>;
 
-  /// Forces and their slopes at a state.
+  /// Forces and their slopes at a state. Where something damps, what is odd in the rates is left out: a motion that is
+  /// damped at once is no pace.
   class Forces {
    public:
     Forces(const SystemAt<1>& here, const double* q, const double* v, std::span<const bool> is_angle)
         : is_angle_(is_angle), f_(is_angle.size()), p_D_v_(f_.size() * f_.size()), f_D_q_(p_D_v_) {
-      std::vector<double> p(f_.size()), p_D_q(p_D_v_.size()), f_D_v(p_D_v_.size());
-      here(&SystemFunctions::momentum_form_with_jacobians, q, v, p.data(), f_.data(), p_D_q.data(), p_D_v_.data(),
-           f_D_q_.data(), f_D_v.data());
+      find(here, q, v);
+      if (!here.model().damped()) return;
+      const std::vector<double> forces = f_, slopes = f_D_q_;
+      std::vector<double> back(f_.size());
+      std::transform(v, v + back.size(), back.begin(), std::negate<>());
+      find(here, q, back.data());
+      const auto mean = [](double one, double other) { return (one + other) / 2; };
+      std::ranges::transform(f_, forces, f_.begin(), mean);
+      std::ranges::transform(f_D_q_, slopes, f_D_q_.begin(), mean);
     }
 
     double mass(std::size_t k) const { return p_D_v_[k * f_.size() + k]; }
@@ -112,6 +120,12 @@ class Pace {
     }
 
    private:
+    void find(const SystemAt<1>& here, const double* q, const double* v) {
+      std::vector<double> p(f_.size()), p_D_q(p_D_v_.size()), f_D_v(p_D_v_.size());
+      here(&SystemFunctions::momentum_form_with_jacobians, q, v, p.data(), f_.data(), p_D_q.data(), p_D_v_.data(),
+           f_D_q_.data(), f_D_v.data());
+    }
+
     std::span<const bool> is_angle_;
     std::vector<double> f_, p_D_v_, f_D_q_;
   };

@@ -65,11 +65,12 @@ class StepController {
       const Num most = max(Num(most_imbalance * tolerance_) * decay.time(), Num(energy_rounding));
       log_excess = max(log_excess, log(max(decay.imbalance, Num(tiny)) / most));
     }
-    const Mask good = log_excess <= Num(0.0);
+    const Mask sees_start = decay.log_unseen(stages_) <= Num(log_tolerance_ - std::log(safety));
+    const Mask good = (log_excess <= Num(0.0)) & sees_start;
     const Mask bad = which & !good;
     if (any(bad)) {
       const Num factor = Num(0.9) * exp(log_excess * Num(-1.0 / order_));
-      shrink(bad, h, select(factor > Num(0.2), factor, Num(0.2)));
+      shrink(bad, h, select((factor > Num(0.2)) & sees_start, factor, Num(0.2)));
     }
     return which & good;
   }

@@ -23,7 +23,9 @@ template <class Num>
 struct StepDecay {
   /// The Legendre coefficients of the rates on the step, times h, relative to the size of the motion, squared  [rad²].
   std::array<Num, max_stages> squares;
-  Num beyond{0.0};     ///< that of degree s, the first that s stages cannot show; 0 where nobody looks
+  /// That of degree s, the first that s stages cannot show: by how much their polynomial misses the rates where the
+  /// step starts. 0 where nobody looks.
+  Num beyond{0.0};
   Num moved{0.0};      ///< (h R)², R in the middle
   Num imbalance{0.0};  ///< of energy, relative to what there is, not squared; 0 where nobody looks
 
@@ -42,14 +44,27 @@ struct StepDecay {
   /// coefficients begin with, also where the swing turns; or, where that is worse, as from those before them.
   Num log_error(int stages, int order) const {
     const Num log_moved = log_root(moved);
-    return log_of_step(log_moved, stages, order) - max(log_moved, Num(std::log(shortest)));
+    const Num least = select(beyond > Num(0.0), Num(std::log(shortest_damped)), Num(std::log(shortest)));
+    return log_of_step(log_moved, stages, order) - max(log_moved, least);
+  }
+
+  /// The logarithm of what no stage has seen of the rates at the start of the step, relative to those of the motion: of
+  /// what is damped before the first stage the coefficients know nothing, however small they are.
+  Num log_unseen(int stages) const {
+    if (!any(beyond > Num(0.0))) return Num(never);
+    const Num missed = log_root(beyond) - log_root(moved);
+    const Num& last = at(stages - 1);
+    const Num shown = stages == 1 ? last : max(last, at(stages - 2));
+    return select((beyond > Num(jump * jump) * shown) & (missed > Num(std::log(rounding))), missed, Num(never));
   }
 
   static constexpr double never = -700;  ///< a logarithm below those of all errors
 
  private:
   static constexpr double shortest = 1e-3;
-  static constexpr double small = 10;     // h R over the largest coefficient
+  static constexpr double shortest_damped = 1e-9;  // where rates may be damped far faster than anything else happens
+  static constexpr double small = 10;              // h R over the largest coefficient
+  static constexpr double jump = 10;      // from the last coefficients that are known to the next, as no motion has it
   static constexpr double tiny = 1e-300;  // in place of zero
   // Coefficients that are smaller, relative to h R, may be rounding; what follows from them would not show.
   static constexpr double rounding = 1e-13;
@@ -70,8 +85,8 @@ struct StepDecay {
     };
     const Num last = log_root(at(stages - 1));
     Num error = extended(last, stages - 1);
-    if (any(beyond > Num(0.0))) error = max(error, extended(log_root(beyond), stages));
-    if (stages == 2) return error;
+    // With so few stages all rests on one coefficient, which vanishes where loads balance gravity.
+    if (stages == 2) return any(beyond > Num(0.0)) ? max(error, extended(log_root(beyond), stages)) : error;
     const Num next = log_root(at(stages - 2));
     error = max(error, extended(next, stages - 2));
     if (stages == 3) return error;
@@ -87,18 +102,15 @@ struct StepDecay {
 struct StepShape {
   /// Sizes of the Legendre coefficients of the rates on the step, times h, relative to the size of the motion  [rad].
   std::array<double, max_stages> decay{};
-  /// The coefficient of degree s, the first that s stages cannot show: by how much their polynomial misses the rates
-  /// where the step starts. 0 where nobody looks.
-  double beyond = 0;
+  double beyond = 0;     ///< StepDecay::beyond; 0 where there are no loads, which alone damp
   double pace = 0;       ///< R in the middle  [1/s]
   double imbalance = 0;  ///< of energy, relative to what there is; 0 where nobody looks
 
   /// A coefficient that is smaller, relative to its coordinate, may be what that is rounded by.
   static constexpr double visible = 8 * std::numeric_limits<double>::epsilon();
 
-  /// With so few stages all rests on one coefficient, which vanishes where loads balance gravity: that of degree s is
-  /// worth its time where there are any.
-  static constexpr int few_stages = 2;
+  /// What a defect is compared with where hardly anything moves: this share of v² that forces bring.
+  static constexpr double slow_squared = 0.01;
 
   /// Of a step h.
   StepDecay<double> of(double h) const {

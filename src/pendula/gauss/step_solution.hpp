@@ -97,7 +97,6 @@ class StepSolution {
   // Smaller defects of a step are not computed. Defects are reported, not acted on: to change the step would spoil
   // symplecticity, and long chains are right in modes far slower than their fastest.
   static constexpr double noticed_defect = 1e-6;
-  static constexpr double visible_turn = 1e-10;  // rad, or of a coordinate
 
   // Where the first correction is larger than this, relative to the unknowns, or a link turns farther, the iteration
   // may have found a solution of the stage equations that is not the motion: its energy is looked at.
@@ -133,16 +132,12 @@ class StepSolution {
       if (!(energy < largest_energy_defect)) return Status::wrong_root;
       if (!(energy > -largest_energy_defect) && !traits_.damped) return Status::wrong_root;
     }
-    defect_ = may_have_defect(turn) ? solver_.defect(controller_.chooses() ? 0 : noticed_defect) : 0;
+    defect_ = may_have_defect() ? solver_.defect(noticed_defect) : 0;
     return Status::ok;
   }
 
-  // The error of a chosen step is known, but for motion that is damped out within a step, which stages do not show.
-  // Where hardly anything moves, there are no rates to compare a defect with.
-  bool may_have_defect(double turn) const {
-    if (traits_.dissipates || turn < visible_turn) return false;
-    return !controller_.chooses() || traits_.damped;
-  }
+  // The error of a chosen step is known.
+  bool may_have_defect() const { return !traits_.dissipates && !controller_.chooses(); }
 
   // Of a step of the controller's choice the error is known, too, so that it may turn farther.
   double largest_turn() const { return controller_.chooses() ? 3 : traits_.largest_turn; }

@@ -168,6 +168,9 @@ class GaussStepper : private StepSolution<Solver> {
   // With so many links or coordinates, an iteration takes less time than to ask for the sign to stop.
   static constexpr int quick_parts = 1000;
 
+  // From there on it is asked whether a given step has missed what is damped before its first stage.
+  static constexpr double visible_defect = 1e-4;
+
   // A step of its own choice fails where it would be smaller than this fraction of the time so far, or was tried so
   // often.
   static constexpr double smallest_chosen = 1e-13;
@@ -307,7 +310,7 @@ class GaussStepper : private StepSolution<Solver> {
       return Base::failure(Status::singular_mass_matrix, h, outcome.iterations, {outcome.residual, -1});
     }
     statistics_.largest_defect = std::max(statistics_.largest_defect, defect_);
-    count_unseen();
+    count_unseen(h);
     if (remembers_) remember(h, false);
     if constexpr (LinearizingSolver<Solver>) {
       if (linearization_ && !looks_) solver_.linearize(linearization_->next());
@@ -319,9 +322,13 @@ class GaussStepper : private StepSolution<Solver> {
   }
 
   // Steps of its own choice were looked at when they were found.
-  void count_unseen() {
+  void count_unseen(double h) {
+    if (looks_) return;
+    if (traits_.loaded && defect_ > visible_defect) {
+      const double missed = std::exp(solver_.shape().of(h).log_unseen(traits_.stages));
+      statistics_.step_over(time(), missed, options_.tolerance);
+    }
     if constexpr (requires { solver_.unseen(); }) {
-      if (looks_) return;
       if (!controller_.chooses()) unseen_ = solver_.unseen();
       statistics_.step_over(time(), controller_.chooses() ? unseen_.impulse : unseen_.effect, options_.tolerance);
     }

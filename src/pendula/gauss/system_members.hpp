@@ -191,11 +191,22 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
       const L a = columns_.legendre(n, pasts_[k][newest_]);
       squared = fma(masses_.inertia(k) * a, a, squared);
     }
-    const L share = squared * (pace_squared_ / fastest);
-    constexpr double visible = StepShape::visible;
-    const L seen = select((squared > L(visible * visible) * size_squared_) & (fastest > L(0.0)), share, L(0.0));
-    if constexpr (has_tangent) return fma(L(tangent_share * tangent_share), tangent_.decay(n), seen);
-    return seen;
+    const L shown = seen(squared, fastest);
+    if constexpr (has_tangent) return fma(L(tangent_share * tangent_share), tangent_.decay(n), shown);
+    return shown;
+  }
+
+  /// By how much the polynomial through the rates misses those at the start of the step, times h, relative to the size
+  /// of the motion, squared; 0 where it may be what coordinates are rounded by.
+  L missed_at_start() const {
+    Base::find_rates(time_);
+    const L fastest = Base::fastest();
+    L squared(0.0);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const L missed = columns_.at_start(pasts_[k][newest_]) - columns_.h() * Base::rate(k);
+      squared = fma(masses_.inertia(k) * missed, missed, squared);
+    }
+    return seen(squared, fastest);
   }
 
   /// Energy that is missing at the end of the step or too much, relative to what there is, where lengths are among the
@@ -248,6 +259,13 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   struct NoTangent {
     NoTangent(MemberSystems<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
+
+  // Of an increment, squared, what is no rounding of coordinates, relative to the size of the motion.
+  L seen(const L& squared, const L& fastest) const {
+    constexpr double visible = StepShape::visible;
+    const L share = squared * (pace_squared_ / fastest);
+    return select((squared > L(visible * visible) * size_squared_) & (fastest > L(0.0)), share, L(0.0));
+  }
 
   void find_scale() {
     L step(0.0);

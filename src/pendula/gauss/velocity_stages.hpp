@@ -97,7 +97,7 @@ class VelocityStages {
     }
     fastest_ = std::max({fastest_, first, last});
     const double off = missed_at_start();
-    return off > 0 ? std::sqrt(off / fastest_) : 0;
+    return off > 0 ? std::sqrt(off / std::max(fastest_, StepShape::slow_squared * pace_.natural_speed_squared())) : 0;
   }
 
   Tempo tempo() const {
@@ -134,7 +134,7 @@ class VelocityStages {
       const double size = std::sqrt(squares[k]);
       if (size > rounding) shape.decay[static_cast<std::size_t>(k)] = size * shape.pace / std::sqrt(fastest);
     }
-    if (stages() == StepShape::few_stages && at_.model().loaded()) {
+    if (at_.model().loaded()) {
       const double size = std::abs(columns_.h()) * std::sqrt(missed_at_start());
       if (size > rounding) shape.beyond = size * shape.pace / std::sqrt(fastest);
     }

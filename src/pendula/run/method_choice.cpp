@@ -36,19 +36,39 @@ std::string against_series(const Subject& subject, double tolerance) {
   return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";
 }
 
-/// Whether damping at the start is much faster than anything that swings or turns there: explicit steps follow it.
-bool is_stiff(const Subject& subject, const Motion& start) {
+/// Whether damping at a place is much faster than anything that swings or turns there: explicit steps follow it.
+bool is_stiff(const Subject& subject, const Motion& place) {
   constexpr double much = 5;
-  const Eigen::Index n = 2 * start.q.size();
+  const Eigen::Index n = 2 * place.q.size();
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> a(n, n);
-  linearize(subject, start, a.data(), nullptr);
+  linearize(subject, place, a.data(), nullptr);
   if (!a.allFinite()) return true;
-  double decay = 0, pace = start.v.cwiseAbs().maxCoeff();
+  double decay = 0, pace = place.v.cwiseAbs().maxCoeff();
   for (const std::complex<double>& rate : eigenvalues(a.data(), n)) {
     decay = std::max(decay, -rate.real());
     pace = std::max({pace, rate.real(), std::abs(rate.imag())});
   }
   return decay > much * pace;
+}
+
+/// Whether it is so at the start, or where coarse steps come to: friction grows as rates fall, and a mass may run into
+/// a damper.
+bool becomes_stiff(const RunSetup& setup) {
+  constexpr int most_steps = 256;
+  const Subject& subject = *setup.subject;
+  if (is_stiff(subject, setup.start)) return true;
+  RunOptions coarse = setup.options;
+  coarse.stages = 4;
+  coarse.tolerance = 1e-3;
+  const auto integrator = subject.make_integrator(coarse);
+  if (!integrator->start(setup.start)) return false;
+  const double end = setup.start.time + setup.duration;
+  for (int step = 1; step <= most_steps && integrator->time() < end; ++step) {
+    if (!integrator->step(end - integrator->time())) return false;
+    const bool is_power_of_two = (step & (step - 1)) == 0;
+    if (is_power_of_two && is_stiff(subject, integrator->state())) return true;
+  }
+  return is_stiff(subject, integrator->state());
 }
 
 /// The size of the first step; 0 if there is none.
@@ -74,7 +94,7 @@ MethodChoice choose_method(const RunSetup& setup) {
   options.method = Method::taylor;
   options.tolerance = step_tolerance(asked, 1, finest);
   try {
-    if (subject.damped() && is_stiff(subject, setup.start)) return {0, "strong damping"};
+    if (subject.damped() && becomes_stiff(setup)) return {0, "strong damping"};
     const double step = first_step(setup, options);
     if (step == 0) return {0, "a start from which series take no step"};
     const double steps = setup.duration / step;

@@ -76,14 +76,15 @@ class SystemModel {
     return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), 0);
   }
 
-  // Forces are loads if their power is not zero; this is sampled in a few generic states. Systems that depend on time
-  // explicitly always count as loaded.
+  // Forces are loads if their power is not zero; this is sampled in a few generic states, near and far, since a force may
+  // act in places alone. Systems that depend on time explicitly always count as loaded.
   void sample_power() {
     std::vector<double> q(coordinates()), v(coordinates()), driven(inputs());
     const std::vector<double> none(inputs());
     for (int k = 1; k <= samples; ++k) {
+      const double far = k <= near_samples ? 1 : std::pow(10, k - near_samples);
       for (std::size_t i = 0; i < q.size(); ++i) {
-        q[i] = 0.5 + std::sin(1.7 * k + 2.3 * static_cast<double>(i));
+        q[i] = far * (0.5 + std::sin(1.7 * k + 2.3 * static_cast<double>(i)));
         v[i] = std::cos(1.1 * k + 3.1 * static_cast<double>(i));
       }
       const double time = 0.37 * k;
@@ -98,7 +99,7 @@ class SystemModel {
     }
   }
 
-  static constexpr int samples = 4;
+  static constexpr int near_samples = 4, samples = 8;
 
   const SystemTable* table_;
   std::vector<double> parameters_, constant_;
