@@ -154,7 +154,7 @@ def test_the_view_changes_and_comes_back(open_page, name):
 @pytest.mark.parametrize("name", ["demo", "hundred_in_space"])
 def test_turning_says_nothing_to_the_console(open_page, name):
     page = open_page(name)
-    for key in ["d"] * 12 + ["w"] * 6:  # 29 and 17 complaints of three.js, once
+    for key in ["d"] * 12 + ["w"] * 6:  # three.js complained of flat shadows, dozens of times
         page.keyboard.press(key)
         picture(page)
 
