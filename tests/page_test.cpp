@@ -228,7 +228,7 @@ TEST_F(PageTest, WantsRowsAtTimesThatItCanKeep) {
     }
   }
   EXPECT_EQ(Page(file(), chain_scene<Planar>(1)).times(0).at(1), 1);  // a run of one row
-  EXPECT_EQ(Page(file(), chain_scene<Planar>(2)).times(10).interval, 0.004);
+  EXPECT_EQ(Page(file(), chain_scene<Planar>(2)).times(10).interval, 0.0025);
 }
 
 TEST_F(PageTest, LongRowsAreFloatsOfWhatIsDrawn) {

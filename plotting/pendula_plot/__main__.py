@@ -31,6 +31,8 @@ except ImportError as missing:
 def plot(arguments: argparse.Namespace) -> None:
     from .drawing import draw, read
     from .figure import Choice, write
+    from .motion import trouble
+    from .run import Run
 
     output = Path(arguments.output)
     paths = [Path(run) for run in arguments.runs]
@@ -41,7 +43,12 @@ def plot(arguments: argparse.Namespace) -> None:
         tuple(filter(None, arguments.show.split(","))),
         tuple(filter(None, arguments.coordinates.split(","))),
         arguments.wrapped,
+        tuple(filter(None, arguments.phase.split(","))),
+        arguments.event,
     )
+    for run in files:
+        if isinstance(run, Run) and (told := trouble(run)):
+            print(f"pendula: warning: {told}", file=sys.stderr)
     with told_of_numbers(files[0].name):
         write(draw(files, choice), output)
 
@@ -61,11 +68,11 @@ def film(arguments: argparse.Namespace) -> None:
     from .film import check, write
 
     check(Path(arguments.output))
-    if arguments.run is None:
+    if not arguments.runs:
         return
-    run = read_run(Path(arguments.run))
-    with told_of_numbers(run.name):
-        write(run, Path(arguments.output), arguments.fps, arguments.size, arguments.seconds)
+    runs = [read_run(Path(run)).between(arguments.start, arguments.end) for run in arguments.runs]
+    with told_of_numbers(runs[0].name):
+        write(runs, Path(arguments.output), arguments.fps, arguments.size, arguments.speed)
 
 
 def gallery(arguments: argparse.Namespace) -> None:
@@ -85,6 +92,8 @@ def parse() -> argparse.Namespace:
     command.add_argument("--from", dest="start", type=float, default=float("-inf"))
     command.add_argument("--to", dest="end", type=float, default=float("inf"))
     command.add_argument("--wrapped", action="store_true")
+    command.add_argument("--phase", default="")
+    command.add_argument("--event", default="")
     command.set_defaults(run_command=plot)
     command = commands.add_parser("map")
     command.add_argument("file")
@@ -94,11 +103,13 @@ def parse() -> argparse.Namespace:
     command.add_argument("--contour", default="")
     command.set_defaults(run_command=draw_map)
     command = commands.add_parser("film")
-    command.add_argument("run", nargs="?", help="none: only look whether a film of that name can be made")
+    command.add_argument("runs", nargs="*", help="none: only look whether a film of that name can be made")
     command.add_argument("--output", required=True)
     command.add_argument("--fps", type=float, default=30)
     command.add_argument("--size", type=int, default=640)
-    command.add_argument("--seconds", type=float, default=float("inf"))
+    command.add_argument("--speed", type=float, default=1)
+    command.add_argument("--from", dest="start", type=float, default=float("-inf"))
+    command.add_argument("--to", dest="end", type=float, default=float("inf"))
     command.set_defaults(run_command=film)
     command = commands.add_parser("gallery")
     command.add_argument("folder")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from . import motion
 from .run import PlotError, Run
 
 # Okabe and Ito's colours, told apart by the colour-blind; black first.
@@ -29,6 +30,8 @@ class Choice:
     panels: tuple[str, ...] = ()  # of trajectories, names of PANELS; none: what there is
     coordinates: tuple[str, ...] = ()  # by name; none: a few
     wrapped: bool = False
+    phase: tuple[str, ...] = ()  # the two columns of phase portraits; none: a coordinate and its rate
+    event: str = ""  # of sections: the only one to show; none: all
 
 
 def symbol(name: str) -> str:
@@ -103,30 +106,72 @@ def curves(runs: list[Run], names: list[str]) -> list[tuple[Run, str, str, str]]
     ]
 
 
-def draw_series(axes: Axes, runs: list[Run], choice: Choice) -> None:
-    names = chosen(runs, choice)
+def base_of(column: str) -> str:
+    """What columns of all links have in common: theta of theta_1, theta_dot of theta_dot_1."""
+    base, _, link = column.rpartition("_")
+    return base if link.isdigit() else column
+
+
+def groups(run: Run, names: list[str], choice: Choice) -> list[list[str]]:
+    """Columns that share an axis: those of one unit. What turns round and round, as phi does, has one of its own, and
+    so has what has no unit."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        turns = base_of(name) == "phi" and not choice.wrapped
+        found.setdefault(base_of(name) if turns else run.unit(name) or base_of(name), []).append(name)
+    return list(found.values())
+
+
+def axis_label(run: Run, names: list[str]) -> str:
+    """Of an axis for several columns: what they are, if that is one thing, and their unit."""
+    if len(names) == 1:
+        return label(run, names[0])
+    unit, bases = run.unit(names[0]), dict.fromkeys(map(base_of, names))
+    what = ", ".join(map(symbol, bases)) if len(bases) <= 3 else ""
+    return f"{what} [{unit}]".strip() if unit else what
+
+
+def draw_series(axes: Axes, runs: list[Run], choice: Choice, names: list[str]) -> None:
+    """Columns that share an axis, over time."""
     for run, name, colour, text in curves(runs, names):
         axes.plot(run.time, shown(run, name, choice), color=colour, label=text)
-    units = {runs[0].unit(name) for name in names}
     axes.set_xlabel(label(runs[0], "t"))
-    axes.set_ylabel(label(runs[0], names[0]) if len(names) == 1 else ", ".join(sorted(units)))
+    axes.set_ylabel(axis_label(runs[0], names))
     legend(axes)
 
 
-def draw_phase(axes: Axes, runs: list[Run], choice: Choice) -> None:
+def phase_of(runs: list[Run], choice: Choice) -> tuple[str, str]:
+    """The columns of a phase portrait."""
+    if choice.phase:
+        if len(choice.phase) != 2:
+            got = ", ".join(choice.phase)
+            raise PlotError(f"--phase: expected two columns, as in theta_1,theta_dot_1, got {got}")
+        chosen(runs, replace(choice, coordinates=choice.phase))
+        return choice.phase[0], choice.phase[1]
     rates = {coordinate.name: coordinate.rate for coordinate in runs[0].coordinates}
     name = ([name for name in choice.coordinates if name in rates] or list(rates))[-1]
-    for run, column, colour, text in curves(runs, [name]):
-        axes.plot(
-            shown(run, column, choice), run.columns[rates[name]], color=colour, label=text, linewidth=0.7
-        )
-    axes.set_xlabel(label(runs[0], name))
-    axes.set_ylabel(label(runs[0], rates[name]))
+    return name, rates[name]
+
+
+def draw_phase(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    across, up = phase_of(runs, choice)
+    for run, column, colour, text in curves(runs, [across]):
+        axes.plot(shown(run, column, choice), shown(run, up, choice), color=colour, label=text, linewidth=0.7)
+    axes.set_xlabel(label(runs[0], across))
+    axes.set_ylabel(label(runs[0], up))
     if len(runs) > 1:
         legend(axes)
 
 
 def draw_energy(axes: Axes, runs: list[Run], choice: Choice) -> None:
+    """The energy where loads act, which change it; else how far it is off."""
+    if any(run.loaded for run in runs):
+        draw_series(axes, runs, choice, ["energy"])
+    else:
+        draw_energy_error(axes, runs)
+
+
+def draw_energy_error(axes: Axes, runs: list[Run]) -> None:
     """|E − E₀| against what rounding alone would give: a last bit of the largest energy a row, added up by chance."""
     for k, run in enumerate(runs):
         energy = run.columns["energy"]
@@ -195,13 +240,14 @@ def draw_steps(axes: Axes, runs: list[Run], choice: Choice) -> None:
         legend(axes)
 
 
-PANELS: dict[str, Callable[[Axes, list[Run], Choice], None]] = {
+PANELS: dict[str, Callable[..., None]] = {
     "series": draw_series,
     "phase": draw_phase,
     "energy": draw_energy,
     "trace": draw_trace,
     "steps": draw_steps,
 }
+OF_MOTION = ("series", "phase", "trace")  # they show what is between rows, too
 
 
 def possible(run: Run, panel: str) -> bool:
@@ -245,14 +291,19 @@ def figure(runs: list[Run], choice: Choice) -> Figure:
     panels = panels_of(runs, choice)
     if not panels:
         raise PlotError(f"{runs[0].name}: expected columns to draw, got {', '.join(runs[0].columns)}")
-    width = min(len(panels), 2)
-    height = (len(panels) + 1) // 2
+    fine = [motion.finer(run) for run in runs]
+    drawings: list[tuple[str, list]] = []
+    for panel in panels:
+        parts = groups(runs[0], chosen(runs, choice), choice) if panel == "series" else [None]
+        drawings += [(panel, [part] if part else []) for part in parts]
+    width = min(len(drawings), 2)
+    height = (len(drawings) + 1) // 2
     with style():
         drawn = Figure(figsize=(4.2 * width, 3.2 * height), layout="constrained")
-        for k, panel in enumerate(panels):
+        for k, (panel, part) in enumerate(drawings):
             space = panel == "trace" and runs[0].dimension == 3
             axes = drawn.add_subplot(height, width, k + 1, **({"projection": "3d"} if space else {}))
-            PANELS[panel](axes, runs, choice)
+            PANELS[panel](axes, fine if panel in OF_MOTION else runs, choice, *part)
     return drawn
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from . import animation, shapes
+from . import animation, motion, shapes
 from .canvas import Canvas, Colour
 from .run import Connection, PlotError, Run
 
@@ -304,9 +304,20 @@ def encode_by_ffmpeg(images: Iterator[Image.Image], path: Path, fps: float, size
         part.unlink(missing_ok=True)
 
 
-def write(run: Run, path: Path, fps: float, size: int, seconds: float = math.inf) -> None:
-    """Writes a film in the format that its name ends in. Raises PlotError."""
-    film = Film([run], fps, size, seconds)
+def alike(runs: list[Run], spacing: float) -> list[Run]:
+    """Runs with the same rows, close enough for traces; as long as the shortest."""
+    if all(len(run.time) == len(runs[0].time) for run in runs) and (
+        len(runs[0].time) < 2 or np.max(np.diff(runs[0].time)) <= 1.5 * spacing
+    ):
+        return runs
+    begin, end = max(run.time[0] for run in runs), min(run.time[-1] for run in runs)
+    times = np.append(np.arange(begin, end, spacing), end)
+    return [motion.at(run, times) for run in runs]
+
+
+def write(runs: list[Run], path: Path, fps: float, size: int, speed: float = 1) -> None:
+    """Writes a film in the format that its name ends in, `speed` times as fast as the motion. Raises PlotError."""
+    film = Film(alike(runs, speed / fps / 4), fps / speed, size)
     if path.suffix in FFMPEG:
         encode_by_ffmpeg(film.frames(), path, fps, size)
     else:

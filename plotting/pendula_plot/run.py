@@ -57,6 +57,7 @@ class Run:
     settings: list[str] = field(default_factory=list)
     kinds: list[str] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
+    loaded: bool = False  # whether loads act, which change the energy; False where no file says so
 
     @property
     def time(self) -> np.ndarray:
@@ -208,6 +209,7 @@ def read_hdf5(path: Path) -> Run:
         scenario, settings = (file["run"][name].asstr()[()] for name in ("scenario", "set"))
         drawing = json.loads(file["run/drawing"].asstr()[()]) if "drawing" in file["run"] else {}
     run = Run(str(path), columns, units, scenario, json.loads(settings))
+    run.loaded = bool(drawing.get("loaded", False))
     run.kinds = [str(kind) for kind in drawing.get("kinds", [])]
     run.connections = [
         Connection(str(kind), int(start), int(end)) for kind, start, end in drawing.get("connections", [])

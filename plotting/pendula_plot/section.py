@@ -123,7 +123,16 @@ def draw(axes: Axes, sections: list[Section], columns: tuple[str, str]) -> None:
     axes.legend(loc="best", fontsize="small")
 
 
+def of_event(section: Section, event: str) -> Section:
+    """Those of one event; of all, where none is named."""
+    there = list(dict.fromkeys(section.events))
+    if event and event not in there:
+        raise PlotError(f"{section.name}: expected an event, one of {', '.join(there)}, got {event}")
+    return section.only(section.events == event) if event else section
+
+
 def figure(sections: list[Section], choice: Choice) -> Figure:
+    sections = [of_event(section, choice.event) for section in sections]
     columns = chosen(sections, choice)
     with style():
         drawn = Figure(figsize=(5.4, 4.6), layout="constrained")

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import _core
 from ._core import InputError
-from ._runs import missing, places
+from ._pictures import module_of_pictures
+from ._runs import missing
 
 if TYPE_CHECKING:
     import xarray
@@ -53,7 +49,7 @@ def map(
     '$θ_{1}$ [rad]'
     """
     try:
-        drawing = _drawing()
+        drawing = module_of_pictures("map")
         import matplotlib.pyplot as plt
     except ImportError as error:
         raise missing("pictures", error) from None
@@ -63,7 +59,7 @@ def map(
         raise InputError(f'scale: expected "log" or "linear", got {scale!r}')
     line, level = contour if contour is not None else ("", None)
     choice = drawing.MapChoice(scale or "", None if level is None else float(level))
-    errors = importlib.import_module("pendula_plot.errors")
+    errors = module_of_pictures("errors")
     try:
         shown = _of(drawing, data, key, line)
         # Before the style is in force: the first figure chooses a backend, and what that sets has to stay, or else a
@@ -102,15 +98,3 @@ def _of(drawing: Any, data: xarray.Dataset, key: str, line: str) -> Any:
         bool(data.attrs["complete"]),
         drawing.duration_of(data.attrs, [name for name, _, _ in axes], unit),
     )
-
-
-def _drawing() -> Any:
-    """The module of the pictures that draws maps."""
-    if "pendula_plot" not in sys.modules:
-        folder = Path(_core.plotting_folder(places()[0])) / "pendula_plot"
-        found = importlib.util.spec_from_file_location("pendula_plot", folder / "__init__.py")
-        assert found is not None and found.loader is not None
-        package = importlib.util.module_from_spec(found)
-        sys.modules["pendula_plot"] = package
-        found.loader.exec_module(package)
-    return importlib.import_module("pendula_plot.map")

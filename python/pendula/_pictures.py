@@ -2,18 +2,38 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _core
 from ._core import InputError
-from ._runs import missing, number
+from ._runs import missing, number, places
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+
+POINTS = 2000  # of a curve: as many as a picture can show
+
+
+def module_of_pictures(name: str) -> Any:
+    """A module of the package that draws for `pendula plot` and `pendula map`, too."""
+    if "pendula_plot" not in sys.modules:
+        folder = Path(_core.plotting_folder(places()[0])) / "pendula_plot"
+        found = importlib.util.spec_from_file_location("pendula_plot", folder / "__init__.py")
+        assert found is not None and found.loader is not None
+        package = importlib.util.module_from_spec(found)
+        sys.modules["pendula_plot"] = package
+        found.loader.exec_module(package)
+    return importlib.import_module(f"pendula_plot.{name}")
 
 
 def _new_figure() -> Figure:
@@ -25,16 +45,42 @@ def _new_figure() -> Figure:
 
 
 def plot(
-    rows: NDArray[np.float64], columns: list[int], names: list[str], units: list[str], axes: Axes | None
+    columns: dict[str, NDArray[np.float64]],
+    units: dict[str, str],
+    names: list[str],
+    axes: Axes | None,
+    label: str | None,
 ) -> Axes:
-    """Columns of rows over the first one."""
-    if axes is None:
-        axes = _new_figure().add_subplot()
-    for column in columns:
-        axes.plot(rows[:, 0], rows[:, column], label=f"{names[column]} [{units[column]}]")
-    axes.set_xlabel(f"t [{units[0]}]")
-    axes.legend()
-    return axes
+    """Columns over time, those of one unit in one panel; in the style of `pendula plot`. Raises InputError."""
+    try:
+        import matplotlib.pyplot as plt
+
+        drawing, run = module_of_pictures("figure"), module_of_pictures("run")
+    except ImportError as error:
+        raise missing("pictures", error) from None
+    shown = module_of_pictures("motion").finer(run.Run("", columns, units))
+    choice = drawing.Choice()
+    parts = drawing.groups(shown, names or drawing.chosen([shown], choice), choice)
+    if axes is not None and len(parts) > 1:
+        told = "; ".join(", ".join(part) for part in parts)
+        raise InputError(f"axes: expected columns that share an axis, got {told}")
+    with drawing.style():
+        if axes is None:
+            height = max(4.8, 2.6 * len(parts))
+            figure = plt.figure(figsize=(6.4, height), layout="constrained")
+            panels = list(figure.subplots(len(parts), sharex=True, squeeze=False)[:, 0])
+        else:
+            panels = [axes]
+        for panel, part in zip(panels, parts, strict=True):
+            for name in part:
+                symbol = drawing.symbol(name)
+                told = symbol if label is None else label if len(part) == 1 else f"{label}, {symbol}"
+                colour = drawing.COLOURS[len(panel.lines) % len(drawing.COLOURS)]
+                panel.plot(shown.time, shown.columns[name], color=colour, label=told)
+            panel.set_ylabel(drawing.axis_label(shown, part))
+            drawing.legend(panel)
+        panels[-1].set_xlabel(drawing.label(shown, "t"))
+    return panels[0]
 
 
 def frames(t: NDArray[np.float64], seconds: float | None, fps: float) -> NDArray[np.float64]:

@@ -288,20 +288,62 @@ class Solution:
         how = f", {s['steps']} steps of {s['method']}, energy error {s['energy_error_max']:.2g}" if s else ""
         return f"<Solution: {rows}{how}: {self.message}>"
 
-    def plot(self, *names: str, axes: Axes | None = None) -> Axes:
-        """Draws columns over time with matplotlib; without names, the coordinates.
+    def plot(self, *names: str, axes: Axes | None = None, label: str | None = None) -> Axes:
+        """Draws columns over time with matplotlib; without names, some coordinates.
 
+        Columns of one unit share a panel. Where a run takes no more than a few seconds it is made again, by the same
+        steps, for as many points as a picture can show.
+
+        Parameters
+        ----------
+        *names : str
+            Columns; without an index, of all links.
+        axes : matplotlib Axes, optional
+            To draw in, beside what is there; for columns of one unit.
+        label : str, optional
+            What the legend calls this run.
+
+        Returns
+        -------
+        Axes
+            The panel of the first column.
+
+        Examples
+        --------
         >>> import pendula
-        >>> axes = pendula.Chain(links=2).simulate(1.0, theta=1.0).plot("theta", "x_2")
-        >>> [line.get_label() for line in axes.lines]
-        ['theta_1 [rad]', 'theta_2 [rad]', 'x_2 [m]']
+        >>> double = pendula.Chain(links=2)
+        >>> axes = double.simulate(1.0, theta=1.0).plot("theta_2", label="1")
+        >>> axes = double.simulate(1.0, theta=1.1).plot("theta_2", axes=axes, label="1.1")
+        >>> axes.get_ylabel(), [line.get_label() for line in axes.lines]
+        ('$θ_{2}$ [rad]', ['1', '1.1'])
         """
         from ._pictures import plot
 
-        if not names:
-            names = tuple(self.names[: len(self.names) // 2])
-        columns = [self._places[column] for name in names for column in self._columns(name)]
-        return plot(self._rows, columns, self._result.columns, self._result.units, axes)
+        columns = [column for name in names for column in self._columns(name)]
+        rows = self._fine_rows()
+        return plot(
+            {name: rows[:, place] for name, place in self._places.items()},
+            dict(zip(self.columns, self.units, strict=True)),
+            columns,
+            axes,
+            label,
+        )
+
+    def _fine_rows(self) -> NDArray[np.float64]:
+        """Rows close enough for a picture, if they can be made in a few seconds; else those that there are."""
+        from ._pictures import POINTS
+
+        quick = self.summary.get("wall_seconds", inf) < 5
+        if not quick or not 2 <= self.t.size < POINTS or not self.t[-1] > self.t[0]:
+            return self._rows
+        times = np.linspace(self.t[0], self.t[-1], POINTS)
+        for more in (self.t, *self.t_events.values()):
+            times = np.union1d(times, more[:POINTS])
+        try:
+            rows = self._rows_at(times[(times >= self.t[0]) & (times <= self.t[-1])])
+        except _core.InputError:  # of a file that another build has made
+            return self._rows
+        return rows if len(rows) else self._rows
 
     def animate(self, *, seconds: float | None = None, fps: int = 30) -> FuncAnimation:
         """A matplotlib animation of the points, in the plane or in space, in a figure of its own.

@@ -188,7 +188,7 @@ class System(ABC):
             How long, in s. Left out, the last of the times ``t``.
         t : array_like, optional
             Times of the rows, in s, increasing from 0 on. Left out, there is a row every ``every`` steps, or every
-            ``interval`` seconds.
+            ``interval`` seconds; without these, some hundreds or a few thousand evenly in time, and the last state.
         start : mapping, optional
             Coordinates and rates at the start by name, as keyword arguments: ``theta="90 deg"``, ``theta_dot=[0, 1]``.
             A single number of a chain stands for every link; rates are 0 unless given.
@@ -244,8 +244,6 @@ class System(ABC):
             "accuracy": accuracy,
             "estimate": estimate,
         }
-        if times is None and every is None and interval is None:
-            every = 1
         tables["output"] = {
             "every": every,
             "interval": interval,

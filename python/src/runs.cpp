@@ -159,7 +159,7 @@ std::unique_ptr<Result> make_run(const io::RunSource& source, RunModel model, Py
                   }
                   for (std::string& warning : summary.warnings) warnings.push_back(std::move(warning));
                   summary.warnings = std::move(warnings);
-                  io::describe(setup, summary);
+                  io::describe(run.setup(), summary);
                   summary.kernel_by = found.by();
                   io::describe(scenario, source.text.name, summary);
                   result->summary = io::to_json(summary);

@@ -61,6 +61,42 @@ bool are_panels(const std::string& text) {
   return good;
 }
 
+/// Parses size=480,speed=0.5,…; empty for any other text.
+std::optional<FilmOptions> film_options(const std::string& text) {
+  FilmOptions film;
+  std::istringstream words(text);
+  bool good = !text.empty() && text.back() != ',';
+  for (std::string word; good && std::getline(words, word, ',');) {
+    const std::size_t equals = std::min(word.find('='), word.size() - 1);
+    const std::string_view key = std::string_view(word).substr(0, equals);
+    const auto number = read_number<double>(std::string_view(word).substr(equals + 1));
+    const auto take = [&](double& place, double least, double most) {
+      good = number && *number >= least && *number <= most;
+      if (good) place = *number;
+    };
+    constexpr double longest = std::numeric_limits<double>::max();
+    if (key == "size") {
+      take(film.size, 16, 4096);
+      good = good && film.size == 2 * std::floor(film.size / 2);  // an even number, as films want it
+    } else if (key == "fps") {
+      take(film.fps, 1, 240);
+    } else if (key == "speed") {
+      take(film.speed, 1e-9, 1e9);
+    } else if (key == "from") {
+      take(film.from, 0, longest);
+    } else if (key == "to") {
+      take(film.to, 0, longest);
+    } else {
+      good = false;
+    }
+  }
+  return good && film.from < film.to ? std::optional(film) : std::nullopt;
+}
+
+bool is_film(const std::string& text) {
+  return film_options(text).has_value();
+}
+
 bool is_finite(const std::string& text) {
   return std::isfinite(read_number<double>(text).value_or(std::nan("")));
 }
@@ -145,6 +181,9 @@ void CommandLine::add_simulate() {
   resume->excludes(simulate->get_option("SCENARIO"));
   simulate->parse_complete_callback([&options] {
     if (options.scenario.empty() && !options.resume) throw CLI::RequiredError("SCENARIO");
+    if (options.copies > 0 && !options.view && !options.video)
+      throw CLI::RequiresError("--copies", "--view or --video");
+    if (options.copies > 0 && options.resume) throw CLI::ExcludesError("--copies", "--resume");
   });
   add_set(simulate, options.overrides);
   takes_file(simulate->add_option(
@@ -159,12 +198,21 @@ void CommandLine::add_simulate() {
                                       "Write a page to look at the motion: one HTML file that needs nothing else"),
                  {".html"});
   view->excludes(resume);
-  takes_file(simulate->add_option("--video", options.video,
-                                  "Write a film of the motion: .mp4 or .webm by ffmpeg, .gif or .webp without"),
-             {".mp4", ".webm", ".gif", ".webp"});
-  CLI::Option* const copies = simulate->add_option("--copies", options.copies,
-                                                   "Show so many further runs in the page, from starts a little apart");
-  copies->type_name("N")->needs(view)->check(CLI::Range(1, 1000));
+  CLI::Option* const video =
+      takes_file(simulate->add_option("--video", options.video,
+                                      "Write a film of the motion: .mp4 or .webm by ffmpeg, .gif or .webp without"),
+                 {".mp4", ".webm", ".gif", ".webp"});
+  simulate
+      ->add_option_function<std::string>(
+          "--film", [&options](const std::string& text) { options.film = *film_options(text); },
+          "Of the film: size=640 (pixels), fps=30, speed=1 (0.5: half as fast), from=0, to=10 (seconds of the motion)")
+      ->type_name("KEY=VALUE,...")
+      ->check(expect("some of size=640 (even, 16 to 4096), fps=30 (1 to 240), speed=1, from=0, to=10, with commas",
+                     is_film))
+      ->needs(video);
+  CLI::Option* const copies = simulate->add_option(
+      "--copies", options.copies, "Show so many further runs in the page and the film, from starts a little apart");
+  copies->type_name("N")->check(CLI::Range(1, 1000));
   simulate->add_option("--apart", options.apart, "How far one start is from the next, in the first coordinate (1e-9)")
       ->type_name("SIZE")
       ->check(expect("a number that is finite", is_finite))
@@ -247,6 +295,11 @@ void CommandLine::add_pictures() {
           "Which, with commas, as in theta_1,theta_3, else a few; of events one, against its rate, or two columns; "
           "of exponents lambda_1,...")
       ->type_name("LIST");
+  plot->add_option("--phase", plot_options.phase,
+                   "Phase portrait of two columns, the first to the right, as in theta_1,theta_dot_1")
+      ->type_name("X,Y");
+  plot->add_option("--event", plot_options.event, "Of events only these, as the other ones spoil a section")
+      ->type_name("NAME");
   plot->add_option("--from", plot_options.from, "First time to show")->type_name("TIME");
   plot->add_option("--to", plot_options.to, "Last time to show")->type_name("TIME");
   plot->add_flag("--wrapped", plot_options.wrapped, "Angles from -pi to pi");

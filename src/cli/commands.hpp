@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,14 @@ enum ExitStatus {
   unfinished = 3,   ///< members of an ensemble are missing; --resume goes on
 };
 
+/// What a film looks like: words of the package that draws it.
+struct FilmOptions {
+  double fps = 30;                                                ///< frames a second
+  double speed = 1;                                               ///< of the motion, relative to real time
+  double size = 640;                                              ///< of the picture, in pixels
+  double from = 0, to = std::numeric_limits<double>::infinity();  ///< which part of the motion  [s]
+};
+
 struct SimulateOptions {
   std::string command;                 ///< as typed, for files
   std::string scenario;                ///< the file; empty if a run is resumed
@@ -25,10 +34,11 @@ struct SimulateOptions {
   std::optional<std::string> events;   ///< CSV file of events
   std::optional<std::string> view;     ///< page of the run
   std::optional<std::string> video;    ///< film of the run
-  int copies = 0;                      ///< further runs in the page, from other starts
-  double apart = 1e-9;                 ///< distance of neighbouring starts, in the first coordinate
-  bool json = false;                   ///< summary as JSON
-  bool quiet = false;                  ///< no summary and no progress; warnings, errors and the JSON object remain
+  FilmOptions film;
+  int copies = 0;       ///< further runs in the page and the film, from other starts
+  double apart = 1e-9;  ///< distance of neighbouring starts, in the first coordinate
+  bool json = false;    ///< summary as JSON
+  bool quiet = false;   ///< no summary and no progress; warnings, errors and the JSON object remain
 };
 
 /// Runs a scenario. The trajectory goes to the file, the summary to standard output (to standard error if standard
@@ -73,6 +83,8 @@ struct PlotOptions {
   std::string output;             ///< .svg, .png or .pdf
   std::string show;               ///< panels, separated by commas; empty for all
   std::string coordinates;        ///< names, separated by commas; empty for a few
+  std::string phase;              ///< two names for the axes of phase portraits; empty for a coordinate and its rate
+  std::string event;              ///< of sections: the one event to show; empty for all
   std::optional<double> from, to;
   bool wrapped = false;  ///< angles within one turn
 };
@@ -94,8 +106,8 @@ ExitStatus map(const MapOptions& options);
 /// Whether a film of that name can be made here; if not, prints why to standard error.
 ExitStatus check_film(const std::string& output);
 
-/// Makes a film of a run file.
-ExitStatus film(const std::string& run, const std::string& output);
+/// Makes a film of run files, all in one picture.
+ExitStatus film(const std::vector<std::string>& runs, const std::string& output, const FilmOptions& film);
 
 /// Makes a page of striking cases, with films, in a folder.
 ExitStatus gallery(const std::string& folder);

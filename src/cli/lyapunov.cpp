@@ -52,6 +52,7 @@ std::string to_json(const LyapunovRun& found, const Statistics& statistics) {
                                     {"exponents_error", numbers(found.errors)},
                                     {"sum", found.sum},
                                     {"duration", found.duration},
+                                    {"averaged_from", found.since},
                                     {"ftle", found.ftle},
                                     {"megno", found.megno},
                                     {"steps", statistics.steps},
@@ -61,7 +62,10 @@ std::string to_json(const LyapunovRun& found, const Statistics& statistics) {
 
 void print_text(const LyapunovSpectrum& found, const Statistics& statistics, const std::string& second) {
   std::cout << std::left << std::setw(19) << "duration" << shortest(found.duration) << ' ' << second << ", "
-            << statistics.steps << " steps\n\n"
+            << statistics.steps << " steps\n"
+            << std::setw(19) << "averaged"
+            << "from " << rounded(found.since, 6) << ' ' << second
+            << " on, when tangents have found their directions\n\n"
             << std::right << std::setw(5) << "" << std::setw(14) << ("1/" + second) << std::setw(12) << "error" << '\n';
   for (Eigen::Index k = 0; k < found.exponents.size(); ++k) {
     std::cout << std::setw(5) << k + 1 << std::setprecision(6) << std::setw(14) << found.exponents[k]
@@ -69,7 +73,8 @@ void print_text(const LyapunovSpectrum& found, const Statistics& statistics, con
   }
   std::cout << '\n'
             << std::left << std::setprecision(6) << std::setw(19) << "sum" << found.sum << '\n'
-            << std::setw(19) << "finite time" << found.ftle << "      of one tangent\n"
+            << std::setw(19) << "finite time" << found.ftle
+            << "      of one tangent from the start on, as the last row of -o has it\n"
             << std::setw(19) << "MEGNO" << found.megno << "      2 where motion is regular\n";
 }
 

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <filesystem>
 #include <pendula/numeric/number_text.hpp>
 #include <string>
@@ -27,8 +28,12 @@ ExitStatus draw(const std::vector<std::string>& arguments) {
 }  // namespace
 
 ExitStatus plot(const PlotOptions& options) {
-  std::vector<std::string> arguments{"plot", "--output=" + options.output, "--show=" + options.show,
-                                     "--coordinates=" + options.coordinates};
+  std::vector<std::string> arguments{"plot",
+                                     "--output=" + options.output,
+                                     "--show=" + options.show,
+                                     "--coordinates=" + options.coordinates,
+                                     "--phase=" + options.phase,
+                                     "--event=" + options.event};
   if (options.from) arguments.push_back("--from=" + shortest(*options.from));
   if (options.to) arguments.push_back("--to=" + shortest(*options.to));
   if (options.wrapped) arguments.emplace_back("--wrapped");
@@ -46,8 +51,17 @@ ExitStatus check_film(const std::string& output) {
   return draw({"film", "--output=" + output});
 }
 
-ExitStatus film(const std::string& run, const std::string& output) {
-  return draw({"film", "--output=" + output, "--", run});
+ExitStatus film(const std::vector<std::string>& runs, const std::string& output, const FilmOptions& film) {
+  std::vector<std::string> arguments{"film",
+                                     "--output=" + output,
+                                     "--size=" + shortest(film.size),
+                                     "--fps=" + shortest(film.fps),
+                                     "--speed=" + shortest(film.speed),
+                                     "--from=" + shortest(film.from)};
+  if (std::isfinite(film.to)) arguments.push_back("--to=" + shortest(film.to));
+  arguments.emplace_back("--");
+  arguments.insert(arguments.end(), runs.begin(), runs.end());
+  return draw(arguments);
 }
 
 ExitStatus gallery(const std::string& folder) {

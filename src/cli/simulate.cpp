@@ -43,8 +43,10 @@ io::RunSource read_run_source(const SimulateOptions& options) {
   return io::resumed_source(*options.resume, io::read_saved_run(*options.resume), options.overrides);
 }
 
-/// Rows of a film: four for each frame of pendula_plot, so that traces are smooth.
-const RowTimes film_times{1.0 / 120, {}};
+/// Rows of a film: four for each frame, so that traces are smooth.
+RowTimes film_times(const FilmOptions& film) {
+  return {film.speed / film.fps / 4, {}};
+}
 
 /// Gives a page's laboratory the model that moves there. Where its program cannot be made, there is no laboratory.
 void add_model(view::Scene& scene, const io::ModelName& name, const SystemInfo& info,
@@ -78,14 +80,15 @@ class RunSession {
         origin_(io::origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
+        film_contents_(contents(plan, scene, false)),
         file_(open_rows(output_, options, origin_, source.saved, contents(plan, scene))),
         events_(open_events(options, setup_)),
-        film_rows_(open_film_rows(contents(plan, scene, false))),
+        film_rows_(open_film_rows()),
         progress_(setup_, !options.quiet) {
     if (file_) run_.add(*file_);
     if (page_) run_.add(*page_, page_->times(setup_.duration));
     if (events_) run_.add(*events_);
-    if (film_rows_) run_.add(*film_rows_, film_times);
+    if (film_rows_) run_.add(*film_rows_, film_times(options_.film));
     run_.add(last_);
     run_.add(progress_);
     warn(plan.warnings);
@@ -98,9 +101,11 @@ class RunSession {
     io::Summary summary;
     if (page_) page_->begin_run(options_.copies > 0 ? "start" : "");
     static_cast<RunReport&>(summary) = from_ ? go_on(interrupted) : run_.go(interrupted);
-    io::describe(setup_, summary);
+    io::describe(run_.setup(), summary);
     summary.event_file = options_.events;
-    if (page_) finish_page(interrupted, summary);
+    if (page_) page_->end_run(summary.energy_error);
+    run_copies(interrupted, summary);
+    if (page_) finish_page(summary);
     if (options_.video) make_film(summary);
     if (summary.end == RunEnd::stopped) tell_how_to_go_on(summary);
     warn(std::exchange(summary.warnings, {}));
@@ -138,13 +143,14 @@ class RunSession {
     }
   }
 
-  /// Runs the copies and writes the page.
-  void finish_page(const std::function<bool()>& interrupted, io::Summary& summary) {
-    page_->end_run(summary.energy_error);
+  void run_copies(const std::function<bool()>& interrupted, io::Summary& summary) {
     for (int copy = 1; copy <= options_.copies && !interrupted(); ++copy) run_copy(copy, summary.options, interrupted);
     if (summary.ending.ok() && options_.copies > 0 && interrupted()) {
       summary.ending = {"interrupted", "interrupted before all copies were run", {}, {}};
     }
+  }
+
+  void finish_page(io::Summary& summary) {
     try {
       page_->close();
     } catch (const io::OutputError& error) {
@@ -160,22 +166,31 @@ class RunSession {
 
   /// A film is made from a temporary run file with rows for each frame; for a resumed run from its own file, which has
   /// the earlier rows.
-  std::unique_ptr<io::RunFile> open_film_rows(const io::RunContents& contents) const {
+  std::unique_ptr<io::RunFile> open_film_rows(int copy = 0) const {
     if (!options_.video || (from_ && keeps_run_file())) return nullptr;
-    return std::make_unique<io::RunFile>(film_rows_name(), origin_, contents);
+    return std::make_unique<io::RunFile>(film_rows_name(copy), origin_, film_contents_);
   }
 
   bool keeps_run_file() const { return output_ && is_run_file(*output_, options_); }
 
-  std::string film_rows_name() const { return *options_.video + ".rows" + std::to_string(getpid()) + ".h5"; }
+  std::string film_rows_name(int copy) const {
+    const std::string number = copy == 0 ? "" : "." + std::to_string(copy);
+    return *options_.video + ".rows" + std::to_string(getpid()) + number + ".h5";
+  }
 
   void make_film(io::Summary& summary) {
-    const std::string rows = film_rows_ ? film_rows_name() : *output_;
-    if (film(rows, *options_.video) != done && summary.ending.ok()) {
+    std::vector<std::string> rows;
+    for (int copy = 0; film_rows_ && copy <= options_.copies; ++copy) {
+      if (std::filesystem::exists(film_rows_name(copy))) rows.push_back(film_rows_name(copy));
+    }
+    if (!film_rows_) rows.push_back(*output_);
+    if (film(rows, *options_.video, options_.film) != done && summary.ending.ok()) {
       summary.ending = {"output_failed", *options_.video + ": the film could not be made", {}, {}};
     }
     std::error_code unknown;
-    if (film_rows_) std::filesystem::remove(rows, unknown);
+    for (const std::string& file : film_rows_ ? rows : std::vector<std::string>()) {
+      std::filesystem::remove(file, unknown);
+    }
   }
 
   /// Keeps the checkpoint in the run file, or in a file of its own.
@@ -202,12 +217,16 @@ class RunSession {
     setup.options = by;
     setup.accuracy.error = 0;
     setup.doubted = false;
-    const view::Coordinate& first = page_->scene().coordinates.front();
-    page_->begin_run(first.name + " + " + rounded(copy * options_.apart) + ' ' + first.unit);
+    if (page_) {
+      const view::Coordinate& first = page_->scene().coordinates.front();
+      page_->begin_run(first.name + " + " + rounded(copy * options_.apart) + ' ' + first.unit);
+    }
     Run run(setup);
-    run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));
+    if (page_) run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));
+    const std::unique_ptr<io::RunFile> rows = open_film_rows(copy);
+    if (rows) run.add(*rows, film_times(options_.film));
     const RunReport report = run.go(interrupted);
-    page_->end_run(report.energy_error);
+    if (page_) page_->end_run(report.energy_error);
     const io::Ending ending = io::ending_of(report, setup.subject->coordinates(), io::event_names(setup));
     if (!ending.ok() && report.end != RunEnd::stopped) {
       warn({"copy " + std::to_string(copy) + " ends early: " + ending.message});
@@ -229,6 +248,7 @@ class RunSession {
   io::RunOrigin origin_;
   std::optional<std::string> output_;
   std::unique_ptr<view::Page> page_;  // opened first; an existing file stays until it is written
+  io::RunContents film_contents_;
   std::unique_ptr<io::RowsFile> file_;
   std::unique_ptr<io::EventFile> events_;
   std::unique_ptr<io::RunFile> film_rows_;

@@ -49,7 +49,7 @@ RunSetup MemberScenario::setup() const {
           .start = start,
           .options = asked.run,
           .duration = asked.duration,
-          .every = asked.every,
+          .every = asked.rows.chosen && !is_adaptive(asked.run) ? 10 : asked.every,  // looks at the energy
           .accuracy = asked.places.contains("accuracy") ? asked.accuracy : Accuracy{},
           .doubted = false,
           .estimate = asked.estimate,

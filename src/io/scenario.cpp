@@ -1,5 +1,6 @@
 #include "io/scenario.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -302,6 +303,29 @@ RowTimes read_row_times(const Section& section, double duration) {
   return rows;
 }
 
+/// Time between rows where nothing says: a round number that gives some hundreds of them, or a hundred a unit of time
+/// as long as these are a few thousand. 0 for a run that takes no time.
+double usual_interval(double duration) {
+  const double least = duration / std::clamp(100 * duration, 1000.0, 5000.0);
+  const double power = std::floor(std::log10(least)), whole = std::pow(10, std::abs(power));
+  for (const double digit : {1, 2, 5, 10}) {
+    const double round = power < 0 ? digit / whole : digit * whole;  // exactly what is written so
+    if (round >= least * (1 - 1e-9) && std::isnormal(round)) return round;
+  }
+  return 0;
+}
+
+/// Chooses rows for a plan that has none: evenly in time, and where steps are constant at their ends.
+void choose_rows(RunPlan& plan) {
+  plan.rows.chosen = true;
+  const double interval = usual_interval(plan.duration);
+  if (is_adaptive(plan.run)) {
+    plan.rows.interval = interval;
+  } else {
+    plan.every = static_cast<std::int64_t>(std::max(1.0, std::floor(interval / plan.run.step * (1 + 1e-9))));
+  }
+}
+
 /// Reads [run] and [output].
 void read_plan(const RunSections& sections, RunPlan& plan) {
   plan.run = read_run(sections.run);
@@ -312,8 +336,9 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
   const auto every = sections.output.find("every");
-  plan.every = every ? every->integer() : is_adaptive(plan.run) ? 1 : 10;
+  if (every) plan.every = every->integer();
   plan.rows = read_row_times(sections.output, plan.duration);
+  if (!every && !plan.rows.any()) choose_rows(plan);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
   plan.events = read_events(sections.root);
   if (!plan.feedback.empty()) plan.places["feedback"] = plan.feedback.front().place;

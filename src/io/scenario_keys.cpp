@@ -152,8 +152,10 @@ constexpr std::array<ScenarioKey, 10> run = {
 };
 
 constexpr std::array<ScenarioKey, 4> output = {
-    an_integer("every", 1, any_most, InWords{"10; 1 where steps are not constant"}, "steps from row to row"),
-    a_number("interval", "s", positive, none, "time from row to row, in place of every"),
+    an_integer("every", 1, any_most, InWords{"of constant steps, so that rows are as interval would have them"},
+               "steps from row to row"),
+    a_number("interval", "s", positive, InWords{"a round number: 400 to 5000 rows; the last state is one, too"},
+             "time from row to row, in place of every"),
     {.name = "times",
      .type = numbers,
      .unit = "s",

@@ -24,7 +24,7 @@ constexpr std::size_t enough_rows = 2048;                 // of exact ones
 constexpr std::size_t fewest_rows = 512;                  // before a page may grow
 constexpr std::size_t most_marks = 1000;                  // of an event in a run
 constexpr double alike = 1e-6;                            // steps that differ by less are of one size
-constexpr double least_wanted = 600, most_wanted = 2500;  // rows of runs that are not very long
+constexpr double least_wanted = 2000, most_wanted = 4000;  // rows of runs that are not very long
 
 /// Bytes of a row in base64: the time, the numbers, and floats that tell its energy error, its distance and its step.
 std::size_t row_bytes(std::size_t numbers, std::size_t size) {
@@ -80,7 +80,7 @@ Page::Page(const std::string& file, Scene scene, std::size_t runs, const PageLim
 RowTimes Page::times(double duration, std::size_t run) const {
   if (duration == 0) return {1, {}};
   const auto most = [&](std::size_t k) { return static_cast<double>(most_rows(k) - 2); };  // the ends, without thinning
-  const double wanted = std::max({least_wanted, std::min(most_wanted, 250 * duration), 50 * duration});
+  const double wanted = std::max({least_wanted, std::min(most_wanted, 400 * duration), 50 * duration});
   double interval = duration / std::min(std::ceil(wanted), most(0));
   while (run > 0 && duration / interval > most(run)) interval *= 2;
   return {interval, {}};

@@ -55,12 +55,12 @@ std::vector<Connection> connections_of(const SystemInfo& info) {
 }
 
 std::string drawing_of(const Scene& scene) {
-  if (scene.rods != Rods::rigid) return {};
   using nlohmann::json;
+  if (scene.rods != Rods::rigid) return json{{"loaded", scene.loaded}}.dump();
   json kinds = json::array(), connections = json::array();
   for (const Point& point : scene.points) kinds.push_back(point.kind);
   for (const Connection& each : scene.connections) connections.push_back({each.kind, each.from, each.to});
-  return json{{"kinds", kinds}, {"connections", connections}}.dump();
+  return json{{"kinds", kinds}, {"connections", connections}, {"loaded", scene.loaded}}.dump();
 }
 
 Scene scene_of(const SystemSubject& subject) {

@@ -23,6 +23,9 @@ def test_the_spectrum_is_told(pendula, double, tmp_path):
     times = [float(row[0]) for row in rows]
     assert times == sorted(times)
     assert 20 < len(rows) < 10000
+    # The file averages from the start on, to the very end; the spectrum leaves out the first tenth.
+    assert (times[-1], found["averaged_from"]) == (50, 5)
+    assert float(rows[-1][1]) == pytest.approx(found["ftle"], rel=1e-12)  # measured MEASURE
 
 
 def test_the_leading_ones_alone_are_those_of_all(pendula, double):
@@ -40,6 +43,8 @@ def test_the_table_has_them_all(pendula, double):
     assert run.status == 0, run.err
     rows = [line.split()[0] for line in run.out.splitlines() if line.startswith("    ")]
     assert rows[1:] == ["1", "2", "3", "4"]
+    assert "averaged           from 0.1 s on, when tangents have found their directions\n" in run.out
+    assert "of one tangent from the start on, as the last row of -o has it\n" in run.out
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,10 @@ import sys
 import numpy as np
 import pytest
 from conftest import DOUBLE, ROOT
+from pendula_plot import motion
 from pendula_plot.__main__ import main
 from pendula_plot.figure import Choice, figure, symbol
+from pendula_plot.motion import trouble
 from pendula_plot.run import PlotError, Run, read_run
 
 ALL = ("series", "phase", "energy", "trace")
@@ -39,13 +41,103 @@ def test_panels_show_the_columns_of_the_run(runs):
     assert np.array_equal(trace.lines[0].get_ydata(), run.columns["y_2"])
 
 
+def swing(rows, turns=5.0):
+    """A pendulum that swings once a second, with so many rows."""
+    t = np.linspace(0, turns, rows)
+    theta, rate = np.cos(2 * np.pi * t), -2 * np.pi * np.sin(2 * np.pi * t)
+    columns = {"t": t, "theta_1": theta, "theta_dot_1": rate, "x_1": np.sin(theta), "y_1": -np.cos(theta)}
+    return Run("swing", columns)
+
+
+def test_the_motion_between_rows_is_drawn():
+    """As a row a step leaves it: with straight lines the bob would leave its circle by 0.03."""
+    series, phase, trace = figure([swing(61)], Choice(("series", "phase", "trace"))).axes
+    t, theta = series.lines[0].get_data()
+    assert len(t) > 400
+    assert np.max(np.abs(theta - np.cos(2 * np.pi * t))) < 5e-4  # measured 1.9e-4
+    assert np.max(np.abs(np.hypot(*trace.lines[0].get_data()) - 1)) < 2e-3  # measured 9.0e-4
+    theta, rate = phase.lines[0].get_data()
+    assert np.max(np.abs(np.hypot(theta, rate / (2 * np.pi)) - 1)) < 5e-3  # measured 2.5e-3
+    few = swing(61)
+    assert all(np.isin(few.time, t)) and trouble(few) is None  # and rows stay
+
+
+def test_rows_that_are_close_stay_as_they_are():
+    run = swing(1001)
+    assert motion.finer(run) is run
+
+
+def test_a_blow_stays_a_corner():
+    """A ball that falls for a second, is thrown up again, and so on."""
+    t = np.linspace(0, 4, 399)
+    since = np.mod(t, 2.0) - 1
+    run = Run("ball", {"t": t, "height": 1 - since**2, "height_dot": -2 * since})
+    drawn = motion.finer(run)
+    assert np.min(drawn.columns["height"]) >= 0 and trouble(run) is None
+
+
+def test_rows_that_are_too_few_are_told(tmp_path, monkeypatch, capsys):
+    assert trouble(swing(21)).startswith("swing: 21 rows are too few to tell the motion between them")
+    few = swing(13).columns
+    header = ",".join(few)
+    np.savetxt(
+        tmp_path / "few.csv", np.column_stack([*few.values()]), "%.17g", ",", header=header, comments=""
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["pendula_plot", "plot", "few.csv", "--output", "few.svg"])
+    assert main() == 0
+    assert capsys.readouterr().err.startswith("pendula: warning: few.csv: 13 rows are too few")
+
+
+def test_a_default_run_is_one_that_can_be_drawn(pendula, tmp_path):
+    """A single pendulum at all defaults: series take steps of a sixth of a second."""
+    single = DOUBLE.replace("[1.0, 0.5]", "1.0\nlinks = 1").replace("[2.5, 3.0]", "2.5")
+    (tmp_path / "single.toml").write_text(single.split("[run]")[0])
+    assert pendula("simulate", "single.toml", "-o", "single.csv").returncode == 0
+    run = read_run(tmp_path / "single.csv")
+    places = run.positions()[:, 0]
+    middles = (places[1:] + places[:-1]) / 2
+    assert len(run.time) == 1001
+    off = np.max(np.abs(np.hypot(*middles.T) - 1))  # of the lines that any program would draw
+    assert off < 0.01  # measured MEASURE
+
+
+def test_columns_of_one_unit_share_a_panel(runs):
+    run = read_run(runs / "space.h5")
+    theta, phi = figure([run], Choice(("series",))).axes
+    assert (theta.get_ylabel(), phi.get_ylabel()) == ("$θ$ [rad]", "$φ$ [rad]")
+    angle, place, rate = figure([run], Choice(("series",), ("theta_1", "x_2", "theta_dot_1", "y_2"))).axes
+    assert (angle.get_ylabel(), place.get_ylabel()) == ("$θ_{1}$ [rad]", "$x$, $y$ [m]")
+    assert rate.get_ylabel() == r"$\dot{θ}_{1}$ [rad/s]"
+    (together,) = figure([run], Choice(("series",), wrapped=True)).axes
+    assert len(together.lines) == 4  # within one turn they can be compared
+
+
+def test_a_phase_portrait_is_of_any_two_columns(runs):
+    run = read_run(runs / "double.h5")
+    (phase,) = figure([run], Choice(("phase",), phase=("theta_1", "x_2"))).axes
+    assert (phase.get_xlabel(), phase.get_ylabel()) == ("$θ_{1}$ [rad]", "$x_{2}$ [m]")
+    assert np.array_equal(phase.lines[0].get_ydata()[-1], run.columns["x_2"][-1])
+    with pytest.raises(PlotError, match="expected two columns, as in theta_1,theta_dot_1, got x_2"):
+        figure([run], Choice(("phase",), phase=("x_2",)))
+    with pytest.raises(PlotError, match="got theta_3"):
+        figure([run], Choice(("phase",), phase=("x_2", "theta_3")))
+
+
+def test_energies_are_not_held_against_rounding_where_loads_act(pendula, runs):
+    assert pendula("simulate", "double.toml", "--set", "chain.damping=0.1", "-o", "damped.h5").returncode == 0
+    (energy,) = figure([read_run(runs / "damped.h5")], Choice(("energy",))).axes
+    assert len(energy.lines) == 1 and energy.get_ylabel() == r"$\mathrm{energy}$ [J]"
+    assert energy.get_yscale() == "linear"
+
+
 def test_inputs_are_drawn_like_coordinates(tmp_path):
     """They have no rate: a phase portrait is that of the coordinate."""
-    (tmp_path / "cart.csv").write_text("t,x,x_dot,push,energy\n0,1,2,3,0\n1,4,5,6,0\n2,7,8,9,0\n")
+    (tmp_path / "cart.csv").write_text("t,x,x_dot,push,energy\n0,1,3,3,0\n1,4,3,6,0\n2,7,3,9,0\n")
     run = read_run(tmp_path / "cart.csv")
     series, phase = figure([run], Choice(("series", "phase"), ("push",))).axes
     assert list(series.lines[0].get_ydata()) == [3, 6, 9]
-    assert list(phase.lines[0].get_xdata()) == [1, 4, 7] and list(phase.lines[0].get_ydata()) == [2, 5, 8]
+    assert list(phase.lines[0].get_xdata()) == [1, 4, 7] and list(phase.lines[0].get_ydata()) == [3, 3, 3]
 
 
 def test_natural_units_are_named(pendula, runs):

@@ -91,6 +91,14 @@ def test_the_coordinate_shown_is_one_that_events_leave_free(events):
     assert section.chosen([hits.only(hits.events == "flip")], Choice()) == ("theta_1", "theta_dot_1")
 
 
+def test_one_event_can_be_shown_alone(events, pendula):
+    (axes,) = draw([read(events)], Choice(event="section")).axes
+    assert set(points(axes)) == {"section, up"}
+    plot = pendula("plot", events.name, "-o", "section.svg", "--event", "flop")
+    assert plot.returncode == 2
+    assert plot.stderr == "pendula: hits.csv: expected an event, one of section, flip, got flop\n"
+
+
 def test_two_files_lie_over_each_other(events, pendula):
     simulate = pendula(
         "simulate", "events.toml", "--set", "start.theta=[1.4,2.5]", "--events", "other.csv", "-o", "o.csv"

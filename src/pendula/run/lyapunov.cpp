@@ -115,8 +115,10 @@ bool LyapunovTangents::follow(Integrator& integrator, double time) {
   return counted() > 0;
 }
 
-void LyapunovTangents::finish() {
-  if (time_ > history_.last_time()) make_orthonormal();
+bool LyapunovTangents::finish() {
+  if (!(time_ > history_.last_time())) return false;
+  make_orthonormal();
+  return counted() > 0;
 }
 
 LyapunovProgress LyapunovTangents::progress() const {
@@ -128,7 +130,8 @@ LyapunovSpectrum LyapunovTangents::spectrum() const {
   spectrum.duration = time_;
   spectrum.ftle = first_.grown() / std::max(counted(), smallest);
   spectrum.megno = first_.megno(time_);
-  history_.average(std::max(GrowthHistory::settling * time_, has_begun_ ? 0 : history_.first_time()), spectrum);
+  spectrum.since = std::max(GrowthHistory::settling * time_, has_begun_ ? 0 : history_.first_time());
+  history_.average(spectrum.since, spectrum);
   sort(spectrum);
   spectrum.sum = spectrum.exponents.sum();
   return spectrum;
@@ -189,7 +192,7 @@ LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, 
   };
   const RunResult result = simulate(
       integrator, start, schedule, [](const Motion&) {}, follow);
-  tangents.finish();
+  if (tangents.finish()) on_way(tangents.progress());
   return {tangents.spectrum(), result};
 }
 

@@ -39,8 +39,8 @@ class LyapunovTangents {
   /// Call after each step of `integrator`, to `time` since the start. Returns whether the history has a new entry.
   bool follow(Integrator& integrator, double time);
 
-  /// Adds the last entry of the history.
-  void finish();
+  /// Adds the last entry of the history. Returns whether it was not there.
+  bool finish();
 
   LyapunovProgress progress() const;
 
@@ -63,8 +63,8 @@ class LyapunovTangents {
 
 /// Runs `integrator` from `start` over `duration` in steps of at most `step`, which may be infinite if the method
 /// chooses its steps, and finds the `count` leading exponents of the motion, 0 for all. Calls `on_way` whenever
-/// tangents were made orthonormal; asks `stop` after every step. Throws std::invalid_argument if there are fewer
-/// exponents, and for methods whose steps have no derivative.
+/// tangents were made orthonormal, and at the end; asks `stop` after every step. Throws std::invalid_argument if there
+/// are fewer exponents, and for methods whose steps have no derivative.
 LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, double step, double duration, int count,
                                    const std::function<void(const LyapunovProgress&)>& on_way,
                                    const std::function<bool()>& stop);

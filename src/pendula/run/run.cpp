@@ -30,7 +30,10 @@ Run::Run(RunSetup setup)
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, row_spacing(setup_)),
             EventWatch(setup_.events, detail::glance_degree(setup_.options)),
-            {}},
+            {},
+            0,
+            static_cast<double>(setup_.every),
+            setup_.rows.interval},
       description_(integrator_->describe()) {
   if (!setup_.chooses_method) return;
   MethodChoice choice = choose_method(setup_);
@@ -63,6 +66,10 @@ RunReport Run::go(const std::function<bool()>& stop) {
 RunReport Run::go_on(const Checkpoint& checkpoint, const std::function<bool()>& stop) {
   const double series = kept_.series;
   become(kept_, checkpoint.record);
+  if (setup_.rows.chosen) {
+    setup_.every = static_cast<std::int64_t>(kept_.every);
+    setup_.rows.interval = kept_.interval;
+  }
   if (kept_.series != series) {
     if (!setup_.chooses_method)
       throw std::invalid_argument("checkpoint: expected one of a run whose method was asked for");

@@ -33,6 +33,9 @@ class Run {
   /// Problems known before the run, one sentence each.
   std::vector<std::string> expected_trouble() const { return setup_.subject->expected_trouble(setup_.options); }
 
+  /// What was asked for; of a run that went on, with the rows that it began with.
+  const RunSetup& setup() const { return setup_; }
+
   /// What actually runs.
   const Description& description() const { return description_; }
 
@@ -91,11 +94,12 @@ class Run {
     RunRecord record;  // of the rows; with rows at times also of the first and the last state
     EventWatch watch;
     AccuracyAim aim;
-    double series = 0;  // tolerance of the series that were chosen; 0: none were
+    double series = 0;               // tolerance of the series that were chosen; 0: none were
+    double every = 0, interval = 0;  // of rows
 
     template <class Numbers>
     void member(Numbers& numbers) {
-      numbers(record, watch, aim, series);
+      numbers(record, watch, aim, series, every, interval);
     }
   };
 

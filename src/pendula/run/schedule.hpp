@@ -22,7 +22,7 @@ struct Schedule {
   double step = 1e-3;       ///< for adaptive methods the largest step, may be infinite  [s]
   double duration = 10;     ///< the last step is cut to end there  [s]
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
-  RowTimes rows = {};       ///< if any: rows at these times instead of `every`
+  RowTimes rows = {};       ///< if any: rows at these times instead of `every`; chosen ones also at the last state
 };
 
 /// Result of a run.
@@ -163,6 +163,17 @@ struct Course {
     come_by();
   }
 
+  /// The last state, unless it is a row.
+  void take_last() {
+    const double end = result.end ? result.end->time : integrator.time();
+    if (place.rows > 0 && is_reached(end - begin, schedule.rows.at(place.rows - 1))) return;
+    if (result.end) {
+      row_at(end);
+    } else {
+      row(integrator.state(), integrator.statistics().load_work);
+    }
+  }
+
   /// A row within the last step.
   bool row_at(double time) {
     Motion motion;
@@ -207,6 +218,7 @@ RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, 
     course.result.stepping_seconds += std::chrono::duration<double>(Clock::now() - before).count();
     at_times ? course.take_times() : course.take_row();
   }
+  if (at_times && schedule.rows.chosen) course.take_last();
   return course.result;
 }
 
