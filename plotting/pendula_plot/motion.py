@@ -66,7 +66,8 @@ def between(
     rate = before + s * (2 * bend + s * 3 * twist)
     blow = blows(t, rates)[k]
     curve = np.where(blow, values[k] + (times - t[k]) * slope, curve)
-    return curve, np.where(blow, before + s * (after - before), rate)
+    rate = np.where(blow, before + s * (after - before), rate)
+    return np.where(s == 1, values[k + 1], curve), np.where(s == 1, after, rate)
 
 
 def blows(t: np.ndarray, rates: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ EVENT = '\n[[event]]\nname = "low"\nwhen = "y_2 + 1.5"\n'
 def test_three_endings_are_one_format(pendula, double, tmp_path, name):
     assert pendula("simulate", double, "-o", name).status == 0
     with h5py.File(tmp_path / name) as run:
-        assert run["theta"].shape == (21, 2)
+        assert run["theta"].shape == (201, 2)
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def test_a_minus_is_standard_output_and_the_summary_goes_to_standard_error(pendu
     pendula("simulate", double, "-o", "out.csv")
     run = pendula("simulate", double, "-o", "-")
     assert (run.status, run.out) == (0, (tmp_path / "out.csv").read_text())
-    assert run.err.startswith("pendula 0.1.0: ") and "trajectory         -, 21 rows\n" in run.err
+    assert run.err.startswith("pendula 0.1.0: ") and "trajectory         -, 201 rows\n" in run.err
     assert not (tmp_path / "-").exists()
 
 
@@ -60,7 +60,7 @@ def test_the_json_summary_goes_to_standard_error_with_the_rows_on_standard_outpu
     run = pendula("simulate", double, "-o", "-", "--json")
     rows = run.out
     summary = type(run)(run.status, run.err, "").json  # alone there, too
-    assert (summary["trajectory"], summary["rows"], rows.count("\n")) == ("-", 21, 22)
+    assert (summary["trajectory"], summary["rows"], rows.count("\n")) == ("-", 201, 202)
     assert pendula("simulate", double, "-o", "-", "--quiet").err == ""
 
 
@@ -170,4 +170,4 @@ def test_a_closed_standard_output_does_not_put_the_summary_into_the_trajectory(d
         check=False,
     )
     assert (run.returncode, run.stderr) == (1, "pendula: standard output could not be written\n")
-    assert len(Trajectory.read(tmp_path / "out.csv").rows) == 21
+    assert len(Trajectory.read(tmp_path / "out.csv").rows) == 201

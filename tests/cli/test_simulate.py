@@ -359,7 +359,7 @@ def test_text_summary_tells_settings_counts_energy_and_last_bob(pendula, double)
     assert lines["method"] == "gauss, 6 stages (order 12), momentum form"
     assert lines["solver"] == "dense, fixed-point, kernel planar_2"
     assert lines["step"] == "0.005 s"
-    assert lines["duration"] == "10 s, a row every 10 steps"
+    assert lines["duration"] == "10 s, a row every 2 steps"
     assert lines["steps"] == "2000"
     assert lines["last bob"].startswith("x = -1.0407657832")
     assert lines["trajectory"] == "out.csv, 201 rows"

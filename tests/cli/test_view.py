@@ -34,7 +34,7 @@ def test_a_page_has_rows_of_its_own_and_changes_nothing(pendula, double, tmp_pat
         assert pendula("simulate", double, "-o", "beside.csv", "--view", "out.html", *asked).status == 0
         assert (tmp_path / "alone.csv").read_bytes() == (tmp_path / "beside.csv").read_bytes()
         [run] = about(tmp_path / "out.html")["runs"]
-        assert run["rows"] == 751 and run["seen"] == 751  # 250 a second
+        assert run["rows"] == 2001 and run["seen"] == 2001
 
 
 def test_a_page_tells_how_it_was_made(pendula, double, tmp_path):
@@ -80,7 +80,7 @@ def test_copies_that_are_interrupted_are_missed(double, tmp_path):
             "--apart: expected a number that is finite, got nan",
         ),
         (["--view", "no/a.html"], "no/a.html: expected a file that can be written"),
-        (["--copies", "2"], "--copies requires --view"),
+        (["--copies", "2"], "--copies requires --view or --video"),
         (["--view", "a.html", "--copies", "0"], "--copies"),
     ],
 )

@@ -59,6 +59,31 @@ def test_a_film_moves_in_real_time(scenario, ending, runs, pendula):
     assert not list(runs.glob("film.*.h5"))
 
 
+def test_a_film_is_as_one_asks_for(runs, pendula):
+    """Half a second of the motion, half as fast: 21 frames, the first and the last among them."""
+    asked = "size=120,fps=20,speed=0.5,from=0.5,to=1"
+    film = pendula("simulate", "double.toml", "--video", "film.gif", "--film", asked, "--quiet")
+    assert (film.returncode, film.stderr) == (0, "")
+    frames = frames_of(runs / "film.gif")
+    assert len(frames) == 21 and frames[0].shape == (120, 120, 3)
+    assert sum(durations_of(runs / "film.gif")) == 1050
+    for wrong in ("size=3", "fast=2", "speed=", "from=2,to=1", ""):
+        refused = pendula("simulate", "double.toml", "--video", "film.gif", "--film", wrong)
+        assert refused.returncode == 2 and "expected some of size=640" in refused.stderr, wrong
+
+
+def test_copies_are_in_the_film(runs, pendula):
+    copies = ("--copies", 2, "--apart", 0.5, "--set", "run.duration=0.2")
+    film = pendula("simulate", "double.toml", "--video", "film.gif", *copies, "--film", "size=200", "--quiet")
+    assert (film.returncode, film.stderr) == (0, "")
+    (first, *_) = frames_of(runs / "film.gif")
+    for colour in (film_module.FIRST_RUN, film_module.LAST_RUN):
+        assert np.abs(first - colour).max(axis=2).min() < 8  # measured 0, 3
+    assert not list(runs.glob("film.*.h5"))
+    alone = pendula("simulate", "double.toml", "--copies", 2)
+    assert alone.returncode == 2 and "--copies requires --view or --video" in alone.stderr
+
+
 @pytest.mark.parametrize("ending", ["webp", "gif"])
 @pytest.mark.parametrize("fps", [24, 30, 60])
 def test_frames_stand_as_long_as_they_should(ending, fps, tmp_path):
@@ -121,8 +146,8 @@ print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
 def test_frames_do_not_wait_for_rows(runs, pendula):
     """Long steps, and a row each: every frame is another one, and the rows are as without a film."""
     scenario = (runs / "double.toml").read_text().replace("step     = 5e-3", "tolerance = 1e-9")
-    (runs / "steps.toml").write_text(scenario.replace("every = 2", ""))
-    limits = ("--set", "run.duration=1", "--set", "run.stages=8")
+    (runs / "steps.toml").write_text(scenario)
+    limits = ("--set", "run.duration=1", "--set", "run.stages=8", "--set", "output.every=1")
     assert pendula("simulate", "steps.toml", "-o", "alone.csv", *limits).returncode == 0
     film = pendula("simulate", "steps.toml", "-o", "beside.csv", "--video", "film.gif", *limits)
     assert film.returncode == 0, film.stderr
@@ -324,6 +349,7 @@ def test_films_and_pages_have_the_same_proportions():
 
 def test_a_drawing_of_other_points_is_refused(runs, pendula):
     with h5py.File(runs / "double.h5", "a") as file:
+        del file["run/drawing"]
         file["run/drawing"] = json.dumps({"kinds": ["bob"], "connections": [["spring", 0, 7]]})
     with pytest.raises(PlotError, match="expected run/drawing of 2 points"):
         read_run(runs / "double.h5")
