@@ -68,7 +68,7 @@ def plot(
         if axes is None:
             height = max(4.8, 2.6 * len(parts))
             figure = plt.figure(figsize=(6.4, height), layout="constrained")
-            panels = list(figure.subplots(len(parts), sharex=True, squeeze=False)[:, 0])
+            panels: list[Axes] = list(figure.subplots(len(parts), sharex=True, squeeze=False)[:, 0])
         else:
             panels = [axes]
         for panel, part in zip(panels, parts, strict=True):
