@@ -109,7 +109,8 @@ TEST(Scenario, DefaultsAreThoseOfTheReference) {
   EXPECT_EQ(scenario.run.step, 0);
   EXPECT_EQ(scenario.run.tolerance, 1e-9);
   EXPECT_EQ(scenario.duration, 10);
-  EXPECT_EQ(scenario.every, 1);
+  EXPECT_TRUE(scenario.rows.chosen);
+  EXPECT_EQ(scenario.rows.interval, 0.01);
   EXPECT_FALSE(scenario.natural);
   EXPECT_TRUE(scenario.warnings.empty());
 }

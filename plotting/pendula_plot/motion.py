@@ -64,18 +64,20 @@ def between(
     bend, twist = 3 * slope - 2 * before - after, before + after - 2 * slope
     curve = values[k] + h * s * (before + s * (bend + s * twist))
     rate = before + s * (2 * bend + s * 3 * twist)
-    blow = blows(t, rates)[k]
+    blow = blows(t, values, rates)[k]
     curve = np.where(blow, values[k] + (times - t[k]) * slope, curve)
     rate = np.where(blow, before + s * (after - before), rate)
     return np.where(s == 1, values[k + 1], curve), np.where(s == 1, after, rate)
 
 
-def blows(t: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Between which rows a rate jumps, as far as one can see."""
+def blows(t: np.ndarray, values: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Between which rows a rate jumps, as far as one can see, or is far from how fast values change."""
+    fast = np.maximum(np.abs(rates[1:]), np.abs(rates[:-1]))
+    apart = np.abs((rates[1:] + rates[:-1]) / 2 - np.diff(values) / np.diff(t)) > fast / 2
     change = np.abs(np.diff(rates) / np.diff(t))
     padded = np.pad(change, 2)
     beside = np.max([padded[k : len(change) + k] for k in (0, 1, 3, 4)], axis=0)
-    return (change > BLOW * beside) & (len(change) > 4)
+    return (change > BLOW * beside) & (len(change) > 4) | apart
 
 
 def pieces(run: Run) -> np.ndarray:
@@ -90,7 +92,7 @@ def pieces(run: Run) -> np.ndarray:
         for bend, curve in bends:
             with np.errstate(divide="ignore", invalid="ignore"):
                 wanted = np.ceil(np.sqrt(np.nan_to_num(bend / (SEEN * np.ptp(curve)), posinf=0)))
-            wanted = np.where(blows(run.time, rates), 1, np.clip(wanted, 1, MOST_PIECES))
+            wanted = np.where(blows(run.time, values, rates), 1, np.clip(wanted, 1, MOST_PIECES))
             count = np.maximum(count, wanted.astype(int))
     return count
 

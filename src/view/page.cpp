@@ -20,10 +20,10 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t enough_rows = 2048;                 // of exact ones
-constexpr std::size_t fewest_rows = 512;                  // before a page may grow
-constexpr std::size_t most_marks = 1000;                  // of an event in a run
-constexpr double alike = 1e-6;                            // steps that differ by less are of one size
+constexpr std::size_t enough_rows = 2048;                  // of exact ones
+constexpr std::size_t fewest_rows = 512;                   // before a page may grow
+constexpr std::size_t most_marks = 1000;                   // of an event in a run
+constexpr double alike = 1e-6;                             // steps that differ by less are of one size
 constexpr double least_wanted = 2000, most_wanted = 4000;  // rows of runs that are not very long
 
 /// Bytes of a row in base64: the time, the numbers, and floats that tell its energy error, its distance and its step.

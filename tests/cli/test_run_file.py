@@ -152,7 +152,9 @@ def test_units_of_a_nondimensional_run(pendula, scenario, tmp_path):
         assert run["theta"].attrs["units"] == "rad" and "natural_unit" not in run["theta"].attrs
 
 
-ROWS = "output.every=3"  # those that nobody asks for depend on the end that a run begins with: see test_rows.py
+ROWS = (
+    "output.every=3"  # those that nobody asks for depend on the end that a run begins with: see test_rows.py
+)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -362,7 +362,7 @@ def test_text_summary_tells_settings_counts_energy_and_last_bob(pendula, double)
     assert lines["duration"] == "10 s, a row every 2 steps"
     assert lines["steps"] == "2000"
     assert lines["last bob"].startswith("x = -1.0407657832")
-    assert lines["trajectory"] == "out.csv, 201 rows"
+    assert lines["trajectory"] == "out.csv, 1001 rows"
     table = [line.split() for line in run.out.splitlines() if line.startswith(" ")]
     assert table[0] == ["t", "x_2", "y_2", "energy", "error"]
     assert [float(row[0]) for row in table[1:]] == list(range(11))
