@@ -133,8 +133,55 @@ def piled_switches(dice: random.Random) -> Drawn:
     }, DETENT
 
 
+# --- damping
+
+
+SPRING = """def define(model, links):
+    x = model.coordinate("x", "m")
+    c = model.parameter("c", "N*s/m", default=1.0)
+    model.lagrangian = model.rate(x) ** 2 / 2 - x**2 / 2
+    model.dissipation = c * model.rate(x) ** 2 / 2
+"""
+BUFFER = """from sympy import Heaviside
+
+
+def define(model, links):
+    x = model.coordinate("x", "m")
+    c = model.parameter("c", "N*s/m", default=1.0)
+    model.lagrangian = model.rate(x) ** 2 / 2 - 9.81 * x
+    model.force(x, -c * model.rate(x) * Heaviside(-x))
+"""
+
+
+def strong_damping(dice: random.Random) -> Drawn:
+    """An overdamped spring, with and without a rate at the start that the damping stops at once."""
+    start = {"x": dice.choice([1.0, 1.0, 0.0]), "x_dot": dice.choice([-1, 1]) * power(dice, -6, 1)}
+    if start["x"] and dice.random() < 0.2:
+        del start["x_dot"]
+    run = {"duration": power(dice, -1, 1), **asked(dice)}
+    if dice.random() < 0.3:
+        run["method"] = "radau"
+    return {
+        "system": {"model": "model.py", "parameters": {"c": power(dice, 0.4, 7)}},
+        "start": start,
+        "run": run,
+    }, SPRING
+
+
+def late_damping(dice: random.Random) -> Drawn:
+    """A body that falls into a damper."""
+    system = {"model": "model.py", "parameters": {"c": power(dice, 0, 7)}}
+    start = {"x": dice.uniform(0.2, 2.0), "x_dot": dice.choice([0.0, dice.uniform(-3, 3)])}
+    return {
+        "system": system,
+        "start": start,
+        "run": {"duration": dice.uniform(1.0, 5.0), **asked(dice)},
+    }, BUFFER
+
+
 FAMILIES: dict[str, Callable[[random.Random], Drawn]] = {
-    each.__name__: each for each in (close_passage, whip, stiff_wall, piled_switches)
+    each.__name__: each
+    for each in (close_passage, whip, stiff_wall, piled_switches, strong_damping, late_damping)
 }
 
 
@@ -189,9 +236,42 @@ def detents(x: Real, v: Real, parameters: dict[str, Real]) -> Iterator[Piece]:
         time, side = time + t, -side
 
 
+def exponentials(x: Real, v: Real, parameters: dict[str, Real]) -> Iterator[Piece]:
+    """x'' = −x − c x', c > 2."""
+    c = Real(parameters["c"])
+    fast = -(c + np.sqrt((c - 2) * (c + 2))) / 2
+    slow = 1 / fast
+    b = (v - slow * x) / (fast - slow)
+    a = x - b
+
+    def piece(t: Real) -> tuple[Real, Real]:
+        one, other = a * np.exp(slow * t), b * np.exp(fast * t)
+        return one + other, slow * one + fast * other
+
+    yield Real(0), piece
+    yield Real(np.inf), piece
+
+
+def falls(x: Real, v: Real, parameters: dict[str, Real]) -> Iterator[Piece]:
+    """x'' = −g, below zero −g − c x'."""
+    g, c = Real(9.81), Real(parameters["c"])
+    yield Real(0), lambda t: (x + v * t - g * t * t / 2, v - g * t)
+    speed = -np.sqrt(v * v + 2 * g * x)
+    slow = -g / c
+
+    def within(t: Real) -> tuple[Real, Real]:
+        lost = -np.expm1(-c * t)
+        return slow * t + (speed - slow) * lost / c, speed - (speed - slow) * lost
+
+    yield (v - speed) / g, within
+    yield Real(np.inf), within
+
+
 MOTIONS: dict[str, Callable[[Real, Real, dict[str, Real]], Iterator[Piece]]] = {
     "stiff_wall": bounces,
     "piled_switches": detents,
+    "strong_damping": exponentials,
+    "late_damping": falls,
 }
 MOST_PIECES = 20000
 

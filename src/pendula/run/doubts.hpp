@@ -53,9 +53,9 @@ inline std::string untrusted_after(double until, double start) {
   return until > start ? rows_after(until, start) + " cannot be trusted" : "no row can be trusted";
 }
 
-/// Whether the defect of a step is larger than that of steps whose size was chosen to resolve the motion.
+/// Whether the defect of a constant step is larger than that of steps whose size was chosen to resolve the motion.
 inline bool misses(const RunOptions& run, double defect) {
-  return run.stages != 1 && defect > (is_adaptive(run) ? std::max(1e-3, 30 * std::sqrt(run.tolerance)) : 0.02);
+  return run.stages != 1 && defect > 0.02;
 }
 
 /// `missed` is when the first such step began.
@@ -63,10 +63,8 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
   const RunOptions& run = setup.options;
   if (!missed) return {};
   trust.until = std::min(trust.until, *missed);
-  const std::string advice =
-      is_adaptive(run) ? "run.method = \"radau\" is made for damping that fast" : smaller_step_advice(run);
   return "a step missed the velocity by " + pendula::rounded(defect, 2) +
-         " of the fastest: " + rows_after(*missed, setup.start.time) + " may be wrong; " + advice;
+         " of the fastest: " + rows_after(*missed, setup.start.time) + " may be wrong; " + smaller_step_advice(run);
 }
 
 /// Steps missed something narrow in the forces, from a time on whose effect shows in rows.

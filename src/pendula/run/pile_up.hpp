@@ -40,7 +40,7 @@ class PileUp {
     begin_ = time;
     lasted_ = lasts;
     before_ = here_;
-    std::ranges::fill(here_, 0);
+    std::fill(here_.begin(), here_.end(), 0);
     return is_endless;
   }
 
