@@ -24,7 +24,7 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
 
     return {
         "model": file.stem,
-        "about": _first_line(text),
+        "about": _about(text),
         "file": str(file.resolve()),
         "links": model.links,
         "has_links": _has_links(model),
@@ -75,10 +75,12 @@ def _has_links(model: Model) -> bool:
     return any(p.per_link for p in model.parameters)
 
 
-def _first_line(text: str) -> str:
-    """Of what the file says of itself."""
-    about = ast.get_docstring(ast.parse(text)) or ""
-    return about.partition("\n")[0]
+def _about(text: str) -> str:
+    """The first line of what the file says of itself, or else of what `define` says of itself."""
+    module = ast.parse(text)
+    defined = [part for part in module.body if isinstance(part, ast.FunctionDef) and part.name == "define"]
+    said = filter(None, map(ast.get_docstring, [module, *defined]))
+    return next(said, "").partition("\n")[0]
 
 
 def _remarks(text: str) -> dict[str, str]:

@@ -25,9 +25,9 @@ def told_of(path: Path, expected: str) -> Iterator[None]:
     except PlotError:
         raise
     except OSError as error:
-        raise PlotError(
-            f"{path}: expected {expected} that can be read, got: {error.strerror or error}"
-        ) from None
+        # Of what HDF5 says the first words are for people.
+        why = os.strerror(error.errno) if error.errno else error
+        raise PlotError(f"{path}: expected {expected} that can be read, got: {why}") from None
     except Exception as error:
         raise PlotError(f"{path}: expected {expected}, got one that is damaged: {one_line(error)}") from None
 

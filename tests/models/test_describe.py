@@ -83,6 +83,10 @@ def test_a_file_of_ones_own(pendula, tmp_path):
     }
     assert told["parameters"][0]["default"] is None
     assert "mass       kg    must be given" in pendula("describe", "arm.py", cwd=tmp_path).stdout
+    about, _, definition = ARM.partition("def define")
+    said = "def define" + definition.replace("links):", f"links):\n    {about.strip()}", 1)
+    (tmp_path / "said.py").write_text(said)
+    assert pendula("describe", "said.py", cwd=tmp_path).stdout.startswith("said: An arm.\n")
 
 
 @pytest.mark.parametrize(

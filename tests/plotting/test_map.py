@@ -129,6 +129,7 @@ def test_one_axis_is_a_curve(pendula, tmp_path):
         (("out.h5", "theta_1", "-o", "map.gif"), "expected a name that ends in .svg, .png or .pdf"),
         (("double.toml", "theta_1", "-o", "map.png"), "double.toml: expected a file of pendula ensemble"),
         (("out.h5", "theta_1", "-o", "map.png", "--contour", "steps"), "expected KEY=VALUE"),
+        (("none.h5", "theta_1", "-o", "map.png"), "that can be read, got: No such file or directory\n"),
     ],
 )
 def test_what_cannot_be_drawn_is_told(ensemble, pendula, arguments, message):
