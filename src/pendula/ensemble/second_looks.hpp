@@ -145,19 +145,12 @@ inline void look_again(std::vector<Doubted>& members, const std::function<bool()
       left,
       [](const Doubted& member) {
         const RunReport& run = member.report;
-        if (run.options.method == Method::taylor) return std::optional(by_gauss_steps(member.setup, run.options));
         return std::optional(coarser(run.options, run.statistics, member.setup.duration));
       },
       stop);
   std::erase_if(left, [](const Doubted* member) { return !member->doubt || member->report.end == RunEnd::stopped; });
   look_by(
-      left,
-      [](const Doubted& member) {
-        const RunOptions& run = member.report.options;
-        return run.method == Method::taylor ? by_gauss_steps(member.setup, run, 100)
-                                            : finer(run, member.setup.duration);
-      },
-      stop);
+      left, [](const Doubted& member) { return finer(member.report.options, member.setup.duration); }, stop);
   for (Doubted& member : members) {
     if (member.doubt) member.report.warnings.push_back(*std::move(member.doubt));
   }

@@ -163,21 +163,6 @@ inline SecondLook coarser(const RunOptions& run, const Statistics& statistics, d
   return look;
 }
 
-/// A comparison run by Gauss steps, of a run by series, whose coefficients may all miss the same: by the tolerance that
-/// was asked of the motion, over `finer`.
-inline SecondLook by_gauss_steps(const RunSetup& setup, const RunOptions& run, double finer = 1) {
-  const bool was_chosen = setup.options.method != run.method;
-  const double of_motion = was_chosen                   ? setup.options.tolerance
-                           : setup.motion_tolerance > 0 ? setup.motion_tolerance
-                                                        : run.tolerance;
-  SecondLook look{run, "by Gauss steps", 0.2, 1};
-  look.options.method = Method::gauss;
-  look.options.step = 0;
-  look.options.tolerance = std::max(1e-16, of_motion / finer);
-  look.options.stages = stages_for(Method::gauss, look.options.tolerance);
-  return look;
-}
-
 /// A comparison run by other stages, of constant steps that end where functions switch from piece to piece: from one
 /// such place to the next there may be a single step, which is the same whatever the size of steps.
 inline SecondLook by_other_stages(const RunOptions& run) {

@@ -357,9 +357,7 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   std::string unknown = "it was interrupted while it ran again to see how far it can be trusted: that is not known";
   const bool ends_between =
       !setup_.subject->switches().empty() && !is_adaptive(setup_.options) && !is_explicit(setup_.options.method);
-  const bool is_series = setup_.options.method == Method::taylor;
   const detail::SecondLook coarser = ends_between ? detail::by_other_stages(setup_.options)
-                                     : is_series  ? detail::by_gauss_steps(setup_, setup_.options)
                                                   : detail::coarser(setup_.options, report.statistics, setup_.duration);
   const Separation first = compare(coarser);
   if (stopped) return unknown;
@@ -367,8 +365,7 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   if (!doubt) return doubt;
   const double begin = setup_.start.time, end = report.last.time;
   const bool is_soon = first.within(detail::visible / coarser.trusted, begin) < begin + (end - begin) / 2;
-  const std::optional<detail::SecondLook> finer =
-      is_series ? detail::by_gauss_steps(setup_, setup_.options, 100) : detail::finer(setup_.options, setup_.duration);
+  const std::optional<detail::SecondLook> finer = detail::finer(setup_.options, setup_.duration);
   if (!finer || ends_between || !(is_adaptive(setup_.options) || is_soon)) return doubt;
   const Separation second = compare(*finer);
   return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);
