@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from functools import cached_property
 
-from sympy import Expr, Function, Matrix, Pow, acos, asin, cos, log, sin, tan
+from sympy import Abs, Add, Expr, Function, Matrix, Mul, Pow, Rational, acos, asin, cos, log, sin, tan
 
 from pendula_codegen.entry_points import Declared, Output, Q, SystemKernel, V
 from pendula_codegen.entry_points import Function as EntryPoint
@@ -13,6 +13,10 @@ from pendula_codegen.mechanics import jacobian, time_slope
 from pendula_codegen.model import Model
 from pendula_codegen.places import Place
 from pendula_codegen.vocabulary import Angle, Leaf
+
+# The order of a zero that no series of the coarsest steps misses: those of 9 terms.
+HIGH, MOST_DEGREE = 3, 8
+TINY = Rational(1, 10**60)  # a square that counts for nothing
 
 
 class ModelKernel(SystemKernel):
@@ -65,12 +69,13 @@ class ModelKernel(SystemKernel):
         """What functions in it are taken of, while it moves, and whether it is a base.
 
         Those change where their argument comes by zero or by its largest or smallest value: exp, tanh, … by steps of
-        1, powers and logarithms by its own size. Sines of what moves slowly move slowly; so do whole powers.
+        1, powers and logarithms by its own size. Sines of what moves slowly move slowly; so do low whole powers. High
+        ones, and products of many factors, are exp of their logarithm.
         """
         system = self.system
         moving = {*system.coordinates, *system.velocities, *system.inputs, self.model.time}
-        held = {call for said in self.model.held_expressions() for call in said.atoms(Function, Pow)}
-        found = {pair: None for call in sorted(held, key=str) for pair in _arguments(call)}
+        held = {call for said in self.model.held_expressions() for call in said.atoms(Function, Pow, Mul)}
+        found = {pair: None for call in sorted(held, key=str) for pair in _arguments(call, moving)}
         return [(value, is_base) for value, is_base in found if value.free_symbols & moving]
 
     def angles(self) -> list[Angle]:
@@ -91,11 +96,13 @@ class ModelKernel(SystemKernel):
         return [*parameters, time, *inputs]
 
 
-def _arguments(call: Expr) -> Iterator[tuple[Expr, bool]]:
+def _arguments(call: Expr, moving: Set[Expr]) -> Iterator[tuple[Expr, bool]]:
     inside = call.args[0]
-    if call.is_Pow:
-        if not (call.exp.is_Integer and call.exp > 0):
-            yield inside, True
+    if call.is_Mul or (call.is_Pow and call.exp.is_Integer and call.exp > 0):
+        if _degree(call, moving) > MOST_DEGREE:
+            yield Add(*map(_log_of_size, Mul.make_args(call))), False
+    elif call.is_Pow:
+        yield inside, True
         if call.exp.free_symbols:
             yield call.exp * log(inside), False
     elif isinstance(call, (asin, acos)):
@@ -104,3 +111,21 @@ def _arguments(call: Expr) -> Iterator[tuple[Expr, bool]]:
         yield cos(inside), True
     elif not isinstance(call, (sin, cos)):
         yield inside, isinstance(call, log)
+
+
+def _degree(product: Expr, moving: Set[Expr]) -> int:
+    """How many of its derivatives vanish at most where high powers in it are zero; sums may touch zero."""
+    found = 0
+    for factor in Mul.make_args(product):
+        base, power = factor.as_base_exp()
+        if base.free_symbols & moving and power.is_Integer and power >= HIGH:
+            found += power * (2 if base.is_Add else 1)
+    return found
+
+
+def _log_of_size(factor: Expr) -> Expr:
+    """The logarithm of its size, and of one that is zero hardly less than of what is smallest."""
+    base, power = factor.as_base_exp()
+    if factor.is_number:
+        return Rational(round(1000 * log(Abs(factor)).evalf()), 1000)
+    return power / 2 * log(base**2 + TINY)

@@ -273,7 +273,7 @@ def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol], zeros: Sequenc
     if _is_root(piece):
         base, power = args
         size = _without_factor(base)
-        if piece.exp.is_Rational and piece.exp.q != 1 and (size in zeros or -size in zeros):
+        if piece.exp.is_number and not piece.exp.is_Integer and (size in zeros or -size in zeros):
             return (here.yes * base**2 + here.no) ** (power / 2)
         base = base if piece.base.is_positive else here.yes * base + here.no
         return base ** (power if piece.exp.is_number else here.yes * power)

@@ -97,7 +97,10 @@ class ExplicitSystem {
     return forcing_.followed(*forward_, time, x_.data(), x_.data() + count(), h);
   }
 
-  bool has_to_look() const { return field_.has_to_look(); }
+  bool has_to_look() const {
+    if constexpr (requires { Method::looks_itself; }) return false;
+    return field_.has_to_look();
+  }
 
   /// Relative to the scale of errors (ErrorSize). Without a tolerance, relative to the highest speed of the coordinate
   /// so far, or to a fraction of the highest speed of any coordinate.

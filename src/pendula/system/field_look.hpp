@@ -39,13 +39,16 @@ class FieldLook {
   /// `nodes` of the method; `few` samples of the step are cheap enough for every step. `is_base` tells of each argument
   /// whether it is the base of a power. Changes of up to `smooth` from sample to sample, as `changes` measures them,
   /// are left to the error estimate of the step.
-  FieldLook(int nodes, int few, std::span<const bool> is_base, double smooth = 0.5)
+  FieldLook(int nodes, int few, std::span<const bool> is_base, double smooth = much)
       : is_base_(is_base.begin(), is_base.end()), smooth_(smooth), parts_(std::max(1, nodes / 2)) {
     if (is_base.empty()) return;
     few_ = spread(few - 1);
     samples_ = spread(std::max(least_intervals, 2 * nodes));
     places_.reserve(most_places);
   }
+
+  /// A change from sample to sample that is not small.
+  static constexpr double much = 0.5;
 
   /// Whether the model has functions that may change within a short time.
   bool has_to_look() const { return !is_base_.empty(); }
@@ -72,6 +75,22 @@ class FieldLook {
       for (std::size_t i = 0; i < samples_.size(); ++i) look_at(a, i, arguments);
     }
     return !places_.empty();
+  }
+
+  /// Whether holds(share) is true at places so dense that nothing of what was found lies between them.
+  template <class Holds>
+  bool holds_at_nodes(Holds&& holds) {
+    find_borders();
+    double before = 0;
+    for (std::size_t i = 0; i <= borders_.size(); ++i) {
+      const double here = i < borders_.size() ? std::clamp(borders_[i], 0.0, 1.0) : 1;
+      if (!(here > before)) continue;
+      for (const double node : Gauss::c) {
+        if (!holds(before + node * (here - before))) return false;
+      }
+      before = here;
+    }
+    return true;
   }
 
   /// Integrals over the step of several quantities, where something was found, and how much of them is missed by nodes

@@ -14,12 +14,14 @@
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/width.hpp>
+#include <pendula/system/field_look.hpp>
 #include <pendula/system/member_systems.hpp>
 #include <pendula/system/moving_part.hpp>
 #include <pendula/system/series_info.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/taylor/series_controller.hpp>
 #include <pendula/taylor/series_tangent.hpp>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -30,6 +32,7 @@ namespace pendula {
 struct TaylorSeries {
   static constexpr int error_order = 14;
   static constexpr bool is_blind = false;
+  static constexpr bool looks_itself = true;  // at its own polynomial: SeriesSteps::solve
 };
 
 /// Steps by the Taylor series of a kernel, of one motion (the stepper of SingleIntegrator) or of several members at
@@ -61,7 +64,7 @@ class SeriesSteps {
         n_(static_cast<std::size_t>(systems.coordinates())),
         row_(series_state_row(n_, W) / W),
         order_(order_for(options.tolerance)),
-        looks_(is_smooth(systems.info()) ? 1 : most_looks),
+        look_(most_looks, 2, systems.info().argument_is_base),
         largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
         log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
@@ -77,6 +80,7 @@ class SeriesSteps {
         begin_(now_),
         seen_(2 * n_),
         rates_(n_ + 2),
+        arguments_(3 * systems.info().argument_is_base.size() + 1),
         scales_(row_),
         rate_scales_(row_),
         unit_row_(1) {
@@ -175,7 +179,8 @@ class SeriesSteps {
   }
 
   /// Tries a step of `h` from `time`. Returns of which `wanted` members its end is finite, and the series solves the
-  /// equations on the way: its last terms know nothing of what is narrow and ahead. The state is unchanged.
+  /// equations on the way: its terms know nothing of what is ahead and vanishes with all its derivatives where the step
+  /// begins, as a hill of a high power does. The state is unchanged.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
     time_ = time;
     if (!is_expanded_) expand();
@@ -195,8 +200,20 @@ class SeriesSteps {
     // Near the size that its steps will have; a step that the end of a run has cut short says nothing of that.
     trial_.unit = select(longest_ <= most_growth * unit_, longest_, unit_);
     Mask found = wanted & (none == L(0.0));
-    for (int k = 1; k <= looks_ && any(found); ++k) found = found & solves(time, h, static_cast<double>(k) / looks_);
-    return found;
+    found = found & solves(time, h, L(1.0), true);
+    const bool may_be_narrow = look_.has_to_look() && any(found);
+    if (may_be_narrow) find_arguments(time + h, 2);
+    const Mask is_far = found & goes_far();
+    for (int k = 1; k < looks && any(found & is_far); ++k) {
+      found = found & (!is_far | solves(time, h, L(static_cast<double>(k) / looks)));
+    }
+    if (!may_be_narrow) return found;
+    see(L(0.5) * tau);
+    find_arguments(fma(L(0.5), h, time), 1);
+    see(L(0.0));
+    find_arguments(time, 0);
+    const Mask is_doubtful = found & arguments_change();
+    return any(is_doubtful) ? found & solves_closely(time, h, is_doubtful) : found;
   }
 
   const Parts& tried() const { return trial_.parts; }
@@ -308,12 +325,12 @@ class SeriesSteps {
   static constexpr std::size_t W = width_of<L>;
   static constexpr double most_growth = 1e3;  // of the unit from step to step: an equilibrium allows any
   static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14, shorter_unit = 1e-6;
-  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 30, most_looks = 4;
-
-  /// Whether nothing but sines, powers and logarithms stands in the equations, and no time.
-  static bool is_smooth(const SystemInfo& info) {
-    return !info.depends_on_time && std::ranges::all_of(info.argument_is_base, std::identity());
-  }
+  static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 30;
+  // Places of a step that goes far where accelerations are compared, the end among them, as in every step; and how
+  // closely functions that may be narrow are looked at, in nodes of a Gauss method.
+  static constexpr int looks = 3, most_looks = 8;
+  static constexpr double far_turn = 0.5, far_way = 0.25;  // rad; of the largest length
+  static constexpr double most_turn = 3;                   // rad within a step, so that it is not from hill to hill
 
   Motion motion_of(const Parts& parts, double time) const requires(!is_batch<L>) {
     Motion motion{time, Eigen::VectorXd(links()), Eigen::VectorXd(links())};
@@ -427,20 +444,41 @@ class SeriesSteps {
     }
   }
 
-  /// Whether accelerations at a fraction of the step are those of the series, but for what terms beyond its order may
-  /// add, and for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
-  Mask solves(const L& time, const L& h, double share) {
-    const L inverse = L(1.0) / unit_, tau = L(share) * h * inverse;
-    sum_all(tau, rises, moved_);
-    sum_all(tau, slopes, turned_);
-    if (info_.has_momenta) sum_all(tau, bends, bent_);
+  /// In which members the tried step is so long that it may have gone over something that its end is not beside.
+  Mask goes_far() const {
+    L turn(0.0), way(0.0), size(0.0);
+    for (int i = 0; i < links(); ++i) {
+      const L from = now_.parts[i].place[0], to = trial_.parts[i].place[0], moved = abs(to - from);
+      if (systems_.is_angle(i)) {
+        turn = max(turn, moved);
+      } else {
+        way = max(way, moved);
+        size = max(size, max(abs(from), abs(to)));
+      }
+    }
+    return (turn > L(far_turn)) | (way > L(far_way) * size);
+  }
+
+  /// Finds the motion of the series at a time; `is_summed`: from sums that are there.
+  void see(const L& tau, bool is_summed = false) {
+    const L inverse = L(1.0) / unit_;
+    if (!is_summed) sum_all(tau, rises, moved_);
+    if (info_.has_momenta) sum_all(tau, slopes, turned_);
     for (std::size_t i = 0; i < n_; ++i) {
       to_row(fma(tau, from_row<L>(moved_[i]), coefficient(0, i)), seen_[i]);
       to_row(info_.has_momenta ? from_row<L>(turned_[i]) * inverse
                                : fma(tau, from_row<L>(moved_[n_ + i]), coefficient(0, n_ + i)),
              seen_[n_ + i]);
     }
-    systems_.here(fma(L(share), h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
+  }
+
+  /// Whether accelerations at a fraction of the step are those of the series, but for what terms beyond its order may
+  /// add, and for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
+  Mask solves(const L& time, const L& h, const L& share, bool is_summed = false) {
+    const L inverse = L(1.0) / unit_, tau = share * h * inverse;
+    see(tau, is_summed);
+    info_.has_momenta ? sum_all(tau, bends, bent_) : sum_all(tau, slopes, turned_);
+    systems_.here(fma(share, h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
     L farthest(0.0);
     for (std::size_t i = 0; i < n_; ++i) farthest = max(farthest, abs(coefficient(0, i)));
     Mask found(L(0.0) == L(0.0));
@@ -451,6 +489,51 @@ class SeriesSteps {
       found = found & (defect * from_row<L>(rate_scales_[i]) <= L(largest_defect_));
     }
     return found;
+  }
+
+  /// Arguments of functions that may be narrow, at the motion that was seen: where the step begins (look 0), in its
+  /// middle, and at its end.
+  void find_arguments(const L& time, int look) {
+    systems_.here(time, &SystemFunctions::call_arguments, seen_[0], seen_[n_], argument(look, 0));
+  }
+  double* argument(int look, std::size_t a) {
+    return arguments_[static_cast<std::size_t>(look) * systems_.info().argument_is_base.size() + a];
+  }
+
+  /// Whether one of them changes much from look to look.
+  Mask arguments_change() {
+    const std::span<const bool> is_base = systems_.info().argument_is_base;
+    Mask are_steady(L(0.0) == L(0.0));
+    for (int look = 1; look < 3; ++look) {
+      for (std::size_t a = 0; a < is_base.size(); ++a) {
+        const L here = from_row<L>(argument(look, a)), before = from_row<L>(argument(look - 1, a));
+        const L size = is_base[a] ? min(abs(here), abs(before)) : L(1.0);
+        are_steady = are_steady & (abs(here - before) <= L(FieldLook::much) * size);
+      }
+    }
+    return !are_steady;
+  }
+
+  /// Which of these members solve the equations wherever such functions change fast within the step; others do.
+  Mask solves_closely(const L& time, const L& h, const Mask& which) {
+    const L asked = select(which, L(1.0), L(0.0));
+    L wrong(0.0);
+    for (int lane = 0; lane < static_cast<int>(W); ++lane) {
+      if (get(asked, lane) != 0 && !solves_closely(time, h, lane)) set(wrong, lane, 1);
+    }
+    return wrong == L(0.0);
+  }
+  bool solves_closely(const L& time, const L& h, int lane) {
+    const auto arguments = [&](std::span<const double> shares, double* found) {
+      for (const double share : shares) {
+        see(L(share) * h / unit_);
+        find_arguments(fma(L(share), h, time), 0);
+        for (std::size_t a = 0; a < systems_.info().argument_is_base.size(); ++a) *found++ = argument(0, a)[lane];
+      }
+    };
+    return !look_.finds(arguments) || look_.holds_at_nodes([&](double share) {
+      return get(select(solves(time, h, L(share)), L(1.0), L(0.0)), lane) != 0;
+    });
   }
 
   /// Computes the series in a unit of time near the step size, so that coefficients are neither huge nor tiny.
@@ -487,7 +570,16 @@ class SeriesSteps {
       is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
       log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(tiny))));
     }
-    return select(is_finite, step_of(log_radius), L(0.0));
+    return select(is_finite, min(step_of(log_radius), longest_turn()), L(0.0));
+  }
+
+  /// The time in which no angle turns by more than `most_turn`, as fast as it does now  [s].
+  L longest_turn() const {
+    L fastest(tiny);
+    for (std::size_t i = 0; i < n_; ++i) {
+      if (systems_.info().is_angle[i]) fastest = max(fastest, abs(rate(0, i)));
+    }
+    return L(most_turn) * unit_ / fastest;
   }
 
   L step_of(const L& log_radius) const {
@@ -551,7 +643,7 @@ class SeriesSteps {
   SeriesInfo info_;
   std::size_t n_, row_;
   int order_;
-  int looks_;              // places of a step where accelerations are compared
+  FieldLook look_;
   double largest_defect_;  // of accelerations, times h, relative to scales
   double log_reach_;       // step size relative to the estimated radius of convergence, log₂
   PackRows<W> state_;
@@ -560,6 +652,7 @@ class SeriesSteps {
   Place now_, trial_, begin_;  // begin_: of one motion
   PackRows<W> seen_;           // a motion on the way of a step
   PackRows<W> rates_;
+  PackRows<W> arguments_;  // of functions that may be narrow, at three places of a step
   // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.
   PackRows<W> scales_, rate_scales_;
   PackRows<W> unit_row_;
