@@ -127,6 +127,13 @@ Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, co
   return words;
 }
 
+/// Exports hold inputs themselves.
+void refuse_signals(const io::RunPlan& plan) {
+  if (plan.signals.empty()) return;
+  refuse(plan.signals.front().input_place,
+         "expected no signal in what is exported, whose inputs are set from step to step; got one");
+}
+
 /// The time from one sample to the next; else the constant step; nothing if there is neither.
 std::optional<double> step_of(const io::RunPlan& plan) {
   for (const io::FeedbackPlan& feedback : plan.feedback) {
@@ -166,6 +173,7 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
   const io::AnyScenario scenario = io::parse_scenario(text.text, text.name, options.overrides, find);
   return std::visit(
       [&](const auto& found) {
+        refuse_signals(found);
         Words words;
         if constexpr (requires { found.chain; }) {
           words = scenario_words(found, text.name);

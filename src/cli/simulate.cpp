@@ -116,6 +116,7 @@ class RunSession {
     summary.shown.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
     summary.trajectory = output_;
     summary.view = options_.view;
+    if (is_filmed_) summary.film = options_.video;
     summary.rows_written = file_ ? file_->rows() : 0;
     return summary;
   }
@@ -184,7 +185,8 @@ class RunSession {
       if (std::filesystem::exists(film_rows_name(copy))) rows.push_back(film_rows_name(copy));
     }
     if (!film_rows_) rows.push_back(*output_);
-    if (film(rows, *options_.video, options_.film) != done && summary.ending.ok()) {
+    is_filmed_ = film(rows, *options_.video, options_.film) == done;
+    if (!is_filmed_ && summary.ending.ok()) {
       summary.ending = {"output_failed", *options_.video + ": the film could not be made", {}, {}};
     }
     std::error_code unknown;
@@ -254,6 +256,7 @@ class RunSession {
   std::unique_ptr<io::RunFile> film_rows_;
   LastCheckpoint last_;
   Progress progress_;
+  bool is_filmed_ = false;
   std::vector<std::string> warnings_;
 };
 

@@ -42,16 +42,7 @@ auto told_at(const FeedbackPlan& plan, Read read) {
 }
 
 std::size_t input_of(const FeedbackPlan& plan, const Subject& subject) {
-  const std::vector<std::string> names = input_names(subject);
-  const auto found = std::ranges::find(names, plan.input);
-  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-  constexpr std::size_t few = 12;
-  std::string known;
-  for (std::size_t k = 0; k < std::min(few, names.size()); ++k) known += (known.empty() ? "" : ", ") + names[k];
-  if (names.size() > few) known += ", ...";
-  const std::vector<std::string_view> views(names.begin(), names.end());
-  throw InputError(plan.input_place + ": expected an input: " + (known.empty() ? "there is none" : known) + "; got \"" +
-                   plan.input + '"' + did_you_mean(nearest_name(plan.input, views)));
+  return input_named(plan.input, plan.input_place, subject);
 }
 
 /// A function of the motion that several threads may call.
@@ -156,6 +147,19 @@ std::vector<FeedbackPlan> read_feedback(const Section& system) {
   return plans;
 }
 
+std::size_t input_named(const std::string& input, const std::string& place, const Subject& subject) {
+  const std::vector<std::string> names = input_names(subject);
+  const auto found = std::ranges::find(names, input);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  constexpr std::size_t few = 12;
+  std::string known;
+  for (std::size_t k = 0; k < std::min(few, names.size()); ++k) known += (known.empty() ? "" : ", ") + names[k];
+  if (names.size() > few) known += ", ...";
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  throw InputError(place + ": expected an input: " + (known.empty() ? "there is none" : known) + "; got \"" +
+                   input + '"' + did_you_mean(nearest_name(input, views)));
+}
+
 InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject) {
   input_of(plan, subject);
   const std::vector<std::string> names = names_for(subject, true);
@@ -181,14 +185,14 @@ std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>&
   return functions;
 }
 
-std::shared_ptr<const Subject> with_sampled(const std::vector<FeedbackPlan>& plans,
-                                            const std::shared_ptr<const Subject>& subject) {
+std::vector<SampledLaw> sampled_laws(const std::vector<FeedbackPlan>& plans,
+                                     const std::shared_ptr<const Subject>& subject) {
   std::vector<SampledLaw> laws;
   for (const FeedbackPlan& plan : plans) {
     if (plan.sample == 0) continue;
     laws.push_back({input_of(plan, *subject), function_of(plan, subject), plan.sample, plan.limit});
   }
-  return with_feedback(subject, std::move(laws));
+  return laws;
 }
 
 }  // namespace pendula::io

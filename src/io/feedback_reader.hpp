@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <memory>
+#include <pendula/run/feedback.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <string>
@@ -23,6 +25,9 @@ struct FeedbackPlan {
 /// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Throws InputError.
 std::vector<FeedbackPlan> read_feedback(const Section& system);
 
+/// The index of an input of a subject. Throws InputError with the place of its name.
+std::size_t input_named(const std::string& input, const std::string& place, const Subject& subject);
+
 /// One of them, continuous or sampled, as the generator reads it. Throws InputError as continuous_laws.
 InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
 
@@ -34,8 +39,8 @@ std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, co
 std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
                                                 const std::shared_ptr<const SystemSubject>& system);
 
-/// The subject with those that are sampled. Throws InputError as continuous_laws.
-std::shared_ptr<const Subject> with_sampled(const std::vector<FeedbackPlan>& plans,
-                                            const std::shared_ptr<const Subject>& subject);
+/// Those that are sampled. Throws InputError as continuous_laws.
+std::vector<SampledLaw> sampled_laws(const std::vector<FeedbackPlan>& plans,
+                                     const std::shared_ptr<const Subject>& subject);
 
 }  // namespace pendula::io
