@@ -73,7 +73,8 @@ class EnsembleSession {
     job_.require_members();
     if (ranks_.all(output_.is_complete())) return leave_alone();
     const std::vector<std::int64_t> missing = output_.find_missing([&](bool mine) { return ranks_.all(mine); });
-    if (ranks_.rank() == 0 && output_.replaces() && !options_.quiet) std::cerr << "pendula: replacing " << options_.output << '\n';
+    if (ranks_.rank() == 0 && output_.replaces() && !options_.quiet)
+      std::cerr << "pendula: replacing " << options_.output << '\n';
     const auto began = Clock::now();
     work(missing);
     seconds_ = std::chrono::duration<double>(Clock::now() - began).count();

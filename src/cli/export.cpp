@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -185,6 +186,10 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
           if (found.duration > 0) add_number(words, "duration", found.duration);
         }
         if (!found.events.empty()) std::cerr << "pendula: warning: events are not exported\n";
+        const auto is_own = [](const io::ColumnPlan& column) {
+          return column.place.find("output.columns") < std::string::npos;
+        };
+        if (std::ranges::any_of(found.columns, is_own)) std::cerr << "pendula: warning: columns are not exported\n";
         if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
         if (found.run.method == Method::gauss && found.run.step > 0) {
           if (!options.stages) add_number(words, "stages", found.run.stages);

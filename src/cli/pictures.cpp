@@ -51,8 +51,8 @@ ExitStatus plot(const PlotOptions& options) {
 }
 
 ExitStatus map(const MapOptions& options) {
-  return draw_picture({"map", "--output=" + options.output, "--scale=" + options.scale,
-                       "--contour=" + options.contour, "--", options.file, options.key},
+  return draw_picture({"map", "--output=" + options.output, "--scale=" + options.scale, "--contour=" + options.contour,
+                       "--", options.file, options.key},
                       options.output);
 }
 

@@ -17,10 +17,18 @@ namespace pendula::io {
 /// Feedback as a scenario describes it. Its expression is read once the columns of the rows are known.
 struct FeedbackPlan {
   std::string input, value;
-  double sample = 0;  ///< 0: continuous  [s]
+  double sample = 0;      ///< 0: continuous  [s]
+  bool is_drive = false;  ///< a function of time alone, and of pieces
   double limit = std::numeric_limits<double>::infinity();
   std::string place, input_place;  ///< `where: key` of `value` and of `input`
 };
+
+/// Reads the values of [[system.drive]], which are laws, too. Throws InputError.
+std::vector<FeedbackPlan> read_drive_values(const Section& system);
+
+/// The same as the generator reads them, which knows whether an input, or a motion, has such a name. Throws InputError
+/// if an expression cannot be read, or is not of time alone.
+std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans);
 
 /// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Throws InputError.
 std::vector<FeedbackPlan> read_feedback(const Section& system);
@@ -35,7 +43,7 @@ InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
 /// unknown, or is not smooth.
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system);
 
-/// The same as functions. `system` is without feedback.
+/// The same as functions, with those of drives of inputs. `system` is without feedback.
 std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
                                                 const std::shared_ptr<const SystemSubject>& system);
 

@@ -345,7 +345,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   if (!every && !plan.rows.any()) choose_rows(plan);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
   plan.events = read_events(sections.root);
-  plan.columns = read_columns(sections.output);
+  for (ColumnPlan& column : read_columns(sections.output)) plan.columns.push_back(std::move(column));
   if (!plan.feedback.empty()) plan.places["feedback"] = plan.feedback.front().place;
   plan.checkpoint = sections.output.number("checkpoint");
   for (const ScenarioKey& key : table_named("run").keys) {

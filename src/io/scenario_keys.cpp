@@ -86,13 +86,14 @@ constexpr std::array<ScenarioKey, 6> system = {
     another("model", text, required, "a model file, or the name of a built-in model"),
     an_integer("links", 1, 64, InWords{"1, for the model to say"}, "number of links, where the model has some"),
     another("parameters", names, InWords{"those of the model"}, "a table by name"),
-    another("drive", tables, none, "constant + amplitude sin(frequency t + phase), added to an input"),
+    another("drive", tables, none, "constant + amplitude sin(frequency t + phase) + value, added to an input"),
     another("feedback", tables, none, "what follows from the motion, added to an input"),
     another("signal", tables, none, "measured numbers, added to an input"),
 };
 
-constexpr std::array<ScenarioKey, 5> system_drive = {
-    another("input", text, required, "the name of an input of the model"),
+constexpr std::array<ScenarioKey, 6> system_drive = {
+    another("input", text, required, "the name of an input or a motion of the model"),
+    another("value", text, none, "an expression of the time t alone, as \"t < 1 ? 0.5 : 0\""),
     a_number("constant", "", any_number, 0.0, "in the unit of the input"),
     a_number("amplitude", "", any_number, 0.0, "in the unit of the input"),
     a_number("frequency", "rad/s", any_number, InWords{"must be given with an amplitude"}, "an angular frequency"),

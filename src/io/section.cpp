@@ -22,7 +22,7 @@ std::string expected_number(Bound bound) {
 std::string or_a_string(std::string_view unit, bool is_string) {
   const std::string strings = strings_in(unit);
   const bool is_usual = strings != unit;
-  if (unit.empty() || !(is_usual || is_string)) return "";
+  if (unit.empty() || unit == "1" || !(is_usual || is_string)) return "";
   const std::string_view kind = is_usual ? "" : kind_of_unit(unit);
   return " or a string in " + strings + (kind.empty() ? "" : " (" + std::string(kind) + ")");
 }
@@ -109,8 +109,8 @@ Eigen::VectorXd Entry::per_link(const LinkCount& count, std::string_view unit) c
     return Eigen::VectorXd::Constant(count.links, number(unit));
   }
   if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
-    fail(expected_number(key_->bound) + or_a_string(unit, false) + " for all links, or an array of " + std::to_string(count.links) +
-         (name_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
+    fail(expected_number(key_->bound) + or_a_string(unit, false) + " for all links, or an array of " +
+         std::to_string(count.links) + (name_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
   }
   Eigen::VectorXd values(count.links);
   for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(unit);

@@ -20,8 +20,8 @@ void read_file(const Section& table, const Entry& file, const std::filesystem::p
   }
   const auto column = table.find("column");
   const std::filesystem::path given = file.text();
-  const NumberTable numbers =
-      read_number_table(given.is_absolute() ? given : folder / given, {times_column, column ? column->text() : plan.input});
+  const NumberTable numbers = read_number_table(given.is_absolute() ? given : folder / given,
+                                                {times_column, column ? column->text() : plan.input});
   plan.signal.times = numbers.columns[0];
   plan.signal.values = numbers.columns[1];
   for (std::size_t k = 1; k < numbers.lines.size(); ++k) {

@@ -50,6 +50,8 @@ std::vector<double> read_parameters(const Section& system, const SystemInfo& inf
 }
 
 void read_drive(const Section& table, const SystemInfo& info, SystemNumbers& numbers) {
+  const bool has_numbers = table.find("constant") || table.find("amplitude");
+  if (table.find("value") && !has_numbers) return;
   const Entry entry = table.require("input", "the name of an input of the model: " + listed(info.inputs));
   if (info.inputs.empty()) entry.fail("no drive, since the model has no inputs");
   const std::size_t input = entry.choice(info.inputs);
@@ -208,6 +210,30 @@ std::vector<std::string> degree_warnings(const Section& root, const SystemInfo& 
   return warnings;
 }
 
+/// What drives make of motions, which are no inputs of a kernel.
+std::vector<ColumnPlan> motion_columns(const std::vector<FeedbackPlan>& drives, const SystemSubject& system) {
+  std::vector<ColumnPlan> columns;
+  for (const FeedbackPlan& drive : drives) {
+    if (std::ranges::find(system.info().inputs, drive.input) != system.info().inputs.end()) continue;
+    const auto same = std::ranges::find(columns, drive.input, &ColumnPlan::name);
+    if (same == columns.end()) {
+      columns.push_back({drive.input, drive.value, drive.place});
+    } else {
+      same->value = "(" + same->value + ") + (" + drive.value + ")";
+    }
+  }
+  return columns;
+}
+
+/// Where a scenario says what a model refuses: the drive of something that it does not have, or the model.
+std::string place_of(std::string_view refused, const std::vector<FeedbackPlan>& drives, const Entry& model) {
+  for (const FeedbackPlan& drive : drives) {
+    if (refused.ends_with("; got " + drive.input)) return drive.input_place;
+    if (refused.find("the motion " + drive.input + " ") != std::string_view::npos) return drive.place;
+  }
+  return model.place();
+}
+
 }  // namespace
 
 std::optional<std::string> warning_of_degrees(const Entry& entry) {
@@ -232,19 +258,24 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   std::optional<int> links;
   if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer());
   SystemScenario scenario;
+  const std::vector<FeedbackPlan> drives = read_drive_values(table);
   scenario.feedback = read_feedback(table);
   scenario.signals = read_signals(table, folder);
   try {
-    ModelName name{model.text(), links, folder};
+    ModelName name{model.text(), links, folder, drive_laws(drives)};
     const auto kernel = find(name);
     const SystemNumbers numbers = read_numbers(table, kernel->info);
     const auto system = std::make_shared<SystemSubject>(kernel, numbers);
-    name.laws = continuous_laws(scenario.feedback, *system);
+    std::vector<FeedbackPlan> laws = drives;
+    laws.insert(laws.end(), scenario.feedback.begin(), scenario.feedback.end());
+    const std::vector<InputLaw> fed = continuous_laws(scenario.feedback, *system);
+    name.laws.insert(name.laws.end(), fed.begin(), fed.end());
     scenario.system = name.laws.empty() ? system
-                                        : std::make_shared<SystemSubject>(
-                                              find(name), numbers, continuous_functions(scenario.feedback, system));
+                                        : std::make_shared<SystemSubject>(fed.empty() ? kernel : find(name), numbers,
+                                                                          continuous_functions(laws, system));
+    scenario.columns = motion_columns(drives, *system);
   } catch (const ModelError& error) {
-    throw InputError(model.place() + ": " + error.what());
+    throw InputError(place_of(error.what(), drives, model) + ": " + error.what());
   }
   scenario.start = read_start(root, *scenario.system);
   scenario.warnings = degree_warnings(root, scenario.system->info());

@@ -131,7 +131,8 @@ bool is_bare_string(std::string_view text) {
            degree_sign.find(c) != std::string_view::npos;
   };
   const std::optional<TextWithUnit> quantity = read_quantity(text);
-  if (!quantity || quantity->unit.empty() || (quantity->unit.front() >= '0' && quantity->unit.front() <= '9')) return false;
+  if (!quantity || quantity->unit.empty() || (quantity->unit.front() >= '0' && quantity->unit.front() <= '9'))
+    return false;
   return std::ranges::all_of(quantity->unit, in_a_unit);
 }
 

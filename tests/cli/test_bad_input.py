@@ -30,7 +30,7 @@ INPUTS = [
         "[1.0, 1.0, 1.0]",
     ),
     ("lengths = 1.0", "lengths = -1", "4: chain.lengths", "a finite number > 0", "-1"),
-    ("gravity = 9.81", 'gravity = "strong"', "5: chain.gravity", "a finite number", '"strong"'),
+    ("gravity = 9.81", 'gravity = "strong"', "5: chain.gravity", "a finite number or a string in m/s^2 (an acceleration)", '"strong"'),
     ("gravity = 9.81", "gravity = inf", "5: chain.gravity", "a finite number", "inf"),
     ("gravity = 9.81", "damping = -1.0", "5: chain.damping", "a finite number >= 0", "-1.0"),
     ('"planar"', '"plane"', "2: chain.space", '"planar" or "spatial"', '"plane" (did you mean planar?)'),

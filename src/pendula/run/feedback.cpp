@@ -315,8 +315,7 @@ std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subj
                                 " and " + std::to_string(signal.times.size()) + " times");
   }
   std::vector<double> inputs = inputs_of(*subject);
-  return std::make_shared<FedSubject>(
-      Fed{std::move(subject), std::move(laws), std::move(signals), std::move(inputs)});
+  return std::make_shared<FedSubject>(Fed{std::move(subject), std::move(laws), std::move(signals), std::move(inputs)});
 }
 
 }  // namespace pendula

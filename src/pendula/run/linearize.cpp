@@ -71,8 +71,8 @@ void find_b(const SystemModel& model, const Motion& motion, double* b) {
 
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
   require_regular(subject, motion);
-  const SystemModel model = as_its_kind_at(
-      subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
+  const SystemModel model =
+      as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
   if (a != nullptr) {
     SystemAt<8> here(model);
     here.set_time(motion.time);
