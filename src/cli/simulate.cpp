@@ -29,6 +29,7 @@
 #include "io/run_source.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
+#include "io/signal_origin.hpp"
 #include "io/summary.hpp"
 #include "view/lab.hpp"
 #include "view/page.hpp"
@@ -77,7 +78,7 @@ class RunSession {
         options_(options),
         from_(io::checkpoint_of(source, setup_.start.time + setup_.duration)),
         run_(io::told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
-        origin_(io::origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
+        origin_(origin_of(source, plan, model, scene)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
         film_contents_(contents(plan, scene, false)),
@@ -157,6 +158,14 @@ class RunSession {
     } catch (const io::OutputError& error) {
       if (summary.ending.ok()) summary.ending = {"output_failed", error.what(), {}, {}};
     }
+  }
+
+  io::RunOrigin origin_of(const io::RunSource& source, const io::RunPlan& plan, const std::string& model,
+                          const view::Scene& scene) const {
+    io::RunOrigin origin =
+        io::origin_of(source, run_.description(), model, options_.command, scene.title + ": " + scene.subject);
+    origin.overrides = io::overrides_with_numbers(source, plan.signals);
+    return origin;
   }
 
   io::RunContents contents(const io::RunPlan& plan, const view::Scene& scene, bool with_events = true) const {

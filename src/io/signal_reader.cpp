@@ -8,6 +8,8 @@
 
 #include "io/feedback_reader.hpp"
 #include "io/number_table.hpp"
+#include "io/signal_origin.hpp"
+#include "io/toml_reader.hpp"
 
 namespace pendula::io {
 namespace {
@@ -46,6 +48,13 @@ void read_arrays(const Section& table, SignalPlan& plan) {
   }
 }
 
+/// In TOML, where 1e300 and 1 are numbers as they are.
+std::string array_of(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double number : numbers) text += (text.empty() ? "[" : ", ") + shortest(number);
+  return text + "]";
+}
+
 }  // namespace
 
 std::vector<SignalPlan> read_signals(const Section& system, const std::filesystem::path& folder) {
@@ -64,6 +73,21 @@ std::vector<SignalPlan> read_signals(const Section& system, const std::filesyste
     plans.push_back(std::move(plan));
   }
   return plans;
+}
+
+std::vector<std::string> overrides_with_numbers(const RunSource& source, const std::vector<SignalPlan>& signals) {
+  std::vector<std::string> overrides = source.overrides;
+  if (signals.empty()) return overrides;
+  const toml::table document = parse_toml(source.text.text, source.text.name, source.overrides);
+  const std::string kind = document.contains("system") ? "system" : "chain";
+  for (std::size_t k = 0; k < signals.size(); ++k) {
+    if (!document[kind]["signal"][k]["file"]) continue;
+    const SignalPlan& plan = signals[k];
+    overrides.push_back(kind + ".signal[" + std::to_string(k + 1) + "]={input=" + toml_string(plan.input) +
+                        ", hold=" + (plan.signal.is_held ? "true" : "false") +
+                        ", times=" + array_of(plan.signal.times) + ", values=" + array_of(plan.signal.values) + "}");
+  }
+  return overrides;
 }
 
 std::vector<Signal> signals_of(const std::vector<SignalPlan>& plans, const Subject& subject) {

@@ -156,7 +156,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
                                           unit_systems = {"SI", "natural"};
 constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
 
-constexpr std::array<JsonRow, 41> rows = {{
+constexpr std::array<JsonRow, 43> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
