@@ -289,8 +289,7 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       {"frequency = 3", "", "file.toml:11: chain.drive[1].frequency: expected an angular frequency, got no such key"},
       // wrong types
       {"lengths = 1.5", "lengths = \"long\"",
-       "file.toml:5: chain.lengths: expected a finite number > 0 for all links, or "
-       "an array of 3 (the links that chain.links tells), got \"long\""},
+       "file.toml:5: chain.lengths: expected a finite number > 0 or a string in m (a length), got \"long\""},
       {"[1.0, 0.5, 2.0]", "[1.0, true, 2.0]", "file.toml:4: chain.masses[2]: expected a finite number > 0, got true"},
       {"links   = 3", "links = 3.0", "file.toml:3: chain.links: expected an integer from 1 to 1000000, got 3.0"},
       {"gravity = 9.8", "gravity = [9.8]", "file.toml:6: chain.gravity: expected a finite number, got [9.8]"},
@@ -440,14 +439,61 @@ TEST(Scenario, TextsThatAreNoAnglesAreTold) {
   for (const std::string text : {"90", "deg", "90 grad", "90 deg deg", "90 deg/s", "nan deg", "inf rad", "1e400 deg",
                                  "", "--1 deg", "+-1 deg", "9 0 deg"}) {
     const std::string override = "start.theta=[1, 2, \"" + text + "\"]";
-    EXPECT_EQ(error_of(spatial_text, {override}),
-              "--set " + override + ": start.theta[3]" + expected + ", got \"" + text + "\"");
+    EXPECT_EQ(error_of(spatial_text, {override}), "--set " + override + ": start.theta[3]" + expected + ", got \"" +
+                                                      text + "\"" +
+                                                      (text == "90 deg/s" ? ", an angular velocity" : ""));
   }
   EXPECT_EQ(error_of(spatial_text, {"start.phi=\"1 rad/s\""}),
-            "--set start.phi=\"1 rad/s\": start.phi" + expected + ", got \"1 rad/s\"");
+            "--set start.phi=\"1 rad/s\": start.phi" + expected + ", got \"1 rad/s\", an angular velocity");
   EXPECT_EQ(error_of(spatial_text, {"start.theta_dot=\"1 deg\""}),
             "--set start.theta_dot=\"1 deg\": start.theta_dot: expected a finite number or a string in rad/s or deg/s, "
-            "got \"1 deg\"");
+            "got \"1 deg\", an angle");
+}
+
+TEST(Scenario, NumbersMayHaveUnits) {
+  const auto chain =
+      parsed<Planar>(planar_text, {"chain.masses=[\"100 g\", 2]", "chain.lengths=5 cm", "chain.gravity=\"981 cm/s^2\"",
+                                   "chain.damping=2 mN m s/rad", "chain.torque=\"3 N cm\"", "run.duration=1 min",
+                                   "start.theta_dot=10 rpm", "output.times=[\"1 ms\", \"2s\"]"});
+  EXPECT_EQ(chain.chain.masses(), numbers({100 * 1e-3, 2}));
+  EXPECT_EQ(chain.chain.lengths(), numbers({5 * 1e-2, 5 * 1e-2}));
+  EXPECT_DOUBLE_EQ(chain.chain.gravity(), 9.81);
+  EXPECT_EQ(chain.chain.damping(), numbers({2e-3, 2e-3}));
+  EXPECT_DOUBLE_EQ(chain.chain.constant_torque()(0, 1), 0.03);
+  EXPECT_EQ(chain.duration, 60);
+  EXPECT_DOUBLE_EQ(chain.start.v[0], std::numbers::pi / 3);
+  EXPECT_EQ(chain.rows.times, (std::vector<double>{1e-3, 2}));
+  const auto driven = parsed<Spatial>(
+      spatial_text, {"chain.drive[1].frequency=\"2 Hz\"", "chain.drive[1].amplitude=[\"1 kN m\", 0, \"2 J\"]"});
+  EXPECT_DOUBLE_EQ(driven.chain.drives()[0].frequency, 4 * std::numbers::pi);
+  EXPECT_EQ(driven.chain.drives()[0].amplitude, Eigen::Vector3d(1e3, 0, 2));
+}
+
+TEST(Scenario, UnitsOfNaturalScenariosAreConverted) {
+  const std::string natural =
+      "[chain]\nspace=\"planar\"\nmasses=[1.0, 3.0]\nlengths=\"40 cm\"\ngravity=10\n"
+      "units=\"natural\"\n[[chain.drive]]\nlink=1\namplitude=\"16 N m\"\nfrequency=\"1 rad/s\"\n"
+      "[start]\ntheta=\"90 deg\"\ntheta_dot=\"1 rad/s\"\n[run]\nduration=\"2 s\"\n";
+  const auto scenario = parsed<Planar>(natural);  // l_1 = 0.4 m, M_1 = 4 kg, a time of 0.2 s, an energy of 16 J
+  EXPECT_DOUBLE_EQ(scenario.duration, 10);
+  EXPECT_DOUBLE_EQ(scenario.start.v[0], 0.2);
+  EXPECT_DOUBLE_EQ(scenario.chain.drives()[0].amplitude[0], 1);
+  EXPECT_DOUBLE_EQ(scenario.chain.drives()[0].frequency, 0.2);
+}
+
+TEST(Scenario, UnitsOfAnotherKindAreTold) {
+  const auto error = [](const std::string& override) { return error_of(planar_text, {override}); };
+  EXPECT_EQ(error("chain.masses=5 cm"),
+            "--set chain.masses=5 cm: chain.masses: expected a finite number > 0 or a string in kg (a mass), got "
+            "\"5 cm\", a length");
+  EXPECT_EQ(error("run.duration=\"3 apples\""),
+            "--set run.duration=\"3 apples\": run.duration: expected a finite number >= 0 or a string in s (a time), "
+            "got \"3 apples\"");
+  EXPECT_EQ(
+      error("run.step=\"-1 ms\""),
+      "--set run.step=\"-1 ms\": run.step: expected a finite number > 0 or a string in s (a time), got \"-1 ms\"");
+  EXPECT_EQ(error("run.tolerance=\"1 m\""),
+            "--set run.tolerance=\"1 m\": run.tolerance: expected a finite number >= 1e-16, got \"1 m\", a length");
 }
 
 TEST(Scenario, MomentaStandInPlaceOfRates) {
@@ -467,8 +513,8 @@ TEST(Scenario, MomentaThatMakeNoSenseAreTold) {
   EXPECT_EQ(error_of(planar_text + "p_phi = 1\n"),
             "file.toml:8: start.p_phi: expected no such key in a planar scenario, got 1");
   EXPECT_EQ(error_of(planar_text + "p_theta = \"1 rad\"\n"),
-            "file.toml:8: start.p_theta: expected a finite number for all links, or an array of 2 (the links that "
-            "chain.masses tells), got \"1 rad\"");
+            "file.toml:8: start.p_theta: expected a finite number or a string in N m s (an angular momentum), got "
+            "\"1 rad\", an angle");
   const std::string pole = "[chain]\nspace=\"spatial\"\nmasses=[1, 1]\nlengths=1\n[start]\ntheta=[1, \"180 deg\"]\n";
   EXPECT_EQ(error_of(pole + "p_phi = 1"), "file.toml:7: start.p_phi: link 2: expected 0 where sin(theta) = 0");
   EXPECT_EQ(parsed<Spatial>(pole + "p_phi = [1, 0]\np_theta = 1").start.v[3], 0);

@@ -209,6 +209,7 @@ def _run_link(options: argparse.Namespace) -> None:
 
 def _run_model(options: argparse.Namespace) -> None:
     model = read_model(find_model(options.model), options.links)
+    model.move({})
     _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name, options.alias))
 
 
@@ -225,7 +226,7 @@ def _run_program(options: argparse.Namespace) -> None:
 
 def _fed_model(options: argparse.Namespace) -> Model:
     model = read_model(find_model(options.model), options.links)
-    if options.feedback:
+    if options.feedback or model.motions:
         close_loops(model, options.feedback)
         model.system  # noqa: B018  the checks of the whole
     return model

@@ -52,6 +52,10 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
         "inputs": [
             {"name": i.symbol.name, "unit": i.unit, "remark": remark(i.symbol.name)} for i in model.inputs
         ],
+        "motions": [
+            {"name": m.symbol.name, "unit": m.unit, "default": m.default, "remark": remark(m.symbol.name)}
+            for m in model.motions
+        ],
         "switches": [{"value": switch.text, "remark": ""} for switch in model.switches],
         "points": [
             {

@@ -1,4 +1,4 @@
-"""Feedback: what a scenario adds to an input of a model or a chain, as a function of the motion.
+"""Feedback: what a scenario adds to an input of a model or a chain, as a function of the motion, or of time alone.
 
 What is continuous stands in the forces of the kernel, which is as exact with it as without, derivatives included.
 """
@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy
-from sympy import Expr
+from sympy import And, Expr, Integer, Or, Piecewise, Symbol
+from sympy.logic.boolalg import Boolean
 
 from pendula_codegen.chain import Chain
 from pendula_codegen.chain_kernel import declared_by
@@ -25,23 +26,44 @@ _SIGNS: dict[str, Callable[[Expr, Expr], Expr]] = {
     "/": operator.truediv,
     "^": lambda base, exponent: base ** _exponent(exponent),
 }
-_FUNCTIONS = frozenset(
-    ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt"]
-)
+_COMPARISONS: dict[str, Callable[[Expr, Expr], Boolean]] = {
+    "<": sympy.StrictLessThan,
+    "<=": sympy.LessThan,
+    ">": sympy.StrictGreaterThan,
+    ">=": sympy.GreaterThan,
+}
+_FUNCTIONS = {
+    **{
+        name: getattr(sympy, name)
+        for name in "sin cos tan asin acos atan sinh cosh tanh exp log sqrt sign".split()
+    },
+    "abs": sympy.Abs,
+}
+_OF_TWO = {"min": sympy.Min, "max": sympy.Max}
 
 
 def close_loops(model: Model, laws: Iterable[str]) -> None:
     """Adds to inputs what laws say: each INPUT=WORDS, operands before what is done with them: `x 9 * ~` is −(x · 9).
 
-    Words are numbers, names of columns of the motion, signs (~ is minus of one), and functions as `sin()`.
+    Words are numbers, names of columns of the motion, signs (~ is minus of one), comparisons, `?:` of a condition and
+    two values, and functions as `sin()`. What laws say of motions adds up to these, which are functions of time.
     """
     names = _columns(model)
+    inputs = {each.symbol.name: each.symbol for each in model.inputs}
+    motions = {each.symbol.name: each.symbol for each in model.motions}
+    moved: dict[Symbol, Expr] = {}
     for law in laws:
         name, _, words = law.partition("=")
-        inputs = {each.symbol.name: each.symbol for each in model.inputs}
-        if name not in inputs:
-            raise GenerationError(f"feedback: expected an input of the model, got {name}")
-        model.feed(inputs[name], _value(words, names))
+        value = _value(words, names)
+        if name in motions:
+            symbol = motions[name]
+            moved[symbol] = moved.get(symbol, Integer(0)) + value
+        elif name in inputs:
+            model.feed(inputs[name], value)
+        else:
+            known = ", ".join([*inputs, *motions]) or "there is none"
+            raise GenerationError(f"expected an input of the model: {known}; got {name}")
+    model.move(moved)
 
 
 @dataclass(frozen=True)
@@ -98,6 +120,20 @@ def _columns_of_chain(chain: Chain) -> dict[str, Expr]:
     return names
 
 
+def _number(condition: Boolean) -> Expr:
+    """1 where it holds, else 0, as expressions have it."""
+    return Piecewise((Integer(1), condition), (Integer(0), True))
+
+
+def _truth(value: Expr) -> Boolean:
+    """The condition that a number was made of; of any other number whether it is not 0."""
+    if isinstance(value, Piecewise) and [piece for piece, _ in value.args] == [1, 0]:
+        return value.args[0][1]
+    if value.is_number:
+        return sympy.true if value != 0 else sympy.false
+    return Or(value > 0, value < 0)
+
+
 def _value(words: str, names: Mapping[str, Expr]) -> Expr:
     stack: list[Expr] = []
     for word in words.split():
@@ -106,8 +142,21 @@ def _value(words: str, names: Mapping[str, Expr]) -> Expr:
             stack.append(_SIGNS[word](stack.pop(), right))
         elif word == "~":
             stack.append(-stack.pop())
+        elif word in _COMPARISONS:
+            right = stack.pop()
+            stack.append(_number(_COMPARISONS[word](stack.pop(), right)))
+        elif word in ("&&", "||"):
+            right = _truth(stack.pop())
+            both = (And if word == "&&" else Or)(_truth(stack.pop()), right)
+            stack.append(_number(both))
+        elif word == "?:":
+            no, yes = stack.pop(), stack.pop()
+            stack.append(Piecewise((yes, _truth(stack.pop())), (no, True)))
         elif word.endswith("()") and word[:-2] in _FUNCTIONS:
-            stack.append(getattr(sympy, word[:-2])(stack.pop()))
+            stack.append(_FUNCTIONS[word[:-2]](stack.pop()))
+        elif word.endswith("()") and word[:-2] in _OF_TWO:
+            right = stack.pop()
+            stack.append(_OF_TWO[word[:-2]](stack.pop(), right))
         elif word in names:
             stack.append(names[word])
         else:

@@ -17,7 +17,7 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from numbers import Real
@@ -80,6 +80,20 @@ class Input:
     unit: str
 
 
+@dataclass(frozen=True)
+class Motion:
+    """What moves as somebody prescribes: a function of time, and what its rates are called."""
+
+    symbol: Symbol
+    unit: str
+    default: float
+
+    @property
+    def rates(self) -> tuple[Symbol, Symbol]:
+        first = _rate_symbol(self.symbol)
+        return first, _rate_symbol(first)
+
+
 POINT_KINDS = ("bob", "cart", "pivot", "weight", "floor")
 ORIGIN = "origin"  # where springs and threads may end, too
 
@@ -119,6 +133,7 @@ class Model:
     coordinates: list[Coordinate] = field(default_factory=list)
     parameters: list[Parameter] = field(default_factory=list)
     inputs: list[Input] = field(default_factory=list)
+    motions: list[Motion] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
     _forces: list[tuple[Symbol, _Said]] = field(default_factory=list)
@@ -151,16 +166,26 @@ class Model:
         return symbol
 
     def rate(self, of: Expr) -> Expr:
-        """dq/dt of a coordinate, a symbol; of an expression in coordinates and time, its derivative.
+        """dq/dt of a coordinate, a symbol; of an expression in coordinates, motions and time, its derivative.
 
-        Of rates and inputs there is none: accelerations are what the equations are solved for.
+        Of rates and inputs there is none: accelerations are what the equations are solved for. A motion has two.
         """
         value = self._expression(of, "rate")
-        self._check(value, "rate", (*self._positions(), self.time))
-        for coordinate in self.coordinates:
-            if value == coordinate.symbol:
-                return _rate_symbol(coordinate.symbol)
         slopes = [(c.symbol, _rate_symbol(c.symbol)) for c in self.coordinates]
+        for motion in self.motions:
+            first, second = motion.rates
+            slopes += [(motion.symbol, first), (first, second)]
+        fed = sorted({i.symbol.name: i for i in self.inputs if value.has(i.symbol)}.items())
+        if fed:
+            name, one = fed[0]
+            self._fail(
+                f"rate holds '{name}', an input, whose rates nobody knows: "
+                f'model.motion("{name}", "{one.unit}") is an input that has rates'
+            )
+        self._check(value, "rate", (*self._positions(), *(symbol for symbol, _ in slopes), self.time))
+        for symbol, slope in slopes:
+            if value == symbol:
+                return slope
         return Add(*(value.diff(q) * v for q, v in slopes), value.diff(self.time))
 
     def parameter(
@@ -192,6 +217,21 @@ class Model:
         """A number that the scenario or a program gives at every time; it may stand in forces only."""
         symbol = self._declare(name, "an input")
         self.inputs.append(Input(symbol, self._text(unit, "a unit")))
+        return symbol
+
+    def motion(self, name: str, unit: str, *, default: float = 0.0) -> Symbol:
+        """A prescribed motion: an input that may stand in the Lagrangian and in points, too, and that has rates.
+
+        Drives of a scenario say what it is as an expression of time: `value = "0.1 * sin(3*t)"`. `default` is what it
+        is without.
+        """
+        symbol = self._declare(name, "a motion")
+        if not isinstance(default, Real) or isinstance(default, bool):
+            self._fail(f"motion {name}: default: expected a number, got {default!r}")
+        motion = Motion(symbol, self._text(unit, "a unit"), float(default))
+        for rate, which in zip(motion.rates, ("rate", "second rate"), strict=True):
+            self._declare(rate.name, f"the {which} of {name}")
+        self.motions.append(motion)
         return symbol
 
     @property
@@ -238,7 +278,8 @@ class Model:
         self._name(name)
         for axis in "xyz"[: len(values)]:
             self._declare(f"{name}_{axis}", f"a component of the point {name}")
-        self._check(Add(*values), f"point {name}", (*self._positions(), self.time))
+        motions = (m.symbol for m in self.motions)
+        self._check(Add(*values), f"point {name}", (*self._positions(), *motions, self.time))
         self.points.append(Point(name, values, kind))
         return self.points[-1]
 
@@ -285,6 +326,39 @@ class Model:
         ]
         vars(self).pop("system", None)  # it was derived without
 
+    def move(self, by: dict[Symbol, Expr]) -> None:
+        """Puts functions of time in place of motions, their default in place of the others, and drops them."""
+        changes: dict[Symbol, Expr] = {}
+        for motion in self.motions:
+            value = exact(sympify(motion.default))
+            if motion.symbol in by:
+                value = self._expression(by[motion.symbol], f"the motion {motion.symbol.name}")
+                self._check(value, f"the motion {motion.symbol.name}", (self.time,), self.file)
+                for switch in self._switches.held_by(value):
+                    if jump(value, switch, self.switches, (self.time,)):
+                        self._fail(
+                            f"the motion {motion.symbol.name} or its rate jumps where {switch.text} = 0, which would "
+                            "be a blow: expected pieces that meet"
+                        )
+            first, second = motion.rates
+            changes |= {motion.symbol: value, first: value.diff(self.time)}
+            changes[second] = changes[first].diff(self.time)
+        if not changes:
+            return
+
+        def moved(said: _Said | None) -> _Said | None:
+            return said and _Said(said.value.xreplace(changes), said.where)
+
+        self._switches.substitute(changes)
+        self._lagrangian, self._dissipation = moved(self._lagrangian), moved(self._dissipation)
+        self._forces[:] = [(along, moved(said)) for along, said in self._forces]
+        self.points[:] = [
+            replace(point, components=tuple(each.xreplace(changes) for each in point.components))
+            for point in self.points
+        ]
+        self.motions.clear()
+        vars(self).pop("system", None)  # it was derived without
+
     @property
     def ordered_parameters(self) -> list[Parameter]:
         """Parameters in the order of the kernel: those of links first, indicators last."""
@@ -318,7 +392,11 @@ class Model:
             name=self.name,
             coordinates=tuple(c.symbol for c in self.coordinates),
             velocities=self._rates(),
-            parameters=tuple(symbol for p in (*self.parameters, *self.indicators) for symbol in p.symbols),
+            # Motions are known once drives are.
+            parameters=(
+                *(symbol for p in (*self.parameters, *self.indicators) for symbol in p.symbols),
+                *(symbol for m in self.motions for symbol in (m.symbol, *m.rates)),
+            ),
             inputs=tuple(i.symbol for i in self.inputs),
             lagrangian=shortest(self._lagrangian.value, angles, self._rates()),
             forces=tuple(self._shortest_force(c.symbol, angles) for c in self.coordinates),
@@ -337,7 +415,7 @@ class Model:
         return Add(*given, -self.dissipation.diff(_rate_symbol(q)))
 
     def _check_forces(self) -> None:
-        known = (*self._positions(), *self._rates(), self.time)
+        known = (*self._moving(), self.time)
         for _, said in self._forces:
             self._check(said.value, "force", (*known, *(i.symbol for i in self.inputs)), said.where)
         if self._dissipation is not None:
@@ -353,7 +431,7 @@ class Model:
             raise GenerationError(
                 f"{said.where}: lagrangian: the input {name} may stand in forces only: model.force(q, {name})"
             )
-        self._check(said.value, "lagrangian", (*self._positions(), *self._rates(), self.time), said.where)
+        self._check(said.value, "lagrangian", (*self._moving(), self.time), said.where)
         fixed = {symbol for p in self.parameters for symbol in p.symbols}
         for switch in self._switches.held_by(said.value):
             moves = self._switches.behind(switch.value) - fixed
@@ -384,6 +462,11 @@ class Model:
 
     def _positions(self) -> tuple[Symbol, ...]:
         return (*(c.symbol for c in self.coordinates), *(s for p in self.parameters for s in p.symbols))
+
+    def _moving(self) -> tuple[Symbol, ...]:
+        """What equations may hold besides time and inputs."""
+        motions = (symbol for m in self.motions for symbol in (m.symbol, *m.rates))
+        return (*self._positions(), *self._rates(), *motions)
 
     def _rates(self) -> tuple[Symbol, ...]:
         return tuple(_rate_symbol(c.symbol) for c in self.coordinates)

@@ -32,8 +32,8 @@ def read(folder: Path, line: str) -> Model:
 REFUSED = {
     "model.force(x, -model.rate(model.rate(x)))": "rate holds 'x_dot', the rate of x, which may not stand in it",
     "model.force(x, model.rate(x * model.rate(y)))": "rate holds 'y_dot', the rate of y, which may not stand in it",
-    "model.force(x, model.rate(push))": "rate holds 'push', an input, which may not stand in it",
-    "model.force(x, model.rate(sin(x) + push**2))": "rate holds 'push', an input, which may not stand in it",
+    "model.force(x, model.rate(push))": "rate holds 'push', an input, whose rates nobody knows: model.motion",
+    "model.force(x, model.rate(sin(x) + push**2))": "rate holds 'push', an input, whose rates nobody knows",
     "model.force(x, gamma(x))": "force: a kernel cannot evaluate gamma(x): it has + − * /",
     "model.force(x, Piecewise((x, x > 0)))": "force: Piecewise((x, x > 0)) has no value where none of its conditions",
     "model.force(x, Piecewise((x, Eq(x, 0)), (0, True)))": "force: a kernel cannot tell pieces apart by Eq(x, 0): it",

@@ -375,7 +375,7 @@ class ModelFunction:
         self,
         links: int | None = None,
         *,
-        inputs: Mapping[str, float] | None = None,
+        inputs: Mapping[str, object] | None = None,
         drives: Sequence[Mapping[str, object]] = (),
         feedback: Sequence[Mapping[str, object]] = (),
         **parameters: object,

@@ -15,21 +15,12 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._runs import did_you_mean, mapping, number, places, plainly, tell
+from ._inputs import inputs_of
+from ._runs import did_you_mean, mapping, places, plainly, tell
 from ._systems import System, Tables, rate_of, tables_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-
-def _inputs(given: Mapping[str, object]) -> dict[str, float]:
-    for name, one in given.items():
-        if callable(one) or isinstance(one, (tuple, list)):
-            raise InputError(
-                f"inputs.{name}: expected a number, which is held (drives= are sines; Simulation.step holds another "
-                f"one from step to step), got {type(one).__name__}"
-            )
-    return {name: number(f"inputs.{name}", one) for name, one in given.items()}
 
 
 class Kernel(NamedTuple):
@@ -59,9 +50,12 @@ class Model(System):
     links : int, optional
         Of models with as many links as asked for.
     inputs : mapping, optional
-        Constant values of inputs, by name.
+        Of inputs, by name: a number, which is held, or a table of numbers over time, linear in between: ``(times,
+        values)``, the name of a CSV file with columns ``t`` and that of the input, or a mapping with ``times`` and
+        ``values`` or ``file`` and ``column``, and ``hold=True`` for steps.
     drives : sequence of mappings, optional
-        Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``.
+        Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``, or ``value``, an
+        expression of time: ``"t < 1 ? 2 : 0"``.
     feedback : sequence of mappings, optional
         What is added to inputs as a function of the motion: ``input``, ``value`` (an expression of the columns:
         ``"-12*x - 9*x_dot"``), and for a controller that samples ``sample`` (s) and ``limit``.
@@ -88,7 +82,7 @@ class Model(System):
         model: str | PathLike[str],
         links: int | None = None,
         *,
-        inputs: Mapping[str, float] | None = None,
+        inputs: Mapping[str, object] | None = None,
         drives: Sequence[Mapping[str, object]] = (),
         feedback: Sequence[Mapping[str, object]] = (),
         **parameters: object,
@@ -99,7 +93,7 @@ class Model(System):
         self._parameters = copy.deepcopy(parameters)
         self._drives = tables_of("drives", drives)
         self._feedback = tables_of("feedback", feedback)
-        self._inputs = _inputs(mapping("inputs", inputs))
+        self._inputs, self._signals = inputs_of(mapping("inputs", inputs))
         self._made_by = ""
         self._require_arguments()
 
@@ -117,7 +111,7 @@ class Model(System):
         given = {
             "links": self._links,
             **self._parameters,
-            "inputs": self._inputs,
+            "inputs": {**self._inputs, **self._signals},
             "drives": self._drives,
             "feedback": self._feedback,
         }
@@ -207,14 +201,20 @@ class Model(System):
             "system": system,
             "system.drive": [*self._drives, *constants],
             "system.feedback": list(self._feedback),
+            "system.signal": list(self._signals.values()),
         }
 
     def held(self, inputs: Mapping[str, object]) -> Model:
-        given = _inputs(inputs)
-        for name in given:
+        for name in inputs:
             if name not in self.inputs:
                 known = ", ".join(self.inputs) or "none"
                 raise InputError(
                     f"inputs: expected some of {known}, got {name}{did_you_mean(name, self.inputs)}"
                 )
-        return self.replaced({}, {name: np.array([one]) for name, one in given.items()})
+        numbers, signals = inputs_of(inputs)
+        other = self.replaced({}, {name: np.array([numbers.get(name, 0.0)]) for name in inputs})
+        other._signals = {
+            **{name: one for name, one in self._signals.items() if name not in inputs},
+            **signals,
+        }
+        return other

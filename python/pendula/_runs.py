@@ -83,7 +83,7 @@ def in_arguments(sentence: str, names: Mapping[str, str] | None = None) -> str:
         return (names or {}).get(table[1], f"{plural}[{int(table[3]) - 1}]")
 
     sentence = re.sub(r"^pendula(:\d+)?: ", "", sentence)
-    sentence = re.sub(r"\b(?:chain\.|system\.)?((drive|event|feedback)\[(\d+)\])", numbered, sentence)
+    sentence = re.sub(r"\b(?:chain\.|system\.)?((drive|event|feedback|signal)\[(\d+)\])", numbered, sentence)
     sentence = re.sub(r"\boutput\.times\b", "t", sentence)
     return re.sub(r"\b(?:run|output|chain|system)\.(?=[a-z])(?:parameters\.)?", "", sentence)
 

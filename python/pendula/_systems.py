@@ -15,6 +15,7 @@ import numpy as np
 from . import _core, _toml
 from ._core import InputError
 from ._events import events_of
+from ._inputs import Signals, inputs_of
 from ._progress import bar
 from ._runs import mapping, merged, numbers, places, plainly, tell, unknown
 from ._solution import Solution, concluded
@@ -154,7 +155,7 @@ class System(ABC):
         """The same with these inputs, in place of its own. Raises InputError."""
         if inputs:
             raise InputError(
-                f"inputs: expected none of a chain, which has torque and drives, got {', '.join(inputs)}"
+                f"inputs: expected tables over time of a chain, which has torque for numbers, got {', '.join(inputs)}"
             )
         return self
 
@@ -164,7 +165,7 @@ class System(ABC):
         *,
         t: ArrayLike | None = None,
         start: Mapping[str, object] | None = None,
-        inputs: Mapping[str, float] | None = None,
+        inputs: Mapping[str, object] | None = None,
         events: Mapping[str, Event] | None = None,
         method: str | None = None,
         stages: int | None = None,
@@ -199,7 +200,8 @@ class System(ABC):
             has it (with its attributes ``terminal`` and ``direction``), is only called at a fixed number of times in
             each step: if its sign changes twice between two of them, both changes are missed.
         inputs : mapping, optional
-            Constant values of a model's inputs, in place of those that it has.
+            Of inputs, in place of what they have: numbers, which are held, or tables of numbers over time, as
+            :class:`Model` takes them: ``{"push": (times, values)}``. Of a chain tables of ``torque_1`` … alone.
         method, stages, form, solver, iteration, step, tolerance, accuracy, estimate
             As ``[run]`` of a scenario (``pendula help scenario``). Steps are chosen for an accuracy of 1e-9 unless one
             of ``accuracy``, ``tolerance`` and ``step`` says otherwise.
@@ -316,6 +318,7 @@ class Chain(System):
         )
         self._drives = tables_of("drives", drives)
         self._feedback = tables_of("feedback", feedback)
+        self._signals: Signals = {}
         if self._tells_links():
             self._require_right(self.tables())
         else:  # a start tells how many there are
@@ -408,7 +411,16 @@ class Chain(System):
             "chain": dict(self._numbers),
             "chain.drive": list(self._drives),
             "chain.feedback": list(self._feedback),
+            "chain.signal": list(self._signals.values()),
         }
+
+    def held(self, inputs: Mapping[str, object]) -> Chain:
+        numbers, signals = inputs_of(inputs)
+        if numbers:
+            return super().held(numbers)  # type: ignore[return-value]
+        other = copy.copy(self)
+        other._signals = signals
+        return other
 
     def replaced(
         self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]

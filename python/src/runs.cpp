@@ -29,6 +29,7 @@
 #include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario_run.hpp"
+#include "io/signal_origin.hpp"
 #include "io/summary.hpp"
 #include "run_result.hpp"
 #include "toolchain.hpp"
@@ -141,6 +142,7 @@ std::unique_ptr<Result> make_run(const io::RunSource& source, RunModel model, Py
                   const view::Scene scene = view::scene_of(scenario, source);
                   result->saved.origin = io::origin_of(source, run.description(), found.text(), saved_by,
                                                        scene.title + ": " + scene.subject);
+                  result->saved.origin.overrides = io::overrides_with_numbers(source, scenario.signals);
                   if (before != nullptr) require_its_events(*before, setup);
                   if (from) begin_with(*before, *result);
                   Recorder recorder(*result);

@@ -14,7 +14,9 @@
 #include <pendula/ensemble/held_members.hpp>
 #include <pendula/pendula.hpp>
 #include <pendula/run/lyapunov.hpp>
+#include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/outcome.hpp>
+#include <stdexcept>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -64,6 +66,7 @@ void define_simulations(nb::module_& module) {
   nb::class_<Moved>(module, "Simulation")
       .def("__init__",
            [](Moved* self, const std::shared_ptr<const Prepared>& made) {
+             if (made->subject->part_at(0)) throw std::invalid_argument(signals_are_not_here);
              new (self) Moved{made, Simulation(model_of(*made), made->start, made->options)};
            })
       .def("copy", [](const Moved& self) { return Moved(self); })

@@ -90,7 +90,7 @@ SWING = "import pendula, sys; swing = pendula.Model('furuta'); swing.simulate(0.
 
 
 def test_what_is_kept_needs_neither_sympy_nor_a_derivation(tmp_path):
-    told = "pendula: deriving the kernel of furuta, once; compiled by LLVM\n"
+    told = "pendula: derived the kernel of furuta, once; compiled by LLVM\n"
     assert run(SWING, tmp_path, PENDULA_KERNELS_BY="llvm") == "jit\n" + told
     assert run(SWING + "print('sympy' in sys.modules)", tmp_path, PENDULA_KERNELS_BY="llvm") == "jit\nFalse\n"
     (kept,) = (tmp_path / "pendula").iterdir()

@@ -243,6 +243,8 @@ void CommandLine::add_ensemble() {
       ->check(expect("I/N with 1 <= I <= N, such as 2/8", is_shard));
   ensemble->add_flag("--resume", options.resume, "Go on with what an interrupted one has left");
   ensemble->add_flag("--json", options.json, "Print the summary as one JSON object, and no progress");
+  ensemble->add_flag("--quiet", options.quiet,
+                     "Print no summary and no progress, but warnings, errors and what --json asks for");
 }
 
 void CommandLine::add_lyapunov() {

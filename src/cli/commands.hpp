@@ -167,6 +167,9 @@ struct EnsembleOptions {
   std::optional<io::Shard> shard;
   bool resume = false;  ///< goes on with the journals beside the output
   bool json = false;
+  bool quiet = false;
+
+  bool tells_progress() const { return !json && !quiet; }
 };
 
 /// Runs the members of a scenario with [ensemble], and prints a summary. Throws io::InputError.

@@ -89,6 +89,9 @@ void print_model(const Json& model) {
   print_list(model, "inputs", {"input", "unit"}, [](const Json& each) {
     return TableRow{text(each, "name"), text(each, "unit")};
   });
+  print_list(model, "motions", {"motion", "unit", "without drives"}, [](const Json& each) {
+    return TableRow{text(each, "name"), text(each, "unit"), shortest(each["default"].get<double>())};
+  });
   print_list(model, "switches", {"steps end where it is 0"},
              [](const Json& each) { return TableRow{text(each, "value")}; });
   print_list(model, "points", {"point", "columns"}, [](const Json& each) {

@@ -62,8 +62,8 @@ class EnsembleSession {
         ranks_(ranks),
         job_(
             source_of(options),
-            [quiet = options.json](const std::string& what) {
-              if (!quiet) std::cerr << "pendula: " << what << '\n';
+            [told = options.tells_progress()](const std::string& what) {
+              if (told) std::cerr << "pendula: " << what << '\n';
             },
             [this] { return guard_.interrupted(); }),
         output_({options.output, options.shard, options.resume}, job_.head()) {}
@@ -73,7 +73,8 @@ class EnsembleSession {
     job_.require_members();
     if (ranks_.all(output_.is_complete())) return leave_alone();
     const std::vector<std::int64_t> missing = output_.find_missing([&](bool mine) { return ranks_.all(mine); });
-    if (ranks_.rank() == 0 && output_.replaces()) std::cerr << "pendula: replacing " << options_.output << '\n';
+    if (ranks_.rank() == 0 && output_.replaces() && !options_.quiet)
+      std::cerr << "pendula: replacing " << options_.output << '\n';
     const auto began = Clock::now();
     work(missing);
     seconds_ = std::chrono::duration<double>(Clock::now() - began).count();
@@ -86,7 +87,7 @@ class EnsembleSession {
 
   ExitStatus leave_alone() const {
     if (ranks_.rank() != 0) return done;
-    std::cerr << "pendula: " << options_.output << ": has all members already\n";
+    if (!options_.quiet) std::cerr << "pendula: " << options_.output << ": has all members already\n";
     output_.remove_journals();
     return done;
   }
@@ -94,7 +95,7 @@ class EnsembleSession {
   void work(const std::vector<std::int64_t>& missing) {
     io::Journal journal(output_.folder(), job_.head().kind());
     ranks_.all(true);  // no rank reads the journals any more
-    EnsembleProgress progress(count(), output_.already(), !options_.json && ranks_.size() == 1);
+    EnsembleProgress progress(count(), output_.already(), options_.tells_progress() && ranks_.size() == 1);
     const auto claim = [&]() -> std::optional<std::int64_t> {
       const std::int64_t k = guard_.interrupted() ? -1 : ranks_.claim();
       if (k < 0 || k >= static_cast<std::int64_t>(missing.size())) return std::nullopt;
@@ -152,6 +153,7 @@ class EnsembleSession {
       std::cout << json.dump() << '\n';
       return;
     }
+    if (options_.quiet) return;
     std::cout << "members            " << tally_.done << (tally_.done < count() ? " of " + std::to_string(count()) : "")
               << '\n';
     for (const auto& [name, count] : statuses.items()) std::cout << "  " << name << "  " << count << '\n';

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -127,6 +128,13 @@ Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, co
   return words;
 }
 
+/// Exports hold inputs themselves.
+void refuse_signals(const io::RunPlan& plan) {
+  if (plan.signals.empty()) return;
+  refuse(plan.signals.front().input_place,
+         "expected no signal in what is exported, whose inputs are set from step to step; got one");
+}
+
 /// The time from one sample to the next; else the constant step; nothing if there is neither.
 std::optional<double> step_of(const io::RunPlan& plan) {
   for (const io::FeedbackPlan& feedback : plan.feedback) {
@@ -166,6 +174,7 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
   const io::AnyScenario scenario = io::parse_scenario(text.text, text.name, options.overrides, find);
   return std::visit(
       [&](const auto& found) {
+        refuse_signals(found);
         Words words;
         if constexpr (requires { found.chain; }) {
           words = scenario_words(found, text.name);
@@ -177,6 +186,10 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
           if (found.duration > 0) add_number(words, "duration", found.duration);
         }
         if (!found.events.empty()) std::cerr << "pendula: warning: events are not exported\n";
+        const auto is_own = [](const io::ColumnPlan& column) {
+          return column.place.find("output.columns") < std::string::npos;
+        };
+        if (std::ranges::any_of(found.columns, is_own)) std::cerr << "pendula: warning: columns are not exported\n";
         if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
         if (found.run.method == Method::gauss && found.run.step > 0) {
           if (!options.stages) add_number(words, "stages", found.run.stages);

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <filesystem>
+#include <iostream>
 #include <pendula/numeric/number_text.hpp>
 #include <string>
 #include <vector>
@@ -25,6 +26,13 @@ ExitStatus draw(const std::vector<std::string>& arguments) {
   return status == 0 ? done : status == 2 ? wrong_input : failed;
 }
 
+/// The same, and tells what was written.
+ExitStatus draw_picture(const std::vector<std::string>& arguments, const std::string& output) {
+  const ExitStatus status = draw(arguments);
+  if (status == done) std::cout << "picture            " << output << '\n';
+  return status;
+}
+
 }  // namespace
 
 ExitStatus plot(const PlotOptions& options) {
@@ -39,12 +47,13 @@ ExitStatus plot(const PlotOptions& options) {
   if (options.wrapped) arguments.emplace_back("--wrapped");
   arguments.emplace_back("--");
   arguments.insert(arguments.end(), options.runs.begin(), options.runs.end());
-  return draw(arguments);
+  return draw_picture(arguments, options.output);
 }
 
 ExitStatus map(const MapOptions& options) {
-  return draw({"map", "--output=" + options.output, "--scale=" + options.scale, "--contour=" + options.contour, "--",
-               options.file, options.key});
+  return draw_picture({"map", "--output=" + options.output, "--scale=" + options.scale, "--contour=" + options.contour,
+                       "--", options.file, options.key},
+                      options.output);
 }
 
 ExitStatus check_film(const std::string& output) {

@@ -29,6 +29,7 @@
 #include "io/run_source.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
+#include "io/signal_origin.hpp"
 #include "io/summary.hpp"
 #include "view/lab.hpp"
 #include "view/page.hpp"
@@ -77,7 +78,7 @@ class RunSession {
         options_(options),
         from_(io::checkpoint_of(source, setup_.start.time + setup_.duration)),
         run_(io::told_at_keys(plan, source.text.name, [&] { return Run(setup_); })),
-        origin_(io::origin_of(source, run_.description(), model, options.command, scene.title + ": " + scene.subject)),
+        origin_(origin_of(source, plan, model, scene)),
         output_(output_of(source, options)),
         page_(open_page(options, scene)),
         film_contents_(contents(plan, scene, false)),
@@ -116,6 +117,7 @@ class RunSession {
     summary.shown.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
     summary.trajectory = output_;
     summary.view = options_.view;
+    if (is_filmed_) summary.film = options_.video;
     summary.rows_written = file_ ? file_->rows() : 0;
     return summary;
   }
@@ -158,6 +160,14 @@ class RunSession {
     }
   }
 
+  io::RunOrigin origin_of(const io::RunSource& source, const io::RunPlan& plan, const std::string& model,
+                          const view::Scene& scene) const {
+    io::RunOrigin origin =
+        io::origin_of(source, run_.description(), model, options_.command, scene.title + ": " + scene.subject);
+    origin.overrides = io::overrides_with_numbers(source, plan.signals);
+    return origin;
+  }
+
   io::RunContents contents(const io::RunPlan& plan, const view::Scene& scene, bool with_events = true) const {
     io::RunContents contents = io::contents_of(setup_, plan, with_events);
     contents.drawing = view::drawing_of(scene);
@@ -184,7 +194,8 @@ class RunSession {
       if (std::filesystem::exists(film_rows_name(copy))) rows.push_back(film_rows_name(copy));
     }
     if (!film_rows_) rows.push_back(*output_);
-    if (film(rows, *options_.video, options_.film) != done && summary.ending.ok()) {
+    is_filmed_ = film(rows, *options_.video, options_.film) == done;
+    if (!is_filmed_ && summary.ending.ok()) {
       summary.ending = {"output_failed", *options_.video + ": the film could not be made", {}, {}};
     }
     std::error_code unknown;
@@ -254,6 +265,7 @@ class RunSession {
   std::unique_ptr<io::RunFile> film_rows_;
   LastCheckpoint last_;
   Progress progress_;
+  bool is_filmed_ = false;
   std::vector<std::string> warnings_;
 };
 

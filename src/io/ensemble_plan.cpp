@@ -33,11 +33,17 @@ void require_none(const Section& section, std::initializer_list<std::string_view
   }
 }
 
-std::vector<double> read_values(const Section& section) {
+/// The unit of a key of the scenario; empty if only a model knows it.
+std::string_view unit_of(const std::string& key) {
+  const ScenarioKey* const known = find_key(key);
+  return known == nullptr ? std::string_view() : known->unit;
+}
+
+std::vector<double> read_values(const Section& section, std::string_view unit) {
   const Entry entry = section.require("values");
   if (entry.size() == 0) entry.fail(std::string(find_key("ensemble.axis.values")->hint));
   std::vector<double> values(entry.size());
-  for (std::size_t k = 0; k < values.size(); ++k) values[k] = entry.element(k).number();
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = entry.element(k).number(unit);
   return values;
 }
 
@@ -46,12 +52,12 @@ EnsembleAxis read_axis(const Section& section) {
   axis.key = read_key(section);
   if (section.find("values")) {
     require_none(section, {"from", "to", "count"}, "nothing beside values");
-    axis.values = read_values(section);
+    axis.values = read_values(section, unit_of(axis.key));
     axis.count = static_cast<std::int64_t>(axis.values.size());
     return axis;
   }
-  axis.from = section.require("from").number();
-  axis.to = section.require("to").number();
+  axis.from = section.require("from").number(unit_of(axis.key));
+  axis.to = section.require("to").number(unit_of(axis.key));
   axis.count = section.require("count").integer();
   return axis;
 }
@@ -61,20 +67,20 @@ EnsembleDraw read_draw(const Section& section) {
   draw.key = read_key(section);
   draw.normal = section.find("mean") || section.find("deviation");
   if (!draw.normal) {
-    draw.first = section.require("from").number();
-    draw.second = section.require("to").number();
+    draw.first = section.require("from").number(unit_of(draw.key));
+    draw.second = section.require("to").number(unit_of(draw.key));
     return draw;
   }
   require_none(section, {"from", "to"}, "nothing beside mean and deviation");
-  draw.first = section.require("mean").number();
-  draw.second = section.require("deviation").number();
+  draw.first = section.require("mean").number(unit_of(draw.key));
+  draw.second = section.require("deviation").number(unit_of(draw.key));
   return draw;
 }
 
 EnsembleDraw read_list(const Section& section) {
   EnsembleDraw list;
   list.key = read_key(section);
-  list.values = read_values(section);
+  list.values = read_values(section, unit_of(list.key));
   return list;
 }
 

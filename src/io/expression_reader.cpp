@@ -368,6 +368,10 @@ std::string_view function_name(Operation operation) {
   return found == functions.end() ? std::string_view() : found->name;
 }
 
+bool is_function(std::string_view name) {
+  return std::ranges::find(functions, name, &Function::name) != functions.end();
+}
+
 ExpressionProgram read_expression(const std::string& text, std::span<const std::string> names) {
   return ExpressionReader(text, names).read();
 }

@@ -41,17 +41,11 @@ auto told_at(const FeedbackPlan& plan, Read read) {
   }
 }
 
+/// What a drive's expression may hold.
+const std::vector<std::string> time_alone{"t"};
+
 std::size_t input_of(const FeedbackPlan& plan, const Subject& subject) {
-  const std::vector<std::string> names = input_names(subject);
-  const auto found = std::ranges::find(names, plan.input);
-  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-  constexpr std::size_t few = 12;
-  std::string known;
-  for (std::size_t k = 0; k < std::min(few, names.size()); ++k) known += (known.empty() ? "" : ", ") + names[k];
-  if (names.size() > few) known += ", ...";
-  const std::vector<std::string_view> views(names.begin(), names.end());
-  throw InputError(plan.input_place + ": expected an input: " + (known.empty() ? "there is none" : known) + "; got \"" +
-                   plan.input + '"' + did_you_mean(nearest_name(plan.input, views)));
+  return input_named(plan.input, plan.input_place, subject);
 }
 
 /// A function of the motion that several threads may call.
@@ -63,7 +57,7 @@ std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
     RowFunction function;
     std::mutex guard;
   };
-  const std::vector<std::string> names = names_for(*subject, plan.sample == 0);
+  const std::vector<std::string> names = plan.is_drive ? time_alone : names_for(*subject, plan.sample == 0);
   auto expression = told_at(plan, [&] { return std::make_shared<Expression>(plan.value, names); });
   const auto size = static_cast<Eigen::Index>(state_columns(*subject).size() / 2);
   const Motion any(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size));
@@ -75,7 +69,7 @@ std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
 }
 
 /// Functions that models may have, too.
-bool is_smooth(Operation operation) {
+bool is_function_of_models(Operation operation, bool has_pieces) {
   using enum Operation;
   constexpr std::array smooth = {sine,
                                  cosine,
@@ -89,10 +83,32 @@ bool is_smooth(Operation operation) {
                                  exponential,
                                  logarithm,
                                  root};
-  return std::ranges::find(smooth, operation) != smooth.end();
+  constexpr std::array of_pieces = {size, sign, least, largest};
+  return std::ranges::find(smooth, operation) != smooth.end() ||
+         (has_pieces && std::ranges::find(of_pieces, operation) != of_pieces.end());
 }
 
-std::string_view sign_of(Operation operation) {
+std::string_view sign_of(Operation operation, bool has_pieces) {
+  if (has_pieces) {
+    switch (operation) {
+      case Operation::less:
+        return "<";
+      case Operation::greater:
+        return ">";
+      case Operation::at_most:
+        return "<=";
+      case Operation::at_least:
+        return ">=";
+      case Operation::both:
+        return "&&";
+      case Operation::either:
+        return "||";
+      case Operation::choose:
+        return "?:";
+      default:
+        break;
+    }
+  }
   switch (operation) {
     case Operation::sum:
       return "+";
@@ -112,19 +128,26 @@ std::string_view sign_of(Operation operation) {
 }
 
 /// A program as the generator reads it: words, operands before what is done with them. `x 9 * ~` is -(x * 9).
-std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names, bool is_sampled) {
+std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names,
+                         const FeedbackPlan& plan) {
   std::vector<std::string> words;
   for (const ExpressionProgram::Node& node : program.nodes) {
-    const std::string_view sign = sign_of(node.operation);
+    const std::string_view sign = sign_of(node.operation, plan.is_drive);
     if (node.operation == Operation::constant) {
       words.push_back(shortest(node.number));
     } else if (node.operation == Operation::column) {
       words.push_back(names[program.columns[node.a]]);
-    } else if (is_smooth(node.operation)) {
+    } else if (is_function_of_models(node.operation, plan.is_drive)) {
       words.push_back(std::string(function_name(node.operation)) + "()");
     } else if (!sign.empty()) {
       words.emplace_back(sign);
+    } else if (plan.is_drive) {
+      throw ExpressionError(
+          "functions that are smooth between pieces in drives (no ==, !=, rint, floor, fmod, atan2, log2, log10; "
+          "sin(2*pi*t) > 0 repeats)",
+          "another one");
     } else {
+      const bool is_sampled = plan.sample > 0;
       throw ExpressionError(std::string("smooth functions in ") + (is_sampled ? "exported" : "continuous") +
                                 " feedback (+ - * / ^, sqrt, exp, log, trigonometric and hyperbolic ones)",
                             std::string("another one") + (is_sampled ? "" : "; sample = ... beside it allows all"));
@@ -156,11 +179,47 @@ std::vector<FeedbackPlan> read_feedback(const Section& system) {
   return plans;
 }
 
+std::size_t input_named(const std::string& input, const std::string& place, const Subject& subject) {
+  const std::vector<std::string> names = input_names(subject);
+  const auto found = std::ranges::find(names, input);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  constexpr std::size_t few = 12;
+  std::string known;
+  for (std::size_t k = 0; k < std::min(few, names.size()); ++k) known += (known.empty() ? "" : ", ") + names[k];
+  if (names.size() > few) known += ", ...";
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  throw InputError(place + ": expected an input: " + (known.empty() ? "there is none" : known) + "; got \"" + input +
+                   '"' + did_you_mean(nearest_name(input, views)));
+}
+
 InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject) {
   input_of(plan, subject);
   const std::vector<std::string> names = names_for(subject, true);
-  return {plan.input,
-          told_at(plan, [&] { return postfix_text(read_expression(plan.value, names), names, plan.sample > 0); })};
+  return {plan.input, told_at(plan, [&] { return postfix_text(read_expression(plan.value, names), names, plan); })};
+}
+
+std::vector<FeedbackPlan> read_drive_values(const Section& system) {
+  std::vector<FeedbackPlan> plans;
+  for (const Section& table : system.each("drive")) {
+    const auto value = table.find("value");
+    if (!value) continue;
+    const Entry input = table.require("input");
+    FeedbackPlan plan{.input = input.text(), .value = value->text(), .is_drive = true};
+    plan.place = value->place();
+    plan.input_place = input.place();
+    plans.push_back(std::move(plan));
+  }
+  return plans;
+}
+
+std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans) {
+  std::vector<InputLaw> laws;
+  for (const FeedbackPlan& plan : plans) {
+    laws.push_back({plan.input, told_at(plan, [&] {
+                      return postfix_text(read_expression(plan.value, time_alone), time_alone, plan);
+                    })});
+  }
+  return laws;
 }
 
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system) {
@@ -175,20 +234,22 @@ std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, co
 std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
                                                 const std::shared_ptr<const SystemSubject>& system) {
   std::vector<InputFunction> functions;
+  const std::vector<std::string> inputs = input_names(*system);
   for (const FeedbackPlan& plan : plans) {
-    if (plan.sample == 0) functions.push_back({input_of(plan, *system), function_of(plan, system)});
+    const bool is_of_motion = plan.is_drive && std::ranges::find(inputs, plan.input) == inputs.end();
+    if (plan.sample == 0 && !is_of_motion) functions.push_back({input_of(plan, *system), function_of(plan, system)});
   }
   return functions;
 }
 
-std::shared_ptr<const Subject> with_sampled(const std::vector<FeedbackPlan>& plans,
-                                            const std::shared_ptr<const Subject>& subject) {
+std::vector<SampledLaw> sampled_laws(const std::vector<FeedbackPlan>& plans,
+                                     const std::shared_ptr<const Subject>& subject) {
   std::vector<SampledLaw> laws;
   for (const FeedbackPlan& plan : plans) {
     if (plan.sample == 0) continue;
     laws.push_back({input_of(plan, *subject), function_of(plan, subject), plan.sample, plan.limit});
   }
-  return with_feedback(subject, std::move(laws));
+  return laws;
 }
 
 }  // namespace pendula::io

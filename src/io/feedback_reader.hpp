@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <memory>
+#include <pendula/run/feedback.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <string>
@@ -15,13 +17,24 @@ namespace pendula::io {
 /// Feedback as a scenario describes it. Its expression is read once the columns of the rows are known.
 struct FeedbackPlan {
   std::string input, value;
-  double sample = 0;  ///< 0: continuous  [s]
+  double sample = 0;      ///< 0: continuous  [s]
+  bool is_drive = false;  ///< a function of time alone, and of pieces
   double limit = std::numeric_limits<double>::infinity();
   std::string place, input_place;  ///< `where: key` of `value` and of `input`
 };
 
+/// Reads the values of [[system.drive]], which are laws, too. Throws InputError.
+std::vector<FeedbackPlan> read_drive_values(const Section& system);
+
+/// The same as the generator reads them, which knows whether an input, or a motion, has such a name. Throws InputError
+/// if an expression cannot be read, or is not of time alone.
+std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans);
+
 /// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Throws InputError.
 std::vector<FeedbackPlan> read_feedback(const Section& system);
+
+/// The index of an input of a subject. Throws InputError with the place of its name.
+std::size_t input_named(const std::string& input, const std::string& place, const Subject& subject);
 
 /// One of them, continuous or sampled, as the generator reads it. Throws InputError as continuous_laws.
 InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
@@ -30,12 +43,12 @@ InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
 /// unknown, or is not smooth.
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system);
 
-/// The same as functions. `system` is without feedback.
+/// The same as functions, with those of drives of inputs. `system` is without feedback.
 std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
                                                 const std::shared_ptr<const SystemSubject>& system);
 
-/// The subject with those that are sampled. Throws InputError as continuous_laws.
-std::shared_ptr<const Subject> with_sampled(const std::vector<FeedbackPlan>& plans,
-                                            const std::shared_ptr<const Subject>& subject);
+/// Those that are sampled. Throws InputError as continuous_laws.
+std::vector<SampledLaw> sampled_laws(const std::vector<FeedbackPlan>& plans,
+                                     const std::shared_ptr<const Subject>& subject);
 
 }  // namespace pendula::io

@@ -47,6 +47,12 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
     return;
   }
   if (has(what)) return;
+  const auto own = std::ranges::find_if(
+      quantities, [&](const Quantity& each) { return each.role == Role::own && each.name == what; });
+  if (own != quantities.end()) {
+    columns_.push_back({{what, own->unit, false, own->meaning + " at the end"}, Source::last, own->first});
+    return;
+  }
   if (what == "lyapunov") {
     columns_.push_back({{what, "1/s"}, Source::exponent});
     columns_.push_back({{what + ":error", "1/s"}, Source::exponent_error});
@@ -56,6 +62,9 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
       events, [&](const EventPlan& each) { return what == std::string(event_prefix) + each.name; });
   if (event == events.end()) {
     std::string known = "final, points, energy, energy_error, steps, lyapunov, ftle, megno";
+    for (const Quantity& each : quantities) {
+      if (each.role == Role::own) known += ", " + each.name;
+    }
     for (const EventPlan& each : events) known += ", " + std::string(event_prefix) + each.name;
     throw InputError(place + ": expected some of " + known + ", got \"" + what + '"');
   }
@@ -68,7 +77,7 @@ void Kept::add_last(const std::vector<Quantity>& quantities, bool points) {
   const std::vector<std::string> names = columns_of(quantities);
   for (const Quantity& quantity : quantities) {
     const bool is_place = quantity.role == Role::point || quantity.role == Role::energy;
-    if (is_place != points || quantity.role == Role::input) continue;
+    if (is_place != points || quantity.role == Role::input || quantity.role == Role::own) continue;
     for (std::size_t k = 0; k < quantity.size(); ++k) {
       const std::size_t column = quantity.column(k);
       columns_.push_back(

@@ -122,9 +122,12 @@ ModelKernel kept_kernel(const ModelName& model, const Toolchain& toolchain,
     fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // marks it as used
   } else {
     const Workshop workshop(cache);
-    tell("deriving the kernel of " + name + (model.laws.empty() ? "" : " with feedback") + ", once; " +
-         how_made(kind, toolchain) + (problem.empty() ? "" : " (not loaded: " + problem + ")"));
-    const fs::path made = make_kernel(kind, name, arguments, workshop.folder(), toolchain);
+    // Not before: what is wrong with a model is told alone.
+    const auto derived = [&] {
+      tell("derived the kernel of " + name + (model.laws.empty() ? "" : " with drives or feedback") + ", once; " +
+           how_made(kind, toolchain) + (problem.empty() ? "" : " (not loaded: " + problem + ")"));
+    };
+    const fs::path made = make_kernel(kind, name, arguments, workshop.folder(), toolchain, derived);
     seal_kernel(made);
     put(made, kept);
     table = load_kernel(kept, toolchain, problem);

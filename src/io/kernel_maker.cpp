@@ -144,12 +144,13 @@ std::string how_made(std::string_view kind, const Toolchain& toolchain) {
 }
 
 fs::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
-                     const fs::path& folder, const Toolchain& toolchain) {
+                     const fs::path& folder, const Toolchain& toolchain, const std::function<void()>& derived) {
   const bool is_c = kind == compiled_kernel, is_llvm = kind == llvm_kernel;
   const fs::path text = folder / (is_c ? "kernel.c" : is_llvm ? "kernel.ll" : "kernel.program");
   arguments.insert(arguments.end(), {"--as", is_c ? "c" : is_llvm ? "llvm" : "bytecode", "--output", text.string()});
   if (is_llvm) arguments.insert(arguments.end(), {"--for", std::string(library().instruction_set)});
   run_generator(arguments, toolchain);
+  derived();
   if (is_c) return compile(name, text, toolchain);
   return is_llvm ? compile_by_llvm(name, text, toolchain) : text;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,8 +21,9 @@ std::vector<std::string> flags_of_least_set();
 /// A description of such kernels.
 std::string how_made(std::string_view kind, const Toolchain& toolchain);
 
-/// Makes a kernel in `folder` by the generator with these arguments. Returns its file.
+/// Makes a kernel in `folder` by the generator with these arguments; calls derived() once that is done. Returns its file.
 std::filesystem::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
-                                  const std::filesystem::path& folder, const Toolchain& toolchain);
+                                  const std::filesystem::path& folder, const Toolchain& toolchain,
+                                  const std::function<void()>& derived);
 
 }  // namespace pendula::io

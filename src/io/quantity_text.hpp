@@ -2,7 +2,7 @@
 
 #include <numbers>
 #include <optional>
-#include <span>
+#include <string>
 #include <string_view>
 
 namespace pendula::io {
@@ -10,12 +10,12 @@ namespace pendula::io {
 inline constexpr double degree = std::numbers::pi / 180;
 inline constexpr std::string_view degree_sign = "\u00b0";
 
-/// A unit in a string such as "90 deg".
-struct Unit {
-  std::string_view name;
-  double size;  ///< relative to the unit of plain numbers
+/// Units of mass, length and time in which plain numbers are; those of a natural scenario are not 1.
+struct BaseUnits {
+  double mass = 1;    ///< [kg]
+  double length = 1;  ///< [m]
+  double time = 1;    ///< [s]
 };
-using Units = std::span<const Unit>;
 
 /// A number and the text after it, as in "90 deg".
 struct TextWithUnit {
@@ -28,7 +28,17 @@ std::string_view trimmed(std::string_view text);
 
 std::optional<TextWithUnit> read_quantity(std::string_view text);
 
-/// The number in a text such as "90 deg" or "90°".
-std::optional<double> with_unit(std::string_view text, Units units);
+/// The number in a text such as "90 deg", "100 g" or "5 N/cm" as a plain number of a key with this `unit`; nothing if
+/// it is none, or one of another kind.
+std::optional<double> with_unit(std::string_view text, std::string_view unit, const BaseUnits& base = {});
+
+/// What a unit measures, in a word or two: "a length"; empty if it is no unit, or none that has a name.
+std::string_view kind_of_unit(std::string_view unit);
+
+/// The same of the unit in a text such as "5 cm".
+std::string_view kind_of_quantity(std::string_view text);
+
+/// Strings that a number with this unit may be, for messages: `rad or deg`; empty if it has no unit.
+std::string strings_in(std::string_view unit);
 
 }  // namespace pendula::io

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <pendula/numeric/interval.hpp>
 #include <pendula/numeric/reach.hpp>
@@ -24,8 +25,11 @@ class RowFunction : public Formula {
  public:
   RowFunction(std::shared_ptr<const Subject> subject, std::shared_ptr<Expression> expression, const Motion& start)
       : subject_(std::move(subject)), expression_(std::move(expression)), numbers_(columns().size()) {
-    subject_->append_row(start, {}, row_);
-    const std::size_t of_motion = row_.size() - 1;  // columns other than points and energy
+    std::size_t of_motion = std::numeric_limits<std::size_t>::max();  // columns before points and energy
+    for (const Quantity& quantity : subject_->quantities()) {
+      const bool is_observed = quantity.role == Role::point || quantity.role == Role::energy;
+      if (is_observed) of_motion = std::min(of_motion, quantity.first);
+    }
     const auto is_observed = [&](std::size_t column) { return column >= of_motion; };
     observes_ = std::ranges::any_of(columns(), is_observed);
     has_time_ = std::ranges::find(columns(), time_column) != columns().end();

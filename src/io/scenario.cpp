@@ -28,12 +28,21 @@ constexpr std::array<std::string_view, 2> momentum_keys = {"p_theta", "p_phi"};
 struct RunSections {
   explicit RunSections(const toml::table& document) : root(document), run(root, "run"), output(root, "output") {}
 
+  void measure_in(const BaseUnits& base) {
+    for (Section* section : {&root, &run, &output}) section->measure_in(base);
+  }
+
   Section root, run, output;
 };
 
 /// The tables of a chain's document.
 struct Sections : RunSections {
   explicit Sections(const toml::table& document) : RunSections(document), chain(root, "chain"), start(root, "start") {}
+
+  void measure_in(const BaseUnits& base) {
+    RunSections::measure_in(base);
+    for (Section* section : {&chain, &start}) section->measure_in(base);
+  }
 
   Section chain, start;
 };
@@ -125,7 +134,6 @@ ChainParameters<Space> read_chain(const Section& chain, const LinkCount& count) 
   parameters.gravity = chain.number("gravity");
   parameters.damping = chain.per_link("damping", count);
   parameters.torque = constant_torque<Space>(chain, count);
-  for (const Section& table : chain.each("drive")) parameters.drives.push_back(read_drive<Space>(table, count));
   return parameters;
 }
 
@@ -152,11 +160,10 @@ std::optional<NaturalUnits> make_natural(const Section& chain, ChainParameters<S
 
 /// One number a link of each coordinate, (dof·n); 0 where a key is not there.
 template <class Space>
-Coordinates<Space, Eigen::Dynamic> read_coordinates(const Section& start, Names keys, const LinkCount& count,
-                                                    Units units) {
+Coordinates<Space, Eigen::Dynamic> read_coordinates(const Section& start, Names keys, const LinkCount& count) {
   Coordinates<Space, Eigen::Dynamic> values(Space::dof * count.links);
   for (int a = 0; a < Space::dof; ++a) {
-    values.segment(a * count.links, count.links) = start.per_link(keys[static_cast<std::size_t>(a)], count, units);
+    values.segment(a * count.links, count.links) = start.per_link(keys[static_cast<std::size_t>(a)], count);
   }
   return values;
 }
@@ -176,7 +183,7 @@ Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Section& start, cons
                                                       const Coordinates<Space, Eigen::Dynamic>& q) {
   const Entry given = *first_of(start, momentum_keys);
   if (const auto rate = first_of(start, rate_keys)) rate->fail("no rates beside the momenta " + given.name());
-  const auto p = read_coordinates<Space>(start, momentum_keys, count, {});
+  const auto p = read_coordinates<Space>(start, momentum_keys, count);
   try {
     return pendula::rates_from_momenta(chain, q, p);
   } catch (const std::invalid_argument& error) {
@@ -184,18 +191,15 @@ Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Section& start, cons
   }
 }
 
-/// time_unit the unit of time of plain rates [s]
 template <class Space>
-State<Space> read_start(const Section& start, const LinkCount& count, const Chain<Space>& chain, double time_unit) {
+State<Space> read_start(const Section& start, const LinkCount& count, const Chain<Space>& chain) {
   if (Space::dof == 1) {
     constexpr std::array<std::string_view, 3> spatial_keys = {"phi", "phi_dot", "p_phi"};
     if (const auto entry = first_of(start, spatial_keys)) entry->fail("no such key in a planar scenario");
   }
-  const std::array<Unit, 2> angles = {{{"rad", 1}, {"deg", degree}}};
-  const std::array<Unit, 2> rates = {{{"rad/s", time_unit}, {"deg/s", degree * time_unit}}};
-  const auto q = read_coordinates<Space>(start, angle_keys, count, angles);
+  const auto q = read_coordinates<Space>(start, angle_keys, count);
   if (first_of(start, momentum_keys)) return {0, q, rates_from_momenta(start, count, chain, q)};
-  return {0, q, read_coordinates<Space>(start, rate_keys, count, rates)};
+  return {0, q, read_coordinates<Space>(start, rate_keys, count)};
 }
 
 /// Names each key once.
@@ -341,6 +345,7 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
   if (!every && !plan.rows.any()) choose_rows(plan);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");
   plan.events = read_events(sections.root);
+  for (ColumnPlan& column : read_columns(sections.output)) plan.columns.push_back(std::move(column));
   if (!plan.feedback.empty()) plan.places["feedback"] = plan.feedback.front().place;
   plan.checkpoint = sections.output.number("checkpoint");
   for (const ScenarioKey& key : table_named("run").keys) {
@@ -349,14 +354,19 @@ void read_plan(const RunSections& sections, RunPlan& plan) {
 }
 
 template <class Space>
-Scenario<Space> read(const Sections& sections) {
+Scenario<Space> read(Sections& sections, const std::filesystem::path& folder) {
   require_keys(sections);
   const LinkCount count = link_count<Space>(sections);
   ChainParameters<Space> parameters = read_chain<Space>(sections.chain, count);
   const std::optional<NaturalUnits> natural = make_natural(sections.chain, parameters);
+  if (natural) sections.measure_in({natural->mass, natural->length, natural->time});
+  for (const Section& table : sections.chain.each("drive")) {
+    parameters.drives.push_back(read_drive<Space>(table, count));
+  }
   const Chain<Space> chain = build_chain(sections.chain, std::move(parameters));
-  Scenario<Space> scenario(chain, read_start(sections.start, count, chain, natural ? natural->time : 1));
+  Scenario<Space> scenario(chain, read_start(sections.start, count, chain));
   scenario.feedback = read_feedback(sections.chain);
+  scenario.signals = read_signals(sections.chain, folder);
   read_plan(sections, scenario);
   scenario.natural = natural;
   for (std::string& warning : degree_warnings(sections.start)) scenario.warnings.push_back(std::move(warning));
@@ -379,17 +389,17 @@ std::string checked(InputFile file, const std::string& name) {
 }  // namespace
 
 AnyScenario read_document(const toml::table& document, std::string_view name, const FindSystem& find) {
+  const std::filesystem::path folder = std::filesystem::path(name).parent_path();
   if (document.contains("system")) {
-    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
     const RunSections sections(document);
     SystemScenario scenario = read_system(sections.root, folder, find);
     read_plan(sections, scenario);
     return scenario;
   }
-  const Sections sections(document);
+  Sections sections(document);
   const Entry space = sections.chain.require("space");
-  if (space.choice() == 0) return read<Planar>(sections);
-  return read<Spatial>(sections);
+  if (space.choice() == 0) return read<Planar>(sections, folder);
+  return read<Spatial>(sections, folder);
 }
 
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides,

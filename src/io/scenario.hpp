@@ -26,6 +26,8 @@
 #include "io/input_error.hpp"
 #include "io/model_name.hpp"
 #include "io/natural_units.hpp"
+#include "io/own_columns.hpp"
+#include "io/signal_reader.hpp"
 
 namespace pendula::io {
 
@@ -42,6 +44,8 @@ struct RunPlan {
   std::int64_t every = 1;  ///< steps from row to row
   std::vector<EventPlan> events;
   std::vector<FeedbackPlan> feedback;
+  std::vector<SignalPlan> signals;
+  std::vector<ColumnPlan> columns;      ///< of rows, besides those of the motion
   RowTimes rows;                        ///< if there are any, in place of `every`
   double checkpoint = 0;                ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI

@@ -60,7 +60,7 @@ constexpr std::array<ScenarioKey, 7> document = {
 constexpr std::array<std::string_view, 2> spaces = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
 
-constexpr std::array<ScenarioKey, 10> chain = {
+constexpr std::array<ScenarioKey, 11> chain = {
     one_of("space", spaces, required, "planar (y up) or spatial (z up)"),
     an_integer("links", 1, max_links, InWords{"the length of the first array"},
                "the number of links, where no array tells it"),
@@ -72,6 +72,7 @@ constexpr std::array<ScenarioKey, 10> chain = {
     one_of("units", unit_systems, unit_systems[0], "of all other tables and of all output"),
     another("drive", tables, none, "torques amplitude sin(frequency t + phase), each on one link"),
     another("feedback", tables, none, "torques that follow from the motion"),
+    another("signal", tables, none, "torques from measured numbers"),
 };
 
 constexpr std::array<ScenarioKey, 4> chain_drive = {
@@ -81,21 +82,38 @@ constexpr std::array<ScenarioKey, 4> chain_drive = {
     a_number("phase", "rad", any_number, 0.0, "phase at t = 0"),
 };
 
-constexpr std::array<ScenarioKey, 5> system = {
+constexpr std::array<ScenarioKey, 6> system = {
     another("model", text, required, "a model file, or the name of a built-in model"),
     an_integer("links", 1, 64, InWords{"1, for the model to say"}, "number of links, where the model has some"),
     another("parameters", names, InWords{"those of the model"}, "a table by name"),
-    another("drive", tables, none, "constant + amplitude sin(frequency t + phase), added to an input"),
+    another("drive", tables, none, "constant + amplitude sin(frequency t + phase) + value, added to an input"),
     another("feedback", tables, none, "what follows from the motion, added to an input"),
+    another("signal", tables, none, "measured numbers, added to an input"),
 };
 
-constexpr std::array<ScenarioKey, 5> system_drive = {
-    another("input", text, required, "the name of an input of the model"),
+constexpr std::array<ScenarioKey, 6> system_drive = {
+    another("input", text, required, "the name of an input or a motion of the model"),
+    another("value", text, none, "an expression of the time t alone, as \"t < 1 ? 0.5 : 0\""),
     a_number("constant", "", any_number, 0.0, "in the unit of the input"),
     a_number("amplitude", "", any_number, 0.0, "in the unit of the input"),
     a_number("frequency", "rad/s", any_number, InWords{"must be given with an amplitude"}, "an angular frequency"),
     a_number("phase", "rad", any_number, 0.0, "phase at t = 0"),
 };
+
+/// Keys of signals, but for what inputs are.
+constexpr std::array<ScenarioKey, 6> signal_of(std::string_view inputs) {
+  return {
+      another("input", text, required, inputs),
+      another("file", text, none, "a CSV file with names in its first line and a column t, in s"),
+      another("column", text, InWords{"the name of the input"}, "the column of the file"),
+      {.name = "times", .type = numbers, .unit = "s", .otherwise = none, .hint = "in place of file: ascending times"},
+      another("values", numbers, none, "and a number at each, in the unit of the input"),
+      another("hold", truth, false, "whether it is held from time to time; else it is linear in between"),
+  };
+}
+
+constexpr auto system_signal = signal_of("the name of an input of the model");
+constexpr auto chain_signal = signal_of("a torque: \"torque_1\", in space \"torque_x_1\"");
 
 constexpr std::array<ScenarioKey, 4> system_feedback = {
     another("input", text, required, "the name of an input of the model"),
@@ -151,7 +169,7 @@ constexpr std::array<ScenarioKey, 10> run = {
     another("estimate", truth, true, "whether to look how far rows can be trusted"),
 };
 
-constexpr std::array<ScenarioKey, 4> output = {
+constexpr std::array<ScenarioKey, 5> output = {
     an_integer("every", 1, any_most, InWords{"of constant steps, so that rows are as interval would have them"},
                "steps from row to row"),
     a_number("interval", "s", positive, InWords{"a round number: 400 to 5000 rows; the last state is one, too"},
@@ -161,6 +179,7 @@ constexpr std::array<ScenarioKey, 4> output = {
      .unit = "s",
      .otherwise = none,
      .hint = "times of rows, ascending, in place of every"},
+    another("columns", columns, none, "further columns of every file, as { height = \"1 - cos(theta_1)\" }"),
     changeable(a_number("checkpoint", "s", positive, 60.0, "wall time between places that a run can go on from")),
 };
 
@@ -217,14 +236,16 @@ constexpr std::array<ScenarioKey, 5> ensemble_random = {
 constexpr std::array<std::string_view, 4> commands = {"simulate", "ensemble", "lyapunov", "linearize"};
 constexpr Names all_commands = commands, of_rows = Names(commands).first(2), of_members = Names(commands).subspan(1, 1);
 
-constexpr std::array<ScenarioTable, 15> tables_of_scenarios = {{
+constexpr std::array<ScenarioTable, 17> tables_of_scenarios = {{
     {"", all_commands, document},
     {"chain", all_commands, chain},
     {"chain.drive", all_commands, chain_drive},
     {"chain.feedback", of_rows, chain_feedback},
+    {"chain.signal", all_commands, chain_signal},
     {"system", all_commands, system},
     {"system.drive", all_commands, system_drive},
     {"system.feedback", all_commands, system_feedback},
+    {"system.signal", all_commands, system_signal},
     {"start", all_commands, start},
     {"run", all_commands, run},
     {"output", of_rows, output},
@@ -342,6 +363,8 @@ std::string type_text(const ScenarioKey& key) {
       return "array of numbers";
     case texts:
       return "array of strings";
+    case columns:
+      return "table of expressions by name";
     case names:
       return "table of numbers by name";
     case table:

@@ -37,6 +37,7 @@ enum class KeyType {
   numbers,   ///< an array
   texts,     ///< an array
   names,     ///< a table whose keys the model has
+  columns,   ///< a table of expressions, whose keys are anybody's
   table,
   tables  ///< any number of them, [[name]]
 };

@@ -21,13 +21,19 @@
 /// From scenarios to runs, and from their reports to summaries.
 namespace pendula::io {
 
+/// With what acts on its inputs besides drives, and with own columns.
+inline std::shared_ptr<const Subject> with_plan(const RunPlan& plan, const std::shared_ptr<const Subject>& subject) {
+  const auto fed = with_feedback(subject, sampled_laws(plan.feedback, subject), signals_of(plan.signals, *subject));
+  return with_columns(fed, own_columns(plan.columns, *fed));
+}
+
 /// The subject of a scenario.
 template <class Space>
 std::shared_ptr<const Subject> subject_of(const Scenario<Space>& scenario) {
-  return with_sampled(scenario.feedback, std::make_shared<ChainSubject<Space>>(scenario.chain));
+  return with_plan(scenario, std::make_shared<ChainSubject<Space>>(scenario.chain));
 }
 inline std::shared_ptr<const Subject> subject_of(const SystemScenario& scenario) {
-  return with_sampled(scenario.feedback, scenario.system);
+  return with_plan(scenario, scenario.system);
 }
 
 /// The run that a scenario asks for. Throws InputError if its events cannot be read.
@@ -86,25 +92,33 @@ inline void describe(const RunSetup& setup, Summary& summary) {
   summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names, setup.subject->switches());
 }
 
-/// Adds which inputs have feedback.
-inline void describe_feedback(const RunPlan& plan, ModelSummary& model) {
-  for (const FeedbackPlan& feedback : plan.feedback) {
-    if (std::ranges::find(model.feedback, feedback.input) == model.feedback.end())
-      model.feedback.push_back(feedback.input);
+/// The inputs of several plans, each once.
+template <class Plan>
+std::vector<std::string> inputs_of(const std::vector<Plan>& plans) {
+  std::vector<std::string> inputs;
+  for (const Plan& plan : plans) {
+    if (std::ranges::find(inputs, plan.input) == inputs.end()) inputs.push_back(plan.input);
   }
-  model.loaded = model.loaded || !model.feedback.empty();
+  return inputs;
+}
+
+/// Adds which inputs have feedback and signals.
+inline void describe_acting(const RunPlan& plan, ModelSummary& model) {
+  model.feedback = inputs_of(plan.feedback);
+  model.signals = inputs_of(plan.signals);
+  model.loaded = model.loaded || !model.feedback.empty() || !model.signals.empty();
 }
 
 /// Adds what moved, by a scenario in `file`, and its last state.
 template <class Space>
 void describe(const Scenario<Space>& scenario, const std::string& file, Summary& summary) {
   summary.model = model_summary(file, scenario.chain, scenario.natural);
-  describe_feedback(scenario, summary.model);
+  describe_acting(scenario, summary.model);
   summary.final = snapshot(scenario.chain, summary.last);
 }
 inline void describe(const SystemScenario& scenario, const std::string& file, Summary& summary) {
   summary.model = model_summary(file, *scenario.system);
-  describe_feedback(scenario, summary.model);
+  describe_acting(scenario, summary.model);
   summary.system = snapshot(*scenario.system, summary.last);
 }
 

@@ -16,12 +16,12 @@ Json array_of(const Json& items) {
   return {{"type", "array"}, {"items", items}};
 }
 
-/// Angles may have a unit.
+/// Strings have a unit.
 Json number_schema(const ScenarioKey& key) {
   Json schema{{"type", "number"}};
   if (key.bound.least > any_number.least)
     schema[key.bound.is_excluded ? "exclusiveMinimum" : "minimum"] = key.bound.least;
-  if (!key.unit.starts_with("rad") || key.type != KeyType::per_link) return schema;
+  if (key.unit == "1") return schema;
   return {{"anyOf", {schema, {{"type", "string"}}}}};
 }
 
@@ -40,13 +40,15 @@ Json value_schema(const ScenarioKey& key, const std::string& name) {
     case KeyType::per_link:
       return {{"anyOf", {number_schema(key), array_of(number_schema(key))}}};
     case KeyType::torque: {
-      const Json number{{"type", "number"}};
+      const Json number = number_schema(key);
       return {{"anyOf", {number, array_of(number), array_of(array_of(number))}}};
     }
     case KeyType::numbers:
       return array_of(number_schema(key));
     case KeyType::texts:
       return array_of({{"type", "string"}});
+    case KeyType::columns:
+      return {{"type", "object"}, {"additionalProperties", {{"type", "string"}, {"minLength", 1}}}};
     case KeyType::names:
       return {{"type", "object"}};
     case KeyType::table:

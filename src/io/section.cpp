@@ -12,13 +12,19 @@ namespace {
 
 using Names = std::span<const std::string_view>;
 
-std::string expected_number(Bound bound, Units units) {
+std::string expected_number(Bound bound) {
   std::string expected = "a finite number";
   if (bound.least > any_number.least) expected += (bound.is_excluded ? " > " : " >= ") + shortest(bound.least);
-  for (std::size_t i = 0; i < units.size(); ++i) {
-    expected += (i == 0 ? " or a string in " : " or ") + std::string(units[i].name);
-  }
   return expected;
+}
+
+/// Angles are often strings. Other quantities are called that where somebody wrote one.
+std::string or_a_string(std::string_view unit, bool is_string) {
+  const std::string strings = strings_in(unit);
+  const bool is_usual = strings != unit;
+  if (unit.empty() || unit == "1" || !(is_usual || is_string)) return "";
+  const std::string_view kind = is_usual ? "" : kind_of_unit(unit);
+  return " or a string in " + strings + (kind.empty() ? "" : " (" + std::string(kind) + ")");
 }
 
 std::string joined(Names names, std::string_view separator) {
@@ -45,20 +51,27 @@ std::string hint_at_key(std::string_view key, Names known, Names elsewhere) {
 }  // namespace
 
 Entry Entry::element(std::size_t index) const {
-  return {*node_->as_array()->get(index), name_ + "[" + std::to_string(index + 1) + "]", *key_};
+  return {*node_->as_array()->get(index), name_ + "[" + std::to_string(index + 1) + "]", *key_, base_};
+}
+
+Entry Entry::member(std::string_view name) const {
+  return {*node_->as_table()->get(name), name_ + "." + printable(name), *key_, base_};
 }
 
 void Entry::fail(const std::string& expected) const {
   throw InputError(where(), name_, expected, shown(*node_));
 }
 
-double Entry::number(Units units) const {
+double Entry::number(std::string_view unit) const {
+  unit = unit_or_own(unit);
   const auto* text = node_->as_string();
   const std::optional<double> value = is_number() ? node_->value<double>()
-                                      : text      ? with_unit(text->get(), units)
+                                      : text      ? with_unit(text->get(), unit, base_)
                                                   : std::nullopt;
-  if (!value || !std::isfinite(*value) || !key_->bound.allows(*value)) fail(expected_number(key_->bound, units));
-  return *value;
+  if (value && std::isfinite(*value) && key_->bound.allows(*value)) return *value;
+  const std::string_view kind = text && !value ? kind_of_quantity(text->get()) : "";
+  throw InputError(where(), name_, expected_number(key_->bound) + or_a_string(unit, text != nullptr),
+                   shown(*node_) + (kind.empty() ? "" : ", " + std::string(kind)));
 }
 
 bool Entry::truth() const {
@@ -90,16 +103,17 @@ std::size_t Entry::choice(Names choices) const {
                    shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
 }
 
-Eigen::VectorXd Entry::per_link(const LinkCount& count, Units units) const {
-  if (is_number() || (node_->is_string() && !units.empty())) {
-    return Eigen::VectorXd::Constant(count.links, number(units));
+Eigen::VectorXd Entry::per_link(const LinkCount& count, std::string_view unit) const {
+  unit = unit_or_own(unit);
+  if (is_number() || (node_->is_string() && !unit.empty())) {
+    return Eigen::VectorXd::Constant(count.links, number(unit));
   }
   if (!is_array() || size() != static_cast<std::size_t>(count.links)) {
-    fail(expected_number(key_->bound, units) + " for all links, or an array of " + std::to_string(count.links) +
-         (name_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
+    fail(expected_number(key_->bound) + or_a_string(unit, false) + " for all links, or an array of " +
+         std::to_string(count.links) + (name_ == count.told_by ? "" : " (the links that " + count.told_by + " tells)"));
   }
   Eigen::VectorXd values(count.links);
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(units);
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = element(static_cast<std::size_t>(i)).number(unit);
   return values;
 }
 
@@ -118,17 +132,17 @@ Section::Section(const toml::table& document)
 }
 
 Section::Section(const Section& parent, std::string_view key)
-    : name_(parent.dotted(key)), where_(parent.where_), keys_(table_named(name_).keys) {
+    : name_(parent.dotted(key)), where_(parent.where_), keys_(table_named(name_).keys), base_(parent.base_) {
   if (const std::optional<Entry> entry = parent.find(key)) read(*entry, all_keys());
 }
 
 Section::Section(const Entry& entry, std::span<const ScenarioKey> keys)
-    : name_(entry.name()), where_(entry.where()), keys_(keys) {
+    : name_(entry.name()), where_(entry.where()), keys_(keys), base_(entry.base()) {
   read(entry, {});
 }
 
 Section::Section(const Section& parent, std::string_view key, std::span<const ScenarioKey> keys)
-    : name_(parent.dotted(key)), where_(parent.where_), keys_(keys) {
+    : name_(parent.dotted(key)), where_(parent.where_), keys_(keys), base_(parent.base_) {
   if (const std::optional<Entry> entry = parent.find(key)) read(*entry, {});
 }
 
@@ -171,7 +185,7 @@ std::string Section::dotted(std::string_view key) const {
 std::optional<Entry> Section::find(std::string_view key) const {
   const toml::node* node = table_ == nullptr ? nullptr : table_->get(key);
   if (node == nullptr) return std::nullopt;
-  return Entry(*node, dotted(key), key_named(key));
+  return Entry(*node, dotted(key), key_named(key), base_);
 }
 
 Entry Section::require(std::string_view key) const {
@@ -184,9 +198,9 @@ Entry Section::require(std::string_view key, const std::string& expected) const 
   throw InputError(where_, dotted(key), expected, "no such key");
 }
 
-double Section::number(std::string_view key) const {
+double Section::number(std::string_view key, std::string_view unit) const {
   const std::optional<Entry> entry = find(key);
-  return entry ? entry->number() : std::get<double>(key_named(key).otherwise);
+  return entry ? entry->number(unit) : std::get<double>(key_named(key).otherwise);
 }
 
 std::int64_t Section::integer(std::string_view key) const {
@@ -206,8 +220,8 @@ std::size_t Section::choice(std::string_view key) const {
   return static_cast<std::size_t>(otherwise - known.choices.begin());
 }
 
-Eigen::VectorXd Section::per_link(std::string_view key, const LinkCount& count, Units units) const {
-  if (const std::optional<Entry> entry = find(key)) return entry->per_link(count, units);
+Eigen::VectorXd Section::per_link(std::string_view key, const LinkCount& count, std::string_view unit) const {
+  if (const std::optional<Entry> entry = find(key)) return entry->per_link(count, unit);
   const double* const otherwise = std::get_if<double>(&key_named(key).otherwise);
   return Eigen::VectorXd::Constant(count.links, otherwise == nullptr ? 0 : *otherwise);
 }

@@ -29,8 +29,8 @@ struct LinkCount {
 /// and what was found.
 class Entry {
  public:
-  Entry(const toml::node& node, std::string name, const ScenarioKey& key)
-      : node_(&node), name_(std::move(name)), key_(&key) {}
+  Entry(const toml::node& node, std::string name, const ScenarioKey& key, const BaseUnits& base = {})
+      : node_(&node), name_(std::move(name)), key_(&key), base_(base) {}
 
   /// Its key with all tables and elements.
   const std::string& name() const { return name_; }
@@ -43,9 +43,11 @@ class Entry {
   std::size_t size() const { return node_->is_array() ? node_->as_array()->size() : 0; }
   /// Element of an array, counted from 0 here, and from 1 in messages.
   Entry element(std::size_t index) const;
+  /// A value of a table by a name that it has.
+  Entry member(std::string_view name) const;
 
-  /// A number, or, if there are `units`, a string with a number and a unit.
-  double number(Units units = {}) const;
+  /// A number, or a string with a number and a unit of the kind of `unit`, that of the key if there is none.
+  double number(std::string_view unit = {}) const;
   bool truth() const;
   std::int64_t integer() const { return integer(key_->least, key_->most); }
   std::int64_t integer(std::int64_t least, std::int64_t most) const;
@@ -55,16 +57,21 @@ class Entry {
   std::size_t choice() const { return choice(key_->choices); }
   std::size_t choice(std::span<const std::string_view> choices) const;
   /// One number a link; a single number stands for every link.  (n)
-  Eigen::VectorXd per_link(const LinkCount& count, Units units = {}) const;
+  Eigen::VectorXd per_link(const LinkCount& count, std::string_view unit = {}) const;
   /// A vector of `components` numbers.  (components)
   Eigen::VectorXd vector(Eigen::Index components) const;
 
   [[noreturn]] void fail(const std::string& expected) const;
 
+  const BaseUnits& base() const { return base_; }
+
  private:
+  std::string_view unit_or_own(std::string_view unit) const { return unit.empty() ? key_->unit : unit; }
+
   const toml::node* node_;
   std::string name_;
   const ScenarioKey* key_;
+  BaseUnits base_;
 };
 
 /// A table of a scenario, all of whose keys must be known. It may be missing; then it has no keys.
@@ -88,12 +95,12 @@ class Section {
   Entry require(std::string_view key, const std::string& expected) const;
 
   /// The value of a key, or its default.
-  double number(std::string_view key) const;
+  double number(std::string_view key, std::string_view unit = {}) const;
   std::int64_t integer(std::string_view key) const;
   bool truth(std::string_view key) const;
   std::size_t choice(std::string_view key) const;
   /// The default is for all links.
-  Eigen::VectorXd per_link(std::string_view key, const LinkCount& count, Units units = {}) const;
+  Eigen::VectorXd per_link(std::string_view key, const LinkCount& count, std::string_view unit = {}) const;
 
   /// An option by its name.
   template <class Option>
@@ -102,6 +109,9 @@ class Section {
   }
 
   const std::string& where() const { return where_; }
+
+  /// From now on plain numbers are in these units, also in the tables within.
+  void measure_in(const BaseUnits& base) { base_ = base; }
 
  private:
   /// `elsewhere` has the dotted names of all keys, for hints at keys in the wrong table.
@@ -114,6 +124,7 @@ class Section {
   std::string name_;
   std::string where_;  // place of the table, or of its parent if it is missing
   std::span<const ScenarioKey> keys_;
+  BaseUnits base_;
 };
 
 }  // namespace pendula::io

@@ -81,6 +81,9 @@ std::string settings(const Summary& summary) {
   std::string fed;
   for (const std::string& input : model.feedback) fed += (fed.empty() ? "" : ", ") + input;
   if (!fed.empty()) text += line("feedback", fed);
+  std::string given;
+  for (const std::string& input : model.signals) given += (given.empty() ? "" : ", ") + input;
+  if (!given.empty()) text += line("signals", given);
   std::string method(name_of(summary.options.method));
   if (has_stages(summary)) {
     method += ", " + plural(summary.options.stages, "stage") + " (order " +
@@ -135,8 +138,9 @@ std::string statistics(const Summary& summary) {
   const auto a_step = [&](double total) {
     return total / static_cast<double>(std::max<std::int64_t>(counts.steps, 1));
   };
-  const std::string sizes = "of " + rounded(counts.smallest_step, 2) + " to " + rounded(counts.largest_step, 2) +
-                            std::string(unit_names(summary.model.natural).time);
+  const std::string least = rounded(counts.smallest_step, 2), most = rounded(counts.largest_step, 2);
+  const std::string sizes =
+      "of " + (least == most ? "" : least + " to ") + most + std::string(unit_names(summary.model.natural).time);
   std::string text = line("steps", std::to_string(counts.steps), counts.largest_step > 0 ? sizes : "");
   text += line("rejected steps", std::to_string(counts.rejected_steps));
   if (has_stages(summary)) {
@@ -179,7 +183,7 @@ std::string place(const Summary& summary) {
   std::string position;
   const auto add = [&](std::string_view name, double value) {
     position += (position.empty() ? "" : ", ") + std::string(name) + " = ";
-    append_number(position, value);
+    append_number(position, value + 0.0);  // no -0
   };
   if (summary.model.space.empty()) {
     const std::vector<double> none(summary.shown.size(), std::nan(""));
@@ -216,6 +220,7 @@ std::string end_of_run(const Summary& summary) {
   }
   if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));
   if (summary.view) text += line("page", *summary.view + ", to open in a browser");
+  if (summary.film) text += line("film", *summary.film);
   if (!summary.ending.ok()) text += line("ended early", summary.ending.message);
   return text;
 }

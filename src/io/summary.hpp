@@ -33,6 +33,7 @@ struct ModelSummary {
   double gravity = 0;
   bool loaded = false;                  ///< damping, torque, a drive or feedback
   std::vector<std::string> feedback;    ///< inputs that have some
+  std::vector<std::string> signals;     ///< the same
   std::optional<NaturalUnits> natural;  ///< units of all numbers; SI if empty
 };
 
@@ -77,6 +78,7 @@ struct Summary : RunReport {
   std::optional<std::string> trajectory;  ///< the file of rows; "-" is standard output
   std::int64_t rows_written = 0;          ///< rows in this file; fewer if the disk is full
   std::optional<std::string> view;        ///< the page
+  std::optional<std::string> film;        ///< if there is one
   std::vector<std::string> event_names;   ///< of the events that were looked for
   std::optional<std::string> event_file;
 };

@@ -156,7 +156,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
                                           unit_systems = {"SI", "natural"};
 constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
 
-constexpr std::array<JsonRow, 41> rows = {{
+constexpr std::array<JsonRow, 43> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
@@ -170,6 +170,7 @@ constexpr std::array<JsonRow, 41> rows = {{
     {{"parameters", parameters_schema, "of the model, by name", "", systems},
      [](const Summary& s) { return named(s.model.parameters); }},
     {{"feedback", texts_schema, "inputs that have some"}, [](const Summary& s) { return Json(s.model.feedback); }},
+    {{"signals", texts_schema, "inputs that follow some"}, [](const Summary& s) { return Json(s.model.signals); }},
     {{"method", "string", "that moved it", "", anything, names_of<Method>},
      [](const Summary& s) { return Json(name_of(s.options.method)); }},
     {{"method_reason", "string null", "why, where the scenario leaves it to the program"},
@@ -212,6 +213,7 @@ constexpr std::array<JsonRow, 41> rows = {{
     {{"trajectory", "string null", "file, as it was named; - is standard output"},
      [](const Summary& s) { return or_null(s.trajectory.value_or("")); }},
     {{"view", "string null", "page, as it was named"}, [](const Summary& s) { return or_null(s.view.value_or("")); }},
+    {{"film", "string null", "film, as it was named"}, [](const Summary& s) { return or_null(s.film.value_or("")); }},
     {{"energy_initial", "number null", "H of the first row", "J"},
      [](const Summary& s) { return Json(s.energy_error.initial); }},
     {{"energy_final", "number null", "H of the last row", "J"}, [](const Summary& s) { return Json(s.energy_final); }},
@@ -298,7 +300,7 @@ std::string to_json_of_file(const Summary& summary) {
   json.erase("final");
   std::string text = one_line(json);
   for (const std::optional<std::string>& file :
-       {std::optional(summary.model.scenario), summary.trajectory, summary.view, summary.event_file}) {
+       {std::optional(summary.model.scenario), summary.trajectory, summary.view, summary.film, summary.event_file}) {
     if (file) text = with_public_name(std::move(text), *file);
   }
   return text;

@@ -1,7 +1,6 @@
 #include "io/system_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -51,11 +50,14 @@ std::vector<double> read_parameters(const Section& system, const SystemInfo& inf
 }
 
 void read_drive(const Section& table, const SystemInfo& info, SystemNumbers& numbers) {
+  const bool has_numbers = table.find("constant") || table.find("amplitude");
+  if (table.find("value") && !has_numbers) return;
   const Entry entry = table.require("input", "the name of an input of the model: " + listed(info.inputs));
   if (info.inputs.empty()) entry.fail("no drive, since the model has no inputs");
   const std::size_t input = entry.choice(info.inputs);
-  numbers.inputs[input] += table.number("constant");
-  const double amplitude = table.number("amplitude");
+  const std::string_view unit = info.input_units[input];
+  numbers.inputs[input] += table.number("constant", unit);
+  const double amplitude = table.number("amplitude", unit);
   if (amplitude == 0) return;
   numbers.sines.push_back(
       {static_cast<int>(input), amplitude, table.require("frequency").number(), table.number("phase")});
@@ -92,10 +94,16 @@ class StartTable {
 
   /// The coordinates; those not given are 0.
   Eigen::VectorXd positions() const {
-    return read([](std::string_view stem) { return std::string(stem); }, "");
+    return read([](std::string_view stem) { return std::string(stem); },
+                [](std::string_view unit) { return std::string(unit); });
   }
-  Eigen::VectorXd rates() const { return read(rate_name, "/s"); }
-  Eigen::VectorXd momenta() const { return read(momentum_of, ""); }
+  Eigen::VectorXd rates() const {
+    return read(rate_name, [](std::string_view unit) { return rate_unit(unit); });
+  }
+  /// A coordinate's momentum times its rate is an energy.
+  Eigen::VectorXd momenta() const {
+    return read(momentum_of, [](std::string_view unit) { return "N m s/" + std::string(unit); });
+  }
 
   std::optional<Entry> first_momentum() const { return first(momentum_of); }
   std::optional<Entry> first_rate() const { return first(rate_name); }
@@ -133,19 +141,17 @@ class StartTable {
     return std::nullopt;
   }
 
-  template <class Name>
-  Eigen::VectorXd read(Name name, const std::string& per_time) const {
+  template <class Name, class UnitOf>
+  Eigen::VectorXd read(Name name, UnitOf unit_of) const {
     Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(info_.coordinates.size()));
     for (std::size_t k = 0; k < info_.coordinates.size(); ++k) {
-      const std::string rad = "rad" + per_time, deg = "deg" + per_time;
-      const std::array<Unit, 2> angles = {{{rad, 1}, {deg, degree}}};
-      const Units units = info_.is_angle[k] ? Units(angles) : Units();
+      const std::string unit = unit_of(info_.coordinate_units[k]);
       const std::string own(info_.coordinates[k]), stem(family(own));
       if (const auto entry = find(name, own)) {
-        values[static_cast<Eigen::Index>(k)] = entry->number(units);
+        values[static_cast<Eigen::Index>(k)] = entry->number(unit);
       } else if (const auto all = stem.empty() ? std::nullopt : find(name, stem)) {
         const int count = members(stem);
-        const Eigen::VectorXd each = all->per_link({count, "the model", all->where()}, units);
+        const Eigen::VectorXd each = all->per_link({count, "the model", all->where()}, unit);
         values[static_cast<Eigen::Index>(k)] = each[number_of(k, stem)];
       }
     }
@@ -204,6 +210,30 @@ std::vector<std::string> degree_warnings(const Section& root, const SystemInfo& 
   return warnings;
 }
 
+/// What drives make of motions, which are no inputs of a kernel.
+std::vector<ColumnPlan> motion_columns(const std::vector<FeedbackPlan>& drives, const SystemSubject& system) {
+  std::vector<ColumnPlan> columns;
+  for (const FeedbackPlan& drive : drives) {
+    if (std::ranges::find(system.info().inputs, drive.input) != system.info().inputs.end()) continue;
+    const auto same = std::ranges::find(columns, drive.input, &ColumnPlan::name);
+    if (same == columns.end()) {
+      columns.push_back({drive.input, drive.value, drive.place});
+    } else {
+      same->value = "(" + same->value + ") + (" + drive.value + ")";
+    }
+  }
+  return columns;
+}
+
+/// Where a scenario says what a model refuses: the drive of something that it does not have, or the model.
+std::string place_of(std::string_view refused, const std::vector<FeedbackPlan>& drives, const Entry& model) {
+  for (const FeedbackPlan& drive : drives) {
+    if (refused.ends_with("; got " + drive.input)) return drive.input_place;
+    if (refused.find("the motion " + drive.input + " ") != std::string_view::npos) return drive.place;
+  }
+  return model.place();
+}
+
 }  // namespace
 
 std::optional<std::string> warning_of_degrees(const Entry& entry) {
@@ -228,18 +258,24 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   std::optional<int> links;
   if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer());
   SystemScenario scenario;
+  const std::vector<FeedbackPlan> drives = read_drive_values(table);
   scenario.feedback = read_feedback(table);
+  scenario.signals = read_signals(table, folder);
   try {
-    ModelName name{model.text(), links, folder};
+    ModelName name{model.text(), links, folder, drive_laws(drives)};
     const auto kernel = find(name);
     const SystemNumbers numbers = read_numbers(table, kernel->info);
     const auto system = std::make_shared<SystemSubject>(kernel, numbers);
-    name.laws = continuous_laws(scenario.feedback, *system);
+    std::vector<FeedbackPlan> laws = drives;
+    laws.insert(laws.end(), scenario.feedback.begin(), scenario.feedback.end());
+    const std::vector<InputLaw> fed = continuous_laws(scenario.feedback, *system);
+    name.laws.insert(name.laws.end(), fed.begin(), fed.end());
     scenario.system = name.laws.empty() ? system
-                                        : std::make_shared<SystemSubject>(
-                                              find(name), numbers, continuous_functions(scenario.feedback, system));
+                                        : std::make_shared<SystemSubject>(fed.empty() ? kernel : find(name), numbers,
+                                                                          continuous_functions(laws, system));
+    scenario.columns = motion_columns(drives, *system);
   } catch (const ModelError& error) {
-    throw InputError(model.place() + ": " + error.what());
+    throw InputError(place_of(error.what(), drives, model) + ": " + error.what());
   }
   scenario.start = read_start(root, *scenario.system);
   scenario.warnings = degree_warnings(root, scenario.system->info());

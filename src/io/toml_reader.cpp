@@ -127,10 +127,13 @@ bool is_bare_word(std::string_view text) {
 bool is_bare_string(std::string_view text) {
   if (is_bare_word(text)) return true;
   const auto in_a_unit = [](char c) {
-    return (c >= 'a' && c <= 'z') || c == '/' || degree_sign.find(c) != std::string_view::npos;
+    return is_key_character(c) || std::string_view("/*^ ").find(c) != std::string_view::npos ||
+           degree_sign.find(c) != std::string_view::npos;
   };
   const std::optional<TextWithUnit> quantity = read_quantity(text);
-  return quantity && !quantity->unit.empty() && std::ranges::all_of(quantity->unit, in_a_unit);
+  if (!quantity || quantity->unit.empty() || (quantity->unit.front() >= '0' && quantity->unit.front() <= '9'))
+    return false;
+  return std::ranges::all_of(quantity->unit, in_a_unit);
 }
 
 /// The value of an override in a table of its own, under the key "value".

@@ -45,6 +45,7 @@ Scene subject_scene(const Scenario& scenario) {
 template <class Scenario>
 std::vector<std::string> laboratory_leaves_out(const Scenario& scenario) {
   std::vector<std::string> words;
+  if (!scenario.signals.empty()) words.emplace_back("signals");
   if constexpr (requires { scenario.chain; }) {
     if (!scenario.feedback.empty()) words.emplace_back("feedback");
     if (scenario.natural) words.emplace_back("natural units: it shows the numbers of the scenario as SI");

@@ -61,7 +61,7 @@ def test_the_examples_are_scenarios(scenario_schema, file):
         ("[1.0, 1.0]", "[1.0, 0.0]"),
         ("planar", "plane"),
         ("step     = 5e-3", "stages = 9"),
-        ("step     = 5e-3", 'step = "5 ms"'),
+        ("step     = 5e-3", 'step = ["5 ms"]'),
         ("[chain]", "[system]"),
         ("[start]", "[begin]"),
     ],

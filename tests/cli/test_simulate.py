@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import subprocess
 
 import pytest
@@ -418,3 +419,14 @@ def test_an_existing_trajectory_is_replaced(pendula, double, tmp_path):
     (tmp_path / "out.csv").write_text("old\n" * 100000)
     pendula("simulate", double, "-o", "out.csv")
     assert "old" not in (tmp_path / "out.csv").read_text()
+
+
+def test_what_rests_has_no_minus(pendula, double):
+    """Forces on what hangs at rest are -0."""
+    text = pendula("simulate", double, *settings("start.theta=0.0")).out
+    assert not re.search(r"(?<!e)-0(?![.\d])", text)
+
+
+def test_steps_of_one_size_are_told_once(pendula, double):
+    text = pendula("simulate", double, *settings("run.duration=0.9999")).out
+    assert re.search(r"^steps +200 +of 0\.005 s$", text, re.MULTILINE)

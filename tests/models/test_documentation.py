@@ -16,9 +16,10 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture
 def folder(tmp_path):
-    sprung, lame, load = blocks("python")
+    sprung, lame, rope, load = blocks("python")
     (tmp_path / "sprung.py").write_text(sprung)
     (tmp_path / "lame.py").write_text(lame)
+    (tmp_path / "rope.py").write_text(rope)
     (tmp_path / "load.py").write_text(load)
     (tmp_path / "sprung.toml").write_text(blocks("toml")[0])
     return tmp_path
@@ -32,6 +33,16 @@ def test_the_commands_do_what_the_page_says(folder, pendula):
         assert ended.returncode == (2 if "lame" in command else 0), ended.stderr
         assert ended.stdout.endswith(output) or ended.stderr.endswith(output)
     assert pendula("check", "start.py", cwd=folder).returncode == 0
+
+
+def test_a_rope_that_is_pulled(folder, pendula):
+    (folder / "rope.toml").write_text(
+        f'[system]\nmodel = "rope.py"\n{blocks("toml")[1]}\n[start]\ntheta = 0.5\n[run]\nduration = 4.0\n'
+    )
+    ended = pendula("simulate", "rope.toml", "--json", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    x, y = json.loads(ended.stdout)["final"]["points"]["bob"]
+    assert abs(x**2 + y**2 - 0.8**2) < 1e-12  # measured TODO
 
 
 def test_a_model_of_several_pieces(folder, pendula):

@@ -129,7 +129,7 @@ def test_a_machine_without_a_compiler(pendula, tmp_path):
     scenario = EXAMPLES / "spring_pendulum.toml"
     first = pendula("simulate", scenario, "--set=run.duration=0.1", **alone)
     assert first.returncode == 0
-    told = "pendula: deriving the kernel of spring_pendulum, once; interpreted: no C compiler was found (CC names one)"
+    told = "pendula: derived the kernel of spring_pendulum, once; interpreted: no C compiler was found (CC names one)"
     assert first.stderr.splitlines()[0] == told
     assert pendula("simulate", scenario, "--set=run.duration=0.1", **alone).stderr == ""
     refused = pendula("build", "spring_pendulum", PENDULA_KERNELS_BY="compiler", **alone)
@@ -161,7 +161,7 @@ def test_a_program_that_is_not_what_was_written_is_made_anew(damage, pendula, tm
     }
     assert damaged[damage] != whole
     program.write_bytes(damaged[damage])
-    assert "deriving the kernel of spring_pendulum" in pendula("build", "spring_pendulum", **given).stderr
+    assert "derived the kernel of spring_pendulum" in pendula("build", "spring_pendulum", **given).stderr
     assert program.read_bytes() == whole
 
 

@@ -39,7 +39,7 @@ def makes_it_anew(cache: Path, environment: dict[str, str], why: str = "") -> bo
         f"kept in {cache}/pendula/{next((cache / 'pendula').glob('*.so')).name}\n"
     )
     return (
-        told.startswith("pendula: deriving the kernel of spring_pendulum, once; compiled by ") and why in told
+        told.startswith("pendula: derived the kernel of spring_pendulum, once; compiled by ") and why in told
     )
 
 

@@ -53,6 +53,8 @@ def test_a_film_moves_in_real_time(scenario, ending, runs, pendula):
         "simulate", f"{scenario}.toml", "--set", "run.duration=0.3", "--video", f"film.{ending}", "--quiet"
     )
     assert (film.returncode, film.stdout, film.stderr) == (0, "", "")
+    again = ("--set", "run.duration=0.1", "--video", f"again.{ending}")
+    assert f"\nfilm               again.{ending}\n" in pendula("simulate", f"{scenario}.toml", *again).stdout
     frames = frames_of(runs / f"film.{ending}")
     assert len(frames) == 10 and frames[0].shape == (640, 640, 3)
     assert all(np.abs(a - b).max() > 30 for a, b in pairwise(frames))

@@ -110,6 +110,7 @@ def test_a_line_where_another_number_has_a_value(ensemble):
 def test_the_command_draws(ensemble, pendula):
     done = pendula("map", "out.h5", "event:up", "-o", "map.png", "--scale", "linear", "--contour", "steps=5")
     assert done.returncode == 0, done.stderr
+    assert done.stdout == "picture            map.png\n"
     with Image.open(ensemble.with_name("map.png")) as picture:
         assert min(picture.size) > 900
 

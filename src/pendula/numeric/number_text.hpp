@@ -18,10 +18,11 @@ inline void append_number(std::string& text, double value) {
   text.append(digits.data(), end.ptr);
 }
 
-/// `value` rounded to `digits` significant digits, for people to read.
+/// `value` rounded to `digits` significant digits, for people to read: -0 is 0.
 inline std::string rounded(double value, int digits = 6) {
   std::array<char, longest_number> text;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, digits);
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value + 0.0, std::chars_format::general, digits);
   return {text.data(), end.ptr};
 }
 

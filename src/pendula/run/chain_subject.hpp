@@ -49,7 +49,7 @@ class ChainSubject : public Subject {
   bool has_poles() const override { return Space::dof == 2; }
 
   /// `t`, per link `theta_i` (`phi_i`) `theta_dot_i` (`phi_dot_i`), bobs `x_i` `y_i` (`z_i`), `energy`.
-  std::vector<Quantity> quantities() const override {
+  std::vector<Quantity> motion_quantities() const override {
     constexpr std::array<std::array<std::string_view, 2>, 2> angles = {
         {{"theta", "angle of the rod from the downward vertical"}, {"phi", "angle of the rod around the vertical"}}};
     const auto links = static_cast<std::size_t>(chain_.links());
@@ -89,7 +89,9 @@ class ChainSubject : public Subject {
     return constants;
   }
 
-  void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
+  std::shared_ptr<Subject> copy() const override { return std::make_shared<ChainSubject>(chain_); }
+
+  void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
     const int links = chain_.links();
     row.push_back(motion.time);
     for (int link = 0; link < links; ++link) {

@@ -53,7 +53,7 @@ class Differentiated {
   TangentMap map_at(const Motion& motion) {
     require_regular(task_.subject, motion);
     const Eigen::Index state = 2 * motion.q.size(), varied = this->varied();
-    return as_its_kind(task_.subject, [&](const auto& kind) {
+    return as_its_kind_at(task_.subject, motion.time, [&](const auto& kind) {
       return is_dense() ? TangentMap(LagrangianVariation(system_model_of(kind), motion), state, rows_, varied)
                         : chain_map(kind, motion, state, varied);
     });
@@ -124,6 +124,7 @@ void find_accelerations(const ChainSubject<Space>& subject, const Motion& motion
 }  // namespace
 
 std::vector<Varied> varied_by(const Subject& subject) {
+  if (const auto part = subject.part_at(0)) return varied_by(*part);
   std::vector<Varied> found;
   if (const auto* system = dynamic_cast<const SystemSubject*>(&subject)) {
     const SystemInfo& info = system->info();
@@ -211,6 +212,7 @@ Backward move_gradients(const MotionTask& task, const Directions<>& gradients) {
 }
 
 void require_regular(const Subject& subject, const Motion& motion) {
+  if (const auto part = subject.part_at(motion.time)) return require_regular(*part, motion);
   if (dynamic_cast<const ChainSubject<Spatial>*>(&subject) == nullptr) return;
   const Eigen::Index links = motion.q.size() / 2;
   constexpr double smallest = 1e-9;  // of sin(theta); derivatives have the digits that this leaves
@@ -224,7 +226,7 @@ Eigen::VectorXd field_at(const Subject& subject, const Motion& motion) {
   Eigen::VectorXd field(2 * motion.q.size());
   field.head(motion.q.size()) = motion.v;
   double* const found = field.data() + motion.q.size();
-  as_its_kind(subject, [&](const auto& kind) { find_accelerations(kind, motion, found); });
+  as_its_kind_at(subject, motion.time, [&](const auto& kind) { find_accelerations(kind, motion, found); });
   return field;
 }
 

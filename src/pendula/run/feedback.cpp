@@ -1,6 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
 #include <optional>
+#include <pendula/numeric/directions.hpp>
 #include <pendula/run/feedback.hpp>
 #include <pendula/run/inputs.hpp>
 #include <pendula/run/relay.hpp>
@@ -13,10 +17,11 @@
 namespace pendula {
 namespace {
 
-/// A subject, its laws, and its inputs without them.
+/// A subject, what is added to its inputs, and its inputs without that.
 struct Fed {
   std::shared_ptr<const Subject> subject;
   std::vector<SampledLaw> laws;
+  std::vector<Signal> signals;
   std::vector<double> inputs;
 
   /// What a law says of a motion, within its limit; NaN where it has no value.
@@ -25,19 +30,51 @@ struct Fed {
     return std::isnan(value) ? value : std::clamp(value, -law.limit, law.limit);
   }
 
-  std::unique_ptr<Integrator> make(const RunOptions& options, const std::vector<double>& held) const {
+  /// The subject while laws hold these values, from the knots of signals that a time comes after.
+  std::shared_ptr<const Subject> part(const std::vector<double>& held, double time) const {
     std::vector<double> all = inputs;
     for (std::size_t k = 0; k < laws.size(); ++k) all[laws[k].input] += held[k];
-    return with_inputs(subject, all)->make_integrator(options);
+    std::vector<InputLine> lines;
+    for (const Signal& signal : signals) {
+      const std::ptrdiff_t knot = signal.knot_before(time);
+      const auto at = static_cast<std::size_t>(std::max<std::ptrdiff_t>(knot, 0));
+      all[signal.input] += signal.values[at];
+      const double slope = signal.slope_after(knot);
+      if (slope == 0) continue;
+      lines.push_back({signal.input, slope, signal.times[at], signal.times[at + 1] - signal.times[at]});
+    }
+    return with_inputs(subject, all, lines);
+  }
+
+  double next_knot(double time) const {
+    double next = std::numeric_limits<double>::infinity();
+    for (const Signal& signal : signals) next = std::min(next, signal.next_knot(time));
+    return next;
+  }
+
+  /// Of all signals on an input.
+  double signal(std::size_t input, double time) const {
+    double sum = 0;
+    for (const Signal& one : signals) {
+      if (one.input == input) sum += one.at(time);
+    }
+    return sum;
+  }
+
+  /// Whether something is added to an input.
+  bool feeds(std::size_t input) const {
+    return std::ranges::find(laws, input, &SampledLaw::input) != laws.end() ||
+           std::ranges::find(signals, input, &Signal::input) != signals.end();
   }
 };
 
-/// Steps of a subject whose inputs are held from sample to sample: from each sample on by a new integrator.
+/// Steps of a subject whose inputs are held from sample to sample, or are lines from knot to knot: from each of them on
+/// by a new integrator.
 class HeldInputs : public Relay {
  public:
   HeldInputs(const Fed& fed, const RunOptions& options)
-      : fed_(fed), options_(options), held_(fed.laws.size()), since_(fed.laws.size()), made_for_(held_) {
-    use(fed_.make(options_, held_));
+      : fed_(fed), options_(options), held_(fed.laws.size()), since_(fed.laws.size()) {
+    make();
   }
 
   Outcome start(double time, const double* q, const double* v) override {
@@ -47,18 +84,19 @@ class HeldInputs : public Relay {
       since_[k] = std::floor(time / fed_.laws[k].sample * (1 + rounding));
     }
     if (!is_finite(held_)) return not_finite(time);
-    if (held_ != made_for_) make();
+    knot_ = time;
+    make_if_new();
     return begin(motion);
   }
 
   Outcome step(double h) override {
     forget();
-    const double next = next_sample(), left = next - time();
+    const double knot = fed_.next_knot(time()), next = std::min(next_sample(), knot), left = next - time();
     const bool reaches = h >= left * (1 - rounding);
     const Outcome stepped = now().step(reaches ? left : h);
     count();
-    if (!stepped || next - time() > rounding * std::abs(next)) return stepped;
-    const Outcome begun = resample(next);
+    if (!stepped || std::isinf(next) || next - time() > rounding * std::abs(next)) return stepped;
+    const Outcome begun = go_on_from(next, knot <= next * (1 + rounding));
     return begun ? stepped : begun;
   }
 
@@ -67,18 +105,49 @@ class HeldInputs : public Relay {
     return has_before() && time < now().time() * (1 - rounding) ? before_held_ : held_;
   }
 
-  bool depends_on_end(double h) const override { return h < next_sample() - time() && now().depends_on_end(h); }
+  bool depends_on_end(double h) const override {
+    return h < std::min(next_sample(), fed_.next_knot(time())) - time() && now().depends_on_end(h);
+  }
 
   void member(MemberNumbers& numbers) override {
-    numbers(held_, since_, done_, all_);
-    if (held_ != made_for_) make();
+    numbers(held_, since_, knot_, done_, all_);
+    make_if_new();
     own_member(numbers);
   }
 
-  int linearize() override { throw std::invalid_argument(sampled_has_no_derivatives); }
+  int linearize() override {
+    if (!fed_.laws.empty()) throw std::invalid_argument(sampled_has_no_derivatives);
+    keep_last();
+    return rows_ = now().linearize();
+  }
+  int parameters() override { return now().parameters(); }
+  double resolved_decay(double error) const override { return now().resolved_decay(error); }
+  void push(double* tangents, int count, const double* parameters) override {
+    Eigen::Map<Directions<>> given(tangents, rows_, count);
+    Directions<> moved = given;
+    if (parameters == nullptr) {
+      last().push(moved);
+    } else {
+      last().push(moved, Eigen::Map<const Directions<>>(parameters, this->parameters(), count));
+    }
+    given = moved;
+  }
+  void pull(double* gradients, int count, double* parameters) override {
+    Eigen::Map<Directions<>> given(gradients, rows_, count);
+    Directions<> moved = given;
+    if (parameters == nullptr) {
+      last().pull(moved);
+    } else {
+      Eigen::Map<Directions<>> sum(parameters, this->parameters(), count);
+      Directions<> of_parameters = sum;
+      last().pull(moved, of_parameters);
+      sum = of_parameters;
+    }
+    given = moved;
+  }
 
  private:
-  static constexpr double rounding = 1e-12;
+  static constexpr double rounding = Signal::rounding;
 
   double next_sample() const {
     double next = std::numeric_limits<double>::infinity();
@@ -86,9 +155,17 @@ class HeldInputs : public Relay {
     return next;
   }
 
-  void make() {
-    use(fed_.make(options_, held_));
+  std::unique_ptr<Integrator> made() {
     made_for_ = held_;
+    made_at_ = knot_;
+    std::unique_ptr<Integrator> made = fed_.part(held_, knot_)->make_integrator(options_);
+    if (rows_ > 0) made->linearize();
+    return made;
+  }
+  void make() { use(made()); }
+  void make_if_new() {
+    const bool is_same = fed_.signals.empty() || knot_ == made_at_;
+    if (held_ != made_for_ || !is_same) make();
   }
 
   static bool is_finite(const std::vector<double>& numbers) {
@@ -96,7 +173,7 @@ class HeldInputs : public Relay {
   }
   static Outcome not_finite(double time) { return {.status = Status::not_finite, .time = time}; }
 
-  Outcome resample(double at) {
+  Outcome go_on_from(double at, bool is_knot) {
     Motion motion = now().state();
     motion.time = at;
     before_held_ = held_;
@@ -109,21 +186,23 @@ class HeldInputs : public Relay {
       held_ = before_held_;
       return not_finite(at);
     }
-    if (held_ == before_held_) return {};  // it goes on as it was
-    made_for_ = held_;
-    return hand_over(fed_.make(options_, held_), motion);
+    if (held_ == before_held_ && !is_knot) return {};  // it goes on as it was
+    knot_ = at;
+    return hand_over(made(), motion);
   }
 
   const Fed fed_;
   const RunOptions options_;
   std::vector<double> held_, since_;  // of each law: its value, and the number of its last sample
   std::vector<double> made_for_, before_held_;
+  double knot_ = 0, made_at_ = 0;  // where signals have the lines that they have now
+  int rows_ = 0;                   // of tangents; 0 without derivatives
 };
 
 class FedSubject : public Subject {
  public:
   explicit FedSubject(Fed fed) : fed_(std::move(fed)), names_(input_names(*fed_.subject)) {
-    for (const Quantity& quantity : fed_.subject->quantities()) {
+    for (const Quantity& quantity : fed_.subject->motion_quantities()) {
       if (quantity.role == Role::input && !own_) own_ = quantity.first;
     }
   }
@@ -144,8 +223,8 @@ class FedSubject : public Subject {
   bool has_poles() const override { return fed_.subject->has_poles(); }
 
   /// A chain has no columns of torques otherwise: those with feedback come last.
-  std::vector<Quantity> quantities() const override {
-    std::vector<Quantity> quantities = fed_.subject->quantities();
+  std::vector<Quantity> motion_quantities() const override {
+    std::vector<Quantity> quantities = fed_.subject->motion_quantities();
     if (own_) return quantities;
     std::size_t column = columns_of(quantities).size();
     for (const std::size_t input : fed_inputs()) {
@@ -154,15 +233,18 @@ class FedSubject : public Subject {
     return quantities;
   }
 
-  void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
+  std::shared_ptr<Subject> copy() const override { return std::make_shared<FedSubject>(fed_); }
+
+  void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
     const std::size_t first = row.size();
-    fed_.subject->append_row(motion, seen, row);
+    fed_.subject->append_motion_row(motion, seen, row);
     if (own_) {
       for (std::size_t k = 0; k < fed_.laws.size(); ++k) row[first + *own_ + fed_.laws[k].input] += held(k, motion);
+      for (const Signal& signal : fed_.signals) row[first + *own_ + signal.input] += signal.at(motion.time);
       return;
     }
     for (const std::size_t input : fed_inputs()) {
-      double torque = fed_.inputs[input];
+      double torque = fed_.inputs[input] + fed_.signal(input, motion.time);
       for (std::size_t k = 0; k < fed_.laws.size(); ++k) {
         if (fed_.laws[k].input == input) torque += held(k, motion);
       }
@@ -172,13 +254,17 @@ class FedSubject : public Subject {
 
   std::vector<std::size_t> fed_columns() const override {
     std::vector<std::size_t> columns = fed_.subject->fed_columns();
-    for (const Quantity& quantity : quantities()) {
+    for (const Quantity& quantity : motion_quantities()) {
       if (quantity.role != Role::input) continue;
-      for (const SampledLaw& law : fed_.laws) {
-        if (quantity.name == names_[law.input]) columns.push_back(quantity.first);
+      for (const std::size_t input : fed_inputs()) {
+        if (quantity.name == names_[input]) columns.push_back(quantity.first);
       }
     }
     return columns;
+  }
+
+  std::shared_ptr<const Subject> part_at(double time) const override {
+    return fed_.laws.empty() ? fed_.part({}, time) : nullptr;
   }
 
   std::vector<Constant> constants() const override { return fed_.subject->constants(); }
@@ -198,8 +284,8 @@ class FedSubject : public Subject {
 
   std::vector<std::size_t> fed_inputs() const {
     std::vector<std::size_t> inputs;
-    for (const SampledLaw& law : fed_.laws) {
-      if (std::ranges::find(inputs, law.input) == inputs.end()) inputs.push_back(law.input);
+    for (std::size_t input = 0; input < names_.size(); ++input) {
+      if (fed_.feeds(input)) inputs.push_back(input);
     }
     return inputs;
   }
@@ -211,16 +297,25 @@ class FedSubject : public Subject {
 
 }  // namespace
 
-std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subject, std::vector<SampledLaw> laws) {
-  if (laws.empty()) return subject;
+std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subject, std::vector<SampledLaw> laws,
+                                             std::vector<Signal> signals) {
+  if (laws.empty() && signals.empty()) return subject;
   const std::size_t count = input_names(*subject).size();
   for (const SampledLaw& law : laws) {
     if (law.input < count && law.sample > 0) continue;
     throw std::invalid_argument("feedback: expected an input from 0 to before " + std::to_string(count) +
                                 " and a sample time > 0, got " + std::to_string(law.input));
   }
+  for (const Signal& signal : signals) {
+    const bool is_table = !signal.times.empty() && signal.times.size() == signal.values.size() &&
+                          std::ranges::adjacent_find(signal.times, std::greater_equal()) == signal.times.end();
+    if (signal.input < count && is_table) continue;
+    throw std::invalid_argument("signal: expected an input from 0 to before " + std::to_string(count) +
+                                " and values at times that ascend, got input " + std::to_string(signal.input) +
+                                " and " + std::to_string(signal.times.size()) + " times");
+  }
   std::vector<double> inputs = inputs_of(*subject);
-  return std::make_shared<FedSubject>(Fed{std::move(subject), std::move(laws), std::move(inputs)});
+  return std::make_shared<FedSubject>(Fed{std::move(subject), std::move(laws), std::move(signals), std::move(inputs)});
 }
 
 }  // namespace pendula

@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <pendula/run/signal.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <vector>
@@ -19,9 +20,10 @@ struct SampledLaw {
   double limit = std::numeric_limits<double>::infinity();  ///< the largest size of what is added
 };
 
-/// The subject with sampled feedback: steps end where samples are. Rows have the inputs as they are held from their
-/// time on. There are no derivatives of its motion, which jumps. Throws std::invalid_argument for an input that the
-/// subject does not have.
-std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subject, std::vector<SampledLaw> laws);
+/// The subject with sampled feedback and signals: steps end where samples and knots are. Rows have the inputs as they
+/// are held from their time on. With feedback there are no derivatives of its motion, which jumps. Throws
+/// std::invalid_argument for an input that the subject does not have.
+std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subject, std::vector<SampledLaw> laws,
+                                             std::vector<Signal> signals = {});
 
 }  // namespace pendula

@@ -37,22 +37,37 @@ std::vector<double> inputs(const ChainSubject<Space>& chain) {
   return {torque.data(), torque.data() + torque.size()};
 }
 
+/// A line as the sine of a turn so small that it is one to the last digit: sin(x) = x (1 - x^2/6 ...).
+InputSine sine_of(const InputLine& line) {
+  constexpr double turn = 1e-9;
+  const double frequency = turn / line.duration;
+  return {static_cast<int>(line.input), line.slope / frequency, frequency, -frequency * line.since};
+}
+
 std::shared_ptr<const Subject> with(const SystemSubject& system, const std::shared_ptr<const Subject>& owner,
-                                    std::span<const double> inputs) {
+                                    std::span<const double> inputs, std::span<const InputLine> lines) {
   SystemNumbers numbers = system.numbers();
   numbers.inputs.assign(inputs.begin(), inputs.end());
+  for (const InputLine& line : lines) numbers.sines.push_back(sine_of(line));
   return std::make_shared<SystemSubject>(std::shared_ptr<const SystemTable>(owner, &system.table()), std::move(numbers),
                                          system.feedback());
 }
 
 template <class Space>
 std::shared_ptr<const Subject> with(const ChainSubject<Space>& subject, const std::shared_ptr<const Subject>& /*owner*/,
-                                    std::span<const double> inputs) {
+                                    std::span<const double> inputs, std::span<const InputLine> lines) {
   const Chain<Space>& chain = subject.chain();
   ChainParameters<Space> parameters{chain.masses(), chain.lengths(), chain.gravity(), chain.damping()};
   parameters.torque.resize(Space::torque_components, chain.links());
   std::ranges::copy(inputs, parameters.torque.data());
   parameters.drives = chain.drives();
+  for (const InputLine& line : lines) {
+    const InputSine sine = sine_of(line);
+    Drive<Space> drive{.link = sine.input / Space::torque_components, .frequency = sine.frequency, .phase = sine.phase};
+    drive.amplitude.setZero();
+    drive.amplitude[sine.input % Space::torque_components] = sine.amplitude;
+    parameters.drives.push_back(drive);
+  }
   return std::make_shared<ChainSubject<Space>>(Chain<Space>(std::move(parameters)));
 }
 
@@ -67,7 +82,7 @@ std::vector<double> inputs_of(const Subject& subject) {
 }
 
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
-                                           std::span<const double> inputs) {
+                                           std::span<const double> inputs, std::span<const InputLine> lines) {
   const std::vector<std::string> known = input_names(*subject);
   if (inputs.size() != known.size()) {
     throw std::invalid_argument("inputs: expected " + std::to_string(known.size()) + " numbers, got " +
@@ -77,7 +92,7 @@ std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>&
     if (std::isfinite(inputs[k])) continue;
     throw std::invalid_argument(known[k] + ": expected a finite number, got " + shortest(inputs[k]));
   }
-  return as_its_kind(*subject, [&](const auto& kind) { return with(kind, subject, inputs); });
+  return as_its_kind(*subject, [&](const auto& kind) { return with(kind, subject, inputs, lines); });
 }
 
 }  // namespace pendula

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <pendula/run/subject.hpp>
 #include <span>
@@ -14,9 +15,17 @@ std::vector<std::string> input_names(const Subject& subject);
 /// Their constant parts.
 std::vector<double> inputs_of(const Subject& subject);
 
-/// The same subject with these as constant parts, which keeps the first one; drives stay. Throws std::invalid_argument
-/// on another number of inputs than it has, and on one that is not finite.
+/// slope (t - since), which is added to an input for so long.
+struct InputLine {
+  std::size_t input = 0;
+  double slope = 0;
+  double since = 0;     ///< [s]
+  double duration = 0;  ///< > 0  [s]
+};
+
+/// The same subject with these as constant parts and with `lines`, which keeps the first one; drives stay. Throws
+/// std::invalid_argument on another number of inputs than it has, and on one that is not finite.
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
-                                           std::span<const double> inputs);
+                                           std::span<const double> inputs, std::span<const InputLine> lines = {});
 
 }  // namespace pendula

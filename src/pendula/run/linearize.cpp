@@ -43,6 +43,7 @@ void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
 }
 
 bool changes_with_time(const Subject& subject) {
+  if (subject.part_at(0)) return true;
   return as_its_kind(subject, [](const auto& kind) {
     if constexpr (requires { kind.chain(); }) {
       return !kind.chain().drives().empty();
@@ -70,7 +71,8 @@ void find_b(const SystemModel& model, const Motion& motion, double* b) {
 
 void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
   require_regular(subject, motion);
-  const SystemModel model = as_its_kind(subject, [&](const auto& kind) { return system_model_of(kind, motion); });
+  const SystemModel model =
+      as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
   if (a != nullptr) {
     SystemAt<8> here(model);
     here.set_time(motion.time);

@@ -8,7 +8,7 @@
 namespace pendula {
 
 /// Kinds of quantities of a trajectory; those up to rates are its time and state.
-enum class Role { time, coordinate, rate, input, point, energy };
+enum class Role { time, coordinate, rate, input, point, energy, own };
 
 /// A quantity of a trajectory: one number per row, or one for each link.
 struct Quantity {

@@ -62,6 +62,10 @@ class Relay : public PlainIntegrator {
   bool has_before() const { return before_ != nullptr; }
   bool remembers() const { return remembers_; }
 
+  /// From now on the integrator of the last step is kept until the next one, as where steps are remembered.
+  void keep_last() { keeps_last_ = true; }
+  Integrator& last() { return before_ ? *before_ : *now_; }
+
   /// Replaces the integrator by another that is not started.
   void use(std::unique_ptr<Integrator> integrator) {
     now_ = std::move(integrator);
@@ -87,7 +91,7 @@ class Relay : public PlainIntegrator {
   Outcome hand_over(std::unique_ptr<Integrator> next, const Motion& motion) {
     before_work_ = done_.load_work;
     done_ = all_;
-    if (remembers_) before_ = std::move(now_);
+    if (remembers_ || keeps_last_) before_ = std::move(now_);
     use(std::move(next));
     return now_->start(motion);
   }
@@ -108,7 +112,7 @@ class Relay : public PlainIntegrator {
 
   std::unique_ptr<Integrator> now_, before_;
   double before_work_ = 0;
-  bool remembers_ = false;
+  bool remembers_ = false, keeps_last_ = false;
   StopSign stop_;
   mutable pendula::Description described_;
 };

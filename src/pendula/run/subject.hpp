@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <pendula/run/integrator.hpp>
@@ -10,6 +12,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace pendula {
@@ -21,6 +24,13 @@ struct Observation {
   double energy = 0;       ///< T + U; for a system h = v·∂L/∂v − L  [J]
 
   double potential() const { return energy - kinetic; }
+};
+
+/// A column that somebody asked for.
+struct OwnColumn {
+  std::string name, meaning;
+  /// A function of the columns before; several threads may call it.
+  std::function<double(std::span<const double> row)> value;
 };
 
 /// What a run moves: a chain or any other system with its parameters. Immutable.
@@ -49,11 +59,34 @@ class Subject {
   /// Whether the coordinates of the dense solver are singular somewhere.
   virtual bool has_poles() const = 0;
 
-  /// The quantities of a trajectory: time, coordinates, rates, inputs, points, energy; and the numbers of one row.
-  virtual std::vector<Quantity> quantities() const = 0;
-  virtual void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
+  /// The quantities of a trajectory: time, coordinates, rates, inputs, points, energy, own columns.
+  std::vector<Quantity> quantities() const {
+    std::vector<Quantity> quantities = motion_quantities();
+    std::size_t column = own_.empty() ? 0 : columns_of(quantities).size();
+    for (const OwnColumn& own : own_) quantities.push_back({own.name, "1", Role::own, own.meaning, column++});
+    return quantities;
+  }
 
-  /// The columns of inputs that feedback adds to.
+  /// The numbers of one row. Without points and energy, of an empty observation, there are no own columns either.
+  void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const {
+    const std::size_t first = row.size();
+    append_motion_row(motion, seen, row);
+    const std::size_t count = row.size() - first;
+    if (own_.empty() || count < motion_columns_) return;
+    for (const OwnColumn& own : own_) row.push_back(own.value(std::span(row).subspan(first, count)));
+  }
+
+  /// The same without own columns.
+  virtual std::vector<Quantity> motion_quantities() const = 0;
+  virtual void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
+
+  virtual std::shared_ptr<Subject> copy() const = 0;
+
+  /// The subject that moves it about a time, where signals add lines to inputs; null where one moves it all the time,
+  /// and for sampled feedback.
+  virtual std::shared_ptr<const Subject> part_at(double /*time*/) const { return nullptr; }
+
+  /// The columns of inputs that feedback or signals add to.
   virtual std::vector<std::size_t> fed_columns() const { return {}; }
 
   /// Masses, lengths and other parameters, in SI units.
@@ -81,6 +114,23 @@ class Subject {
   double distance(const Motion& a, const Motion& b) const {
     return distance(a, b, {b.time, a.q.cwiseAbs().cwiseMax(b.q.cwiseAbs()), a.v.cwiseAbs().cwiseMax(b.v.cwiseAbs())});
   }
+
+ private:
+  friend std::shared_ptr<const Subject> with_columns(const std::shared_ptr<const Subject>& subject,
+                                                     std::vector<OwnColumn> own);
+
+  std::vector<OwnColumn> own_;
+  std::size_t motion_columns_ = 0;
 };
+
+/// The same subject with own columns, in place of those that it has.
+inline std::shared_ptr<const Subject> with_columns(const std::shared_ptr<const Subject>& subject,
+                                                   std::vector<OwnColumn> own) {
+  if (own.empty()) return subject;
+  const std::shared_ptr<Subject> made = subject->copy();
+  made->own_ = std::move(own);
+  made->motion_columns_ = columns_of(made->motion_quantities()).size();
+  return made;
+}
 
 }  // namespace pendula

@@ -115,7 +115,7 @@ class SystemSubject : public Subject {
   bool has_poles() const override { return false; }
 
   /// `t`, coordinates, their rates, inputs, components of the points, `energy`.
-  std::vector<Quantity> quantities() const override {
+  std::vector<Quantity> motion_quantities() const override {
     constexpr std::string_view axes = "xyz";
     std::vector<Quantity> quantities{{"t", "s", Role::time, "time"}};
     const auto add = [&](std::string name, std::string unit, Role role, std::string meaning) {
@@ -146,7 +146,11 @@ class SystemSubject : public Subject {
     return quantities;
   }
 
-  void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
+  std::shared_ptr<Subject> copy() const override {
+    return std::make_shared<SystemSubject>(table_, numbers_, feedback_);
+  }
+
+  void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
     row.push_back(motion.time);
     row.insert(row.end(), motion.q.begin(), motion.q.end());
     row.insert(row.end(), motion.v.begin(), motion.v.end());

@@ -1,0 +1,54 @@
+"""What inputs are given: numbers, which are held, and tables of numbers over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+
+from ._core import InputError
+from ._runs import mapping, number, numbers
+
+Signals = dict[str, dict[str, object]]
+_KEYS = ("file", "column", "times", "values", "hold")
+
+
+def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, float], Signals]:
+    """Those that are held, and signals: the keys of a table ``[[system.signal]]`` each. Raises InputError."""
+    held: dict[str, float] = {}
+    signals: Signals = {}
+    for name, one in given.items():
+        where = f"inputs.{name}"
+        if callable(one):
+            raise InputError(
+                f"{where}: expected a number, (times, values) or a CSV file, got {type(one).__name__} (a drive has a "
+                'function of time: value="t < 1 ? 2 : 0"; Simulation.step holds another number from step to step)'
+            )
+        if isinstance(one, Mapping):
+            signals[name] = _signal(name, where, mapping(where, one))
+        elif isinstance(one, (str, PathLike)):
+            signals[name] = _signal(name, where, {"file": one})
+        elif isinstance(one, (tuple, list)):
+            if len(one) != 2:
+                raise InputError(f"{where}: expected (times, values), got {len(one)} of them")
+            signals[name] = _signal(name, where, {"times": one[0], "values": one[1]})
+        else:
+            held[name] = number(where, one)
+    return held, signals
+
+
+def _signal(name: str, where: str, given: Mapping[str, object]) -> dict[str, object]:
+    unknown = [key for key in given if key not in _KEYS]
+    if unknown:
+        raise InputError(f"{where}: expected some of {', '.join(_KEYS)}, got {', '.join(unknown)}")
+    table = {"input": name, **given}
+    if "file" in given:
+        table["file"] = str(Path(str(given["file"])).resolve())
+    for key in ("times", "values"):
+        if key not in given:
+            continue
+        array = numbers(f"{where}.{key}", given[key])
+        if array.ndim != 1:
+            raise InputError(f"{where}.{key}: expected a vector, got an array of shape {array.shape}")
+        table[key] = array.tolist()
+    return table

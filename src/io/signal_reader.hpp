@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <pendula/run/signal.hpp>
+#include <pendula/run/subject.hpp>
+#include <string>
+#include <vector>
+
+#include "io/section.hpp"
+
+namespace pendula::io {
+
+/// A table [[system.signal]] or [[chain.signal]] of a scenario, with its numbers.
+struct SignalPlan {
+  std::string input;
+  std::string input_place;  ///< where the name of the input stands, as `where: key`, for later errors
+  Signal signal;            ///< of no input yet
+};
+
+/// Reads [[NAME.signal]] of the table of a system or a chain; files are relative to `folder`. Throws InputError.
+std::vector<SignalPlan> read_signals(const Section& system, const std::filesystem::path& folder);
+
+/// Throws InputError for an input that the subject does not have.
+std::vector<Signal> signals_of(const std::vector<SignalPlan>& plans, const Subject& subject);
+
+}  // namespace pendula::io
