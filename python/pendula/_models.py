@@ -209,6 +209,9 @@ class Model(System):
             "system.feedback": list(self._feedback),
         }
 
+    def unforced(self) -> Model:
+        return self.replaced({}, {name: np.zeros(1) for name in self.inputs})
+
     def held(self, inputs: Mapping[str, object]) -> Model:
         given = _inputs(inputs)
         for name in given:

@@ -32,7 +32,7 @@ def test_points_are_measured_and_eigenvalues_have_frequencies_and_damping(pendul
         "linearize", double, "--at", "equilibrium", "--set", "chain.damping=0.5", "--json", "--step", "0.05"
     ).json
     for key in ("frequencies", "damping"):
-        assert sorted(discrete[key]) == pytest.approx(sorted(damped[key]), rel=1e-8)
+        assert sorted(discrete[key]) == pytest.approx(sorted(damped[key]), rel=1e-8)  # measured 3e-9
     assert 0.01 < min(damped["damping"]) < max(damped["damping"]) < 1
     text = pendula("linearize", double, "--at", "equilibrium").out
     assert "C, of y = C x" in text and f"{wanted[0]:.6g} Hz" in text
