@@ -204,6 +204,9 @@ class Model(System):
             "system.signal": list(self._signals.values()),
         }
 
+    def unforced(self) -> Model:
+        return self.replaced({}, {name: np.zeros(1) for name in self.inputs})
+
     def held(self, inputs: Mapping[str, object]) -> Model:
         for name in inputs:
             if name not in self.inputs:

@@ -13,13 +13,16 @@ import numpy as np
 
 from . import _core, _toml
 from ._core import InputError
+from ._events import events_of
 from ._linear import LinearSystem, seen
 from ._runs import in_order, mapping, merged, number, places, plainly, tell, warn
-from ._systems import System, starts_of, system_of
+from ._solution import Solution, concluded
+from ._systems import System, starts_of, system_of, times_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
+    from ._events import Event
     from ._linear import Outputs
 
     Controller = Callable[[float, NDArray[np.float64]], Mapping[str, float]]
@@ -31,9 +34,19 @@ class Beginning(NamedTuple):
     """What a simulation begins with, as it is pickled."""
 
     scenario: str
+    unforced: str  # the same with no constant parts of inputs
     remember: bool
     model_file: str | None
     model_hash: str | None
+
+    @property
+    def system(self) -> str:
+        """The name of the table that says what moves."""
+        return "chain" if self.scenario.startswith("[chain]") else "system"
+
+    @property
+    def has_method(self) -> bool:
+        return "\nmethod = " in self.scenario
 
     @classmethod
     def of(
@@ -51,14 +64,23 @@ class Beginning(NamedTuple):
         if step is None and tolerance is None:
             tolerance = 1e-9
         run = {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
-        tables = {
-            key: table
-            for key, table in system.tables().items()
-            if feeds_back or not key.endswith(".feedback")
-        }
-        text = _toml.document({**tables, "start": start, "run": run})
+
+        def text_of(one: System) -> str:
+            tables = {
+                key: table
+                for key, table in one.tables().items()
+                if feeds_back or not key.endswith(".feedback")
+            }
+            return _toml.document({**tables, "start": start, "run": run})
+
         file = system.model_file()
-        return cls(text, remember, None if file is None else str(file), _hash(file))
+        return cls(
+            text_of(system),
+            text_of(system.unforced()),
+            remember,
+            None if file is None else str(file),
+            _hash(file),
+        )
 
     def prepare(self) -> _core.Prepared:
         """Raises InputError, too, if a model is not what it was."""
@@ -148,6 +170,7 @@ class Simulation:
         with plainly():
             self._core = _core.Simulation(self._made)
             self._inputs = self._made.inputs
+        self._holds = {self._core.time: self._core.held}  # from when on what was held, for record
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -213,6 +236,8 @@ class Simulation:
             before = dict(zip(self._inputs, self._core.held, strict=True))
             if values:
                 self._core.hold([{**before, **values}[name] for name in self._inputs])
+                if self._text.remember and self._core.held != [*self._holds.values()][-1]:
+                    self._holds[self._core.time] = self._core.held
         return self
 
     def advance_to(self, time: float) -> Simulation:
@@ -259,6 +284,66 @@ class Simulation:
         with self._alone():
             return self._core.at(when)
 
+    def record(
+        self,
+        *,
+        t: ArrayLike | None = None,
+        interval: float | None = None,
+        events: Mapping[str, Event] | None = None,
+    ) -> Solution:
+        """The whole motion up to now as a run: rows, page, plots and events, with the inputs that were held.
+
+        The run is made again for it, by the same steps, with these inputs as signals; and it says how far it can be
+        trusted.
+
+        Parameters
+        ----------
+        t, interval, events
+            As for :meth:`Chain.simulate`.
+
+        Raises
+        ------
+        InputError
+            An argument is wrong, or the simulation has ``remember=False``.
+
+        Examples
+        --------
+        >>> import pendula
+        >>> cart = pendula.Simulation(pendula.Model("cart_chain"), theta=0.1)
+        >>> for _ in range(50):
+        ...     moved = cart.step(0.01, push=-20 * cart["theta_1"])
+        >>> run = cart.record(interval=0.01)
+        >>> run["push"].shape, run.success
+        ((51,), True)
+        """
+        if not self._text.remember:
+            raise InputError("record: expected a simulation with remember=True, got one with False")
+        expressions, functions = events_of(events)
+        times = None if t is None else times_of(t).tolist()
+        every = 1 if times is None and interval is None else None
+        more: dict[str, Any] = {
+            f"{self._text.system}.signal": self._signals(),
+            "output": {"times": times, "interval": interval, "every": every},
+            "event": expressions,
+        }
+        text = self._text.unforced + _toml.document(more)
+        keys = [f"run.duration={self.time - self._made.time!r}"]
+        if not self._text.has_method:
+            keys.append("run.method=gauss")
+        names = {f"event[{k + 1}]": f"events.{one['name']}" for k, one in enumerate(expressions)}
+        with plainly(names):
+            result = _core.simulate(text, "pendula", keys, functions, None, *places(), tell)
+        return concluded(result, names)
+
+    def _signals(self) -> list[dict[str, object]]:
+        """Tables of what was held."""
+        times, values = [*self._holds], np.array([*self._holds.values()])
+        return [
+            {"input": name, "times": times, "values": held.tolist(), "hold": True}
+            for name, held in zip(self._inputs, values.T, strict=True)
+            if held.any()
+        ]
+
     def linearize(self, outputs: Outputs | None = None) -> LinearSystem:
         """The linear system d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly; ``outputs`` are those of
         :func:`linearize`.
@@ -286,6 +371,7 @@ class Simulation:
         other._text, other._made, other._inputs = self._text, self._made, self._inputs
         with self._alone():
             other._core = self._core.copy()
+            other._holds = dict(self._holds)
         return other
 
     __copy__ = copy
@@ -295,13 +381,14 @@ class Simulation:
 
     def __getstate__(self) -> dict[str, object]:
         with self._alone():
-            return {"text": tuple(self._text), "saved": self._core.save()}
+            return {"text": tuple(self._text), "saved": self._core.save(), "holds": self._holds}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._text = Beginning(*state["text"])
         self._begin()
         with self._alone():
             self._core.resume(np.ascontiguousarray(state["saved"], dtype=float))
+            self._holds = state["holds"]
 
     def __repr__(self) -> str:
         return f"<Simulation: t = {self.time:.6g} s after {self.steps} steps>"

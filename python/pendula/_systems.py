@@ -151,6 +151,10 @@ class System(ABC):
     ) -> System:
         """The same system with other values of parameters, and of what is constant of inputs."""
 
+    @abstractmethod
+    def unforced(self) -> System:
+        """The same without constant parts of inputs."""
+
     def held(self, inputs: Mapping[str, object]) -> System:
         """The same with these inputs, in place of its own. Raises InputError."""
         if inputs:
@@ -433,6 +437,11 @@ class Chain(System):
         if "torque" in inputs:
             per_link = (-1, 3) if self._numbers["space"] == "spatial" else (-1,)
             other._numbers["torque"] = inputs["torque"].reshape(per_link)
+        return other
+
+    def unforced(self) -> Chain:
+        other = copy.copy(self)
+        other._numbers = {**self._numbers, "torque": None}
         return other
 
     def at_zero(self) -> dict[str, object]:
