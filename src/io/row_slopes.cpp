@@ -80,41 +80,57 @@ Eigen::MatrixXd column_slopes(const Subject& subject, const Motion& motion, std:
   return slopes;
 }
 
-void require_slopes(const Subject& subject, const Expression& expression, const std::string& text) {
-  if (expression.may_jump()) throw std::invalid_argument("expected an expression that does not jump, got " + text);
+/// Why an expression has no slopes; empty where it has.
+std::string against_slopes(const Subject& subject, const Expression& expression, const std::string& text) {
+  if (expression.may_jump()) return "expected an expression that does not jump, got " + text;
   const std::vector<std::size_t> fed = subject.fed_columns();
   const std::vector<std::string> names = subject.columns();
   for (const Quantity& quantity : subject.quantities()) {
     for (const std::size_t column : expression.columns()) {
       const bool is_fed = std::ranges::find(fed, column) != fed.end();
       if (!quantity.holds(column) || (quantity.role != Role::energy && !is_fed)) continue;
-      throw std::invalid_argument(
-          "expected an expression in t, coordinates, rates, points and inputs without feedback, got " + names[column]);
+      return "expected an expression in t, coordinates, rates, points and inputs without feedback, got " +
+             names[column];
     }
   }
+  return "";
 }
 
 }  // namespace
 
 RowSlopes row_slopes(const Subject& subject, const Motion& motion, std::span<const std::string> expressions) {
   const std::size_t inputs = input_names(subject).size();
-  const Eigen::MatrixXd of_columns = column_slopes(subject, motion, inputs);
+  Eigen::MatrixXd of_columns = column_slopes(subject, motion, inputs);
   const std::vector<std::string> names = subject.columns();
   std::vector<double> row;
   subject.append_row(motion, subject.observe(motion), row);
-  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(expressions.size()), of_columns.cols());
-  for (std::size_t k = 0; k < expressions.size(); ++k) {
-    Expression expression(expressions[k], names);
-    require_slopes(subject, expression, expressions[k]);
+  const auto change = [&](const std::string& text) {
+    Expression expression(text, names);
+    if (const std::string problem = against_slopes(subject, expression, text); !problem.empty()) {
+      throw std::invalid_argument(problem);
+    }
+    Eigen::RowVectorXd slopes = Eigen::RowVectorXd::Zero(of_columns.cols());
     std::vector<Dual<double>> numbers;
     for (const std::size_t column : expression.columns()) numbers.emplace_back(row[column]);
     for (std::size_t j = 0; j < numbers.size(); ++j) {
       numbers[j].slope = 1;
       const double slope = expression(std::span<const Dual<double>>(numbers)).slope;
       numbers[j].slope = 0;
-      slopes.row(static_cast<Eigen::Index>(k)) +=
-          slope * of_columns.row(static_cast<Eigen::Index>(expression.columns()[j]));
+      slopes += slope * of_columns.row(static_cast<Eigen::Index>(expression.columns()[j]));
     }
+    return slopes;
+  };
+  for (const Quantity& quantity : subject.quantities()) {
+    const bool is_asked_for = std::ranges::any_of(expressions, [&](const std::string& text) {
+      const Expression expression(text, names);
+      return std::ranges::any_of(expression.columns(), [&](std::size_t column) { return quantity.holds(column); });
+    });
+    if (quantity.role != Role::own || !is_asked_for) continue;
+    of_columns.row(static_cast<Eigen::Index>(quantity.first)) = change(quantity.meaning);
+  }
+  Eigen::MatrixXd slopes(static_cast<Eigen::Index>(expressions.size()), of_columns.cols());
+  for (std::size_t k = 0; k < expressions.size(); ++k) {
+    slopes.row(static_cast<Eigen::Index>(k)) = change(expressions[k]);
   }
   const Eigen::Index size = 2 * motion.q.size();
   return {slopes.col(0), slopes.middleCols(1, size), slopes.rightCols(static_cast<Eigen::Index>(inputs))};
@@ -124,8 +140,10 @@ std::vector<std::string> point_columns(const Subject& subject) {
   const std::vector<std::string> names = subject.columns();
   std::vector<std::size_t> places;
   for (const Quantity& quantity : subject.quantities()) {
-    for (std::size_t k = 0; quantity.role == Role::point && k < quantity.size(); ++k)
-      places.push_back(quantity.column(k));
+    const bool has_slopes = quantity.role == Role::own &&
+                            against_slopes(subject, Expression(quantity.meaning, names), quantity.meaning).empty();
+    const bool is_output = quantity.role == Role::point || has_slopes;
+    for (std::size_t k = 0; is_output && k < quantity.size(); ++k) places.push_back(quantity.column(k));
   }
   std::ranges::sort(places);
   std::vector<std::string> found;

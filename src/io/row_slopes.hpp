@@ -19,7 +19,8 @@ struct RowSlopes {
 /// input to which feedback adds.
 RowSlopes row_slopes(const Subject& subject, const Motion& motion, std::span<const std::string> expressions);
 
-/// Names of the components of points, which are what is measured where nothing else is asked for.
+/// Names of what is measured where nothing else is asked for: the components of points, and own columns that have
+/// slopes.
 std::vector<std::string> point_columns(const Subject& subject);
 
 }  // namespace pendula::io

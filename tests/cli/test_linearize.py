@@ -38,6 +38,20 @@ def test_points_are_measured_and_eigenvalues_have_frequencies_and_damping(pendul
     assert "C, of y = C x" in text and f"{wanted[0]:.6g} Hz" in text
 
 
+def test_own_columns_are_measured_unless_they_have_no_slopes(pendula, double):
+    columns = 'height = "1 - cos(theta_1)", fast = "theta_dot_2*y_2", all = "2*energy"'
+    double.write_text(double.read_text() + f"\n[output]\ncolumns = {{ {columns} }}\n")
+    run = pendula("linearize", double, "--json")
+    assert run.status == 0, run.err
+    assert run.json["outputs"] == ["x_1", "y_1", "x_2", "y_2", "height", "fast"]
+    theta, other, _, rate = run.json["state"]
+    height, fast = run.json["C"][4:]
+    assert height == pytest.approx([math.sin(theta), 0, 0, 0], abs=1e-15)  # measured 0
+    y = -math.cos(theta) - math.cos(other)
+    wanted = [rate * math.sin(theta), rate * math.sin(other), 0, y]
+    assert fast == pytest.approx(wanted, abs=1e-14)  # measured 0
+
+
 def test_the_discrete_system_has_the_exponentials_of_its_eigenvalues(pendula, double):
     continuous, discrete = (
         pendula("linearize", double, "--at", "equilibrium", "--json", *step).json
