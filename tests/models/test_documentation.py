@@ -42,7 +42,7 @@ def test_a_rope_that_is_pulled(folder, pendula):
     ended = pendula("simulate", "rope.toml", "--json", cwd=folder)
     assert ended.returncode == 0, ended.stderr
     x, y = json.loads(ended.stdout)["final"]["points"]["bob"]
-    assert abs(x**2 + y**2 - 0.8**2) < 1e-12  # measured TODO
+    assert abs(x**2 + y**2 - 0.8**2) < 1e-12  # measured 1.1e-16
 
 
 def test_a_model_of_several_pieces(folder, pendula):
