@@ -364,8 +364,10 @@ class ModelFunction:
         given = list(arguments.values())[1].default
         self._links = given if isinstance(given, int) else None
         try:
-            written = _Text(function)
+            written: _Text | None = _Text(function)
         except _NoText:
+            written = None
+        if written is None:  # out of the handler, whose exception an error would show
             written = _Text(function, compiled=True)
         self.file: Path = kept_model(name, written.text())
         written_from[str(self.file)] = written.lines()

@@ -24,7 +24,8 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     Attributes
     ----------
-    C, D : (outputs, 2n) and (outputs, inputs) arrays
+    C, D : numpy.ndarray
+        How outputs change by the state, and by what is put in: a row an output.
     names, inputs, outputs : list of str
         What x, u and y are.
     step : float or None

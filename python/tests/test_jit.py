@@ -97,7 +97,9 @@ def test_what_is_kept_needs_neither_sympy_nor_a_derivation(tmp_path):
     whole = kept.read_bytes()
     for damaged in (whole[: len(whole) // 2], whole.replace(b"ELF", b"FLE")):
         kept.write_bytes(damaged)
-        assert run(SWING, tmp_path, PENDULA_KERNELS_BY="llvm") == "jit\n" + told
+        again = run(SWING, tmp_path, PENDULA_KERNELS_BY="llvm")
+        why = f"{told.rstrip()} (not loaded: {kept}: it is not what was written)\n"
+        assert again == "jit\n" + why
 
 
 def test_it_is_taken_where_there_is_no_compiler(tmp_path):
@@ -108,7 +110,9 @@ def test_it_is_taken_where_there_is_no_compiler(tmp_path):
     assert run(without + SWING, tmp_path, **alone).startswith("interpreted\n")
     wanted = "try: pendula.Model('furuta').kernel\nexcept pendula.InputError as error: print(error)"
     told = run(without + "import pendula\n" + wanted, tmp_path, **{**alone, "PENDULA_KERNELS_BY": "llvm"})
-    assert told == "PENDULA_KERNELS_BY: llvm is for Python with llvmlite (pip install 'pendula[jit]')\n"
+    assert (
+        told == "model: PENDULA_KERNELS_BY: llvm is for Python with llvmlite (pip install 'pendula[jit]')\n"
+    )
 
 
 @pytest.mark.parametrize(

@@ -116,7 +116,7 @@ def test_a_run_of_some_seconds_has_a_bar(monkeypatch):
     assert told == []
     monkeypatch.setitem(sys.modules, "tqdm.auto", None)
     with pytest.raises(
-        ImportError, match=r"progress: expected tqdm, got none \(pip install pendula\[progress\]\)"
+        ImportError, match=r'expected tqdm.auto, which pip install "pendula\[progress\]" brings'
     ):
         pendula.Chain(links=2).simulate(0.1, theta=1.0, progress=True)
 

@@ -102,11 +102,6 @@ REFUSED = {
         "inputs.push",
         "function",
     ),
-    "a table as input": (
-        lambda: CART.simulate(0.1, inputs={"push": ([0, 1], [1, 2])}),
-        "inputs.push",
-        "tuple",
-    ),
     "an input of a chain": (simulate(inputs={"push": 1.0}), "inputs", "push"),
     "a path of a number": (lambda: RUN.to_netcdf(FOLDER / "rows.csv"), "file", "rows.csv"),
     "a file of no format": (lambda: RUN.save(FOLDER / "rows.txt"), "rows.txt", ""),

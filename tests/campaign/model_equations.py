@@ -80,7 +80,7 @@ class Said:
     def spring(self, start: str, end: str) -> None:
         """What is drawn moves nothing."""
 
-    thread = spring
+    thread = pulleys = spring
 
 
 class Printer(C99CodePrinter):

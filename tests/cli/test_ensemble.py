@@ -523,7 +523,7 @@ def test_values_of_axes_and_of_members_may_be_listed(tmp_path):
         ('axis = [{key = "start.theta[1]", values = []}]', "values: expected an array of finite numbers"),
         (
             'axis = [{key = "start.theta[1]", values = [1, nan]}]',
-            "values[2]: expected a finite number, got nan",
+            "values[2]: expected a finite number or a string in rad or deg, got nan",
         ),
         (
             'axis = [{key = "start.theta[1]", values = [1], count = 1}]',

@@ -43,9 +43,9 @@ def test_own_columns_are_measured_unless_they_have_no_slopes(pendula, double):
     double.write_text(double.read_text() + f"\n[output]\ncolumns = {{ {columns} }}\n")
     run = pendula("linearize", double, "--json")
     assert run.status == 0, run.err
-    assert run.json["outputs"] == ["x_1", "y_1", "x_2", "y_2", "height", "fast"]
+    assert run.json["outputs"] == ["x_1", "y_1", "x_2", "y_2", "fast", "height"]  # names in order
     theta, other, _, rate = run.json["state"]
-    height, fast = run.json["C"][4:]
+    fast, height = run.json["C"][4:]
     assert height == pytest.approx([math.sin(theta), 0, 0, 0], abs=1e-15)  # measured 0
     y = -math.cos(theta) - math.cos(other)
     wanted = [rate * math.sin(theta), rate * math.sin(other), 0, y]

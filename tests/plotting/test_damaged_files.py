@@ -114,5 +114,5 @@ def test_modules_of_the_working_folder_are_not_run(runs, pendula):
         (runs / f"{name}.py").write_text("raise SystemExit('it ran')\n")
     (runs / "matplotlibrc").write_text("text.usetex: True\nbackend: module://pendula_plot\n")
     ended = pendula("plot", "double.h5", "-o", "out.svg", "--show", "energy", PYTHONPATH=str(runs))
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "picture            out.svg\n", "")
     assert "</svg>" in (runs / "out.svg").read_text()

@@ -122,7 +122,7 @@ def test_of_a_model_the_first_coordinate_and_its_rate(tmp_path):
 
 def test_the_program_draws_it(events, pendula):
     plot = pendula("plot", events.name, "-o", "section.svg", "--coordinates", "theta_2", "--from", "10")
-    assert (plot.returncode, plot.stdout, plot.stderr) == (0, "", "")
+    assert (plot.returncode, plot.stdout, plot.stderr) == (0, "picture            section.svg\n", "")
     assert (events.parent / "section.svg").read_text().startswith("<?xml")
 
 

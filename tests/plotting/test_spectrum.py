@@ -61,7 +61,7 @@ def test_many_exponents_have_a_scale_of_colours(tmp_path):
 
 def test_the_program_draws_it(history, pendula):
     plot = pendula("plot", "history.csv", "leading.csv", "-o", "history.png")
-    assert (plot.returncode, plot.stdout, plot.stderr) == (0, "", "")
+    assert (plot.returncode, plot.stdout, plot.stderr) == (0, "picture            history.png\n", "")
     assert (history.parent / "history.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -67,13 +67,16 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
          " of the fastest: " + rows_after(*missed, setup.start.time) + " may be wrong; " + smaller_step_advice(run);
 }
 
-/// Steps missed something narrow in the forces, from a time on whose effect shows in rows.
+/// Steps missed something narrow in the forces, from a time on whose effect shows in rows. What one constant step has
+/// met of it may show already, before what the next one adds is told.
 inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trust& trust) {
   if (std::isinf(statistics.unseen_from)) return {};
-  trust.until = std::min(trust.until, statistics.unseen_from);
+  const double before = is_adaptive(setup.options) ? 0 : setup.options.step;
+  const double from = std::max(setup.start.time, statistics.unseen_from - before);
+  trust.until = std::min(trust.until, from);
   trust.expected_error = std::numeric_limits<double>::quiet_NaN();
   return "steps went past something narrow in the forces, " + pendula::rounded(statistics.unseen, 1) +
-         " of the speed of the motion in all: " + untrusted_after(statistics.unseen_from, setup.start.time) + "; " +
+         " of the speed of the motion in all: " + untrusted_after(from, setup.start.time) + "; " +
          smaller_step_advice(setup.options);
 }
 
