@@ -268,10 +268,10 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       // unknown keys, with the one that may be meant
       {"masses  =", "mases =",
        "file.toml:4: chain.mases: expected one of space, links, masses, lengths, gravity, damping, "
-       "torque, units, drive, feedback, got the unknown key \"mases\" (did you mean masses?)"},
+       "torque, units, drive, feedback, signal, got the unknown key \"mases\" (did you mean masses?)"},
       {"units   =", "theta =",
        "file.toml:9: chain.theta: expected one of space, links, masses, lengths, gravity, damping, "
-       "torque, units, drive, feedback, got the unknown key \"theta\" (did you mean start.theta?)"},
+       "torque, units, drive, feedback, signal, got the unknown key \"theta\" (did you mean start.theta?)"},
       {"phase = 0.4", "delay = 0.4",
        "file.toml:15: chain.drive[1].delay: expected one of link, amplitude, frequency, "
        "phase, got the unknown key \"delay\""},
@@ -583,7 +583,8 @@ TEST(Scenario, BadOverridesAreToldByTheirText) {
       {"run.step=", "--set run.step=: run.step: expected a key of the scenario, to take it out, got none"},
       {"chain.masses[3]=",
        "--set chain.masses[3]=: chain.masses[3]: expected an array of at least 3 elements, got [1.0, 2.0]"},
-      {"run.step=1e-", "--set run.step=1e-: expected a TOML value after '=', got \"1e-\""},
+      {"run.step=1e-",
+       "--set run.step=1e-: run.step: expected a finite number > 0 or a string in s (a time), got \"1e-\""},
       {"run.step=1\nevery=2", "--set run.step=1?every=2: expected a TOML value after '=', got \"1?every=2\""},
       {"run.method=eulr",
        "--set run.method=eulr: run.method: expected \"gauss\" or \"radau\" or \"rk4\" or \"dopri5\" or "
@@ -613,8 +614,10 @@ TEST(Scenario, OverridesReachElementsAndTablesInArrays) {
   EXPECT_EQ(scenario.chain.drives()[0].amplitude, Eigen::Vector3d(1, 0, -1));
   EXPECT_EQ(scenario.chain.constant_torque()(0, 1), 4);
   EXPECT_EQ(scenario.chain.constant_torque()(2, 0), 1);
-  EXPECT_EQ(error_of(spatial_text, {"chain.drive[1].frequency=nan"}),
-            "--set chain.drive[1].frequency=nan: chain.drive[1].frequency: expected a finite number, got nan");
+  EXPECT_EQ(
+      error_of(spatial_text, {"chain.drive[1].frequency=nan"}),
+      "--set chain.drive[1].frequency=nan: chain.drive[1].frequency: expected a finite number or a string in rad/s or "
+      "deg/s, got nan");
 }
 
 TEST(Scenario, OverridesWithoutAValueTakeKeysOut) {

@@ -32,11 +32,23 @@ _COMPARISONS: dict[str, Callable[[Expr, Expr], Boolean]] = {
     ">": sympy.StrictGreaterThan,
     ">=": sympy.GreaterThan,
 }
+_SYMPY_NAMES = (
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "log",
+    "sqrt",
+    "sign",
+)
 _FUNCTIONS = {
-    **{
-        name: getattr(sympy, name)
-        for name in "sin cos tan asin acos atan sinh cosh tanh exp log sqrt sign".split()
-    },
+    **{name: getattr(sympy, name) for name in _SYMPY_NAMES},
     "abs": sympy.Abs,
 }
 _OF_TWO = {"min": sympy.Min, "max": sympy.Max}

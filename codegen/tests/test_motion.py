@@ -47,7 +47,9 @@ def test_what_it_cannot_be_is_told():
 def test_inputs_have_no_rates_and_say_what_has():
     model, _, _ = shaken()
     push = model.input("push", "N")
-    with pytest.raises(GenerationError, match=r'whose rates nobody knows: model\.motion\("push", "N"\) is an input'):
+    with pytest.raises(
+        GenerationError, match=r'whose rates nobody knows: model\.motion\("push", "N"\) is an input'
+    ):
         model.rate(push * 2)
     with pytest.raises(GenerationError, match=r"expected an input of the model: push, pivot; got pusch"):
         close_loops(model, ["pusch=t"])

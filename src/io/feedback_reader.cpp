@@ -204,7 +204,10 @@ std::vector<FeedbackPlan> read_drive_values(const Section& system) {
     const auto value = table.find("value");
     if (!value) continue;
     const Entry input = table.require("input");
-    FeedbackPlan plan{.input = input.text(), .value = value->text(), .is_drive = true};
+    FeedbackPlan plan;
+    plan.input = input.text();
+    plan.value = value->text();
+    plan.is_drive = true;
     plan.place = value->place();
     plan.input_place = input.place();
     plans.push_back(std::move(plan));

@@ -21,7 +21,8 @@ std::vector<std::string> flags_of_least_set();
 /// A description of such kernels.
 std::string how_made(std::string_view kind, const Toolchain& toolchain);
 
-/// Makes a kernel in `folder` by the generator with these arguments; calls derived() once that is done. Returns its file.
+/// Makes a kernel in `folder` by the generator with these arguments; calls derived() once that is done. Returns its
+/// file.
 std::filesystem::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
                                   const std::filesystem::path& folder, const Toolchain& toolchain,
                                   const std::function<void()>& derived);

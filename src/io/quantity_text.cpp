@@ -36,7 +36,7 @@ struct NamedUnit {
 };
 
 constexpr Dimension mass{1, 0, 0, 0}, length{0, 1, 0, 0}, time_span{0, 0, 1, 0}, angle{0, 0, 0, 1};
-constexpr Dimension turning{0, 0, -1, 1}, force{1, 1, -2, 0}, energy{1, 2, -2, 0}, power{1, 2, -3, 0};
+constexpr Dimension turning{0, 0, -1, 1}, force{1, 1, -2, 0}, energy{1, 2, -2, 0}, work_rate{1, 2, -3, 0};
 
 /// A turn a second is 1 Hz: where an angular frequency is expected, 2 pi rad/s.
 constexpr std::array<NamedUnit, 31> named_units = {{
@@ -68,9 +68,9 @@ constexpr std::array<NamedUnit, 31> named_units = {{
     {"J", {energy}},
     {"mJ", {energy, 1e-3}},
     {"kJ", {energy, 1e3}},
-    {"W", {power}},
-    {"mW", {power, 1e-3}},
-    {"kW", {power, 1e3}},
+    {"W", {work_rate}},
+    {"mW", {work_rate, 1e-3}},
+    {"kW", {work_rate, 1e3}},
 }};
 
 struct NamedKind {
@@ -88,7 +88,7 @@ constexpr std::array<NamedKind, 14> kinds = {{
     {"an acceleration", {0, 1, -2, 0}},
     {"a force", force},
     {"a torque or energy", energy},
-    {"a power", power},
+    {"a power", work_rate},
     {"a stiffness", {1, 0, -2, 0}},
     {"a damping", {1, 0, -1, 0}},
     {"a moment of inertia", {1, 2, 0, 0}},

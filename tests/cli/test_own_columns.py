@@ -100,7 +100,10 @@ def test_points_of_chains_with_feedback_are_seen_by_events(pendula, double, tmp_
         ('{ x_1 = "1" }', 'columns.x_1: expected a name that no column and no function has, got "x_1"'),
         ('{ theta = "1" }', 'columns.theta: expected a name that no column and no function has, got "theta"'),
         ('{ sin = "1" }', 'columns.sin: expected a name that no column and no function has, got "sin"'),
-        ('{ a-b = "1" }', 'columns: expected names of letters, digits and _ that begin with a letter, got "a-b"'),
+        (
+            '{ a-b = "1" }',
+            'columns: expected names of letters, digits and _ that begin with a letter, got "a-b"',
+        ),
         ('{ up = "thetta_1" }', 'the unknown name "thetta_1" (did you mean theta_1?)'),
         ('{ up = "energy", high = "up" }', 'the unknown name "up"'),
         ("{ up = 3 }", "columns.up: expected a text, got 3"),

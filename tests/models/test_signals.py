@@ -133,7 +133,9 @@ interval = 0.1
 """
 
 
-@pytest.mark.parametrize(("space", "link", "input_"), [("planar", 1, "torque_1"), ("spatial", 2, "torque_y_2")])
+@pytest.mark.parametrize(
+    ("space", "link", "input_"), [("planar", 1, "torque_1"), ("spatial", 2, "torque_y_2")]
+)
 def test_torques_on_links_of_a_chain(pendula, tmp_path, space, link, input_):
     """A sine in 4000 pieces against a drive: they differ by a ten millionth."""
     times = np.linspace(0, 2, 4001)
@@ -160,11 +162,23 @@ def test_torques_on_links_of_a_chain(pendula, tmp_path, space, link, input_):
         ({}, "t,push\n0,1\n0,2\n", "push.csv:3: t: expected a time after 0, got 0"),
         ({}, "t,push\n0,1\n1,x\n", 'push.csv:3: push: expected a finite number, got "x"'),
         ({}, "t,push\n0,1\n1\n", "push.csv:3: expected 2 numbers, as the first line has names, got 1"),
-        ({}, "t,pusch\n0,1\n", "push.csv:1: expected the column push in the first line, got t, pusch (did you mean pusch?)"),
+        (
+            {},
+            "t,pusch\n0,1\n",
+            "push.csv:1: expected the column push in the first line, got t, pusch (did you mean pusch?)",
+        ),
         ({}, "t,push\n", "push.csv: expected names in the first line, and rows; got none"),
-        ({"file": "none.csv"}, "", "none.csv: expected a CSV file that can be read, got: No such file or directory"),
+        (
+            {"file": "none.csv"},
+            "",
+            "none.csv: expected a CSV file that can be read, got: No such file or directory",
+        ),
         ({"times": [0, 1]}, "t,push\n0,1\n", "signal[1].times: expected nothing beside file"),
-        ({"input": "pull", "column": "push"}, "t,push\n0,1\n", 'signal[1].input: expected an input: push; got "pull"'),
+        (
+            {"input": "pull", "column": "push"},
+            "t,push\n0,1\n",
+            'signal[1].input: expected an input: push; got "pull"',
+        ),
     ],
 )
 def test_what_is_wrong_with_a_table_is_told(pendula, tmp_path, keys, text, message):
@@ -212,7 +226,9 @@ def test_a_drive_may_repeat(moved):
 
 def test_a_smooth_drive_is_a_force_of_the_model(moved):
     rows = moved(drive("exp(-t) + t^2"))
-    assert np.abs(rows["x_dot"] - (1 - np.exp(-rows["t"]) + rows["t"] ** 3 / 3)).max() < 1e-12  # measured 4.4e-16
+    assert (
+        np.abs(rows["x_dot"] - (1 - np.exp(-rows["t"]) + rows["t"] ** 3 / 3)).max() < 1e-12
+    )  # measured 4.4e-16
     assert np.abs(rows["push"] - (np.exp(-rows["t"]) + rows["t"] ** 2)).max() < 1e-14  # measured 0
 
 

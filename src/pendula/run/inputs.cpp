@@ -63,7 +63,10 @@ std::shared_ptr<const Subject> with(const ChainSubject<Space>& subject, const st
   parameters.drives = chain.drives();
   for (const InputLine& line : lines) {
     const InputSine sine = sine_of(line);
-    Drive<Space> drive{.link = sine.input / Space::torque_components, .frequency = sine.frequency, .phase = sine.phase};
+    Drive<Space> drive;
+    drive.link = sine.input / Space::torque_components;
+    drive.frequency = sine.frequency;
+    drive.phase = sine.phase;
     drive.amplitude.setZero();
     drive.amplitude[sine.input % Space::torque_components] = sine.amplitude;
     parameters.drives.push_back(drive);

@@ -76,8 +76,8 @@ class SystemModel {
     return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), 0);
   }
 
-  // Forces are loads if their power is not zero; this is sampled in a few generic states, near and far, since a force may
-  // act in places alone. Systems that depend on time explicitly always count as loaded.
+  // Forces are loads if their power is not zero; this is sampled in a few generic states, near and far, since a force
+  // may act in places alone. Systems that depend on time explicitly always count as loaded.
   void sample_power() {
     std::vector<double> q(coordinates()), v(coordinates()), driven(inputs());
     const std::vector<double> none(inputs());
