@@ -217,6 +217,7 @@ std::vector<FeedbackPlan> read_drive_values(const Section& system) {
 
 std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans) {
   std::vector<InputLaw> laws;
+  laws.reserve(plans.size());
   for (const FeedbackPlan& plan : plans) {
     laws.push_back({plan.input, told_at(plan, [&] {
                       return postfix_text(read_expression(plan.value, time_alone), time_alone, plan);

@@ -90,8 +90,13 @@ NumberTable read_number_table(const std::filesystem::path& file, const std::vect
       for (const std::string& column : columns) {
         const auto found = std::ranges::find(cells, column);
         if (found == cells.end()) {
-          throw InputError(place + ": expected the column " + column + " in the first line, got " + listed(cells) +
-                           did_you_mean(nearest_name(column, cells)));
+          std::string problem = place;
+          problem += ": expected the column ";
+          problem += column;
+          problem += " in the first line, got ";
+          problem += listed(cells);
+          problem += did_you_mean(nearest_name(column, cells));
+          throw InputError(problem);
         }
         places.push_back(static_cast<std::size_t>(found - cells.begin()));
       }

@@ -147,6 +147,7 @@ std::vector<std::string> point_columns(const Subject& subject) {
   }
   std::ranges::sort(places);
   std::vector<std::string> found;
+  found.reserve(places.size());
   for (const std::size_t place : places) found.push_back(names[place]);
   return found;
 }

@@ -114,7 +114,7 @@ def open_lab(lab_file: Path, browser: Browser) -> Iterator[Callable[..., Page]]:
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("console", lambda said: said.type == "error" and wrong.append(said.text))
         page.on("request", lambda request: _only(request))
-        page.goto(f"file://{file}" + (f"#{link}" if link else ""))
+        page.goto(f"file://{file}" + (f"#{link}" if link else ""), timeout=120_000)
         until(page, "window.pendulaLab?.history.rows > 0")
         await_frame(page)
         return page

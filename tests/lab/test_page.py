@@ -748,7 +748,9 @@ LOADS = {
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_the_page_of_a_run_goes_on_in_a_laboratory(space, load, browser, tmp_path):
     chain = CHAIN.format(space=space).replace("[start]", (LOADS[space] if load else "") + "[start]")
-    done = program("simulate", "-", "--view", str(tmp_path / "run.html"), text=chain)
+    # A page knows the motion at its rows, and draws lines between them.
+    every = ("--set", "output.every=1")
+    done = program("simulate", "-", "--view", str(tmp_path / "run.html"), *every, text=chain)
     assert done.returncode == 0, done.stderr
     context = browser.new_context(reduced_motion="reduce")
     page = context.new_page()

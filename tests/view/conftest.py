@@ -87,7 +87,7 @@ def open_page(pages: Pages, browser: Browser) -> Iterator[Callable[..., Page]]:
         page.on(
             "request", lambda request: request.url.startswith(("file:", "http")) and _only(request, address)
         )
-        page.goto(address)
+        page.goto(address, timeout=120_000)
         until(page, "performance.getEntriesByName('pendula first frame').length === 1")
         return page
 

@@ -191,7 +191,7 @@ class Track {
   void add(std::vector<Motion> more) {
     if (more.empty()) return;
     std::ranges::move(more, std::back_inserter(states_));
-    std::stable_sort(states_.begin(), states_.end(), [](const Motion& a, const Motion& b) { return a.time < b.time; });
+    std::ranges::sort(states_, {}, &Motion::time);
     const auto is_same = [](const Motion& a, const Motion& b) { return a.time == b.time; };
     states_.erase(std::unique(states_.begin(), states_.end(), is_same), states_.end());
   }
