@@ -143,7 +143,7 @@ class GaussStepper : private StepSolution<Solver> {
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(time_, statistics_, Base::fixed_point_stop_, Base::newton_stop_, controller_, solver_);
+    numbers(time_, statistics_, Base::fixed_point_stop_, Base::newton_stop_, controller_, solver_, halved_);
   }
 
   const Solver& solver() const { return solver_; }
@@ -164,6 +164,9 @@ class GaussStepper : private StepSolution<Solver> {
   // So many halvings of a step are tried by fixed point, which together cost less than the whole step by Newton. Where
   // they do not help, Newton takes it.
   static constexpr int fixed_point_worth = 3;
+  // Unless steps have been halved for that again and again, more than one of so many: then it is convergence that limits
+  // them, as after motion that was damped fast, not their errors.
+  static constexpr int seldom = 4, often = 16;
 
   // With so many links or coordinates, an iteration takes less time than to ask for the sign to stop.
   static constexpr int quick_parts = 1000;
@@ -199,7 +202,8 @@ class GaussStepper : private StepSolution<Solver> {
   /// Tries steps until one is good enough. One whose error is too large predicts the stages of the next, shorter one.
   Outcome find_step(double longest, double most, int tries = most_attempts) {
     const StepController<double> before = controller_;
-    int shorter = fixed_point_worth;
+    int shorter = halved_ > often ? 0 : fixed_point_worth;
+    halved_ = std::max(0, halved_ - 1);
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
       const double chosen = std::min(controller_.step(), longest);
@@ -226,6 +230,7 @@ class GaussStepper : private StepSolution<Solver> {
         outcome.status = Status::tolerance_not_met;
       } else {
         controller_.shrink(true, h, 0.5);
+        halved_ = std::min(halved_ + seldom, 2 * often);
         if (shorter > 0 && --shorter == 0) controller_ = before;
       }
       const bool is_last = attempts == tries || outcome.status == Status::interrupted;
@@ -364,6 +369,7 @@ class GaussStepper : private StepSolution<Solver> {
       Base::traits_;
 
   Unseen unseen_;
+  int halved_ = 0;  // steps that were not solved, seldom each, less those since
   bool remembers_ = false, looks_ = false;
   Remembered before_;
   typename Solver::Place start_;  // of a step that is taken in parts
