@@ -106,8 +106,11 @@ endfunction()
 function(pendula_add_refresh_target)
   pendula_find_python("${PENDULA_CODEGEN_DIR}/requirements-dev.txt" python problem)  # SymPy of one version
   if(problem)
-    add_custom_target(refresh-generated COMMAND "${CMAKE_COMMAND}" -E echo "refresh-generated: ${problem}"
-                                        COMMAND "${CMAKE_COMMAND}" -E false VERBATIM)
+    add_custom_target(
+      refresh-generated
+      COMMAND "${CMAKE_COMMAND}" -E echo
+              "refresh-generated: expected the packages that made generated/; scripts/setup --tests installs them"
+      COMMAND "${CMAKE_COMMAND}" -E false VERBATIM)
   else()
     add_custom_target(
       refresh-generated

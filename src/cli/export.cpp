@@ -132,7 +132,8 @@ Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, co
 void refuse_signals(const io::RunPlan& plan) {
   if (plan.signals.empty()) return;
   refuse(plan.signals.front().input_place,
-         "expected no signal in what is exported, whose inputs are set from step to step; got one");
+         "expected no signal in what is exported, whose inputs are set from step to step, got one; --set system.signal= "
+         "(of a chain chain.signal=) leaves it out");
 }
 
 /// The time from one sample to the next; else the constant step; nothing if there is neither.

@@ -185,7 +185,8 @@ void print_text(const Linear& linear, const LinearizeOptions& options, const Eig
 ExitStatus linearize(const LinearizeOptions& options) {
   const InterruptGuard guard;
   const Linear linear = std::visit(
-      [&](const auto& scenario) {
+      [&](auto scenario) {
+        scenario.signals.clear();  // they add to u, which stands in the result
         return io::told_at_keys(scenario, options.scenario, [&] { return linear_of(scenario, options, guard); });
       },
       read_scenario(options.scenario, options.overrides, options.json));
