@@ -124,6 +124,7 @@ SCIPY = {  # words of SciPy, and ours
     "args": "parameters of the system",
     "atol": "accuracy= (of every row) or tolerance= (of each step)",
     "dense_output": "run.sol(t), which every run has",
+    "dt": "interval=, between rows, or step=, constant steps",
     "first_step": "step=, constant steps",
     "max_step": "step=, constant steps; events and rows need none",
     "rtol": "accuracy= (of every row) or tolerance= (of each step)",

@@ -182,6 +182,7 @@ class System(ABC):
         estimate: bool | None = None,
         every: int | None = None,
         interval: float | None = None,
+        columns: Mapping[str, str] | None = None,
         progress: bool | None = None,
         **starts: object,
     ) -> Solution:
@@ -210,6 +211,8 @@ class System(ABC):
             As ``[run]`` of a scenario (``pendula help scenario``). Steps are chosen for an accuracy of 1e-9 unless one
             of ``accuracy``, ``tolerance`` and ``step`` says otherwise.
 
+        columns : mapping, optional
+            Expressions of the columns as further columns, by name: ``{"height": "1 - cos(theta_1)"}``.
         progress : bool, optional
             Whether a bar (of tqdm) is shown where a run takes more than a second; left out, where somebody looks.
 
@@ -254,6 +257,7 @@ class System(ABC):
             "every": every,
             "interval": interval,
             "times": None if times is None else times.tolist(),
+            "columns": mapping("columns", columns) or None,
         }
         expressions, functions = events_of(events)
         tables["event"] = expressions
@@ -394,6 +398,8 @@ class Chain(System):
 
     def _per_link(self, name: str) -> NDArray[np.float64]:
         given = self._numbers[name]
+        if any(isinstance(one, str) for one in np.ravel(np.asarray(given, dtype=object))):  # with units
+            given = self._info.constants[name]
         return np.array(np.broadcast_to(numbers(name, 0.0 if given is None else given), self.links))
 
     @property

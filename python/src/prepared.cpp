@@ -56,6 +56,13 @@ void check(const std::string& text, const std::string& program, const std::strin
   io::parse_scenario(text, "pendula", {}, models.finder());
 }
 
+/// Values of constants of the system, by name.
+std::map<std::string, std::vector<double>> constants_of(const Prepared& made) {
+  std::map<std::string, std::vector<double>> values;
+  for (const Constant& one : made.subject->constants()) values[one.name] = one.values;
+  return values;
+}
+
 /// Units of coordinates, rates, inputs and parameters, by name.
 std::map<std::string, std::string> units_of(const Prepared& made) {
   const std::optional<io::NaturalUnits> natural =
@@ -130,6 +137,7 @@ void define_prepared(nb::module_& module) {
       .def_prop_ro(
           "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
       .def_prop_ro("units", &units_of)
+      .def_prop_ro("constants", &constants_of)
       .def_prop_ro("is_natural",
                    [](const Prepared& made) {
                      return std::visit([](const auto& scenario) { return scenario.natural.has_value(); },

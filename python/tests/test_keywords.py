@@ -39,6 +39,7 @@ def test_a_start_is_given_by_keywords_or_a_mapping(take):
         ("rtol", r"here it is accuracy="),
         ("t_eval", "here it is t="),
         ("max_step", "here it is step="),
+        ("dt", "here it is interval="),
         ("tolerence", r"did you mean tolerance"),
         ("thetaa", "did you mean theta"),
         ("nonsense", "expected some of .*theta"),

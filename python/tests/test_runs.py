@@ -125,6 +125,17 @@ def test_columns_of_a_model_have_their_names():
     assert run.y.shape[0] == 4 and run["energy"].shape == run.t.shape
 
 
+def test_own_columns_are_expressions():
+    double = pendula.Chain(links=2)
+    run = double.simulate(1.0, theta=1.0, columns={"height": "2 - cos(theta_1) - cos(theta_2)"})
+    assert np.abs(run["height"] - (2 - np.cos(run["theta"]).sum(axis=0))).max() < 1e-14  # measured 2.2e-16
+    assert "height" in run.to_xarray()
+    with pytest.raises(
+        pendula.InputError, match=r"^columns.height: .*unknown name .thet_1. \(did you mean theta_1"
+    ):
+        double.simulate(1.0, theta=1.0, columns={"height": "thet_1"})
+
+
 def test_an_event_may_end_a_run():
     run = pendula.Chain(links=1).simulate(10.0, theta=0.5, events={"low": {"when": "theta_1", "stop": True}})
     assert run.status == 1 and run.success and "low" in run.message

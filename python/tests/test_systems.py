@@ -22,6 +22,8 @@ def test_a_chain_tells_what_it_has_as_a_model_does():
         **dict.fromkeys(CHAIN.inputs, "N m"),
         **{"gravity": "m/s^2", "masses": "kg", "lengths": "m", "damping": "N m s/rad"},
     }
+    told = pendula.Chain(masses=["100 g", 2], lengths="50 cm")
+    assert np.array_equal(told.masses, [0.1, 2]) and np.array_equal(told.lengths, [0.5, 0.5])
     whirl = pendula.Chain(links=2, space="spatial")
     assert whirl.coordinates == ["theta_1", "theta_2", "phi_1", "phi_2"] and whirl.links == 2
     assert whirl.inputs[:3] == ["torque_x_1", "torque_y_1", "torque_z_1"]

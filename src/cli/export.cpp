@@ -131,9 +131,10 @@ Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, co
 /// Exports hold inputs themselves.
 void refuse_signals(const io::RunPlan& plan) {
   if (plan.signals.empty()) return;
-  refuse(plan.signals.front().input_place,
-         "expected no signal in what is exported, whose inputs are set from step to step, got one; --set system.signal= "
-         "(of a chain chain.signal=) leaves it out");
+  refuse(
+      plan.signals.front().input_place,
+      "expected no signal in what is exported, whose inputs are set from step to step, got one; --set system.signal= "
+      "(of a chain chain.signal=) leaves it out");
 }
 
 /// The time from one sample to the next; else the constant step; nothing if there is neither.
@@ -225,33 +226,29 @@ void require_fitting(const ExportOptions& options) {
 ExitStatus export_system(const ExportOptions& options) {
   require_fitting(options);
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
-  try {
-    Words words;
-    if (options.what.ends_with(".toml")) {
-      words = scenario_words(options, toolchain);
-    } else if (std::optional<Words> chain = chain_words(options.what, options.links)) {
-      words = *chain;
-    } else {
-      words = io::about("export", {options.what, options.links}, toolchain);
-      words.erase(words.begin());
-    }
-    words.insert(words.begin(), "export");
-    words.insert(words.end(), {"--as", options.language, "--output", options.output, "--name",
-                               options.name.empty() ? default_name(options) : options.name});
-    if (options.stages) words.insert(words.end(), {"--stages", std::to_string(*options.stages)});
-    if (has_runtime(options, toolchain)) {
-      add_runtime(words, toolchain);
-    } else if (options.language == "fmu") {
-      std::cerr << "pendula: warning: the FMU takes steps of constant size: adaptive ones take the static library, "
-                << (toolchain.library.empty() ? "which this build has none of"
-                                              : "and there is no " + toolchain.library.string())
-                << '\n';
-    }
-    if (options.is_float) words.insert(words.end(), {"--number", "float"});
-    std::cout << io::run_generator(words, toolchain);
-  } catch (const io::ModelError& error) {
-    throw io::InputError(error.what());
+  Words words;
+  if (options.what.ends_with(".toml")) {
+    words = scenario_words(options, toolchain);
+  } else if (std::optional<Words> chain = chain_words(options.what, options.links)) {
+    words = *chain;
+  } else {
+    words = io::about("export", {options.what, options.links}, toolchain);
+    words.erase(words.begin());
   }
+  words.insert(words.begin(), "export");
+  words.insert(words.end(), {"--as", options.language, "--output", options.output, "--name",
+                             options.name.empty() ? default_name(options) : options.name});
+  if (options.stages) words.insert(words.end(), {"--stages", std::to_string(*options.stages)});
+  if (has_runtime(options, toolchain)) {
+    add_runtime(words, toolchain);
+  } else if (options.language == "fmu") {
+    std::cerr << "pendula: warning: the FMU takes steps of constant size: adaptive ones take the static library, "
+              << (toolchain.library.empty() ? "which this build has none of"
+                                            : "and there is no " + toolchain.library.string())
+              << '\n';
+  }
+  if (options.is_float) words.insert(words.end(), {"--number", "float"});
+  std::cout << io::run_generator(words, toolchain);
   return done;
 }
 

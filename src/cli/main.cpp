@@ -142,6 +142,9 @@ int main(int argc, char** argv) {
   } catch (const pendula::io::InputError& error) {
     std::cerr << "pendula: " << error.what() << '\n';
     return pendula::cli::wrong_input;
+  } catch (const pendula::io::ModelError& error) {
+    std::cerr << "pendula: " << error.what() << '\n';
+    return pendula::cli::wrong_input;
   } catch (const std::bad_alloc&) {
     std::cerr << "pendula: not enough memory\n";
   } catch (const std::exception& error) {

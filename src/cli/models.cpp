@@ -71,26 +71,22 @@ bool is_name(const std::string& name) {
 }  // namespace
 
 ExitStatus build(const BuildOptions& options) {
-  try {
-    const io::ModelKernel kernel =
-        io::find_kernel({options.model, options.links}, io::Toolchain::of_this_program(),
-                        [](const std::string& what) { std::cerr << "pendula: " << what << '\n'; });
-    const SystemInfo& info = kernel.table->info;
-    std::cout << info.name << ": coordinates";
-    for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
-      std::cout << (k == 0 ? " " : ", ") << info.coordinates[k] << " [" << info.coordinate_units[k] << ']';
-    }
-    std::cout << '\n';
-    if (kernel.file.empty()) {
-      std::cout << "part of this program\n";
-    } else {
-      std::cout << (kernel.by() == "compiler" ? "compiled\n" : "interpreted\n")
-                << (kernel.was_there ? "kept in " : "made as ") << kernel.file.string() << '\n';
-    }
-    return done;
-  } catch (const io::ModelError& error) {
-    throw io::InputError(error.what());
+  const io::ModelKernel kernel =
+      io::find_kernel({options.model, options.links}, io::Toolchain::of_this_program(),
+                      [](const std::string& what) { std::cerr << "pendula: " << what << '\n'; });
+  const SystemInfo& info = kernel.table->info;
+  std::cout << info.name << ": coordinates";
+  for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
+    std::cout << (k == 0 ? " " : ", ") << info.coordinates[k] << " [" << info.coordinate_units[k] << ']';
   }
+  std::cout << '\n';
+  if (kernel.file.empty()) {
+    std::cout << "part of this program\n";
+  } else {
+    std::cout << (kernel.by() == "compiler" ? "compiled\n" : "interpreted\n")
+              << (kernel.was_there ? "kept in " : "made as ") << kernel.file.string() << '\n';
+  }
+  return done;
 }
 
 ExitStatus new_model(const std::string& name) {

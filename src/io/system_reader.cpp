@@ -53,7 +53,8 @@ void read_drive(const Section& table, const SystemInfo& info, SystemNumbers& num
   const bool has_numbers = table.find("constant") || table.find("amplitude");
   if (table.find("value") && !has_numbers) return;
   const Entry entry = table.require("input", "the name of an input of the model: " + listed(info.inputs));
-  if (info.inputs.empty()) entry.fail("no constant and no amplitude, since the model has no inputs, only motions by value");
+  if (info.inputs.empty())
+    entry.fail("no constant and no amplitude, since the model has no inputs, only motions by value");
   const std::size_t input = entry.choice(info.inputs);
   const std::string_view unit = info.input_units[input];
   numbers.inputs[input] += table.number("constant", unit);

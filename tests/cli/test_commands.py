@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 
 def test_version(pendula):
     run = pendula("--version")
@@ -65,3 +67,11 @@ def test_check_of_a_kernel_that_is_not_there(pendula):
     run = pendula("check", "--links", "97")
     assert (run.status, run.out) == (2, "")
     assert run.err.startswith("pendula: check: expected --space and --links of a kernel in this build (")
+
+
+@pytest.mark.parametrize("command", [["lab"], ["export", "--as", "c"], ["build"], ["describe"]])
+def test_a_name_that_is_no_model_is_wrong_input(command, pendula):
+    run = pendula(*command, "nosuch", *(["-o", "out"] if command[0] in ("lab", "export") else []))
+    assert (
+        run.status == 2 and "expected a model file ending in .py, or a built-in model: cart_chain" in run.err
+    )

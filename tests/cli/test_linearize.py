@@ -97,6 +97,14 @@ def test_what_has_none_is_refused(arguments, status, said, pendula, double):
     assert said in run.err
 
 
+def test_what_a_signal_adds_to_is_an_input(pendula, tmp_path):
+    (tmp_path / "cart.toml").write_text(CART)
+    signal = '[[system.signal]]\ninput = "push"\ntimes = [0.0, 1.0]\nvalues = [0.0, 2.0]\n'
+    (tmp_path / "pushed.toml").write_text(CART.replace("[start]", f"{signal}[start]"))
+    plain, pushed = (pendula("linearize", f"{name}.toml", "--json").json for name in ("cart", "pushed"))
+    assert [pushed[key] for key in "ABCD"] == [plain[key] for key in "ABCD"]
+
+
 def test_where_there_is_no_equilibrium_none_is_told(pendula, tmp_path):
     pushed = CART + '[[system.drive]]\ninput = "push"\nconstant = 5.0\n'
     (tmp_path / "pushed.toml").write_text(pushed)

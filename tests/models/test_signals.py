@@ -196,6 +196,7 @@ def test_what_cannot_have_tables_says_so(moved, pendula, tmp_path):
     ended = pendula("export", tmp_path / "free.toml", "--as", "c", "-o", tmp_path / "out")
     assert ended.returncode == 2
     assert "signal[1].input: export: expected no signal in what is exported" in ended.stderr
+    assert "--set system.signal= (of a chain chain.signal=) leaves it out" in ended.stderr
 
 
 def drive(value: str, input_: str = "push") -> str:
