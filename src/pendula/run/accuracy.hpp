@@ -164,12 +164,15 @@ std::optional<AccuracyAim> coarsen_while_enough(double wanted, double coarsest, 
 }
 
 /// A trial by steps of another kind, which err elsewhere and by other amounts: what all steps of one kind get wrong
-/// alike, their trials do not show. Series are told from Gauss steps; those with another number of stages, whose last
-/// one damps what it does not resolve with the other sign.
+/// alike, their trials do not show. Series are told from Gauss steps; these by another number of stages, of which what
+/// they do not damp has the other sign.
 inline RunOptions of_other_kind(RunOptions run, double wanted) {
   switch (run.method) {
     case Method::gauss:
       run.stages += run.stages < 8 ? 1 : -1;
+      return run;
+    case Method::radau:  // Gauss steps do not damp what these do
+      run.stages = run.stages == 3 ? 2 : 3;
       return run;
     case Method::dopri5:
     case Method::bulirsch_stoer:
