@@ -6,7 +6,7 @@ include_guard(GLOBAL)
 set(PENDULA_LAB_PAGE "${PENDULA_GENERATED_DIR}/laboratory.html")
 
 # Sets OUT_COMPILER to what compiles the module to the bytes that are committed, empty elsewhere: they depend on Debian 12's
-# emscripten, Eigen, Boost and xsimd.
+# emscripten, Eigen and xsimd.
 function(_pendula_lab_compiler out_compiler)
   find_program(compiler em++ NO_CACHE)
   cmake_host_system_information(RESULT system QUERY DISTRIB_ID)
@@ -25,11 +25,8 @@ function(_pendula_lab_module compiler out_module)
   # Headers alone, without those of this machine's C library, which lie in the same folder.
   get_target_property(eigen Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
   list(GET eigen 0 eigen)
-  get_target_property(boost Boost::headers INTERFACE_INCLUDE_DIRECTORIES)
-  list(GET boost 0 boost)
   file(MAKE_DIRECTORY "${folder}/include")
   file(CREATE_LINK "${eigen}/Eigen" "${folder}/include/Eigen" SYMBOLIC)
-  file(CREATE_LINK "${boost}/boost" "${folder}/include/boost" SYMBOLIC)
   file(CREATE_LINK "${XSIMD_INCLUDE_DIR}/xsimd" "${folder}/include/xsimd" SYMBOLIC)
   file(TOUCH "${folder}/include/mmintrin.h")  # Eigen asks for it beside SSE2's, which emscripten has
 

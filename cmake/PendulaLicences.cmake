@@ -3,7 +3,7 @@ include_guard(GLOBAL)
 
 # Installs each as DESTINATION/NAME; what follows are more arguments of install().
 function(pendula_install_licences destination)
-  foreach(part IN ITEMS eigen3:libeigen3-dev xsimd:libxsimd-dev boost:libboost-dev hdf5:libhdf5-dev isa-l:libisal-dev
+  foreach(part IN ITEMS eigen3:libeigen3-dev xsimd:libxsimd-dev hdf5:libhdf5-dev isa-l:libisal-dev
                         random123:librandom123-dev cli11:libcli11-dev tomlplusplus:libtomlplusplus-dev
                         nlohmann-json:nlohmann-json3-dev three.js:libjs-three)
     string(REGEX MATCH "^([^:]*):(.*)$" matched "${part}")

@@ -109,8 +109,8 @@ constexpr int kinds = 9;
 struct Case {
   const char* name;
   RunOptions options;
-  double off;  // [s] of instants that are looked for in two ways: measured 4e-15, of the last two 2e-13
-  // Of a crossing, in the mean, with those of the plain expression: measured 11 to 17.3, by extrapolation 32.
+  double off;  // [s] of instants that are looked for in two ways: measured 4e-15, of the last one 2e-13
+  // Of a crossing, in the mean, with those of the plain expression: measured 11 to 17.3.
   std::int64_t looks = 20;
 
   friend void PrintTo(const Case& given, std::ostream* out) { *out << given.name; }
@@ -172,18 +172,16 @@ TEST_P(NarrowEvents, AreAllFound) {
   EXPECT_LE(cost.looks, GetParam().looks * static_cast<std::int64_t>(found));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Methods, NarrowEvents,
-    ::testing::Values(Case{"gauss", {.stages = 8, .step = 0, .tolerance = 1e-10}, 1e-13},
-                      Case{"gauss_4", {.stages = 4, .step = 0.01}, 1e-13},
-                      Case{"gauss_2", {.stages = 2, .step = 0.002}, 1e-13},
-                      Case{"radau", {.method = Method::radau, .stages = 3, .step = 0.02}, 1e-13},
-                      Case{"rk4", {.method = Method::rk4, .step = 0.01}, 1e-13},
-                      Case{"dopri5", {.method = Method::dopri5, .tolerance = 1e-9}, 1e-13},
-                      Case{"fehlberg78", {.method = Method::fehlberg78, .tolerance = 1e-9}, 1e-13},
-                      Case{"bulirsch_stoer", {.method = Method::bulirsch_stoer, .tolerance = 1e-10}, 1e-12, 40},
-                      Case{"taylor", {.method = Method::taylor, .tolerance = 1e-10}, 1e-12}),
-    [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Methods, NarrowEvents,
+                         ::testing::Values(Case{"gauss", {.stages = 8, .step = 0, .tolerance = 1e-10}, 1e-13},
+                                           Case{"gauss_4", {.stages = 4, .step = 0.01}, 1e-13},
+                                           Case{"gauss_2", {.stages = 2, .step = 0.002}, 1e-13},
+                                           Case{"radau", {.method = Method::radau, .stages = 3, .step = 0.02}, 1e-13},
+                                           Case{"rk4", {.method = Method::rk4, .step = 0.01}, 1e-13},
+                                           Case{"dopri5", {.method = Method::dopri5, .tolerance = 1e-9}, 1e-13},
+                                           Case{"fehlberg78", {.method = Method::fehlberg78, .tolerance = 1e-9}, 1e-13},
+                                           Case{"taylor", {.method = Method::taylor, .tolerance = 1e-10}, 1e-12}),
+                         [](const auto& test) { return std::string(test.param.name); });
 
 // Of members that move side by side, each in its lane, and of ones whose steps lanes do not look into at full order.
 TEST(NarrowEventsInLanes, AreAllFound) {
@@ -364,7 +362,7 @@ RunSetup slow_motion(const RunOptions& options, double duration) {
 const std::vector<RunOptions> few_methods = {{.stages = 8, .step = 0, .tolerance = 1e-9},
                                              {.method = Method::radau, .stages = 3, .step = 0.05},
                                              {.method = Method::dopri5, .tolerance = 1e-6},
-                                             {.method = Method::bulirsch_stoer, .tolerance = 1e-9}};
+                                             {.method = Method::fehlberg78, .tolerance = 1e-9}};
 
 TEST(EventsOfTime, ThatHardlyReachZeroAreAllFound) {
   Random random(1);

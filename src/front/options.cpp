@@ -16,7 +16,9 @@ void read(const char* key, const char* name, Option& option) {
   }
   std::string all;
   for (const std::string_view one : names_of<Option>) all += (all.empty() ? "" : ", ") + std::string(one);
-  throw std::invalid_argument(std::string(key) + ": expected one of " + all + ", got " + name);
+  throw std::invalid_argument(
+      std::string(key) + ": expected one of " + all + ", got " + name +
+      (instead_of(name).empty() ? "" : ", which is gone: take " + std::string(instead_of(name))));
 }
 
 }  // namespace

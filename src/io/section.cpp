@@ -4,6 +4,7 @@
 #include <cmath>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/quantity.hpp>
+#include <pendula/system/options.hpp>
 
 #include "io/nearest_name.hpp"
 
@@ -99,8 +100,10 @@ std::size_t Entry::choice(Names choices) const {
   const auto found = value == nullptr ? choices.end() : std::ranges::find(choices, std::string_view(value->get()));
   if (found != choices.end()) return static_cast<std::size_t>(found - choices.begin());
   if (value == nullptr) fail(expected_choice(choices));
+  const std::string_view instead = instead_of(value->get());
   throw InputError(where(), name_, expected_choice(choices),
-                   shown(*node_) + did_you_mean(nearest_name(value->get(), choices)));
+                   shown(*node_) + (instead.empty() ? did_you_mean(nearest_name(value->get(), choices))
+                                                    : " (that is gone, take " + std::string(instead) + ')'));
 }
 
 Eigen::VectorXd Entry::per_link(const LinkCount& count, std::string_view unit) const {

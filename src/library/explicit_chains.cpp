@@ -1,8 +1,6 @@
 #include <pendula/explicit/chain_accelerations.hpp>
-#include <pendula/explicit/chain_forward_dynamics.hpp>
 #include <pendula/explicit/explicit_chain.hpp>
 #include <pendula/explicit/explicit_steps.hpp>
-#include <pendula/explicit/extrapolation_integrator.hpp>
 #include <pendula/explicit/single_integrator.hpp>
 
 #include "library/explicit_methods.hpp"
@@ -21,10 +19,6 @@ struct Make {
     using Steps = ExplicitSteps<ChainAccelerations<Space, Eigen::Dynamic, double>, Method>;
     return std::make_unique<SingleIntegrator<Steps, ExplicitChain<Space>>>(ExplicitChain<Space>(chain),
                                                                            options.tolerance);
-  }
-  std::unique_ptr<PlainIntegrator> by_extrapolation() const {
-    return make_extrapolation_integrator(std::make_unique<ChainForwardDynamics<Space>>(chain),
-                                         Space::dof * chain.links(), chain.links(), options.tolerance, "");
   }
   std::unique_ptr<PlainIntegrator> by_series() const { return make_taylor_integrator(chain, options); }
 };

@@ -12,7 +12,7 @@
 
 namespace pendula {
 
-/// Explicit methods on rods, for any number of links. They pass poles, except bulirsch-stoer, which integrates angles.
+/// Explicit methods on rods, for any number of links. They pass poles.
 /// Throws std::invalid_argument for taylor, and for a tolerance ≤ 0.
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Space>& chain, const RunOptions& options);
@@ -26,7 +26,7 @@ std::unique_ptr<PlainIntegrator> make_explicit_system(const SystemTable& table, 
 
 namespace detail {
 
-/// Returns make.of<Method>() for a method of explicit_tableau.hpp, or make.by_extrapolation(), or make.by_series().
+/// Returns make.of<Method>() for a method of explicit_tableau.hpp, or make.by_series().
 template <class Make>
 std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const Make& make) {
   if (is_adaptive(options.method) && !(options.tolerance > 0)) {
@@ -39,8 +39,6 @@ std::unique_ptr<PlainIntegrator> make_explicit(const RunOptions& options, const 
       return make.template of<DormandPrince5>();
     case Method::fehlberg78:
       return make.template of<Fehlberg8>();
-    case Method::bulirsch_stoer:
-      return make.by_extrapolation();
     case Method::taylor:
       return make.by_series();
     case Method::gauss:

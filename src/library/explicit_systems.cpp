@@ -1,9 +1,7 @@
 #include <pendula/explicit/explicit_steps.hpp>
 #include <pendula/explicit/explicit_system.hpp>
-#include <pendula/explicit/extrapolation_integrator.hpp>
 #include <pendula/explicit/single_integrator.hpp>
 #include <pendula/explicit/system_accelerations.hpp>
-#include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/system/member_systems.hpp>
 #include <pendula/taylor/series_steps.hpp>
 #include <stdexcept>
@@ -25,12 +23,6 @@ struct Make {
     using Subject = ExplicitSystem<MemberSystems<double>, Method>;
     return std::make_unique<SingleIntegrator<Steps, Subject>>(Subject(table, plain, options.tolerance),
                                                               options.tolerance);
-  }
-  std::unique_ptr<PlainIntegrator> by_extrapolation() const {
-    const SystemModel model(table, plain);
-    const auto coordinates = static_cast<int>(model.coordinates());
-    return make_extrapolation_integrator(std::make_unique<SystemForwardDynamics>(model), coordinates, coordinates,
-                                         options.tolerance, table.info.name);
   }
   std::unique_ptr<PlainIntegrator> by_series() const {
     if (table.of_1.series_next == nullptr) {

@@ -86,7 +86,7 @@ def power(dice: random.Random, low: float, high: float) -> float:
 def settings(dice: random.Random, fastest: float, series: bool, long: bool = False) -> dict:
     """Keys of [run]. fastest: what changes most quickly, 1/s; series: whether Taylor series know the system; long: few
     steps must do."""
-    methods = ["dopri5", "fehlberg78", "bulirsch-stoer"] + (["taylor"] if series else [])
+    methods = ["dopri5", "fehlberg78"] + (["taylor"] if series else [])
     step = power(dice, -2 if long else -3, -0.5) / fastest
     kind = dice.random()
     chosen = dice.choice([{}, {"method": "auto"}])

@@ -36,7 +36,7 @@ ROOM_FOR_TOLERANCE = {
     "gauss": 100,
     "radau": 1000,
 }  # times the growth of a disturbance; explicit ones as radau
-ADAPTIVE = ("dopri5", "fehlberg78", "bulirsch-stoer", "taylor")
+ADAPTIVE = ("dopri5", "fehlberg78", "taylor")
 NOTHING_ASKED = 1e-3  # of the size; no run that is further off may be silent
 SEEN = 1e-3
 DOUBTFUL = {

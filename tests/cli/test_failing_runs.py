@@ -49,8 +49,7 @@ def test_a_failing_step_ends_the_run_and_the_rows_stay(pendula, tmp_path, form):
     assert trajectory.rows[-1][1] == run.json["final"]["theta"][0]
 
 
-@pytest.mark.parametrize("method", ["gauss", "bulirsch-stoer"])
-def test_a_start_at_the_pole_is_refused(pendula, tmp_path, method):
+def test_a_start_at_the_pole_is_refused(pendula, tmp_path):
     (tmp_path / "run.toml").write_text(EVER_FASTER)
     run = pendula(
         "simulate",
@@ -58,7 +57,7 @@ def test_a_start_at_the_pole_is_refused(pendula, tmp_path, method):
         "-o",
         "out.csv",
         "--json",
-        *settings("start.theta=0.0", f"run.method={method}"),
+        *settings("start.theta=0.0"),
     )
     assert run.status == 1
     assert run.json["outcome"]["status"] == "singular_mass_matrix"

@@ -81,7 +81,6 @@ def test_spherical_pendulum_with_four_stages(pendula, spherical, ways):
         (["run.method=dopri5", "run.tolerance=1e-11"], 1e-7),  # measured 3.4e-10
         (["run.method=fehlberg78", "run.tolerance=1e-12"], 1e-8),  # measured 5.5e-12
         (["run.method=taylor", "run.tolerance=1e-12"], 1e-9),  # measured 4.7e-12
-        (["run.method=bulirsch-stoer", "run.tolerance=1e-12"], 1e-8),  # measured 2.2e-11
     ],
 )
 def test_explicit_methods_find_the_same_end(pendula, double, overrides, limit):

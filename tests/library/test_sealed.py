@@ -24,7 +24,6 @@ ONCE = [
     f"{name}.cpp.o"
     for name in (
         "c_kernel",
-        "extrapolation_integrator",
         "interpreted_kernel",
         "kernel_check",
         "kernel_comparison",
@@ -37,7 +36,7 @@ ONCE = [
 ]
 
 # Of the library itself, what a copy may ask the other objects for.
-SHARED = re.compile(r"pendula::(library\(\)|make_extrapolation_integrator\(.*\))$")
+SHARED = re.compile(r"pendula::library\(\)$")
 
 
 def read(tool: str, *options: str) -> dict[str, str]:

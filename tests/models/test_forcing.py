@@ -64,7 +64,6 @@ METHODS = {
     "radau": 'method = "radau"\ntolerance = 1e-6',
     "dopri5": 'method = "dopri5"\ntolerance = 1e-8',
     "fehlberg78": 'method = "fehlberg78"\ntolerance = 1e-8',
-    "bulirsch-stoer": 'method = "bulirsch-stoer"\ntolerance = 1e-8',
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-METHODS = ("gauss", "radau", "taylor", "rk4", "dopri5", "fehlberg78", "bulirsch-stoer", "auto")
+METHODS = ("gauss", "radau", "taylor", "rk4", "dopri5", "fehlberg78", "auto")
 CHOSEN = [method for method in METHODS if method != "rk4"]
 BALL = '''"""A ball on a contact spring."""
 from sympy import Piecewise
@@ -321,7 +321,7 @@ def define(model, links):
 '''
 
 
-@pytest.mark.parametrize("method", ["gauss", "dopri5", "fehlberg78", "bulirsch-stoer", "auto"])
+@pytest.mark.parametrize("method", ["gauss", "dopri5", "fehlberg78", "auto"])
 def test_roots_of_what_switches_lose_digits_and_nothing_else(method, move):
     def fall(_, state):
         return [state[1], -9.81 + 2500 * max(0, -state[0]) ** 1.5]

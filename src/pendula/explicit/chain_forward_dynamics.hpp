@@ -3,7 +3,6 @@
 #include <pendula/chain/chain_links.hpp>
 #include <pendula/chain/heading.hpp>
 #include <pendula/chain/multipliers.hpp>
-#include <pendula/explicit/forward_dynamics.hpp>
 #include <vector>
 
 namespace pendula {
@@ -14,7 +13,7 @@ namespace pendula {
 ///   ξ̈_i = b_i − b_{i−1} − δ_{i1} g up,  b_i = (F_i − F_{i+1})/m_i,  F_i = T_i ξ_i + (torque_i × ξ_i − λ_i ξ̇_i)/l_i²,
 /// where T keeps the lengths: ξ_i·ξ̈_i = −|ξ̇_i|².
 template <class Space>
-class ChainForwardDynamics : public ForwardDynamics {
+class ChainForwardDynamics {
   using Link = typename Space::Link;
   using Rates = std::array<double, Space::dof>;
   using Cartesian = typename Link::template Cartesian<double>;
@@ -26,7 +25,8 @@ class ChainForwardDynamics : public ForwardDynamics {
     chain_.torque(0, torque_);
   }
 
-  void acceleration(double time, const double* q, const double* v, double* acceleration) override {
+  /// q̈ at `time`, of angles and their rates; all (dof·n).
+  void acceleration(double time, const double* q, const double* v, double* acceleration) {
     if (chain_.driven()) chain_.torque(time, torque_);
     for (int i = 0; i < chain_.links(); ++i) place(i, rates_of(i, q), rates_of(i, v));
     eliminate();
@@ -45,8 +45,6 @@ class ChainForwardDynamics : public ForwardDynamics {
       tension = next;
     }
   }
-
-  double fastest_drive() const override { return chain_.fastest_drive(); }
 
  private:
   struct Motion {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -20,7 +20,7 @@ class FieldSteps {
  public:
   /// `nodes`: those of a Gauss quadrature as accurate as the method. `is_blind`: the error estimate of the method
   /// misses forces that only one stage meets.
-  FieldSteps(int nodes, const ForwardDynamics& dynamics, std::size_t coordinates, bool is_blind = false)
+  FieldSteps(int nodes, const SystemForwardDynamics& dynamics, std::size_t coordinates, bool is_blind = false)
       : look_(nodes, few_samples, dynamics.arguments()),
         is_blind_(is_blind),
         path_(coordinates),
@@ -48,7 +48,7 @@ class FieldSteps {
   /// The largest over the coordinates k, relative to size_of(rate at x)(k). The path from x = (q, q̇) to `end` is the
   /// quintic through both states with their accelerations.
   template <class SizeOf>
-  Unseen unseen(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
+  Unseen unseen(SystemForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
                 const std::vector<double>& end, SizeOf&& size_of) {
     const auto arguments = [&](std::span<const double> shares, double* found) {
       find_arguments(dynamics, time, h, shares, found);
@@ -98,7 +98,7 @@ class FieldSteps {
     }
   }
 
-  void fit_quintic(ForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
+  void fit_quintic(SystemForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
                    const std::vector<double>& end) {
     const std::size_t count = path_.size();
     if (!begin_is_known_) dynamics.acceleration(time, x.data(), x.data() + count, begin_.data() + count);
@@ -139,7 +139,8 @@ class FieldSteps {
   }
 
   // Lanes beyond the last share repeat it.
-  void find_arguments(ForwardDynamics& dynamics, double time, double h, std::span<const double> shares, double* found) {
+  void find_arguments(SystemForwardDynamics& dynamics, double time, double h, std::span<const double> shares,
+                      double* found) {
     const std::size_t count = path_.size(), arguments = dynamics.arguments().size();
     for (std::size_t first = 0; first < shares.size(); first += width) {
       const std::size_t here = std::min(width, shares.size() - first);

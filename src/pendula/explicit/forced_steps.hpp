@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <pendula/explicit/forward_dynamics.hpp>
+#include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <span>
@@ -27,13 +27,13 @@ class ForcedSteps {
         sizes_(coordinates) {}
 
   /// Call at the start of a run.
-  void start(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
+  void start(SystemForwardDynamics& dynamics, double time, const double* q, const double* v) {
     if (dynamics.depends_on_time()) pace_ = pace_of(dynamics, time, q, v);
   }
 
   /// The longest step up to h from q and v. Drives turn by at most a radian per node: a weak drive that oscillates
   /// often within a step would show in no stage.
-  double followed(ForwardDynamics& dynamics, double time, const double* q, const double* v, double h) {
+  double followed(SystemForwardDynamics& dynamics, double time, const double* q, const double* v, double h) {
     h = std::min(h, turn_ / dynamics.fastest_drive());
     if (!dynamics.depends_on_time()) return h;
     for (std::size_t k = 0; k < a_.size(); ++k) sizes_[k] = std::max(1.0, std::abs(q[k]));
@@ -50,7 +50,7 @@ class ForcedSteps {
 
  private:
   // The highest frequency at which a single coordinate would oscillate here; 1/s if there is none.
-  double pace_of(ForwardDynamics& dynamics, double time, const double* q, const double* v) {
+  double pace_of(SystemForwardDynamics& dynamics, double time, const double* q, const double* v) {
     double squared = 0;
     dynamics.acceleration(time, q, v, a_.data());
     const std::vector<double> here = a_;

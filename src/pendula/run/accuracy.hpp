@@ -68,8 +68,7 @@ inline FinestTolerance finest_tolerance(const RunOptions& options, const Accurac
   constexpr double most_steps = 4;
   const double rounding = adds_up_rounding(options.method) ? 1e-14 : 1e-16;
   const double few_steps = std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
-  const bool chooses_order = options.method == Method::bulirsch_stoer || options.method == Method::taylor;
-  if (chooses_order) return {rounding, rounding};
+  if (options.method == Method::taylor) return {rounding, rounding};
   if (!accuracy.chooses_stages) return {few_steps, few_steps};
   return {rounding, options.method == Method::gauss ? rounding : few_steps};
 }
@@ -175,11 +174,7 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
       run.stages = run.stages == 3 ? 2 : 3;
       return run;
     case Method::dopri5:
-    case Method::bulirsch_stoer:
       run.method = Method::fehlberg78;
-      return run;
-    case Method::fehlberg78:
-      run.method = Method::bulirsch_stoer;
       return run;
     default:
       run.method = Method::gauss;

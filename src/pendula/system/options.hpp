@@ -10,7 +10,7 @@ namespace pendula {
 
 /// Time-stepping method: implicit Gauss–Legendre; Radau IIA for stiff damping; explicit methods for comparison (paper
 /// §3.2).
-enum class Method { gauss, radau, rk4, dopri5, fehlberg78, bulirsch_stoer, taylor };
+enum class Method { gauss, radau, rk4, dopri5, fehlberg78, taylor };
 
 /// Form of the equations that Gauss–Legendre solves: (q, p) is symplectic, (q, q̇) is the paper's.
 enum class Form { momentum, velocity };
@@ -34,8 +34,8 @@ constexpr bool is_adaptive(Method method) {
 template <class Option>
 inline constexpr std::array<std::string_view, 0> names_of{};
 template <>
-inline constexpr std::array<std::string_view, 7> names_of<Method>{"gauss",      "radau",          "rk4",   "dopri5",
-                                                                  "fehlberg78", "bulirsch-stoer", "taylor"};
+inline constexpr std::array<std::string_view, 6> names_of<Method>{"gauss",  "radau",      "rk4",
+                                                                  "dopri5", "fehlberg78", "taylor"};
 template <>
 inline constexpr std::array<std::string_view, 2> names_of<Form>{"momentum", "velocity"};
 template <>
@@ -46,6 +46,11 @@ inline constexpr std::array<std::string_view, 3> names_of<Iteration>{"auto", "ne
 template <class Option>
 requires(!names_of<Option>.empty()) constexpr std::string_view name_of(Option option) {
   return names_of<Option>[static_cast<std::size_t>(option)];
+}
+
+/// What to take for a value that earlier versions had; empty for others.
+constexpr std::string_view instead_of(std::string_view gone) {
+  return gone == "bulirsch-stoer" ? "fehlberg78" : "";
 }
 
 /// The option of that name, or nothing.

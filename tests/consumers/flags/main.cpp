@@ -1,7 +1,5 @@
 // Everything that crosses between a program and the compiled library does so once, in both directions, and comes back
 // right and can be freed.
-#include <pendula/explicit/extrapolation_integrator.hpp>
-#include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/kernels/planar_3.hpp>
 #include <pendula/pendula.hpp>
 #include <span>
@@ -43,8 +41,7 @@ bool throws(const std::string& what, Action action) {
 
 int main() {
   std::cout << "library for " << library().instruction_set << ", heap aligned to " << EIGEN_DEFAULT_ALIGN_BYTES << '\n';
-  const RunOptions chain{.solver = Solver::chain}, dense{.solver = Solver::dense},
-      extrapolation{.method = Method::bulirsch_stoer};
+  const RunOptions chain{.solver = Solver::chain}, dense{.solver = Solver::dense};
   // Two discretisations of one motion: with so many stages, both are the motion.
   const RunOptions exact_chain{.stages = 6, .solver = Solver::chain}, exact_dense{.stages = 6, .solver = Solver::dense};
   const auto planar = loaded_chain<Planar>();
@@ -52,11 +49,6 @@ int main() {
   bool good = same("in a simulation", by_library<Planar>(chain), by_simulation(planar));
   good = same("in the plane", by_library<Planar>(exact_chain), by_library<Planar>(exact_dense)) && good;
   good = same("in space", by_library<Spatial>(exact_chain), by_library<Spatial>(exact_dense)) && good;
-  // The method from there, the accelerations from here.
-  auto accelerations = std::make_unique<SystemForwardDynamics>(system_of<kernels::Planar3>(planar));
-  Integrator ours(make_extrapolation_integrator(std::move(accelerations), 3, 3, extrapolation.tolerance, ""), 3,
-                  "chain");
-  good = same("explicit ones", by_library<Planar>(extrapolation), end_of_run<Planar>(ours)) && good;
 
   for (const KernelInfo& kernel : built_in_kernels()) std::cout << kernel.name << ' ';
   std::cout << make_integrator(planar, dense)->describe().kernel << '\n';
