@@ -5,8 +5,8 @@
 
 namespace pendula {
 
-/// Moves members in lanes: by Gauss methods with 2 stages or those that stages_for returns, by explicit Runge–Kutta
-/// methods, and by Taylor series; nullptr for other options.
+/// Moves members in lanes: by Gauss methods with the stages that stages_for returns, by fehlberg78, and by Taylor
+/// series; nullptr for other options.
 template <class Space>
 MoveMembers* chain_lanes(const RunOptions& options);
 

@@ -9,13 +9,16 @@ struct SystemMoves {
   static MoveSystemMembers* by() {
     return &move_systems<SystemLanes<Method>>;
   }
+  template <int S>
+  static MoveSystemMembers* of() {
+    return &move_systems<GaussSystemLanes<S>>;
+  }
 };
 
 }  // namespace
 
 MoveSystemMembers* system_lanes(const RunOptions& options) {
-  if (options.method == Method::gauss) return gauss_system_lanes(options.stages);
-  return detail::explicit_lanes<SystemMoves>(options.method);
+  return detail::lanes_of<SystemMoves>(options);
 }
 
 }  // namespace pendula

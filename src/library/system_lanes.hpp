@@ -4,11 +4,8 @@
 
 namespace pendula {
 
-/// Moves members of generated kernels in lanes, by explicit and Gauss methods and Taylor series; nullptr for
-/// other methods.
+/// Moves members of generated kernels in lanes, as chain_lanes moves those of chains.
 MoveSystemMembers* system_lanes(const RunOptions& options);
-/// The same by the Gauss method with this number of stages.
-MoveSystemMembers* gauss_system_lanes(int stages);
 /// The same with a tangent of each member.
 MoveSystemMembers* system_tangent_lanes(const RunOptions& options);
 

@@ -27,7 +27,7 @@ struct LaneKind {
 
 /// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
 /// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
-/// on time by nothing but inputs; systems by Taylor series; all chains and systems by explicit Runge–Kutta methods.
+/// on time by nothing but inputs; systems by Taylor series; all chains and systems by fehlberg78.
 /// None of systems whose forces may be narrow by other functions than powers and logarithms.
 std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options);
 std::optional<LaneKind> lane_kind(const RunSetup& setup);

@@ -28,49 +28,24 @@ bool move_by(typename Queue::Subject subject, const RunOptions& options, std::in
   return queue.run(members, ends);
 }
 
-/// Moves::by<Method>() of an explicit method, or Moves::by_series(); nullptr for other methods.
-template <class Moves>
-auto explicit_lanes(Method method) -> decltype(Moves::template by<DormandPrince5>()) {
-  switch (method) {
-    case Method::dopri5:
-      return Moves::template by<DormandPrince5>();
-    case Method::taylor:
-      return Moves::by_series();
-#ifndef PENDULA_FEW_LANES  // where sanitizers make minutes of their compilation
-    case Method::rk4:
-      return Moves::template by<ClassicalRungeKutta>();
-    case Method::fehlberg78:
-      return Moves::template by<Fehlberg8>();
-#endif
-    default:
-      return nullptr;
-  }
-}
-
-/// Moves::of<stages>() of Gauss steps; nullptr for numbers of stages that lanes were not compiled for.
-template <class Moves>
-auto gauss_lanes(int stages) -> decltype(Moves::template of<4>()) {
-  switch (stages) {
-    case 4:
-      return Moves::template of<4>();
-#ifndef PENDULA_FEW_LANES
-    case 2:
-      return Moves::template of<2>();
-    case 6:
-      return Moves::template of<6>();
-    case 8:
-      return Moves::template of<8>();
-#endif
-    default:
-      return nullptr;
-  }
-}
-
-/// Either of them.
+/// Moves::of<stages>() of Gauss steps, Moves::by<Method>() of an explicit method, or Moves::by_series(); nullptr for
+/// what lanes were not compiled for.
 template <class Moves>
 auto lanes_of(const RunOptions& options) -> decltype(Moves::template of<4>()) {
-  if (options.method == Method::gauss) return gauss_lanes<Moves>(options.stages);
-  return explicit_lanes<Moves>(options.method);
+  switch (options.method) {
+    case Method::gauss:
+      if (options.stages == 4) return Moves::template of<4>();
+#ifndef PENDULA_FEW_LANES  // where sanitizers make minutes of their compilation
+      if (options.stages == 8) return Moves::template of<8>();
+#endif
+      return nullptr;
+    case Method::fehlberg78:
+      return Moves::template by<Fehlberg8>();
+    case Method::taylor:
+      return Moves::by_series();
+    default:
+      return nullptr;
+  }
 }
 
 }  // namespace pendula::detail

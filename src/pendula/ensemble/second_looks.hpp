@@ -39,11 +39,10 @@ struct Doubted {
   Doubt doubt = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// Lanes are compiled for even numbers of stages only. Of the two nearest it takes the one farther from the number of
-/// the run.
+/// Lanes are compiled for four and eight stages. By a tolerance it is the other of the two; of constant steps, whose
+/// sizes differ, the same.
 inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
-  if (options.method == Method::gauss && options.stages % 2 != 0)
-    options.stages += options.stages < run.stages ? -1 : 1;
+  if (options.method == Method::gauss) options.stages = is_adaptive(run) ? 12 - run.stages : run.stages;
   return options;
 }
 

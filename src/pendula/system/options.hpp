@@ -89,7 +89,7 @@ constexpr bool is_adaptive(const RunOptions& options) {
 /// The number of stages that needs the fewest evaluations for a tolerance.
 constexpr int stages_for(Method method, double tolerance) {
   if (method == Method::radau) return 3;
-  return tolerance > 1e-5 ? 4 : tolerance > 1e-8 ? 6 : 8;
+  return tolerance > 1e-5 ? 4 : 8;
 }
 
 }  // namespace pendula
