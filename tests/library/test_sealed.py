@@ -26,7 +26,6 @@ ONCE = [
         "c_kernel",
         "extrapolation_integrator",
         "interpreted_kernel",
-        "kernel_check",
         "kernel_comparison",
         "kernel_text",
         "kernel_values",
