@@ -90,11 +90,6 @@ class ComplexKernel {
   typename Kernel::template Torque<Complex> torque_;
 };
 
-template <class A, class B>
-double relative_difference(const A& a, const B& b) {
-  return (a - b).cwiseAbs().maxCoeff() / std::max(1.0, b.cwiseAbs().maxCoeff());
-}
-
 constexpr double tolerance = 2e-15;  // measured at most 4e-16 over all kernels, draws and entry points
 
 template <class Kernel>

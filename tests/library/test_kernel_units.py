@@ -14,7 +14,7 @@ UNITS = [Path(name) for name in os.environ["PENDULA_OBJECTS"].split(":") if "/ke
 
 # The kernel itself, the functions that its table points to, and functions of numbers.
 OF_A_KERNEL = re.compile(
-    r"pendula::(kernels::|registry::table_|detail::(KernelFunctions<|KernelSeries<|sums_of_kernel<|chain_functions<|one_by_one<|sincos_of_large<)"
+    r"pendula::(kernels::|registry::table_|detail::(KernelFunctions<|KernelSeries<|sums_of_kernel<|one_by_one<|sincos_of_large<)"
     r"|(for_each_register|sincos|sin|cos|tan|asin|acos|atan|sinh|cosh|tanh|exp|log|sqrt|cbrt|pow)<)"
 )
 

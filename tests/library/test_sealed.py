@@ -25,7 +25,6 @@ ONCE = [
     for name in (
         "c_kernel",
         "interpreted_kernel",
-        "kernel_check",
         "kernel_comparison",
         "kernel_text",
         "kernel_values",

@@ -110,8 +110,9 @@ int failures(const char* file) {
   std::vector<double> said;
   for (std::string word; stream >> word;) said.push_back(std::strtod(word.c_str(), nullptr));
   int count = 0;
-  const pendula::KernelCheck check = pendula::KernelComparison(pendula::system_table<S>, said).check();
-  for (int k = 0; k < check.count; ++k) count += !(check.lines[k].error <= check.lines[k].limit);
+  for (const pendula::KernelLine& line : pendula::KernelComparison(pendula::system_table<S>, said).check()) {
+    count += !(line.error <= line.limit);
+  }
   return count;
 }
 

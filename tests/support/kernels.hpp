@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <pendula/kernels/planar_1.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/kernels/planar_3.hpp>
@@ -79,6 +80,12 @@ To matrix_as(const From& from) {
     for (Eigen::Index i = 0; i < from.rows(); ++i) to(i, j) = typename To::Scalar(from(i, j));
   }
   return to;
+}
+
+/// The largest entry of a − b, relative to the largest one of b, or to 1 if that is larger.
+template <class A, class B>
+double relative_difference(const A& a, const B& b) {
+  return (a - b).cwiseAbs().maxCoeff() / std::max(1.0, b.cwiseAbs().maxCoeff());
 }
 
 }  // namespace pendula::test

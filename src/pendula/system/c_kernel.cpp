@@ -27,7 +27,7 @@ std::shared_ptr<const SystemTable> table_of(const CKernel& kernel, std::shared_p
     if (!kept->description.take(text)) text.fail("a line of a kernel's description", text.kind());
   }
   const auto& [of_1, of_2, of_4, of_8] = kernel.functions;
-  kept->table = {kept->description.info(), nullptr, *of_1, *of_2, *of_4, *of_8, *kernel.plain, nullptr};
+  kept->table = {kept->description.info(), nullptr, *of_1, *of_2, *of_4, *of_8, *kernel.plain};
   return {kept, &kept->table};
 }
 

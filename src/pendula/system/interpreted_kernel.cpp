@@ -265,8 +265,7 @@ class OwnedKernel {
     if (lines.kind() != "end") lines.fail("a function or the end", lines.kind());
     if (lines.next()) lines.fail("nothing after the end", lines.kind());
     table_ = {
-        info,   &program_, interpreter.of_1, interpreter.of_2, interpreter.of_4, interpreter.of_8, interpreter.plain,
-        nullptr};
+        info, &program_, interpreter.of_1, interpreter.of_2, interpreter.of_4, interpreter.of_8, interpreter.plain};
     require_all(lines);
   }
 

@@ -1,4 +1,3 @@
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -81,15 +80,16 @@ void KernelComparison::compare_solved(std::size_t point, const std::vector<doubl
   }
 }
 
-KernelCheck KernelComparison::check() const {
+std::vector<KernelLine> KernelComparison::check() const {
   constexpr double limit = 8;
   // Looser: functions of one state are compared with the model already, and a wrong function is off by far more than
   // this.
   constexpr double width_limit = 1e-6;
-  KernelCheck check;
+  constexpr double unknown = -1;  // until something is compared
+  std::vector<KernelLine> lines;
   const auto add = [&](std::string_view what) {
-    check.lines[static_cast<std::size_t>(check.count++)] = {what, 0, limit};
-    return static_cast<std::size_t>(check.count - 1);
+    lines.push_back({what, unknown, limit});
+    return lines.size() - 1;
   };
   const std::size_t energies = add("energies, as the model says");
   const std::size_t masses = add("mass matrix");
@@ -128,16 +128,11 @@ KernelCheck KernelComparison::check() const {
   };
   const std::size_t lanes = add(width_line), series = table_.of_1.series_next == nullptr ? lanes : add(series_line);
   std::vector<KernelPoint> all;
-  std::array<int, 12> compared{};
-  const auto keep = [&](std::size_t line, double error) {
-    check.lines[line].keep(error);
-    ++compared[line];
-  };
   std::vector<double> values(static_cast<std::size_t>(outputs_ + solved_count * n_));
   for (std::size_t point = 0; point < count_; ++point) {
     const double* at = arguments(point);
     const PlainSystem system{at + 1 + 3 * n_, at + 1 + 3 * n_ + parameters_, {}};
-    const auto numbers = [](const double* from, int count) { return std::span(from, static_cast<std::size_t>(count)); };
+    const auto numbers = [](const double* from, int count) { return std::vector(from, from + count); };
     all.push_back({at[0], numbers(system.parameters, parameters_), numbers(system.inputs, inputs_), numbers(at + 1, n_),
                    numbers(at + 1 + n_, n_), numbers(at + 1 + 2 * n_, n_)});
     evaluate_kernel(table_, system, at[0], at + 1, at + 1 + n_, at + 1 + 2 * n_, values.data());
@@ -145,20 +140,18 @@ KernelCheck KernelComparison::check() const {
     for (const Written what : kernel_outputs) {
       for (int k = 0; k < size(what); ++k, ++value) {
         const Truth said = truth(point, what, k);
-        if (said.is_known()) keep(line_of(what), said.roundings(*value));
+        if (said.is_known()) lines[line_of(what)].keep(said.roundings(*value));
       }
     }
-    compare_solved(point, values, [&](double error) { keep(solutions, error); });
+    compare_solved(point, values, [&](double error) { lines[solutions].keep(error); });
   }
-  for (const std::size_t line : {lanes, series}) check.lines[line].limit = width_limit;
-  if (!all.empty()) keep(lanes, width_error(table_, all));
-  if (!all.empty() && series != lanes) keep(series, series_error(table_, all));
-  for (int k = 0; k < check.count; ++k) {
-    if (compared[static_cast<std::size_t>(k)] == 0) {
-      check.lines[static_cast<std::size_t>(k)].error = std::numeric_limits<double>::quiet_NaN();
-    }
+  for (const std::size_t line : {lanes, series}) lines[line].limit = width_limit;
+  if (!all.empty()) lines[lanes].keep(width_error(table_, all));
+  if (!all.empty() && series != lanes) lines[series].keep(series_error(table_, all));
+  for (KernelLine& line : lines) {
+    if (line.error == unknown) line.error = std::numeric_limits<double>::quiet_NaN();
   }
-  return check;
+  return lines;
 }
 
 }  // namespace pendula

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_values.hpp>
+#include <pendula/system/kernel_widths.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <vector>
@@ -23,7 +23,7 @@ class KernelComparison {
   /// Rounding error of the energy at the first point  [J].
   double energy_rounding() const { return count_ == 0 ? 0 : std::abs(truth(0, Written::energy, 0).error); }
 
-  KernelCheck check() const;
+  std::vector<KernelLine> check() const;
 
  private:
   static constexpr double rounding = std::numeric_limits<double>::epsilon() / 2;

@@ -84,12 +84,6 @@ class KernelFunctions : KernelNumbers<S, W> {
   }
   static constexpr bool has_points = requires { &S::template positions<double>; };
 
-  static constexpr ChainFunctions chain_functions() {
-    return {&residual_D_q,         &residual_D_v,     &residual_D_a, &force,
-            &force_with_jacobians, &potential_energy, &lagrangian,   &lagrangian_gradient,
-            &lagrangian_hessian,   &hamiltonian};
-  }
-
  private:
   // --- The functions ---
 
@@ -258,68 +252,6 @@ class KernelFunctions : KernelNumbers<S, W> {
     for (int k = 1; k < W; ++k) total += each[k];
     return total;
   }
-
-  // --- Functions of chains only ---
-
-  static void residual_D_q(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_q) {
-    Matrix<L> found;
-    S::residual_D_q(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
-    write(found, E_D_q);
-  }
-  static void residual_D_v(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_v) {
-    Matrix<L> found;
-    S::residual_D_v(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
-    write(found, E_D_v);
-  }
-  static void residual_D_a(const Conditions& at, const double* q, const double* v, const double* a, double* E_D_a) {
-    Matrix<L> found;
-    S::residual_D_a(parameters(at), vector(q), vector(v), vector(a), inputs(at), found);
-    write(found, E_D_a);
-  }
-  static void force(const Conditions& at, const double* q, const double* v, double* Q) {
-    Vector<L> found;
-    S::generalized_force(parameters(at), vector(q), vector(v), inputs(at), found);
-    write(found, Q);
-  }
-  static void force_with_jacobians(const Conditions& at, const double* q, const double* v, double* Q, double* Q_D_q,
-                                   double* Q_D_v) {
-    Vector<L> found;
-    Matrix<L> by_q, by_v;
-    S::generalized_force_with_jacobians(parameters(at), vector(q), vector(v), inputs(at), found, by_q, by_v);
-    write(found, Q);
-    write(by_q, Q_D_q);
-    write(by_v, Q_D_v);
-  }
-  static void potential_energy(const Conditions& at, const double* q, double* U) {
-    L found;
-    S::potential_energy(parameters(at), vector(q), found);
-    store(found, U);
-  }
-  static void lagrangian(const Conditions& at, const double* q, const double* v, double* value) {
-    L found;
-    S::lagrangian(parameters(at), vector(q), vector(v), found);
-    store(found, value);
-  }
-  static void lagrangian_gradient(const Conditions& at, const double* q, const double* v, double* L_D_q,
-                                  double* L_D_v) {
-    Vector<L> by_q, by_v;
-    S::lagrangian_gradient(parameters(at), vector(q), vector(v), by_q, by_v);
-    write(by_q, L_D_q);
-    write(by_v, L_D_v);
-  }
-  static void lagrangian_hessian(const Conditions& at, const double* q, const double* v, double* L_D_qq, double* L_D_qv,
-                                 double* L_D_vv) {
-    Matrix<L> qq, qv, vv;
-    S::lagrangian_hessian(parameters(at), vector(q), vector(v), qq, qv, vv);
-    write(qq, L_D_qq);
-    write(qv, L_D_qv);
-    write(vv, L_D_vv);
-  }
-  static void hamiltonian(const Conditions& at, const double* q, const double* p, double* H) {
-    L found;
-    S::hamiltonian(parameters(at), vector(q), vector(p), found);
-    store(found, H);
-  }
 };
 
 template <System S>
@@ -327,15 +259,6 @@ constexpr PlainFunctions plain_functions() {
   using Functions = KernelFunctions<S, 1>;
   return {&Functions::residual, Functions::has_points ? &Functions::positions : nullptr,
           Functions::has_points ? &Functions::velocities : nullptr, has_switches<S> ? &Functions::switches : nullptr};
-}
-
-template <System S>
-inline constexpr ChainFunctions chain_functions = KernelFunctions<S, 1>::chain_functions();
-
-template <System S>
-constexpr const ChainFunctions* chain_functions_of() {
-  if constexpr (requires { &S::template lagrangian_hessian<double>; }) return &chain_functions<S>;
-  return nullptr;
 }
 
 }  // namespace detail
@@ -348,8 +271,7 @@ inline constexpr SystemTable system_table = {info_of<S>(),
                                              detail::KernelFunctions<S, 2>::functions(),
                                              detail::KernelFunctions<S, 4>::functions(),
                                              detail::KernelFunctions<S, 8>::functions(),
-                                             detail::plain_functions<S>(),
-                                             detail::chain_functions_of<S>()};
+                                             detail::plain_functions<S>()};
 
 /// A model of the generated kernel S with `parameters` in the kernel's own layout (its time is ignored), constant
 /// `inputs` (zero where null), and `sines` added to them.

@@ -5,8 +5,8 @@
 #include <initializer_list>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/pack_rows.hpp>
-#include <pendula/system/kernel_check.hpp>
 #include <pendula/system/kernel_widths.hpp>
+#include <random>
 #include <tuple>
 #include <vector>
 
@@ -36,7 +36,7 @@ class Difference {
   double relative() const { return worst_.error == 0 ? 0 : worst_.error / (largest_ > 0 ? largest_ : 1); }
 
  private:
-  KernelCheck::Line worst_;
+  KernelLine worst_;
   double largest_ = 0;
 };
 
@@ -45,15 +45,12 @@ class Widths {
   Widths(const SystemTable& table, std::span<const KernelPoint> points)
       : table_(table), points_(points), n_(table.info.coordinates.size()) {
     for (const KernelPoint& point : points) {
-      const auto add = [](Arrays& arrays, std::span<const double> numbers) {
-        arrays.emplace_back(numbers.begin(), numbers.end());
-      };
       times_.push_back({point.time});
-      add(parameters_, point.parameters);
-      add(inputs_, point.inputs);
-      add(q_, point.q);
-      add(v_, point.v);
-      add(a_, point.a);
+      parameters_.push_back(point.parameters);
+      inputs_.push_back(point.inputs);
+      q_.push_back(point.q);
+      v_.push_back(point.v);
+      a_.push_back(point.a);
     }
     for (std::size_t k = 0; k < points.size(); ++k) {
       const Wide p = call(&SystemFunctions::momentum_from_velocity, 1, k, {&q_, &v_}, {n_})[0];
@@ -190,10 +187,32 @@ class Widths {
   std::span<const KernelPoint> points_;
   std::size_t n_;
   Arrays times_, parameters_, inputs_, q_, v_, a_, p_;
-  KernelCheck::Line worst_;
+  KernelLine worst_;
 };
 
 }  // namespace
+
+std::vector<KernelPoint> random_points(const SystemInfo& info, unsigned seed) {
+  std::mt19937 random(seed);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  std::vector<KernelPoint> points(5);
+  for (KernelPoint& point : points) {
+    for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+      const double usual = info.parameter_defaults[k];
+      const double size = std::isfinite(usual) && usual != 0 ? usual : info.is_positive[k] ? 1 : 0.1;
+      for (int i = 0; i < info.parameter_sizes[k]; ++i) point.parameters.push_back(size * uniform(0.5, 2));
+    }
+    for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
+      point.q.push_back(uniform(0.3, 2.8));  // away from the poles of (θ, φ)
+      point.v.push_back(uniform(-2, 2));
+      point.a.push_back(uniform(-2, 2));
+    }
+    for (std::size_t k = 0; k < info.inputs.size(); ++k) point.inputs.push_back(uniform(-1, 1));
+  }
+  return points;
+}
 
 double width_error(const SystemTable& table, std::span<const KernelPoint> points) {
   return points.empty() ? 0 : Widths(table, points).error();

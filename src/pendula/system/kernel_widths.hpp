@@ -1,16 +1,33 @@
 #pragma once
 
+#include <cmath>
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace pendula {
 
+/// One statement about a kernel, the largest error found, and the largest one allowed.
+struct KernelLine {
+  std::string_view what;
+  double error = 0;
+  double limit = 0;
+
+  /// Keeps the larger error; NaN counts as the largest, so that the check fails.
+  void keep(double found) {
+    if (!std::isnan(error) && !(found <= error)) error = found;
+  }
+};
+
 /// A state of a system, with its parameters and inputs.
 struct KernelPoint {
-  double time;
-  std::span<const double> parameters, inputs, q, v, a;
+  double time = 0;
+  std::vector<double> parameters, inputs, q, v, a;
 };
+
+/// Five random states of a chain, with random parameters; the same for the same seed.
+std::vector<KernelPoint> random_points(const SystemInfo& info, unsigned seed);
 
 /// Name of the check that width_error belongs to.
 inline constexpr std::string_view width_line = "functions of 2, 4 and 8 states, as of one";

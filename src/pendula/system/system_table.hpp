@@ -98,22 +98,6 @@ struct PlainFunctions {
   void (*switches)(const Conditions&, Numbers q, Numbers v, double* g);
 };
 
-/// Further functions of chain kernels, used to check them (kernel_check.hpp).
-struct ChainFunctions {
-  using Numbers = const double*;
-
-  void (*residual_D_q)(const Conditions&, Numbers q, Numbers v, Numbers a, double* E_D_q);
-  void (*residual_D_v)(const Conditions&, Numbers q, Numbers v, Numbers a, double* E_D_v);
-  void (*residual_D_a)(const Conditions&, Numbers q, Numbers v, Numbers a, double* E_D_a);
-  void (*force)(const Conditions&, Numbers q, Numbers v, double* Q);
-  void (*force_with_jacobians)(const Conditions&, Numbers q, Numbers v, double* Q, double* Q_D_q, double* Q_D_v);
-  void (*potential_energy)(const Conditions&, Numbers q, double* U);
-  void (*lagrangian)(const Conditions&, Numbers q, Numbers v, double* L);
-  void (*lagrangian_gradient)(const Conditions&, Numbers q, Numbers v, double* L_D_q, double* L_D_v);
-  void (*lagrangian_hessian)(const Conditions&, Numbers q, Numbers v, double* L_D_qq, double* L_D_qv, double* L_D_vv);
-  void (*hamiltonian)(const Conditions&, Numbers q, Numbers p, double* H);
-};
-
 /// A mechanical system as the runtime sees it: its description and its functions, all that is compiled from a generated
 /// kernel (kernel_table.hpp).
 struct SystemTable {
@@ -121,7 +105,6 @@ struct SystemTable {
   const void* context;  ///< passed to its functions
   SystemFunctions of_1, of_2, of_4, of_8;
   PlainFunctions plain;
-  const ChainFunctions* chain;  ///< null if it is not a chain
 };
 static_assert(std::is_trivially_copyable_v<SystemTable> && std::is_standard_layout_v<SystemTable>);
 
@@ -133,6 +116,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 14;
+inline constexpr int system_interface = 15;
 
 }  // namespace pendula
