@@ -147,7 +147,10 @@ SWINGING = '[system]\nmodel = "spring_pendulum"\n'
         (SWINGING + "parameters = { stifness = 3 }\n", "(did you mean stiffness?)"),
         (SWINGING + "parameters = { mass = -1 }\n", "mass: expected a finite number > 0, got -1"),
         (SWINGING + "[start]\nr = 1\n", "run.toml:4: start.r: expected one of"),
-        (SWINGING + '[[system.drive]]\ninput = "push"\n', "expected no constant and no amplitude, since the model has no inputs"),
+        (
+            SWINGING + '[[system.drive]]\ninput = "push"\n',
+            "expected no constant and no amplitude, since the model has no inputs",
+        ),
         (
             SWINGING + "[start]\nx = 1\nx_dot = 1\np_y = 1\n",
             "start.x_dot: expected no rates beside the momenta",
