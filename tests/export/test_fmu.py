@@ -185,7 +185,7 @@ def simulated(pendula, place, text: str, *overrides: str) -> dict[str, float]:
     ended = pendula("simulate", "scenario.toml", "--json", *words, cwd=place)
     assert ended.returncode == 0, ended.stderr
     final = json.loads(ended.stdout)["final"]
-    rates = {re.sub(r"^([a-z]+)", r"\1_dot", name): value for name, value in final["v"].items()}
+    rates = {re.sub(r"^([a-z]+\d*)", r"\1_dot", name): value for name, value in final["v"].items()}
     return final["q"] | rates
 
 
@@ -511,6 +511,29 @@ def test_a_model_may_have_more_coordinates_than_its_equations_are_written_out_fo
     forces = fmu.numbers("ContinuousStateDerivatives", 2 * MASSES)[MASSES:]
     slowest = 4 * 40.0 * math.sin(angle / 2) ** 2
     assert forces == pytest.approx([-slowest * swing * x for x in mode.values()], abs=1e-11)
+
+
+def test_with_pieces_a_large_model_is_for_co_simulation_alone(pendula, tmp_path):
+    rubbing = ROW + "    model.force(x[0], -0.5 * sign(model.rate(x[0])))\n"
+    (tmp_path / "row.py").write_text("from sympy import sign\n" + rubbing)
+    text = """
+[system]
+model = "row.py"
+parameters = { k = 40.0 }
+[start]
+x0 = 0.4
+[run]
+duration = 0.5
+tolerance = 1e-12
+"""
+    (tmp_path / "row.toml").write_text(text)
+    place = unpacked(pendula, tmp_path, tmp_path / "row.toml")
+    description = ElementTree.parse(place / "modelDescription.xml").getroot()
+    assert description.find("ModelExchange") is None
+    fmu = Fmu(place)
+    assert not fmu.library.fmi3InstantiateModelExchange(*[None] * 7)
+    fmu.run(0.0, 50, 0.01)
+    assert distance(fmu, simulated(pendula, tmp_path, text)) < 1e-12  # measured 4.4e-16
 
 
 def test_what_cannot_be_exported_is_told(pendula, environment, tmp_path):
