@@ -6,6 +6,7 @@ import argparse
 import json
 import shlex
 import sys
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from pendula_codegen.chain_kernel import ChainKernel, declared_by
 from pendula_codegen.comparison import Start, comparison
 from pendula_codegen.counts import as_json, count_table
 from pendula_codegen.describe import describe, describe_all
-from pendula_codegen.drives import driven
+from pendula_codegen.drives import Drive, driven
+from pendula_codegen.entry_points import Declared
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.export import (
     LANGUAGES,
@@ -23,11 +25,10 @@ from pendula_codegen.export import (
     Request,
     Values,
     render_export,
-    render_runtime_fmu,
     require_size,
 )
 from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws, sampled_laws_of_chain
-from pendula_codegen.fmu import DEFAULT_TOLERANCE, MARK, Drive, Runtime, packed_fmu
+from pendula_codegen.fmu import DEFAULT_TOLERANCE, EQUATIONS, MARK, Runtime, packed_fmu
 from pendula_codegen.kernel_program import render_bytecode, render_c, render_llvm
 from pendula_codegen.links import LINKS, find_link
 from pendula_codegen.model import Model, read_model
@@ -144,7 +145,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--time", type=float, default=0.0, help="to begin with")
     export.add_argument("--step", type=float, help="to begin with")
     export.add_argument("--duration", type=float, default=Values.duration, help="of an FMU's run, by default")
-    export.add_argument("--library", type=Path, help="pendula's static library, for an FMU of adaptive steps")
+    export.add_argument("--library", type=Path, help="pendula's static library, which an FMU takes")
     export.add_argument("--headers", type=Path, help="the folder of pendula/pendula.h")
     export.add_argument("--flag", action="append", default=[], help="of the compiler, with that library")
     export.add_argument("--tolerance", type=float, default=DEFAULT_TOLERANCE, help="of adaptive steps")
@@ -233,10 +234,7 @@ def _fed_model(options: argparse.Namespace) -> Model:
 
 
 def _run_export(options: argparse.Namespace) -> None:
-    texts, runtime = _exported_chain(options) if options.space is not None else _exported_model(options)
-    files: dict[str, str | bytes] = {**texts}
-    if options.language == "fmu":
-        files = {f"{options.name}.fmu": packed_fmu(options.name, texts, runtime)}
+    files = _exported_chain(options) if options.space is not None else _exported_model(options)
     is_file = options.language == "fmu" and options.output.suffix == ".fmu"
     for name, content in files.items():
         path = options.output if is_file else options.output / name
@@ -245,47 +243,58 @@ def _run_export(options: argparse.Namespace) -> None:
         print(path)
 
 
-def _exported_chain(options: argparse.Namespace) -> tuple[dict[str, str], Runtime | None]:
+def _exported_chain(options: argparse.Namespace) -> Mapping[str, str | bytes]:
     chain = Chain(find_link(options.space), 1 if options.links is None else options.links)
-    runtime = _runtime(options, drives=[Drive.of(numbers) for numbers in options.drive])
-    laws = sampled_laws_of_chain(chain, options.sampled)
-    request, words = _request(options, laws, runtime), _export_words(options)
-    command = f"--space {options.space} --links {chain.links} {words} --output ."
-    if runtime is not None and len(chain.coordinates) > MOST_COORDINATES:
-        what = f"A chain of {chain.links} links."
-        return render_runtime_fmu(declared_by(chain), request, what, command, chain, options.space), runtime
-    require_size(len(chain.coordinates))
-    kernel = ChainKernel(driven(chain, map(Drive.of, options.drive)))
-    return render_export(kernel, request, command, options.space), runtime
+    drives = [Drive.of(numbers) for numbers in options.drive]
+    wanted = _request(options, sampled_laws_of_chain(chain, options.sampled))
+    command = f"--space {options.space} --links {chain.links} {_export_words(options)} --output ."
+
+    def equations(request: Request) -> dict[str, str]:
+        require_size(len(chain.coordinates))
+        return render_export(ChainKernel(driven(chain, drives)), request, command, options.space)
+
+    if options.language != "fmu":
+        return equations(wanted)
+    return _fmu(options, wanted, declared_by(chain), equations, chain=chain, drives=drives)
 
 
-def _exported_model(options: argparse.Namespace) -> tuple[dict[str, str], Runtime | None]:
+def _exported_model(options: argparse.Namespace) -> Mapping[str, str | bytes]:
     model = _fed_model(options)
-    laws = sampled_laws(model, options.sampled)
-    what = f"--model {Path(options.model).name}{links_argument(model)}"
-    runtime = _runtime(options)
-    request = _request(options, laws, runtime)
-    command = f"{what} {_export_words(options)} --output ."
+    wanted = _request(options, sampled_laws(model, options.sampled))
+    command = f"--model {Path(options.model).name}{links_argument(model)} {_export_words(options)} --output ."
     kernel, file = ModelKernel(model), Path(model.file)
-    if runtime is not None:
-        runtime = replace(runtime, kernel=render_c(model, Path(options.model).name, "kernel.c"))
-        if len(kernel.declared.coordinates) > MOST_COORDINATES:
-            what = f"The system {kernel.system.name}."
-            return render_runtime_fmu(kernel.declared, request, what, command, file=file), runtime
-    return render_export(kernel, request, command, None, file), runtime
+
+    def equations(request: Request) -> dict[str, str]:
+        return render_export(kernel, request, command, None, file)
+
+    if options.language != "fmu":
+        return equations(wanted)
+    own = render_c(model, Path(options.model).name, "kernel.c")
+    return _fmu(options, wanted, kernel.declared, equations, kernel=own)
 
 
-def _runtime(options: argparse.Namespace, **more: object) -> Runtime | None:
-    if options.language != "fmu" or options.library is None:
-        return None
-    return Runtime(options.library, options.headers, options.flag, options.tolerance, **more)
+def _fmu(
+    options: argparse.Namespace,
+    request: Request,
+    declared: Declared,
+    equations: Callable[[Request], dict[str, str]],
+    **moved: object,
+) -> dict[str, bytes]:
+    """An FMU of what is `moved`, fields of Runtime; `equations` are written out where they are not too many."""
+    if options.library is None or options.headers is None:
+        raise GenerationError("export: expected --library and --headers with fmu, got none")
+    request.check()
+    runtime = Runtime(options.library, options.headers, options.flag, options.tolerance, **moved)
+    is_small = len(declared.coordinates) <= MOST_COORDINATES
+    texts = equations(replace(request, name=EQUATIONS)) if is_small else {}
+    return {f"{options.name}.fmu": packed_fmu(declared, request, runtime, texts)}
 
 
-def _request(options: argparse.Namespace, laws: list[SampledLaw], runtime: Runtime | None) -> Request:
+def _request(options: argparse.Namespace, laws: list[SampledLaw]) -> Request:
     values = Values(
         options.parameters, options.inputs, options.q, options.v, options.time, options.step, options.duration
     )
-    return Request(options.name, options.language, options.number, options.stages, values, laws, runtime)
+    return Request(options.name, options.language, options.number, options.stages, values, laws)
 
 
 def _export_words(options: argparse.Namespace) -> str:

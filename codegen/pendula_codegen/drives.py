@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from sympy import Rational, sin
 
 from pendula_codegen.chain import Chain
 from pendula_codegen.errors import GenerationError
-from pendula_codegen.fmu import Drive
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A torque amplitude sin(frequency t + phase) on a link, counted from 0."""
+
+    link: int
+    amplitude: tuple[float, ...]
+    frequency: float
+    phase: float
+
+    @staticmethod
+    def of(numbers: Sequence[float]) -> Drive:
+        """Of link, amplitude, frequency and phase, one after the other."""
+        link, *amplitude, frequency, phase = numbers
+        return Drive(int(link), tuple(amplitude), frequency, phase)
 
 
 def driven(chain: Chain, drives: Iterable[Drive]) -> Chain:

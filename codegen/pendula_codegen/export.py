@@ -7,27 +7,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite
 from pathlib import Path
 
 from pendula_codegen.backends.c99 import NUMBERS, C99Printer
 from pendula_codegen.casadi_face import Side, quoted, shapes, slopes_of
-from pendula_codegen.chain import Chain
 from pendula_codegen.entry_points import Declared, SystemKernel
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import SampledLaw
-from pendula_codegen.fmu import (
-    DEFAULT_STEP,
-    OF_EQUATIONS,
-    OF_EXCHANGE,
-    UNSUPPORTED,
-    Runtime,
-    settings_of,
-    token_of,
-    variables_of,
-)
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model import CPP_KEYWORDS, Parameter
@@ -43,9 +32,8 @@ _C = {"export.h.j2": ".h", "export.c.j2": ".c"}
 LANGUAGES = {
     "c": _C,
     "casadi": {**_C, "export_casadi.c.j2": "_casadi.c"},
-    "fmu": {**_C, "export_fmu.c.j2": "_fmu.c", "export_fmu.xml.j2": "_fmu.xml"},
+    "fmu": _C,  # its equations: fmu.py
 }
-_ADAPTIVE = {"export_fmu_adaptive.c.j2": "_adaptive.c"}
 EPSILON, FLOAT_EPSILON = 2.0**-52, 2.0**-23
 MOST_COORDINATES = 16  # everything is written out, and matrices are dense
 
@@ -283,7 +271,6 @@ class Request:
     number   double or float
     stages   of the Gauss step
     laws     of a controller that samples
-    runtime  what an FMU takes adaptive steps by
     """
 
     name: str
@@ -292,7 +279,6 @@ class Request:
     stages: int = 2
     values: Values = field(default_factory=Values)
     laws: Sequence[SampledLaw] = ()
-    runtime: Runtime | None = None
 
     def check(self) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) or self.name in CPP_KEYWORDS:
@@ -382,82 +368,13 @@ def render_export(
             ([each.symbol.name for each in declared.inputs].index(law.input), law.limit)
             for law in request.laws
         ],
-        "values": _numbers(declared, request.values),
+        "values": numbers_of(declared, request.values),
         "step": request.values.step,
         "time": request.values.time,
     }
-    templates = LANGUAGES[request.language]
-    if request.language == "fmu":
-        chain = getattr(kernel, "chain", None)
-        context |= _fmu_context(declared, request, context["banner"], chain, has_equations=True)
-        templates = templates | (_ADAPTIVE if request.runtime is not None else {})
-    return _rendered(request, templates, context)
-
-
-def render_runtime_fmu(
-    declared: Declared,
-    request: Request,
-    what: str,
-    command: str,
-    chain: Chain | None = None,
-    space: str | None = None,
-    file: Path | None = None,
-) -> dict[str, str]:
-    """Names of files and their text, of an FMU that leaves everything to pendula's library.
-
-    It may be of a chain of any length, with drives or without, or of a model of any size, with functions of several
-    pieces or without. `what` is the first line of the banner; for `command`, `space` and `file` see render_export.
-    """
-    request.check()
-    printer = C99Printer("double", "", {})
-    text = banner(what, "export", space, command, file)
-    context = {"banner": text, "name": request.name, "literal": printer.literal, "time": request.values.time}
-    context |= _fmu_context(declared, request, text, chain, has_equations=False)
-    return _rendered(request, _ADAPTIVE | {"export_fmu.xml.j2": "_fmu.xml"}, context)
-
-
-def _rendered(request: Request, templates: dict[str, str], context: dict[str, object]) -> dict[str, str]:
     return {
         f"{request.name}{ending}": ENVIRONMENT.get_template(template).render(context)
-        for template, ending in templates.items()
-    }
-
-
-def _fmu_context(
-    declared: Declared, request: Request, text: str, chain: Chain | None, has_equations: bool
-) -> dict[str, object]:
-    step, runtime = request.values.step or DEFAULT_STEP, request.runtime
-    values = _numbers(declared, request.values)
-    settings = settings_of(step, runtime, has_equations)
-    exchanges = has_equations or not declared.switches
-    variables = variables_of(declared, values, settings, exchanges)
-    n = len(declared.coordinates)
-    return {
-        "n": n,
-        "states": 2 * n,
-        "parameters": len(values["parameters"]),
-        "inputs": len(declared.inputs),
-        "points": sum(count for _, count in declared.points),
-        "values": values,
-        "literals": lambda numbers: ", ".join(map(repr, numbers)),
-        "switches": declared.switches if has_equations else (),
-        "equations": has_equations,
-        "exchanges": exchanges,
-        "settings": [setting.key for setting in settings],
-        "names_of_settings": {setting.key: setting.name for setting in settings},
-        "tolerance": runtime.tolerance if runtime is not None else None,
-        "chain": {"dimension": chain.model.dimension, "links": chain.links} if chain else None,
-        "drives": runtime.drives if runtime is not None else (),
-        "variables": variables,
-        "units": sorted({variable.unit for variable in variables} - {""}),
-        "internal_step": step,
-        "duration": request.values.duration,
-        "token": token_of([text, repr(replace(request, runtime=None)), repr(variables)]),
-        "unsupported_functions": (
-            *UNSUPPORTED,
-            *(() if has_equations else OF_EQUATIONS),
-            *(() if exchanges else OF_EXCHANGE),
-        ),
+        for template, ending in LANGUAGES[request.language].items()
     }
 
 
@@ -497,7 +414,7 @@ def _printed(printer: C99Printer, function: ExportedFunction) -> _Printed:
     return _Printed(function, unused, printer.body(function.tape))
 
 
-def _numbers(declared: Declared, values: Values) -> dict[str, list[float | None]]:
+def numbers_of(declared: Declared, values: Values) -> dict[str, list[float | None]]:
     """Those of the request; else defaults, 1 where a parameter has none and must be positive."""
     defaults = [
         parameter.default if parameter.default is not None else 1.0 if parameter.positive else None

@@ -64,7 +64,7 @@ KINDS = {
     "chain.py": {"export", "kernel"},
     "chain_kernel.py": {"export", "kernel"},
     "entry_points.py": {"export", "kernel", "model", "program"},
-    "fmu.py": {"export"},
+    "fmu.py": set(),
     "forward.py": {"export", "program"},
     "kernel_program.py": {"program"},
     "linear_solve.py": {"export", "kernel", "model", "program"},
@@ -92,8 +92,9 @@ KINDS = {
     "templates/gauss_tableaux.hpp.j2": {"tableaux"},
     **{
         f"templates/export{name}.j2": {"export"}
-        for name in (".c", ".h", "_solve.c", "_casadi.c", "_fmu.c", "_fmu.xml")
+        for name in (".c", ".h", "_solve.c", "_pieces.c", "_casadi.c")
     },
+    **{f"templates/export_fmu{name}.j2": set() for name in (".c", ".xml")},
     **{
         f"templates/{name}.c.j2": {"program"}
         for name in ("kernel", "sincos", "exp", "log", "solve", "iterate", "series")

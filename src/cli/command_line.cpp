@@ -374,7 +374,7 @@ void CommandLine::add_export() {
       ->required();
   takes_words(exports->add_option("--as", options.language,
                                   "c: C99, NAME.h and NAME.c; casadi: functions for CasADi and acados besides; fmu: "
-                                  "NAME.fmu, for simulators that know FMI 3.0, with pendula's adaptive steps"),
+                                  "NAME.fmu, for simulators that know FMI 3.0, with pendula's library in it"),
               "LANGUAGE", {"c", "casadi", "fmu"})
       ->required();
   takes_file(exports->add_option("-o,--output", options.output, "The folder for the files, or the FMU: NAME.fmu"),
@@ -382,8 +382,9 @@ void CommandLine::add_export() {
       ->required();
   exports->add_option("--name", options.name, "What names in it begin with; else that of the model")->type_name("NAME");
   exports
-      ->add_option("--stages", options.stages,
-                   "Of the Gauss step, whose order is twice that; else the scenario's where it says its step, or 2")
+      ->add_option(
+          "--stages", options.stages,
+          "Of the Gauss step of c and casadi, half its order; else the scenario's where it says its step, or 2")
       ->type_name("S")
       ->check(CLI::Range(1, 8));
   exports->add_flag("--float", options.is_float, "Numbers are float, not double");

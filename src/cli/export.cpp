@@ -151,17 +151,17 @@ double tolerance_of(const io::RunPlan& plan) {
   return plan.accuracy.error > 0 ? plan.accuracy.error : plan.run.tolerance;
 }
 
-/// Whether an FMU has pendula's library in it.
-bool has_runtime(const ExportOptions& options, const io::Toolchain& toolchain) {
+/// What the generator is told of the library that an FMU has in it.
+Words library_words(const io::Toolchain& toolchain) {
   std::error_code unknown;
-  return options.language == "fmu" && std::filesystem::is_regular_file(toolchain.library, unknown);
-}
-
-/// What the generator is told of that library.
-void add_runtime(Words& words, const io::Toolchain& toolchain) {
-  words.push_back("--library=" + toolchain.library.string());
-  words.push_back("--headers=" + toolchain.headers.string());
+  if (!std::filesystem::is_regular_file(toolchain.library, unknown)) {
+    throw io::InputError(
+        "export: an FMU takes pendula's static library, " +
+        (toolchain.library.empty() ? "which this build has none of" : "and there is no " + toolchain.library.string()));
+  }
+  Words words{"--library=" + toolchain.library.string(), "--headers=" + toolchain.headers.string()};
   for (const std::string& flag : io::flags_of_least_set()) words.push_back("--flag=" + flag);
+  return words;
 }
 
 /// What the generator is told of a scenario.
@@ -193,8 +193,8 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
         };
         if (std::ranges::any_of(found.columns, is_own)) std::cerr << "pendula: warning: columns are not exported\n";
         if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
-        if (found.run.method == Method::gauss && found.run.step > 0) {
-          if (!options.stages) add_number(words, "stages", found.run.stages);
+        if (found.run.method == Method::gauss && found.run.step > 0 && !options.stages) {
+          add_number(words, "stages", found.run.stages);
         }
         return words;
       },
@@ -216,6 +216,9 @@ void require_fitting(const ExportOptions& options) {
   if (!is_scenario && !options.overrides.empty()) {
     throw io::InputError("export: --set: expected a scenario (.toml), got " + options.what);
   }
+  if (options.stages && options.language == "fmu") {
+    throw io::InputError("export: --stages: expected --as c or casadi, got fmu, which chooses its steps");
+  }
   if (options.links && (is_scenario || options.what.find(':') != std::string::npos)) {
     throw io::InputError("export: --links: expected a model or the name of a space, got " + options.what);
   }
@@ -226,6 +229,7 @@ void require_fitting(const ExportOptions& options) {
 ExitStatus export_system(const ExportOptions& options) {
   require_fitting(options);
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
+  const Words library = options.language == "fmu" ? library_words(toolchain) : Words();
   Words words;
   if (options.what.ends_with(".toml")) {
     words = scenario_words(options, toolchain);
@@ -239,14 +243,7 @@ ExitStatus export_system(const ExportOptions& options) {
   words.insert(words.end(), {"--as", options.language, "--output", options.output, "--name",
                              options.name.empty() ? default_name(options) : options.name});
   if (options.stages) words.insert(words.end(), {"--stages", std::to_string(*options.stages)});
-  if (has_runtime(options, toolchain)) {
-    add_runtime(words, toolchain);
-  } else if (options.language == "fmu") {
-    std::cerr << "pendula: warning: the FMU takes steps of constant size: adaptive ones take the static library, "
-              << (toolchain.library.empty() ? "which this build has none of"
-                                            : "and there is no " + toolchain.library.string())
-              << '\n';
-  }
+  words.insert(words.end(), library.begin(), library.end());
   if (options.is_float) words.insert(words.end(), {"--number", "float"});
   std::cout << io::run_generator(words, toolchain);
   return done;

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from xml.etree import ElementTree
 
 import pytest
-from conftest import BUMPER, COMPILER, FLAGS, consumer, numbers
+from conftest import BUMPER
 
 OK, ERROR = 0, 3
 LOG = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
@@ -41,41 +41,27 @@ def unpacked(pendula, place, *words):
     return place
 
 
-def test_its_file_may_be_named(pendula, tmp_path):
-    ended = pendula("export", "planar:1", "--as", "fmu", "-o", tmp_path / "new/slide.fmu")
+def test_it_and_its_file_may_be_named(pendula, tmp_path):
+    """Functions of pendula.h begin with that name, too."""
+    words = "planar:1", "--as", "fmu", "--name", "pendula"
+    ended = pendula("export", *words, "-o", tmp_path / "new/slide.fmu")
     assert (ended.returncode, ended.stdout) == (0, f"{tmp_path}/new/slide.fmu\n"), ended.stderr
     with zipfile.ZipFile(tmp_path / "new/slide.fmu") as archive:
-        assert b'modelName="planar_1"' in archive.read("modelDescription.xml")
+        assert b'modelName="pendula"' in archive.read("modelDescription.xml")
 
 
 @pytest.fixture(scope="module")
 def folder(pendula, tmp_path_factory):
     """A folder with the FMU of a cart with two links, unpacked."""
-    return unpacked(pendula, tmp_path_factory.mktemp("fmu"), "cart_chain", "--links", 2, "--stages", 4)
-
-
-def built(folder):
-    """What somebody else's compiler makes of the sources: steps of constant size."""
-    sources = sorted((folder / "sources").glob("*.c"))
-    assert [source.name for source in sources] == ["system.c", "system_fmu.c"]
-    binary = folder / "again.so"
-    command = [COMPILER, *FLAGS, "-O1", "-fPIC", "-shared", *sources, "-o", binary, "-lm"]
-    subprocess.run(command, check=True)
-    return binary
-
-
-@pytest.fixture(scope="module")
-def rebuilt(folder):
-    return built(folder)
+    return unpacked(pendula, tmp_path_factory.mktemp("fmu"), "cart_chain", "--links", 2)
 
 
 class Fmu:
     """An instance for co-simulation, or for model exchange; `said` is what it complains of."""
 
-    def __init__(self, folder, token: str | None = None, binary=None, tells_events: bool = False):
+    def __init__(self, folder, token: str | None = None, tells_events: bool = False):
         description = ElementTree.parse(folder / "modelDescription.xml").getroot()
-        if binary is None:
-            [binary] = (folder / "binaries").glob("*/system.*")
+        [binary] = (folder / "binaries").glob("*/system.*")
         self.library = ctypes.CDLL(str(binary))
         self.said: list[str] = []
         self._log = LOG(lambda _, status, category, message: self.said.append(message.decode()))
@@ -199,22 +185,12 @@ def simulated(pendula, place, text: str, *overrides: str) -> dict[str, float]:
     ended = pendula("simulate", "scenario.toml", "--json", *words, cwd=place)
     assert ended.returncode == 0, ended.stderr
     final = json.loads(ended.stdout)["final"]
-    rates = {re.sub(r"^([a-z]+)", r"\1_dot", name): value for name, value in final["v"].items()}
+    rates = {re.sub(r"^([a-z]+\d*)", r"\1_dot", name): value for name, value in final["v"].items()}
     return final["q"] | rates
 
 
 def distance(fmu: Fmu, theirs: dict[str, float]) -> float:
     return max(abs(x - y) for x, y in zip(fmu.get(*theirs), theirs.values(), strict=True))
-
-
-def test_steps_of_the_sources_are_those_of_the_exported_c(folder, rebuilt, export, tmp_path):
-    exported = export(tmp_path, "cart_chain", "--links", "2", "--stages", "4")
-    fmu = Fmu(folder, binary=rebuilt)
-    assert fmu.set(**{"pendula.internal_step": 1.0, "masses_1": 1.0 + 1e-3}) == OK
-    assert fmu.step(0.0, 0.01) == OK and fmu.step(0.01, 0.01) == OK
-    ours = numbers(consumer(exported), 2, 0.01, "parameters", 0, 1e-3)
-    assert fmu.get(*STATES) == pytest.approx(ours["state"], abs=1e-15)  # measured 0
-    assert fmu.get("energy") == pytest.approx(ours["energy"], abs=1e-14)
 
 
 @pytest.mark.parametrize("h", [1e-3, 0.5])
@@ -342,12 +318,11 @@ tolerance = 1e-12
     ids=["40 links", "drives"],
 )
 def test_long_and_driven_chains(text, bound, pendula, tmp_path):
-    """Equations of many links are not written out: there are no sources, and no directional derivatives."""
+    """Equations of many links are not written out: there are no directional derivatives."""
     (tmp_path / "chain.toml").write_text(text)
     place = unpacked(pendula, tmp_path, tmp_path / "chain.toml")
     description = ElementTree.parse(place / "modelDescription.xml").getroot()
     written = text is DRIVEN
-    assert (place / "sources").exists() == written
     for kind in ("CoSimulation", "ModelExchange"):
         assert (description.find(kind).get("providesDirectionalDerivatives") == "true") == written
     fmu = Fmu(place)
@@ -390,7 +365,7 @@ def bumper(pendula, tmp_path_factory):
     place = tmp_path_factory.mktemp("bumper")
     (place / "bumper.py").write_text(BUMPER)
     (place / "bumper.toml").write_text(BUMPED)
-    return unpacked(pendula, place, place / "bumper.toml", "--stages", 4)
+    return unpacked(pendula, place, place / "bumper.toml")
 
 
 def test_steps_end_where_pieces_of_a_model_meet(bumper, pendula):
@@ -413,16 +388,8 @@ def test_steps_end_where_pieces_of_a_model_meet(bumper, pendula):
     assert fmu.get("x", "theta", "x_dot", "theta_dot") == there
 
 
-def test_steps_of_sources_end_there_too(bumper, pendula):
-    fmu = Fmu(bumper, binary=built(bumper))
-    fmu.run(0.0, 200, 0.01)
-    assert distance(fmu, simulated(pendula, bumper, BUMPED)) < 1e-11  # measured 1.4e-13
-
-
-@pytest.mark.parametrize("from_sources", [False, True])
-def test_steps_return_early_where_pieces_change(from_sources, bumper, pendula):
-    binary = built(bumper) if from_sources else None
-    fmu, t, times = Fmu(bumper, binary=binary, tells_events=True), 0.0, []
+def test_steps_return_early_where_pieces_change(bumper, pendula):
+    fmu, t, times = Fmu(bumper, tells_events=True), 0.0, []
     while t < 2.0:
         event, t = fmu.step_to_event(t, min(0.1, 2.0 - t))
         if event:
@@ -435,12 +402,10 @@ def test_steps_return_early_where_pieces_change(from_sources, bumper, pendula):
             assert (fmu.step_to_event(t, 0.01), fmu.get("x", "theta_dot")) == again
             t = again[0][1]
     assert len(times) == 6
-    assert (
-        distance(fmu, simulated(pendula, bumper, BUMPED)) < 1e-11
-    )  # measured 2.7e-15; of the sources 1.9e-13
-    alone = Fmu(bumper, binary=binary)
+    assert distance(fmu, simulated(pendula, bumper, BUMPED)) < 1e-12  # measured 2.7e-15
+    alone = Fmu(bumper)
     assert [alone.step_to_event(k / 10, 0.1) for k in range(20)] == [(False, k / 10 + 0.1) for k in range(20)]
-    held = Fmu(bumper, binary=binary, tells_events=True)
+    held = Fmu(bumper, tells_events=True)
     held.set(push=0.1, x_dot=0.3, theta=0.01)
     event, t = False, 0.0
     while not (event and held.update()):
@@ -450,12 +415,11 @@ def test_steps_return_early_where_pieces_change(from_sources, bumper, pendula):
 
 
 def test_a_motion_that_friction_holds_ends(bumper):
-    """As the program does; by its library, by the sources, and in model exchange."""
-    by_library, by_sources, exchanged = Fmu(bumper), Fmu(bumper, binary=built(bumper)), Fmu(bumper)
-    for fmu in (by_library, by_sources, exchanged):
+    """As the program does; in co-simulation and in model exchange."""
+    stepped, exchanged = Fmu(bumper), Fmu(bumper)
+    for fmu in (stepped, exchanged):
         fmu.set(push=0.1, x_dot=0.0, theta=0.0)
-    assert by_library.step(0.0, 0.01) == ERROR and "the motion is held where x_dot = 0" in by_library.said[-1]
-    assert by_sources.step(0.0, 0.01) == ERROR and "the motion is held" in by_sources.said[-1]
+    assert stepped.step(0.0, 0.01) == ERROR and "the motion is held where x_dot = 0" in stepped.said[-1]
     assert exchanged.update() and "the motion is held" in exchanged.said[-1]
     exchanged.set(push=0.3)
     assert not exchanged.update()
@@ -523,7 +487,7 @@ MASSES = 18
 ROW = f"""
 def define(model, links):
     x = [model.coordinate(f"x{{k}}", "m") for k in range({MASSES})]
-    k = model.parameter("k", "N/m", default=40.0)
+    k = model.parameter("k", "N/m")
     stretch = [a - b for a, b in zip([*x, 0], [0, *x])]
     model.lagrangian = sum(model.rate(one) ** 2 for one in x) / 2 - k * sum(s**2 for s in stretch) / 2
     model.point("last", (x[-1], 0))
@@ -534,8 +498,9 @@ def test_a_model_may_have_more_coordinates_than_its_equations_are_written_out_fo
     """Masses in a row between walls, in the slowest of their modes, which is a sine."""
     (tmp_path / "row.py").write_text(ROW)
     place = unpacked(pendula, tmp_path, tmp_path / "row.py")
-    assert not (place / "sources").exists()
     fmu = Fmu(place)
+    assert math.isnan(fmu.get("k")[0])  # it has no default
+    fmu.set(k=40.0)
     angle = math.pi / (MASSES + 1)
     mode = {f"x{k}": math.sin((k + 1) * angle) for k in range(MASSES)}
     fmu.set(**mode, **{"pendula.tolerance": 1e-12})
@@ -548,40 +513,47 @@ def test_a_model_may_have_more_coordinates_than_its_equations_are_written_out_fo
     assert forces == pytest.approx([-slowest * swing * x for x in mode.values()], abs=1e-11)
 
 
-def test_without_the_library_steps_are_of_constant_size_and_it_says_so(pendula, environment, tmp_path):
+def test_with_pieces_a_large_model_is_for_co_simulation_alone(pendula, tmp_path):
+    rubbing = ROW + "    model.force(x[0], -0.5 * sign(model.rate(x[0])))\n"
+    (tmp_path / "row.py").write_text("from sympy import sign\n" + rubbing)
+    text = """
+[system]
+model = "row.py"
+parameters = { k = 40.0 }
+[start]
+x0 = 0.4
+[run]
+duration = 0.5
+tolerance = 1e-12
+"""
+    (tmp_path / "row.toml").write_text(text)
+    place = unpacked(pendula, tmp_path, tmp_path / "row.toml")
+    description = ElementTree.parse(place / "modelDescription.xml").getroot()
+    assert description.find("ModelExchange") is None
+    fmu = Fmu(place)
+    assert not fmu.library.fmi3InstantiateModelExchange(*[None] * 7)
+    fmu.run(0.0, 50, 0.01)
+    assert distance(fmu, simulated(pendula, tmp_path, text)) < 1e-12  # measured 4.4e-16
+
+
+def test_what_cannot_be_exported_is_told(pendula, environment, tmp_path):
+    ended = pendula("export", "planar:2", "--as", "fmu", "--stages", 4, "-o", tmp_path)
+    assert ended.returncode == 2 and "--stages: expected --as c or casadi, got fmu" in ended.stderr
     program = os.environ["PENDULA_PROGRAM"]
     beside = os.path.join(os.path.dirname(program), "pendula.toolchain")
     with open(beside) as file:
         lines = file.read().splitlines()
     (tmp_path / "bin").mkdir()
     shutil.copy2(program, tmp_path / "bin/pendula")
-    (tmp_path / "bin/pendula.toolchain").write_text("\n".join([*lines[:4], "/no/libpendula.a", "/no"]) + "\n")
-
-    def export(*words):
-        command = [
-            tmp_path / "bin/pendula",
-            "export",
-            *words,
-            "--as",
-            "fmu",
-            "--name",
-            "system",
-            "-o",
-            tmp_path,
-        ]
-        return subprocess.run(command, capture_output=True, text=True, env=environment)
-
-    ended = export("planar:2")
-    assert ended.returncode == 0
-    assert "the FMU takes steps of constant size" in ended.stderr and "/no/libpendula.a" in ended.stderr
-    with zipfile.ZipFile(tmp_path / "system.fmu") as archive:
-        assert b"pendula.tolerance" not in archive.read("modelDescription.xml")
-        assert "sources/system_fmu.c" in archive.namelist()
-    (tmp_path / "driven.toml").write_text(DRIVEN)
-    ended = export(tmp_path / "driven.toml")
-    assert ended.returncode == 0
-    ended = export("planar:40")
-    assert ended.returncode != 0 and "at most 16 coordinates" in ended.stderr
+    for library, said in (
+        ("/no/libpendula.a", "there is no /no/libpendula.a"),
+        ("", "this build has none of"),
+    ):
+        (tmp_path / "bin/pendula.toolchain").write_text("\n".join([*lines[:4], library, "/no"]) + "\n")
+        command = [tmp_path / "bin/pendula", "export", "planar:2", "--as", "fmu", "-o", tmp_path]
+        ended = subprocess.run(command, capture_output=True, text=True, env=environment)
+        assert ended.returncode == 2 and "takes pendula's static library" in ended.stderr
+        assert said in ended.stderr
 
 
 @pytest.mark.parametrize("known", ["theta_2", "theta_dot_1", "push", "lengths_2", "cart_mass"])
@@ -596,20 +568,15 @@ def test_directional_derivatives_are_slopes(known, folder):
 def test_what_is_wrong_is_told(folder):
     fmu = Fmu(folder)
     assert fmu.set(energy=1.0) == ERROR and "cannot be set" in fmu.said[-1]
-    for name in ("pendula.internal_step", "pendula.tolerance"):
-        assert fmu.set(**{name: 0.0}) == ERROR and fmu.said[-1] == f"{name}: expected a number > 0"
+    assert fmu.set(**{"pendula.tolerance": 0.0}) == ERROR
+    assert fmu.said[-1] == "pendula.tolerance: expected a number > 0"
     fmu.set(masses_1=float("nan"))
+    assert math.isnan(fmu.get("masses_1")[0])
     assert fmu.step(0.0, 0.01) == ERROR and "mass matrix is singular" in fmu.said[-1]
     fmu.set(masses_1=1.0)
     assert fmu.step(0.0, 0.01) == OK
     stranger = Fmu(folder, token="{0}")
     assert not stranger.instance and "not that of this FMU" in stranger.said[-1]
-
-
-def test_its_sources_say_what_is_wrong(folder, rebuilt):
-    fmu = Fmu(folder, binary=rebuilt)
-    fmu.set(masses_1=float("nan"))
-    assert fmu.step(0.0, 0.01) == ERROR and "could not be solved" in fmu.said[-1]
 
 
 def test_of_its_binary_the_functions_of_fmi_alone_are_seen(folder):
