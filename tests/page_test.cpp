@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
+#include "io/files.hpp"
 #include "io/input_error.hpp"
 #include "io/line_file.hpp"
-#include "io/whole_file.hpp"
 #include "view/encode.hpp"
 #include "view/kept_rows.hpp"
 #include "view/scene.hpp"

@@ -16,7 +16,7 @@
 #include "bindings.hpp"
 #include "io/changed_file.hpp"
 #include "io/event_list.hpp"
-#include "io/file_format.hpp"
+#include "io/files.hpp"
 #include "io/input_error.hpp"
 #include "io/provenance.hpp"
 #include "io/run_file.hpp"

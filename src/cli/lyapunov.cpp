@@ -13,7 +13,7 @@
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/read_scenario.hpp"
-#include "io/file_format.hpp"
+#include "io/files.hpp"
 #include "io/line_file.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"

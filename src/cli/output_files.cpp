@@ -5,7 +5,7 @@
 #include <iostream>
 #include <system_error>
 
-#include "io/file_format.hpp"
+#include "io/files.hpp"
 #include "io/input_error.hpp"
 #include "io/run_file.hpp"
 #include "io/trajectory.hpp"

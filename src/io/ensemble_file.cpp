@@ -14,9 +14,9 @@
 #include <variant>
 
 #include "io/ensemble_arrays.hpp"
+#include "io/files.hpp"
 #include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
-#include "io/link_target.hpp"
 #include "io/output_error.hpp"
 
 namespace pendula::io {

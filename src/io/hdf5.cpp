@@ -11,7 +11,7 @@
 #include <cstring>
 #include <numeric>
 
-#include "io/descriptor.hpp"
+#include "io/files.hpp"
 #include "io/hdf5_types.hpp"
 
 namespace pendula::io::hdf5 {

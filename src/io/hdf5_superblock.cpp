@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "io/descriptor.hpp"
+#include "io/files.hpp"
 #include "io/hdf5.hpp"
 
 namespace pendula::io::hdf5 {

@@ -22,11 +22,9 @@
 #include <system_error>
 #include <utility>
 
-#include "io/descriptor.hpp"
+#include "io/files.hpp"
 #include "io/fingerprint.hpp"
 #include "io/input_error.hpp"
-#include "io/input_file.hpp"
-#include "io/trusted_folder.hpp"
 
 namespace pendula::io {
 

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "io/changed_file.hpp"
-#include "io/link_target.hpp"
+#include "io/files.hpp"
 #include "io/output_error.hpp"
 
 namespace pendula::io {

@@ -11,7 +11,7 @@
 
 #include "io/checkpoint_table.hpp"
 #include "io/event_list.hpp"
-#include "io/file_lock.hpp"
+#include "io/files.hpp"
 #include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/quantity_arrays.hpp"

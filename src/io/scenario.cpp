@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/input_file.hpp"
+#include "io/files.hpp"
 #include "io/scenario_document.hpp"
 #include "io/section.hpp"
 #include "io/system_reader.hpp"

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "io/whole_file.hpp"
+#include "io/files.hpp"
 #include "view/kept_rows.hpp"
 #include "view/scene.hpp"
 
