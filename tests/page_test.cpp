@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/input_error.hpp"
 #include "io/line_file.hpp"
 #include "view/encode.hpp"
 #include "view/kept_rows.hpp"

@@ -14,10 +14,9 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "io/changed_file.hpp"
+#include "io/errors.hpp"
 #include "io/event_list.hpp"
 #include "io/files.hpp"
-#include "io/input_error.hpp"
 #include "io/provenance.hpp"
 #include "io/run_file.hpp"
 #include "io/scenario_run.hpp"

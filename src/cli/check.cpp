@@ -22,8 +22,8 @@
 
 #include "cli/commands.hpp"
 #include "cli/motion_check.hpp"
+#include "io/errors.hpp"
 #include "io/generator.hpp"
-#include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"

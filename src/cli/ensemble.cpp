@@ -18,7 +18,7 @@
 #include "cli/terminal_line.hpp"
 #include "io/ensemble_job.hpp"
 #include "io/ensemble_output.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/journal.hpp"
 
 namespace pendula::cli {

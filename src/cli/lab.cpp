@@ -7,8 +7,8 @@
 #include <variant>
 
 #include "cli/commands.hpp"
+#include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"

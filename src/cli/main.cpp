@@ -19,7 +19,7 @@
 #include "cli/help.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/manual_page.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/provenance.hpp"
 #include "io/scenario_schema.hpp"
 #include "io/summary.hpp"

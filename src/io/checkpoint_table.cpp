@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/changed_file.hpp"
+#include "io/errors.hpp"
 #include "io/fingerprint.hpp"
 
 namespace pendula::io {

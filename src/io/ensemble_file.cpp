@@ -14,10 +14,10 @@
 #include <variant>
 
 #include "io/ensemble_arrays.hpp"
+#include "io/errors.hpp"
 #include "io/files.hpp"
 #include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
-#include "io/output_error.hpp"
 
 namespace pendula::io {
 namespace {

@@ -8,10 +8,9 @@
 #include <system_error>
 #include <utility>
 
+#include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/input_error.hpp"
 #include "io/journal.hpp"
-#include "io/output_error.hpp"
 
 namespace pendula::io {
 

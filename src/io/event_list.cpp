@@ -6,7 +6,7 @@
 #include <sstream>
 #include <utility>
 
-#include "io/changed_file.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 namespace {

@@ -18,8 +18,7 @@
 #include <thread>
 #include <utility>
 
-#include "io/input_error.hpp"
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 namespace {

@@ -22,9 +22,9 @@
 #include <system_error>
 #include <utility>
 
+#include "io/errors.hpp"
 #include "io/files.hpp"
 #include "io/fingerprint.hpp"
-#include "io/input_error.hpp"
 
 namespace pendula::io {
 

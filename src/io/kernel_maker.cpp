@@ -10,8 +10,8 @@
 #include <pendula/run/library.hpp>
 #include <thread>
 
+#include "io/errors.hpp"
 #include "io/generator.hpp"
-#include "io/input_error.hpp"
 #include "io/kernel_file.hpp"
 #include "io/process.hpp"
 

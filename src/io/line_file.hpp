@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 

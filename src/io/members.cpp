@@ -10,7 +10,7 @@
 #include <variant>
 
 #include "io/ensemble_file.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/summary.hpp"
 

@@ -7,8 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/input_error.hpp"
 #include "io/nearest_name.hpp"
 #include "io/quantity_text.hpp"
 #include "io/shown.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "io/changed_file.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "io/changed_file.hpp"
+#include "io/errors.hpp"
 #include "io/fingerprint.hpp"
 #include "io/provenance.hpp"
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/provenance.hpp"
 #include "io/scenario_keys.hpp"
 

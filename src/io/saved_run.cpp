@@ -5,9 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "io/changed_file.hpp"
+#include "io/errors.hpp"
 #include "io/hdf5.hpp"
-#include "io/input_error.hpp"
 #include "io/process.hpp"
 
 namespace pendula::io {

@@ -21,9 +21,9 @@
 #include <variant>
 #include <vector>
 
+#include "io/errors.hpp"
 #include "io/event_reader.hpp"
 #include "io/feedback_reader.hpp"
-#include "io/input_error.hpp"
 #include "io/model_name.hpp"
 #include "io/natural_units.hpp"
 #include "io/own_columns.hpp"

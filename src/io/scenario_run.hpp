@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "io/errors.hpp"
 #include "io/event_reader.hpp"
-#include "io/input_error.hpp"
 #include "io/quantity_arrays.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/quantity_text.hpp"
 #include "io/scenario_keys.hpp"
 #include "io/shown.hpp"

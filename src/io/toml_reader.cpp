@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/nearest_name.hpp"
 #include "io/quantity_text.hpp"
 #include "io/scenario_keys.hpp"

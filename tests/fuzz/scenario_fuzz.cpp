@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "fuzz/whole_text.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/scenario_document.hpp"
 #include "io/scenario_run.hpp"
 
