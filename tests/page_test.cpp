@@ -17,7 +17,7 @@
 
 #include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/line_file.hpp"
+#include "io/trajectory.hpp"
 #include "view/encode.hpp"
 #include "view/kept_rows.hpp"
 #include "view/scene.hpp"

@@ -14,9 +14,9 @@
 #include "cli/interrupt.hpp"
 #include "cli/read_scenario.hpp"
 #include "io/files.hpp"
-#include "io/line_file.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
+#include "io/trajectory.hpp"
 
 namespace pendula::cli {
 namespace {

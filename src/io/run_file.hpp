@@ -15,9 +15,9 @@
 #include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/quantity_arrays.hpp"
-#include "io/rows_file.hpp"
 #include "io/run_origin.hpp"
 #include "io/saved_run.hpp"
+#include "io/trajectory.hpp"
 
 namespace pendula::io {
 
