@@ -28,7 +28,6 @@
 #include "io/run_source.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
-#include "io/signal_origin.hpp"
 #include "io/summary.hpp"
 #include "io/trajectory.hpp"
 #include "view/lab.hpp"
