@@ -7,7 +7,6 @@
 
 #include "cli/commands.hpp"
 #include "io/quantity_arrays.hpp"
-#include "io/run_origin.hpp"
 #include "io/run_source.hpp"
 #include "io/saved_run.hpp"
 #include "io/trajectory.hpp"

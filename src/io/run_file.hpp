@@ -9,13 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "io/checkpoint_table.hpp"
 #include "io/event_list.hpp"
 #include "io/files.hpp"
 #include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/quantity_arrays.hpp"
-#include "io/run_origin.hpp"
 #include "io/saved_run.hpp"
 #include "io/trajectory.hpp"
 
