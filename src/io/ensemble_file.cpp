@@ -16,8 +16,8 @@
 #include "io/ensemble_arrays.hpp"
 #include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
+#include "io/provenance.hpp"
 #include "io/quantity_arrays.hpp"
 
 namespace pendula::io {

@@ -14,7 +14,7 @@
 #include <system_error>
 
 #include "io/errors.hpp"
-#include "io/fingerprint.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {

@@ -9,10 +9,10 @@
 #include <system_error>
 
 #include "io/files.hpp"
-#include "io/fingerprint.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_file.hpp"
 #include "io/kernel_maker.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {

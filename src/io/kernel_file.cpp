@@ -24,7 +24,7 @@
 
 #include "io/errors.hpp"
 #include "io/files.hpp"
-#include "io/fingerprint.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 

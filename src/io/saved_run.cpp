@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "io/errors.hpp"
-#include "io/fingerprint.hpp"
 #include "io/hdf5.hpp"
 #include "io/process.hpp"
 #include "io/provenance.hpp"
