@@ -19,7 +19,7 @@
 #include "io/feedback_reader.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_cache.hpp"
-#include "io/kernel_maker.hpp"
+#include "io/kernel_file.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"
 

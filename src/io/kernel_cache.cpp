@@ -11,7 +11,6 @@
 #include "io/files.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_file.hpp"
-#include "io/kernel_maker.hpp"
 #include "io/provenance.hpp"
 
 namespace pendula::io {
