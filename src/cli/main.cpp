@@ -21,7 +21,7 @@
 #include "cli/manual_page.hpp"
 #include "io/errors.hpp"
 #include "io/provenance.hpp"
-#include "io/scenario_schema.hpp"
+#include "io/scenario_keys.hpp"
 #include "io/summary.hpp"
 
 namespace pendula::cli {

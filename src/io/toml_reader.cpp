@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/nearest_name.hpp"
 #include "io/quantity_text.hpp"
 #include "io/scenario_keys.hpp"
@@ -294,6 +295,18 @@ std::string counting_hint(std::string_view key) {
   return key.find("[0]") == std::string_view::npos ? "" : " (elements of arrays count from 1)";
 }
 
+/// Longest scenario that is read: ten numbers for each of `max_links` fit in.
+constexpr std::size_t max_text = std::size_t{256} << 20;
+
+[[noreturn]] void reject_file(const std::string& name, const std::string& why) {
+  throw InputError(name + ": expected a scenario file that can be read, got: " + why);
+}
+
+std::string checked(InputFile file, const std::string& name) {
+  if (!file.problem.empty()) reject_file(name, file.problem);
+  return std::move(file.text);
+}
+
 }  // namespace
 
 void apply_override(toml::table& root, const std::string& text) {
@@ -309,6 +322,12 @@ void apply_override(toml::table& root, const std::string& text) {
   if (given.empty()) return take_out(root, key, where);
   toml::table value = parse_value(given, where);
   put(root, key, *value.get("value"), where);
+}
+
+ScenarioText read_scenario_text(const std::filesystem::path& file) {
+  const std::string standard_input = "standard input";
+  if (file == "-") return {standard_input, checked(read_standard_input(max_text), standard_input)};
+  return {file.string(), checked(read_input_file(file, max_text), file.string())};
 }
 
 toml::table parse_toml(std::string_view text, std::string_view name, std::span<const std::string> overrides) {

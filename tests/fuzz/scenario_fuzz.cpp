@@ -10,7 +10,7 @@
 
 #include "fuzz/whole_text.hpp"
 #include "io/errors.hpp"
-#include "io/scenario_document.hpp"
+#include "io/members.hpp"
 #include "io/scenario_run.hpp"
 
 namespace pendula::io {
