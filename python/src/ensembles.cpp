@@ -27,7 +27,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "interruption.hpp"
-#include "io/ensemble_arrays.hpp"
+#include "io/ensemble_file.hpp"
 #include "io/ensemble_job.hpp"
 #include "io/ensemble_output.hpp"
 #include "io/journal.hpp"

@@ -1,3 +1,5 @@
+// Files, attributes, and data sets of text; those of numbers are in hdf5_rows.cpp.
+
 #include "io/hdf5.hpp"
 
 #include <fcntl.h>
@@ -8,6 +10,8 @@
 
 #include <array>
 #include <cerrno>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <numeric>
 
@@ -168,6 +172,113 @@ void attach_scale(const Handle& dataset, const Handle& scale, unsigned axis) {
 
 Handle open_dataset(const Handle& where, const std::string& name) {
   return {H5Dopen2(where.get(), name.c_str(), H5P_DEFAULT), H5Dclose};
+}
+
+Handle property_list(hid_t of) {
+  return {H5Pcreate(of), H5Pclose};
+}
+
+Handle text_type() {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  require(H5Tset_size(type.get(), H5T_VARIABLE));
+  require(H5Tset_cset(type.get(), H5T_CSET_UTF8));
+  return type;
+}
+
+Handle space_of(std::span<const hsize_t> extent, const hsize_t* most) {
+  return {H5Screate_simple(static_cast<int>(extent.size()), extent.data(), most), H5Sclose};
+}
+
+Handle single_space() {
+  return {H5Screate(H5S_SCALAR), H5Sclose};
+}
+
+hid_t stored_as(Type type) {
+  return type == Type::real ? H5T_IEEE_F64LE : type == Type::whole ? H5T_STD_I64LE : H5T_STD_I8LE;
+}
+
+void set_fill(const Handle& properties, Type type) {
+  const double none = std::nan("");
+  const std::int64_t no_count = -1;
+  require(type == Type::real ? H5Pset_fill_value(properties.get(), H5T_NATIVE_DOUBLE, &none)
+                             : H5Pset_fill_value(properties.get(), H5T_NATIVE_INT64, &no_count));
+}
+
+std::string taken(char* text) {
+  std::string copy(text == nullptr ? "" : text);
+  H5free_memory(text);
+  return copy;
+}
+
+Handle create_dataset(const Handle& where, const std::string& name, hid_t type, const Handle& space,
+                      const Handle& properties) {
+  const hid_t chosen = properties.get() < 0 ? H5P_DEFAULT : properties.get();
+  return {H5Dcreate2(where.get(), name.c_str(), type, space.get(), H5P_DEFAULT, chosen, H5P_DEFAULT), H5Dclose};
+}
+
+namespace {
+
+/// Replaces an attribute of the same name.
+Handle create_attribute(const Handle& object, const std::string& name, hid_t type, const Handle& space) {
+  if (H5Aexists(object.get(), name.c_str()) > 0) require(H5Adelete(object.get(), name.c_str()));
+  return {H5Acreate2(object.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+}
+
+}  // namespace
+
+void write_attribute(const Handle& object, const std::string& name, const std::string& text) {
+  const Handle type = text_type();
+  const char* const begin = text.c_str();
+  const Handle attribute = create_attribute(object, name, type.get(), single_space());
+  require(H5Awrite(attribute.get(), type.get(), &begin));
+}
+
+void write_attribute(const Handle& object, const std::string& name, std::int64_t number) {
+  const Handle attribute = create_attribute(object, name, H5T_STD_I64LE, single_space());
+  require(H5Awrite(attribute.get(), H5T_NATIVE_INT64, &number));
+}
+
+bool has_attribute(const Handle& object, const std::string& name) {
+  return H5Aexists(object.get(), name.c_str()) > 0;
+}
+
+std::string read_attribute(const Handle& object, const std::string& name) {
+  const Handle attribute(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
+  char* text = nullptr;
+  require(H5Aread(attribute.get(), text_type().get(), &text));
+  return taken(text);
+}
+
+std::int64_t read_number(const Handle& object, const std::string& name) {
+  const Handle attribute(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
+  std::int64_t number = 0;
+  require(H5Aread(attribute.get(), H5T_NATIVE_INT64, &number));
+  return number;
+}
+
+void write_text(const Handle& where, const std::string& name, const std::string& text) {
+  const Handle type = text_type(), space = single_space();
+  const Handle dataset = create_dataset(where, name, type.get(), space);
+  const char* const begin = text.c_str();
+  require(H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &begin));
+}
+
+std::string read_text(const Handle& where, const std::string& name) {
+  const Handle dataset = open_dataset(where, name);
+  char* text = nullptr;
+  require(H5Dread(dataset.get(), text_type().get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &text));
+  return taken(text);
+}
+
+void write_flags(const Handle& array, Type type, int first, std::span<const std::string> meanings) {
+  std::vector<int> values(meanings.size());
+  std::iota(values.begin(), values.end(), first);
+  std::string words;
+  for (const std::string& meaning : meanings) words += (words.empty() ? "" : " ") + meaning;
+  const std::array<hsize_t, 1> extent{values.size()};
+  const Handle attribute = create_attribute(array, "flag_values", stored_as(type), space_of(extent));
+  require(H5Awrite(attribute.get(), H5T_NATIVE_INT, values.data()));
+  write_attribute(array, "flag_meanings", words);
 }
 
 }  // namespace pendula::io::hdf5
