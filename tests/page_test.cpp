@@ -19,7 +19,6 @@
 #include "io/files.hpp"
 #include "io/trajectory.hpp"
 #include "view/encode.hpp"
-#include "view/kept_rows.hpp"
 #include "view/scene.hpp"
 
 namespace pendula::view {

@@ -18,7 +18,6 @@
 #include "cli/completion.hpp"
 #include "cli/help.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/manual_page.hpp"
 #include "io/errors.hpp"
 #include "io/provenance.hpp"
 #include "io/scenario_keys.hpp"
