@@ -11,7 +11,7 @@
 #include "io/errors.hpp"
 #include "io/provenance.hpp"
 #include "io/scenario_keys.hpp"
-#include "io/shown.hpp"
+#include "io/section.hpp"
 #include "io/toml_reader.hpp"
 
 namespace pendula::io {

@@ -16,7 +16,7 @@
 #include "io/files.hpp"
 #include "io/nearest_name.hpp"
 #include "io/quantity_text.hpp"
-#include "io/shown.hpp"
+#include "io/section.hpp"
 
 namespace pendula::io {
 namespace {

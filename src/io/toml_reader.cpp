@@ -17,7 +17,7 @@
 #include "io/nearest_name.hpp"
 #include "io/quantity_text.hpp"
 #include "io/scenario_keys.hpp"
-#include "io/shown.hpp"
+#include "io/section.hpp"
 
 namespace pendula::io {
 namespace {
