@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <pendula/run/checkpoint.hpp>
 #include <pendula/run/observer.hpp>
 #include <string>
 #include <vector>

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <pendula/run/checkpoint.hpp>
+#include <pendula/run/observer.hpp>
 #include <string>
 #include <vector>
 
