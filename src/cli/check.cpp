@@ -11,9 +11,8 @@
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/kernel_checks.hpp>
 #include <pendula/system/kernel_comparison.hpp>
-#include <pendula/system/kernel_widths.hpp>
-#include <pendula/system/series_check.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
