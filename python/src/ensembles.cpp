@@ -31,7 +31,7 @@
 #include "io/ensemble_job.hpp"
 #include "io/ensemble_output.hpp"
 #include "io/journal.hpp"
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "prepared.hpp"
 #include "toolchain.hpp"
 

@@ -15,9 +15,9 @@
 
 #include "bindings.hpp"
 #include "io/errors.hpp"
-#include "io/event_list.hpp"
 #include "io/files.hpp"
 #include "io/provenance.hpp"
+#include "io/run_arrays.hpp"
 #include "io/run_file.hpp"
 #include "io/scenario_run.hpp"
 #include "io/trajectory.hpp"

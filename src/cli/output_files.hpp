@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cli/commands.hpp"
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "io/run_source.hpp"
 #include "io/saved_run.hpp"
 #include "io/trajectory.hpp"

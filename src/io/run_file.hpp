@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "io/event_list.hpp"
 #include "io/files.hpp"
 #include "io/hdf5.hpp"
 #include "io/provenance.hpp"
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "io/saved_run.hpp"
 #include "io/trajectory.hpp"
 

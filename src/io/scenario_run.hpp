@@ -14,7 +14,7 @@
 
 #include "io/errors.hpp"
 #include "io/event_reader.hpp"
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"
 
