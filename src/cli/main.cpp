@@ -15,7 +15,6 @@
 
 #include "cli/command_line.hpp"
 #include "cli/commands.hpp"
-#include "cli/completion.hpp"
 #include "cli/help.hpp"
 #include "cli/interrupt.hpp"
 #include "io/errors.hpp"
