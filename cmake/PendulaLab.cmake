@@ -33,7 +33,7 @@ function(_pendula_lab_module compiler out_module)
   file(GLOB sources CONFIGURE_DEPENDS "${source}/lab/*.cpp" "${source}/front/*.cpp" "${source}/pendula/run/*.cpp")
   list(FILTER sources EXCLUDE REGEX "/(front/propagate|front/derivatives|run/library|run/feedback|run/derivatives)\\.cpp$")
   foreach(name IN ITEMS pendula/system/interpreted_kernel pendula/system/kernel_text library/interpreter
-                        library/orthonormal io/line_file io/output_error io/trajectory)
+                        library/orthonormal io/errors io/trajectory)
     list(APPEND sources "${source}/${name}.cpp")
   endforeach()
 

@@ -2,7 +2,7 @@
 // tells: with the parameters and in the states that `pendula check` draws.
 
 #include <cmath>
-#include <pendula/system/kernel_widths.hpp>
+#include <pendula/system/kernel_checks.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <vector>
 

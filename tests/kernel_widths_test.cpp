@@ -5,9 +5,8 @@
 #include <cstddef>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/kernels/spatial_1.hpp>
+#include <pendula/system/kernel_checks.hpp>
 #include <pendula/system/kernel_table.hpp>
-#include <pendula/system/kernel_widths.hpp>
-#include <pendula/system/series_check.hpp>
 #include <pendula/system/series_info.hpp>
 #include <utility>
 

@@ -15,11 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "io/input_error.hpp"
-#include "io/line_file.hpp"
-#include "io/whole_file.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
+#include "io/trajectory.hpp"
 #include "view/encode.hpp"
-#include "view/kept_rows.hpp"
 #include "view/scene.hpp"
 
 namespace pendula::view {

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <pendula/chain/chain_numbers.hpp>
-#include <pendula/gauss/prediction_depth.hpp>
+#include <pendula/gauss/step_prediction.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 namespace {

@@ -228,7 +228,7 @@ def _binary(runtime: Runtime, files: Sequence[str], folder: str) -> bytes:
     for file in files:
         compile_to(f"{file}.o", "-std=c99", f"-I{runtime.headers}", file)
     if runtime.kernel:
-        for width in (1, 2, 4, 8):  # as kernels of models are compiled (src/io/kernel_maker.cpp)
+        for width in (1, 2, 4, 8):  # as kernels of models are compiled (src/io/kernel_file.cpp)
             fast = ("-ffp-contract=fast", "-fno-math-errno", "-w")
             compile_to(f"kernel_{width}.o", *fast, f"-DWIDTHS={width}", "kernel.c")
     _run(commands, folder)

@@ -6,7 +6,7 @@
 
 #include <exception>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/kernel_cache.hpp"
 
 namespace nb = nanobind;

@@ -20,8 +20,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "interruption.hpp"
+#include "io/errors.hpp"
 #include "io/expression.hpp"
-#include "io/input_error.hpp"
 #include "io/row_slopes.hpp"
 #include "prepared.hpp"
 

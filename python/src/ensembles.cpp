@@ -27,11 +27,11 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "interruption.hpp"
-#include "io/ensemble_arrays.hpp"
+#include "io/ensemble_file.hpp"
 #include "io/ensemble_job.hpp"
 #include "io/ensemble_output.hpp"
 #include "io/journal.hpp"
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "prepared.hpp"
 #include "toolchain.hpp"
 

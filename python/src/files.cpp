@@ -14,11 +14,10 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "io/changed_file.hpp"
-#include "io/event_list.hpp"
-#include "io/file_format.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/provenance.hpp"
+#include "io/run_arrays.hpp"
 #include "io/run_file.hpp"
 #include "io/scenario_run.hpp"
 #include "io/trajectory.hpp"

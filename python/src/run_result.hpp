@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "io/run_source.hpp"
 #include "io/saved_run.hpp"
 #include "prepared.hpp"

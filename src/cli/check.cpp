@@ -11,9 +11,8 @@
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/kernel_checks.hpp>
 #include <pendula/system/kernel_comparison.hpp>
-#include <pendula/system/kernel_widths.hpp>
-#include <pendula/system/series_check.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,8 +21,8 @@
 
 #include "cli/commands.hpp"
 #include "cli/motion_check.hpp"
+#include "io/errors.hpp"
 #include "io/generator.hpp"
-#include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "cli/help.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/nearest_name.hpp"
 
 namespace pendula::cli {

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -94,5 +95,15 @@ std::string likely_meant(const CLI::App& app, const std::string& word);
 
 /// Throws io::InputError on `--set KEY VALUE`, which is one word, KEY=VALUE.
 void require_one_word(const std::vector<std::string>& words);
+
+/// `pendula completion --words WORD...` is how the scripts of shells ask.
+inline constexpr std::string_view candidates_flag = "--words";
+
+/// Candidates for the last of the words after `pendula`, a line each, some with a tab and a description; or `:files`
+/// and the endings of files.
+std::string candidates(const CommandLine& line, std::span<const std::string> words);
+
+/// A script for bash, zsh or fish that asks the program for candidates.
+std::string completion_script(std::string_view shell);
 
 }  // namespace pendula::cli

@@ -1,10 +1,9 @@
-#include "cli/completion.hpp"
+#include "cli/command_line.hpp"
 
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
-#include "cli/command_line.hpp"
 #include "cli/help.hpp"
 
 namespace pendula::cli {

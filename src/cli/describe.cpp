@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "io/errors.hpp"
 #include "io/generator.hpp"
-#include "io/input_error.hpp"
 #include "io/toolchain.hpp"
 
 namespace pendula::cli {

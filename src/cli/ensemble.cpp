@@ -14,11 +14,11 @@
 
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/progress.hpp"
 #include "cli/ranks.hpp"
-#include "cli/terminal_line.hpp"
 #include "io/ensemble_job.hpp"
 #include "io/ensemble_output.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/journal.hpp"
 
 namespace pendula::cli {

@@ -15,11 +15,11 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "io/errors.hpp"
 #include "io/feedback_reader.hpp"
 #include "io/generator.hpp"
-#include "io/input_error.hpp"
 #include "io/kernel_cache.hpp"
-#include "io/kernel_maker.hpp"
+#include "io/kernel_file.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"
 

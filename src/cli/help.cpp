@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "cli/command_line.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/summary.hpp"
 
 namespace pendula::cli {

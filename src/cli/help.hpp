@@ -61,4 +61,9 @@ std::string scenario_help();
 /// All keys of summaries.
 std::string summary_help();
 
+struct CommandLine;
+
+/// The manual page pendula(1), in the macros of man(7).
+std::string manual_page(const CommandLine& line);
+
 }  // namespace pendula::cli

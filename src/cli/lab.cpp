@@ -7,11 +7,11 @@
 #include <variant>
 
 #include "cli/commands.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/kernel_cache.hpp"
 #include "io/scenario.hpp"
 #include "io/toolchain.hpp"
-#include "io/whole_file.hpp"
 #include "view/lab.hpp"
 #include "view/scenario_scene.hpp"
 

@@ -22,7 +22,7 @@
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/read_scenario.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/row_slopes.hpp"
 #include "io/scenario_run.hpp"
 

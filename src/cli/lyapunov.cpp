@@ -13,10 +13,10 @@
 #include "cli/commands.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/read_scenario.hpp"
-#include "io/file_format.hpp"
-#include "io/line_file.hpp"
+#include "io/files.hpp"
 #include "io/scenario.hpp"
 #include "io/scenario_run.hpp"
+#include "io/trajectory.hpp"
 
 namespace pendula::cli {
 namespace {

@@ -15,13 +15,11 @@
 
 #include "cli/command_line.hpp"
 #include "cli/commands.hpp"
-#include "cli/completion.hpp"
 #include "cli/help.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/manual_page.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/provenance.hpp"
-#include "io/scenario_schema.hpp"
+#include "io/scenario_keys.hpp"
 #include "io/summary.hpp"
 
 namespace pendula::cli {

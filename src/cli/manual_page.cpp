@@ -1,11 +1,10 @@
-#include "cli/manual_page.hpp"
+#include "cli/help.hpp"
 
 #include <algorithm>
 #include <pendula/version.hpp>
 #include <string_view>
 
 #include "cli/command_line.hpp"
-#include "cli/help.hpp"
 
 namespace pendula::cli {
 namespace {

@@ -7,7 +7,7 @@
 #include <iostream>
 
 #include "cli/commands.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/kernel_cache.hpp"
 
 namespace pendula::cli {

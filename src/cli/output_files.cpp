@@ -5,8 +5,8 @@
 #include <iostream>
 #include <system_error>
 
-#include "io/file_format.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/run_file.hpp"
 #include "io/trajectory.hpp"
 

@@ -6,12 +6,10 @@
 #include <string>
 
 #include "cli/commands.hpp"
-#include "io/event_file.hpp"
-#include "io/quantity_arrays.hpp"
-#include "io/rows_file.hpp"
-#include "io/run_origin.hpp"
+#include "io/run_arrays.hpp"
 #include "io/run_source.hpp"
 #include "io/saved_run.hpp"
+#include "io/trajectory.hpp"
 #include "view/page.hpp"
 #include "view/scene.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/commands.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/process.hpp"
 #include "io/toolchain.hpp"
 

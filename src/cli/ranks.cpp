@@ -10,7 +10,7 @@
 
 #include <mutex>
 #else
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #endif
 
 namespace pendula::cli {

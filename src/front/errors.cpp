@@ -6,8 +6,7 @@
 #include <new>
 #include <pendula/run/no_kernel.hpp>
 
-#include "io/input_error.hpp"
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::front {
 namespace {

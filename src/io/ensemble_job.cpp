@@ -8,7 +8,7 @@
 #include <utility>
 #include <variant>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/provenance.hpp"
 
 namespace pendula::io {

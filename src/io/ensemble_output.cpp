@@ -8,11 +8,9 @@
 #include <system_error>
 #include <utility>
 
-#include "io/file_format.hpp"
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/journal.hpp"
-#include "io/link_target.hpp"
-#include "io/output_error.hpp"
 
 namespace pendula::io {
 

@@ -10,7 +10,7 @@
 #include <span>
 #include <string_view>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/section.hpp"
 
 namespace pendula::io {

@@ -6,8 +6,8 @@
 #include <pendula/numeric/number_text.hpp>
 #include <string_view>
 
+#include "io/errors.hpp"
 #include "io/expression.hpp"
-#include "io/input_error.hpp"
 #include "io/row_function.hpp"
 
 namespace pendula::io {

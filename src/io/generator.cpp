@@ -9,8 +9,8 @@
 #include <system_error>
 #include <utility>
 
-#include "io/input_error.hpp"
-#include "io/input_file.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/nearest_name.hpp"
 #include "io/process.hpp"
 

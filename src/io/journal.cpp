@@ -13,9 +13,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "io/fingerprint.hpp"
-#include "io/input_error.hpp"
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <pendula/run/quantity.hpp>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 namespace {

@@ -8,11 +8,10 @@
 #include <pendula/version.hpp>
 #include <system_error>
 
-#include "io/fingerprint.hpp"
+#include "io/files.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_file.hpp"
-#include "io/kernel_maker.hpp"
-#include "io/trusted_folder.hpp"
+#include "io/provenance.hpp"
 
 namespace pendula::io {
 namespace {

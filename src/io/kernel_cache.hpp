@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/model_name.hpp"
 #include "io/toolchain.hpp"
 

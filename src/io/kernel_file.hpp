@@ -1,17 +1,36 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <pendula/system/system_table.hpp>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "io/toolchain.hpp"
 
-/// Files of kernels. They end in a hash, so that a damaged kernel is not run.
+/// Files of kernels of models: the generator derives them, and a compiler or LLVM compiles them, or they are
+/// interpreted. They end in a hash, so that a damaged kernel is not run. Failures throw ModelError.
 namespace pendula::io {
 
 /// Extensions of their names: a shared object, an object file by LLVM, or a program for the interpreter.
 inline constexpr const char *compiled_kernel = ".so", *llvm_kernel = ".o", *interpreted_kernel = ".program";
+
+/// The extension of kernels that are made here, as the environment asks. Fails if it asks for something unknown.
+const char* kind_of_kernels(const Toolchain& toolchain);
+
+/// Compiler flags for code that runs on every processor that this build does.
+std::vector<std::string> flags_of_least_set();
+
+/// A description of such kernels.
+std::string how_made(std::string_view kind, const Toolchain& toolchain);
+
+/// Makes a kernel in `folder` by the generator with these arguments; calls derived() once that is done. Returns its
+/// file.
+std::filesystem::path make_kernel(std::string_view kind, const std::string& name, std::vector<std::string> arguments,
+                                  const std::filesystem::path& folder, const Toolchain& toolchain,
+                                  const std::function<void()>& derived);
 
 /// Appends the hash, and lets nobody but the owner write. Throws ModelError if the file cannot be written.
 void seal_kernel(const std::filesystem::path& file);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <toml++/toml.h>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -12,7 +13,9 @@
 #include <pendula/ensemble/run_members.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/system/system_table.hpp>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,11 +24,33 @@
 #include "io/journal.hpp"
 #include "io/kept.hpp"
 #include "io/scenario.hpp"
-#include "io/scenario_document.hpp"
 #include "io/scenario_run.hpp"
 #include "io/toolchain.hpp"
 
 namespace pendula::io {
+
+/// A scenario with [ensemble] that is parsed once and read many times with other numbers.
+class ScenarioDocument {
+ public:
+  /// Throws InputError as parse_scenario, and where there is no [ensemble].
+  ScenarioDocument(std::string_view text, std::string_view name, std::span<const std::string> overrides);
+
+  const EnsemblePlan& plan() const { return plan_; }
+
+  /// Whether it starts with momenta, of which rates are made by the mass matrix at the coordinates.
+  bool starts_with_momenta() const;
+
+  /// The scenario with further overrides. An InputError names these; lines of the file only where there are none.
+  AnyScenario with(std::span<const std::string> overrides, const FindSystem& find) const;
+  /// The scenario with numbers[k] as the value of keys[k]. Neither it nor the InputError that it throws knows places in
+  /// the file.
+  AnyScenario with(std::span<const std::string> keys, std::span<const double> numbers, const FindSystem& find) const;
+
+ private:
+  std::string name_;
+  toml::table root_;  // without [ensemble], which may list every member
+  EnsemblePlan plan_;
+};
 
 /// Thrown when a member is stopped.
 struct Interrupted {};

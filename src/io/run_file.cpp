@@ -12,9 +12,8 @@
 #include <system_error>
 #include <utility>
 
-#include "io/changed_file.hpp"
-#include "io/link_target.hpp"
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 
 namespace pendula::io {
 namespace {

@@ -4,20 +4,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <pendula/run/checkpoint.hpp>
 #include <pendula/run/observer.hpp>
 #include <string>
 #include <vector>
 
-#include "io/checkpoint_table.hpp"
-#include "io/event_list.hpp"
-#include "io/file_lock.hpp"
-#include "io/fingerprint.hpp"
+#include "io/files.hpp"
 #include "io/hdf5.hpp"
-#include "io/quantity_arrays.hpp"
-#include "io/rows_file.hpp"
-#include "io/run_origin.hpp"
+#include "io/provenance.hpp"
+#include "io/run_arrays.hpp"
 #include "io/saved_run.hpp"
+#include "io/trajectory.hpp"
 
 namespace pendula::io {
 

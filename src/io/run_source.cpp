@@ -8,9 +8,11 @@
 #include <string_view>
 #include <system_error>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/provenance.hpp"
 #include "io/scenario_keys.hpp"
+#include "io/section.hpp"
+#include "io/toml_reader.hpp"
 
 namespace pendula::io {
 namespace {
@@ -48,6 +50,13 @@ void require_same_solver(const RunOrigin& began, const RunOrigin& here) {
   };
   throw InputError(began.scenario_name + ": the run began by " + told(began) + ", and this build would go on by " +
                    told(here) + ": go on with a build that has the same kernels");
+}
+
+/// In TOML, where 1e300 and 1 are numbers as they are.
+std::string array_of(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double number : numbers) text += (text.empty() ? "[" : ", ") + shortest(number);
+  return text + "]";
 }
 
 }  // namespace
@@ -108,6 +117,21 @@ std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end) {
   if (checkpoint.time <= end) return checkpoint;
   throw InputError("run.duration: expected at least " + shortest(checkpoint.time) + ", where the run is already, got " +
                    shortest(end));
+}
+
+std::vector<std::string> overrides_with_numbers(const RunSource& source, const std::vector<SignalPlan>& signals) {
+  std::vector<std::string> overrides = source.overrides;
+  if (signals.empty()) return overrides;
+  const toml::table document = parse_toml(source.text.text, source.text.name, source.overrides);
+  const std::string kind = document.contains("system") ? "system" : "chain";
+  for (std::size_t k = 0; k < signals.size(); ++k) {
+    if (!document[kind]["signal"][k]["file"]) continue;
+    const SignalPlan& plan = signals[k];
+    overrides.push_back(kind + ".signal[" + std::to_string(k + 1) + "]={input=" + toml_string(plan.input) +
+                        ", hold=" + (plan.signal.is_held ? "true" : "false") +
+                        ", times=" + array_of(plan.signal.times) + ", values=" + array_of(plan.signal.values) + "}");
+  }
+  return overrides;
 }
 
 }  // namespace pendula::io

@@ -34,6 +34,9 @@ std::filesystem::path model_folder(const std::string& run_file, const std::strin
 RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
                     const std::string& command, const std::string& title);
 
+/// The overrides of a run, and those that put numbers in place of the files of its signals: a run file needs no other.
+std::vector<std::string> overrides_with_numbers(const RunSource& source, const std::vector<SignalPlan>& signals);
+
 /// The checkpoint to resume from, for a checked scenario. Throws InputError if the scenario ends before it.
 std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end);
 

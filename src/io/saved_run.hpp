@@ -1,14 +1,70 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
-#include <pendula/run/checkpoint.hpp>
+#include <pendula/run/observer.hpp>
 #include <string>
+#include <vector>
 
-#include "io/checkpoint_table.hpp"
-#include "io/run_origin.hpp"
+#include "io/hdf5.hpp"
 
 namespace pendula::io {
+
+/// Where the numbers of a run file come from: program, command, scenario, model.
+struct RunOrigin {
+  std::string version;                 ///< of pendula
+  std::string instruction_set;         ///< of the library that ran it
+  std::string solver, kernel;          ///< as in a summary; may be empty
+  std::string title;                   ///< one line
+  std::string command;                 ///< the present command
+  std::string history;                 ///< earlier commands, a line each
+  std::string scenario_name;           ///< public name of its file
+  std::string scenario;                ///< its text
+  std::vector<std::string> overrides;  ///< `key.path=value`
+  std::string model;                   ///< text of the model's file; empty where there is none
+};
+
+/// Writes it into a new file. Returns the group `run`.
+hdf5::Handle write_origin(const hdf5::Handle& file, const RunOrigin& origin);
+
+/// Reads it from a file and its group `run`. Throws ChangedFile, hdf5::Error, nlohmann::json::exception.
+RunOrigin read_origin(const hdf5::Handle& file, const hdf5::Handle& run);
+
+/// Throws ChangedFile unless it matches its checksum.
+void require_written(const RunOrigin& origin, const hdf5::Handle& run);
+
+/// How many events a run file had at a checkpoint, and checksums of its rows and events.
+struct RunSoFar {
+  std::size_t events = 0;
+  double rows_check = 0, events_check = 0;  ///< checksums
+};
+
+/// A checkpoint as it stands in a run file.
+struct KeptCheckpoint {
+  Checkpoint checkpoint;
+  std::optional<RunSoFar> so_far;  ///< older files have none
+};
+
+/// The newest intact checkpoint in the group `run` that needs at most `rows` rows; empty if there is none. Throws
+/// ChangedFile.
+std::optional<KeptCheckpoint> last_checkpoint(const hdf5::Handle& run, double rows);
+
+/// The table of checkpoints in a run file. It has two rows, written in turn, so that one is always intact.
+class CheckpointTable {
+ public:
+  /// Makes the table in the group `run`; all checkpoints have the size of this one.
+  void create(const hdf5::Handle& run, const Checkpoint& checkpoint);
+  bool is_there() const { return table_.get() >= 0; }
+  void write(const Checkpoint& checkpoint, const RunSoFar& so_far);
+  void close() { table_.close(); }
+  void abandon() { table_.abandon(); }
+
+ private:
+  hdf5::Handle table_;
+  std::uint64_t serial_ = 0;  // number of the last checkpoint
+};
 
 /// A run to resume, as read from its file.
 struct SavedRun {

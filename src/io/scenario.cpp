@@ -9,11 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/input_file.hpp"
-#include "io/scenario_document.hpp"
 #include "io/section.hpp"
 #include "io/system_reader.hpp"
-#include "io/toml_reader.hpp"
 
 namespace pendula::io {
 namespace {
@@ -374,18 +371,6 @@ Scenario<Space> read(Sections& sections, const std::filesystem::path& folder) {
   return scenario;
 }
 
-/// Longest scenario that is read: ten numbers for each of `max_links` fit in.
-constexpr std::size_t max_text = std::size_t{256} << 20;
-
-[[noreturn]] void reject_file(const std::string& name, const std::string& why) {
-  throw InputError(name + ": expected a scenario file that can be read, got: " + why);
-}
-
-std::string checked(InputFile file, const std::string& name) {
-  if (!file.problem.empty()) reject_file(name, file.problem);
-  return std::move(file.text);
-}
-
 }  // namespace
 
 AnyScenario read_document(const toml::table& document, std::string_view name, const FindSystem& find) {
@@ -397,20 +382,13 @@ AnyScenario read_document(const toml::table& document, std::string_view name, co
     return scenario;
   }
   Sections sections(document);
-  const Entry space = sections.chain.require("space");
-  if (space.choice() == 0) return read<Planar>(sections, folder);
+  if (sections.chain.require("space").choice() == 0) return read<Planar>(sections, folder);
   return read<Spatial>(sections, folder);
 }
 
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides,
                            const FindSystem& find) {
   return read_document(parse_toml(text, name, overrides), name, find);
-}
-
-ScenarioText read_scenario_text(const std::filesystem::path& file) {
-  const std::string standard_input = "standard input";
-  if (file == "-") return {standard_input, checked(read_standard_input(max_text), standard_input)};
-  return {file.string(), checked(read_input_file(file, max_text), file.string())};
 }
 
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides,

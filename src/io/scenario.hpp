@@ -21,13 +21,14 @@
 #include <variant>
 #include <vector>
 
+#include "io/errors.hpp"
 #include "io/event_reader.hpp"
 #include "io/feedback_reader.hpp"
-#include "io/input_error.hpp"
 #include "io/model_name.hpp"
 #include "io/natural_units.hpp"
 #include "io/own_columns.hpp"
 #include "io/signal_reader.hpp"
+#include "io/toml_reader.hpp"
 
 namespace pendula::io {
 
@@ -85,13 +86,8 @@ std::shared_ptr<const SystemTable> built_in_system(const ModelName& model);
 AnyScenario parse_scenario(std::string_view text, std::string_view name, std::span<const std::string> overrides = {},
                            const FindSystem& find = built_in_system);
 
-/// The text of a scenario, and the name of its file in messages.
-struct ScenarioText {
-  std::string name, text;
-};
-
-/// Reads a file, "-" being standard input. Throws InputError where it cannot be read.
-ScenarioText read_scenario_text(const std::filesystem::path& file);
+/// Reads a scenario from its document. Throws InputError.
+AnyScenario read_document(const toml::table& document, std::string_view name, const FindSystem& find);
 
 /// Reads a scenario from a file; "-" is standard input. Throws InputError, too, if the file cannot be read.
 AnyScenario read_scenario(const std::filesystem::path& file, std::span<const std::string> overrides = {},

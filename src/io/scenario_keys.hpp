@@ -94,4 +94,7 @@ std::string default_text(const ScenarioKey& key);
 /// A description of its values: `a number > 0, or one a link`.
 std::string type_text(const ScenarioKey& key);
 
+/// The JSON Schema of scenarios, for editors and for the tests of docs/reference/scenario.md.
+std::string scenario_schema();
+
 }  // namespace pendula::io

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "io/errors.hpp"
 #include "io/event_reader.hpp"
-#include "io/input_error.hpp"
-#include "io/quantity_arrays.hpp"
+#include "io/run_arrays.hpp"
 #include "io/scenario.hpp"
 #include "io/summary.hpp"
 

@@ -1,9 +1,7 @@
-#include "io/scenario_schema.hpp"
+#include "io/scenario_keys.hpp"
 
 #include <nlohmann/json.hpp>
 #include <variant>
-
-#include "io/scenario_keys.hpp"
 
 namespace pendula::io {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 #include <memory>
-#include <pendula/run/signal.hpp>
+#include <pendula/run/inputs.hpp>
 #include <pendula/run/subject.hpp>
 #include <string>
 #include <vector>

@@ -9,7 +9,7 @@
 #include <pendula/version.hpp>
 #include <string_view>
 
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
 
 namespace pendula::io {
 namespace {

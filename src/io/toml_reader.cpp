@@ -12,15 +12,78 @@
 #include <utility>
 #include <vector>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
+#include "io/files.hpp"
 #include "io/nearest_name.hpp"
 #include "io/quantity_text.hpp"
 #include "io/scenario_keys.hpp"
-#include "io/shown.hpp"
-#include "io/toml_nesting.hpp"
+#include "io/section.hpp"
 
 namespace pendula::io {
 namespace {
+
+/// Greatest depth of nested keys and values; a scenario needs four.
+constexpr int max_nesting = 16;
+
+/// One past the last quote of the string that begins at `begin`; the end of the text if it does not end.
+std::size_t string_end(std::string_view text, std::size_t begin) {
+  const char quote = text[begin];
+  const std::string_view three = text.substr(begin, 3);
+  const bool multi_line = three.size() == 3 && three[1] == quote && three[2] == quote;
+  for (std::size_t i = begin + (multi_line ? 3 : 1); i < text.size(); ++i) {
+    if (text[i] == '\\' && quote == '"') {
+      ++i;  // an escaped character does not end the string
+    } else if (multi_line && text.substr(i, 3) == three) {
+      return i + 3;
+    } else if (!multi_line && (text[i] == quote || text[i] == '\n')) {
+      return i + (text[i] == quote ? 1 : 0);
+    }
+  }
+  return text.size();
+}
+
+/// The first line, from 1, of TOML text in which a key has more than `max_nesting` parts, or a value is nested deeper;
+/// 0 if there is none. To be asked before parsing: a recursive parser would exhaust the stack on such text.
+int line_nested_too_deep(std::string_view text) {
+  int depth = 0, dots = 0, line = 1;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    switch (text[i]) {
+      case '#':
+        i = std::min(text.find('\n', i), text.size()) - 1;
+        break;
+      case '"':
+      case '\'': {
+        const std::size_t end = string_end(text, i);
+        line += static_cast<int>(std::ranges::count(text.substr(i, end - i), '\n'));
+        i = end - 1;
+        break;
+      }
+      case '[':
+      case '{':
+        ++depth;
+        dots = 0;
+        break;
+      case ']':
+      case '}':
+        depth = std::max(depth - 1, 0);
+        break;
+      case '.':
+        ++dots;
+        break;
+      case '\n':
+        ++line;
+        [[fallthrough]];
+      case '=':
+      case ',':
+        dots = 0;
+        break;
+      default:
+        break;
+    }
+    if (depth > max_nesting || dots >= max_nesting) return line;
+  }
+  return 0;
+}
 
 bool is_key_character(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
@@ -232,6 +295,18 @@ std::string counting_hint(std::string_view key) {
   return key.find("[0]") == std::string_view::npos ? "" : " (elements of arrays count from 1)";
 }
 
+/// Longest scenario that is read: ten numbers for each of `max_links` fit in.
+constexpr std::size_t max_text = std::size_t{256} << 20;
+
+[[noreturn]] void reject_file(const std::string& name, const std::string& why) {
+  throw InputError(name + ": expected a scenario file that can be read, got: " + why);
+}
+
+std::string checked(InputFile file, const std::string& name) {
+  if (!file.problem.empty()) reject_file(name, file.problem);
+  return std::move(file.text);
+}
+
 }  // namespace
 
 void apply_override(toml::table& root, const std::string& text) {
@@ -247,6 +322,12 @@ void apply_override(toml::table& root, const std::string& text) {
   if (given.empty()) return take_out(root, key, where);
   toml::table value = parse_value(given, where);
   put(root, key, *value.get("value"), where);
+}
+
+ScenarioText read_scenario_text(const std::filesystem::path& file) {
+  const std::string standard_input = "standard input";
+  if (file == "-") return {standard_input, checked(read_standard_input(max_text), standard_input)};
+  return {file.string(), checked(read_input_file(file, max_text), file.string())};
 }
 
 toml::table parse_toml(std::string_view text, std::string_view name, std::span<const std::string> overrides) {

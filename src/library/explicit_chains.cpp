@@ -4,7 +4,6 @@
 #include <pendula/explicit/single_integrator.hpp>
 
 #include "library/explicit_methods.hpp"
-#include "library/taylor_integrator.hpp"
 
 namespace pendula {
 namespace {

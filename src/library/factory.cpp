@@ -9,7 +9,6 @@
 #include "library/chain_integrator.hpp"
 #include "library/explicit_methods.hpp"
 #include "library/solver_choice.hpp"
-#include "library/system_integrator.hpp"
 
 namespace pendula {
 namespace {

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/ensemble/member_queue.hpp>
 #include <pendula/ensemble/plain_queue.hpp>
 #include <vector>
 
-#include "library/chain_lanes.hpp"
+#include "library/lanes.hpp"
 
 namespace pendula {
 
@@ -64,6 +65,13 @@ MoveMembers* chain_lanes(const RunOptions& options) {
 template <class Space>
 MoveMembers* tangent_lanes(const RunOptions& options) {
   return detail::lanes_of<TangentMoves<Space>>(options);
+}
+
+template <class Queue>
+bool move_systems(const SystemTable& table, const RunOptions& options, std::int64_t every,
+                  std::span<const PlainMember<PlainSystem>> members, std::span<MemberEnd> ends, MemberWatch& watch) {
+  MemberSystems<typename Queue::L> dynamics(table);
+  return detail::move_by<Queue>(dynamics, options, every, members, ends, watch);
 }
 
 }  // namespace pendula

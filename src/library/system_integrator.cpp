@@ -1,4 +1,4 @@
-#include "library/system_integrator.hpp"
+#include "library/factory.hpp"
 
 #include <pendula/gauss/gauss_integrator.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>

@@ -1,4 +1,4 @@
-#include "library/system_lane_methods.hpp"
+#include "library/lane_methods.hpp"
 
 namespace pendula {
 namespace {

@@ -1,4 +1,4 @@
-#include "library/taylor_integrator.hpp"
+#include "library/explicit_methods.hpp"
 
 #include <algorithm>
 #include <array>

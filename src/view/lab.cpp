@@ -11,7 +11,6 @@
 #include "view/assets.hpp"
 #include "view/encode.hpp"
 #include "view/scene.hpp"
-#include "view/template.hpp"
 
 namespace pendula::view {
 

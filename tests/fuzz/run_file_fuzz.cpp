@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "io/input_error.hpp"
+#include "io/errors.hpp"
 #include "io/run_source.hpp"
 #include "io/saved_run.hpp"
 

@@ -9,8 +9,8 @@
 #include <variant>
 
 #include "fuzz/whole_text.hpp"
-#include "io/input_error.hpp"
-#include "io/scenario_document.hpp"
+#include "io/errors.hpp"
+#include "io/members.hpp"
 #include "io/scenario_run.hpp"
 
 namespace pendula::io {

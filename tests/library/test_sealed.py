@@ -25,12 +25,10 @@ ONCE = [
     for name in (
         "c_kernel",
         "interpreted_kernel",
+        "kernel_checks",
         "kernel_comparison",
         "kernel_text",
-        "kernel_values",
-        "kernel_widths",
         "library",
-        "series_check",
     )
 ]
 

@@ -13,7 +13,6 @@
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
-#include <pendula/numeric/ordered_sum.hpp>
 #include <pendula/numeric/written_out.hpp>
 #include <type_traits>
 

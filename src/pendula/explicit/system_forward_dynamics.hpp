@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <pendula/system/at_times.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <pendula/gauss/tableau.hpp>
-#include <pendula/system/at_times.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <pendula/system/system_model.hpp>
 #include <span>

@@ -5,7 +5,6 @@
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/numeric.hpp>
-#include <pendula/numeric/ordered_sum.hpp>
 #include <pendula/numeric/sincos.hpp>
 #include <pendula/numeric/written_out.hpp>
 #include <xsimd/xsimd.hpp>

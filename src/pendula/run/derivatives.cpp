@@ -5,7 +5,7 @@
 #include <pendula/explicit/chain_forward_dynamics.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/schedule.hpp>
-#include <pendula/run/subject_model.hpp>
+#include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/lagrangian_variation.hpp>
 #include <stdexcept>
 #include <utility>

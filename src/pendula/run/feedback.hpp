@@ -4,7 +4,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <pendula/run/signal.hpp>
+#include <pendula/run/inputs.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <vector>

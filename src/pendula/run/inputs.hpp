@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <iterator>
+#include <limits>
 #include <memory>
 #include <pendula/run/subject.hpp>
 #include <span>
@@ -27,5 +30,43 @@ struct InputLine {
 /// std::invalid_argument on another number of inputs than it has, and on one that is not finite.
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
                                            std::span<const double> inputs, std::span<const InputLine> lines = {});
+
+/// What a table of numbers over time adds to an input: linear from knot to knot, or held from each knot to the next.
+/// Before the first knot and from the last one on it is what it is there.
+struct Signal {
+  std::size_t input = 0;      ///< index among the subject's inputs (inputs.hpp)
+  std::vector<double> times;  ///< of the knots, ascending, one at least  [s]
+  std::vector<double> values;
+  bool is_held = false;
+
+  /// A knot at 0.3 s is also one at the third of 0.1 s, which rounding puts before it.
+  static constexpr double rounding = 1e-12;
+
+  /// The knot that a time is at or comes after; −1 before the first one.
+  std::ptrdiff_t knot_before(double time) const {
+    const double most = time + rounding * (time < 0 ? -time : time);
+    return std::ranges::upper_bound(times, most) - times.begin() - 1;
+  }
+
+  /// The first knot after a time; infinite if there is none.
+  double next_knot(double time) const {
+    const auto next = static_cast<std::size_t>(knot_before(time) + 1);
+    return next < times.size() ? times[next] : std::numeric_limits<double>::infinity();
+  }
+
+  double at(double time) const {
+    const std::ptrdiff_t knot = knot_before(time);
+    if (knot < 0) return values.front();
+    const auto k = static_cast<std::size_t>(knot);
+    return values[k] + slope_after(knot) * (time - times[k]);
+  }
+
+  /// From a knot on; 0 before the first one and after the last.
+  double slope_after(std::ptrdiff_t knot) const {
+    if (is_held || knot < 0 || knot + 1 >= std::ssize(times)) return 0;
+    const auto k = static_cast<std::size_t>(knot);
+    return (values[k + 1] - values[k]) / (times[k + 1] - times[k]);
+  }
+};
 
 }  // namespace pendula

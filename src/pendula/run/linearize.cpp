@@ -6,7 +6,7 @@
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/linearize.hpp>
-#include <pendula/run/subject_model.hpp>
+#include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>

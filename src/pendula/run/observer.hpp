@@ -1,12 +1,23 @@
 #pragma once
 
-#include <pendula/run/checkpoint.hpp>
+#include <cstdint>
 #include <pendula/run/event.hpp>
 #include <pendula/run/subject.hpp>
+#include <pendula/system/member.hpp>
 #include <pendula/system/motion.hpp>
 #include <span>
 
 namespace pendula {
+
+/// Where a run can be continued: with the same subject, start and options, and any later end, as if it had never
+/// stopped, to the last bit.
+struct Checkpoint {
+  double time = 0;             ///< of the state  [s]
+  std::int64_t rows = 0;       ///< so far; rows written only because the run ended do not count
+  std::int64_t since_row = 0;  ///< steps since the last row
+  Member integrator;
+  Member record;  ///< state of the rows and events (RunRecord, EventWatch)
+};
 
 /// One row of a run.
 struct Row {

@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <pendula/run/accuracy.hpp>
-#include <pendula/run/checkpoint.hpp>
 #include <pendula/run/doubts.hpp>
 #include <pendula/run/event.hpp>
 #include <pendula/run/event_watch.hpp>

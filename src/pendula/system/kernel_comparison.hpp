@@ -4,13 +4,81 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <pendula/system/kernel_values.hpp>
-#include <pendula/system/kernel_widths.hpp>
+#include <pendula/system/kernel_checks.hpp>
+#include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <vector>
 
 namespace pendula {
+
+/// Quantities of a model that its kernel computes, as pendula_codegen/written.py lists them; matrices row by row.
+enum class Written {
+  kinetic_energy,
+  energy,
+  mass,
+  momenta,
+  forces,  ///< ∂L/∂q + Q
+  momenta_q,
+  forces_q,
+  forces_v,
+  residual,  ///< E
+  residual_q,
+  residual_v,
+  power,
+  positions,
+  velocities,
+  momenta_at_rest,   ///< ∂L/∂v at v = 0
+  residual_at_rest,  ///< E at a = 0
+};
+inline constexpr int written_count = 16;
+
+/// How many numbers a quantity has, for a system of n coordinates.
+constexpr int written_size(Written what, int n, int point_components) {
+  switch (what) {
+    case Written::kinetic_energy:
+    case Written::energy:
+    case Written::power:
+      return 1;
+    case Written::mass:
+    case Written::momenta_q:
+    case Written::forces_q:
+    case Written::forces_v:
+    case Written::residual_q:
+    case Written::residual_v:
+      return n * n;
+    case Written::positions:
+    case Written::velocities:
+      return point_components;
+    default:
+      return n;
+  }
+}
+
+/// The order in which evaluate_kernel writes. A quantity occurs several times if several functions of a kernel return
+/// it.
+inline constexpr std::array kernel_outputs = {
+    Written::kinetic_energy, Written::energy,     Written::mass,        // a function each
+    Written::momenta,                                                   // momentum_from_velocity
+    Written::momenta,        Written::forces,                           // momentum_form
+    Written::momenta,        Written::forces,     Written::momenta_q,   // momentum_form_with_jacobians
+    Written::mass,           Written::forces_q,   Written::forces_v,    //
+    Written::residual,                                                  // residual
+    Written::residual,       Written::residual_q, Written::residual_v,  // residual_with_jacobians
+    Written::mass,           Written::power,      Written::positions,  Written::velocities};
+
+/// What evaluate_kernel writes after these, n numbers each: solutions of linear systems.
+enum class Solved {
+  accelerations,
+  rates,              ///< velocity_from_momentum of the momenta that momentum_from_velocity returns
+  hamiltonian_rates,  ///< hamiltonian_form of the same momenta
+  hamiltonian_forces,
+};
+inline constexpr int solved_count = 4;
+
+/// Evaluates every function of a kernel at one point; sines of the inputs are ignored.
+void evaluate_kernel(const SystemTable& table, const PlainSystem& system, double time, const double* q, const double* v,
+                     const double* a, double* values);
 
 /// Compares a kernel with the expressions of its model at several points. Errors are in units of the rounding error of
 /// the model's own expressions, with each operation rounded once.

@@ -20,4 +20,9 @@ MoveMembers* tangent_lanes(const RunOptions& options);
 extern template MoveMembers* tangent_lanes<Planar>(const RunOptions&);
 extern template MoveMembers* tangent_lanes<Spatial>(const RunOptions&);
 
+/// Moves members of generated kernels in lanes, as chain_lanes moves those of chains.
+MoveSystemMembers* system_lanes(const RunOptions& options);
+/// The same with a tangent of each member.
+MoveSystemMembers* system_tangent_lanes(const RunOptions& options);
+
 }  // namespace pendula

@@ -1,11 +1,9 @@
-#include "io/output_error.hpp"
+#include "io/errors.hpp"
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
-
-#include "io/input_error.hpp"
 
 namespace pendula::io {
 

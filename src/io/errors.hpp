@@ -22,4 +22,25 @@ class ModelError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// An opened file cannot be written: the disk is full, say.
+class OutputError : public std::runtime_error {
+ public:
+  /// `error` is errno.
+  OutputError(const std::string& file, int error);
+  /// `why` in words.
+  OutputError(const std::string& file, const std::string& why);
+};
+
+/// Throws InputError: the file cannot be written, because `why`.
+[[noreturn]] void reject_output(const std::string& file, const std::string& why);
+
+/// The same for the errno of opening the file; a missing folder is named. Messages call the file `name`.
+[[noreturn]] void reject_output(const std::string& name, const std::string& file, int error);
+
+/// A run file whose contents are not what was written; the message says what differs.
+class ChangedFile : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 }  // namespace pendula::io
