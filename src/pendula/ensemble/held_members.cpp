@@ -17,10 +17,10 @@ namespace pendula {
 
 namespace {
 
-// Ends what takes many steps, as stiff motions do that explicit steps move: implicit steps move it anew.
-class Impatience : public MemberWatch {
+// Ends a motion that takes more explicit steps than this, as a stiff one does: implicit steps move it anew.
+class StepBudget : public MemberWatch {
  public:
-  Impatience(std::size_t members, const std::function<bool()>& stop) : steps_(members), stop_(stop) {}
+  StepBudget(std::size_t members, const std::function<bool()>& stop) : steps_(members), stop_(stop) {}
 
   bool is_slow(std::size_t member) const { return steps_[member] >= most_steps; }
 
@@ -104,7 +104,7 @@ HeldMembers::Moved HeldMembers::move(std::span<const double> inputs, std::span<d
     ends[k].v = ends[k].q + coordinates_;
     if (!kind_) ends[k].status = Status::not_converged;
   }
-  Impatience watch(count, stop);
+  StepBudget watch(count, stop);
   if (kind_ && !go_in_lanes(inputs, states, ends, watch)) return {{.status = Status::interrupted}, 0};
   for (std::size_t k = 0; k < count; ++k) {
     if (ends[k].status == Status::ok && !watch.is_slow(k)) continue;
