@@ -135,7 +135,7 @@ Advance Mover::step() {
   stopped_by_.reset();
   integrator_->remember_steps(true);
   seen_since_ = never;
-  const Heeding heeding(*integrator_, stop_sign(stop_));
+  const ScopedStopSign sign(*integrator_, stop_sign(stop_));
   const double begin = integrator_->time();
   const Outcome outcome = integrator_->step(is_adaptive(options_) ? never : options_.step);
   if (outcome.status == Status::interrupted) return {.outcome = {}, .stopped = true};
@@ -157,7 +157,7 @@ std::optional<Motion> Mover::after_step() {
   ++steps_;
   std::optional<Motion> end;
   if (!watch_.events().empty()) {
-    const Heeding nothing(*integrator_, {});  // what is found has to be right
+    const ScopedStopSign none(*integrator_, {});  // what is found has to be right
     for (const Occurrence& happened : watch_.after_step(*integrator_)) {
       const std::size_t k = happened.event;
       const bool stops = happened_[k] && happened_[k](happened.up, happened.motion);

@@ -35,7 +35,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
       : block_(kept), gains_(std::min(links, kept)), below_(static_cast<std::size_t>(std::max(links - 1, 0) / kept)) {}
 
   /// From now on asks `stop` after every `most_kept` links. What an iteration finds that it ends is of no use.
-  void heed(StopSign stop) { stop_ = stop; }
+  void set_stop_sign(StopSign stop) { stop_ = stop; }
 
   /// Improves increments and multipliers once.
   Correction correct(Stages& stages) {

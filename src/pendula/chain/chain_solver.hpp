@@ -52,7 +52,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
   }
 
   Correction correct() { return Base::correct(newton_, stages_.links()); }
-  void heed(StopSign stop) { newton_.heed(stop); }
+  void set_stop_sign(StopSign stop) { newton_.set_stop_sign(stop); }
 
   /// Iterations do not note which link they change most: one more finds out.
   int part_of(Status status) {

@@ -99,7 +99,7 @@ class SingleIntegrator final : public PlainIntegrator {
     return {.status = Status::ok, .time = time, .step = time - begin_};
   }
 
-  void heed(StopSign stop) override {
+  void set_stop_sign(StopSign stop) override {
     constexpr int quick = 1000;  // parts: a step of fewer is faster than asking
     stop_ = steps_.links() > quick ? stop : StopSign{};
   }

@@ -63,7 +63,7 @@ class GaussIntegrator : public PlainIntegrator {
     if (outcome) write(state, q, v);
     return named(outcome);
   }
-  void heed(StopSign stop) override { stepper_.heed(stop); }
+  void set_stop_sign(StopSign stop) override { stepper_.set_stop_sign(stop); }
   const Statistics& statistics() const override { return stepper_.statistics(); }
   void member(MemberNumbers& numbers) override { numbers(stepper_); }
   int linearize() override {

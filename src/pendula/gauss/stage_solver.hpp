@@ -28,9 +28,9 @@ struct SolverTraits {
 
 /// What solves the stage equations of a step: it owns the model, the state and the stages. GaussStepper takes steps
 /// with any such solver. A solver may have, too:
-///   unseen()      what forces do between the stages that were solved (Unseen);
-///   heed(stop)    a sign that it looks at within long iterations (StopSign);
-///   linearize(…)  the derivative of the step (LinearizingSolver).
+///   unseen()             what forces do between the stages that were solved (Unseen);
+///   set_stop_sign(stop)  a sign that it looks at within long iterations (StopSign);
+///   linearize(…)         the derivative of the step (LinearizingSolver).
 template <class S>
 concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::Place& place,
                                const typename S::Place& kept, const StepTask& task, MemberNumbers& numbers, double time,

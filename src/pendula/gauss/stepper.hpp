@@ -132,9 +132,9 @@ class GaussStepper : private StepSolution<Solver> {
 
   /// From now on asks `stop` between iterations, where one iteration takes long. A step that ends by it leaves the
   /// state as it was, but not everything else that the next steps depend on.
-  void heed(StopSign stop) {
+  void set_stop_sign(StopSign stop) {
     stop_ = traits_.parts > quick_parts ? stop : StopSign{};
-    if constexpr (requires { solver_.heed(stop_); }) solver_.heed(stop_);
+    if constexpr (requires { solver_.set_stop_sign(stop_); }) solver_.set_stop_sign(stop_);
   }
 
   double time() const { return Base::time(); }
@@ -164,8 +164,8 @@ class GaussStepper : private StepSolution<Solver> {
   // So many halvings of a step are tried by fixed point, which together cost less than the whole step by Newton. Where
   // they do not help, Newton takes it.
   static constexpr int fixed_point_worth = 3;
-  // Unless steps have been halved for that again and again, more than one of so many: then it is convergence that limits
-  // them, as after motion that was damped fast, not their errors.
+  // Unless steps have been halved for that again and again, more than one of so many: then it is convergence that
+  // limits them, as after motion that was damped fast, not their errors.
   static constexpr int seldom = 4, often = 16;
 
   // With so many links or coordinates, an iteration takes less time than to ask for the sign to stop.

@@ -102,8 +102,8 @@ class Integrator {
 
   /// From now on, long steps and looks end with Status::interrupted when `stop` says so. Replaces and returns the sign
   /// used before.
-  StopSign heed(StopSign stop) {
-    integrator_->heed(stop);
+  StopSign set_stop_sign(StopSign stop) {
+    integrator_->set_stop_sign(stop);
     return std::exchange(stop_, stop);
   }
 
@@ -199,13 +199,14 @@ class Integrator {
   StopSign stop_;
 };
 
-/// Makes an integrator heed a stop sign within a scope.
-class Heeding {
+/// Sets a stop sign of an integrator for a scope.
+class ScopedStopSign {
  public:
-  Heeding(Integrator& integrator, StopSign stop) : integrator_(integrator), before_(integrator.heed(stop)) {}
-  ~Heeding() { integrator_.heed(before_); }
-  Heeding(const Heeding&) = delete;
-  Heeding& operator=(const Heeding&) = delete;
+  ScopedStopSign(Integrator& integrator, StopSign stop)
+      : integrator_(integrator), before_(integrator.set_stop_sign(stop)) {}
+  ~ScopedStopSign() { integrator_.set_stop_sign(before_); }
+  ScopedStopSign(const ScopedStopSign&) = delete;
+  ScopedStopSign& operator=(const ScopedStopSign&) = delete;
 
  private:
   Integrator& integrator_;

@@ -33,10 +33,10 @@ class Relay : public PlainIntegrator {
     return looked;
   }
 
-  void heed(StopSign stop) override {
+  void set_stop_sign(StopSign stop) override {
     stop_ = stop;
-    now_->heed(stop);
-    if (before_) before_->heed(stop);
+    now_->set_stop_sign(stop);
+    if (before_) before_->set_stop_sign(stop);
   }
 
   const Statistics& statistics() const override { return all_; }
@@ -70,7 +70,7 @@ class Relay : public PlainIntegrator {
   void use(std::unique_ptr<Integrator> integrator) {
     now_ = std::move(integrator);
     now_->remember_steps(remembers_);
-    now_->heed(stop_);
+    now_->set_stop_sign(stop_);
   }
 
   Outcome begin(const Motion& motion) {

@@ -256,7 +256,7 @@ void Run::take(const Motion& motion, double work) {
 // The first event that ends the run is the last one reported.
 std::optional<Motion> Run::take_events(RunReport& report) {
   if (setup_.events.empty()) return {};
-  const Heeding nothing(*integrator_, {});  // events have to be right: no interruption
+  const ScopedStopSign none(*integrator_, {});  // events have to be right: no interruption
   for (const Occurrence& happened : kept_.watch.after_step(*integrator_)) {
     tell(happened);
     if (!setup_.events[happened.event].stop) continue;

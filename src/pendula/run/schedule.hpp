@@ -210,7 +210,7 @@ RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, 
   detail::Course<OnRow, Stop, OnWay, OnStep> course{integrator, begin, schedule, place, on_row, stop, on_way, on_step};
   const bool at_times = schedule.rows.any();
   if (at_times) integrator.remember_steps(true);
-  const Heeding heeding(integrator, stop_sign(stop));
+  const ScopedStopSign sign(integrator, stop_sign(stop));
   on_way(place, true);
   while (course.goes_on() && !course.is_over()) {
     const auto before = Clock::now();

@@ -196,7 +196,7 @@ class SwitchingIntegrator : public Relay {
 
   /// The first one in the last step.
   std::optional<Occurrence> crossing() {
-    const Heeding nothing(now(), {});
+    const ScopedStopSign none(now(), {});
     std::vector<Occurrence> found = watch_.after_step(now());
     if (found.empty()) return {};
     return std::move(found.front());

@@ -47,7 +47,7 @@ class PlainIntegrator {
 
   /// Lets long steps and looks end with Status::interrupted when `stop` says so; the integrator cannot be continued
   /// from there. Methods and systems with short steps may ignore it.
-  virtual void heed(StopSign /*stop*/) {}
+  virtual void set_stop_sign(StopSign /*stop*/) {}
 
   virtual const Statistics& statistics() const = 0;
   virtual Description describe() const = 0;
