@@ -36,7 +36,7 @@ Mover::Mover(std::shared_ptr<const Subject> subject, const RunOptions& options, 
       integrator_(subject_->make_integrator(options)),
       held_{{-std::numeric_limits<double>::infinity(), inputs_of(*subject_)}},
       remembers_(remembers),
-      watch_({}, detail::glance_degree(options)) {}
+      watch_({}, detail::dense_output_degree(options)) {}
 
 Mover::Mover(const Mover& other)
     : model_(other.model_),
@@ -185,7 +185,7 @@ Outcome Mover::at(double time, Motion& motion) {
     motion = motion_;
     return {};
   }
-  if (time >= seen_since_ && time < motion_.time) return integrator_->look(time, motion);
+  if (time >= seen_since_ && time < motion_.time) return integrator_->at_full_order(time, motion);
   if (!history_.covers(time)) {
     throw std::invalid_argument("time: expected one since the start that steps were kept of, until " +
                                 shortest(motion_.time) + " s, got " + shortest(time));

@@ -71,7 +71,7 @@ class TaylorIntegrator : public PlainIntegrator {
   /// Nothing to do: the series is kept until the next step.
   void remember_steps(bool /*wanted*/) override {}
 
-  void glance(double time, double* q, double* v) override {
+  void at(double time, double* q, double* v) override {
     if (step_ == 0 || time == this->time()) return read_state(q, v);
     const double share = (time - begin_) / step_;
     for (int i = 0; i < chain_.links(); ++i) {
@@ -81,9 +81,9 @@ class TaylorIntegrator : public PlainIntegrator {
     }
   }
 
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     work = statistics_.load_work;
-    glance(time, q, v);
+    at(time, q, v);
     return {.status = Status::ok, .time = time, .step = time - begin_};
   }
 
@@ -139,7 +139,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   // Follows the angles from the start of the last step to the fraction `share` of it.
   void follow(int i, double share, Anchor& anchor) const {
-    const auto direction = [&](double at) { return direction_of(stepper_.glance(i, at).place); };
+    const auto direction = [&](double at) { return direction_of(stepper_.at(i, at).place); };
     const Direction there = direction(share);
     double squared = 0;
     for (std::size_t k = 0; k < there.size(); ++k) {
@@ -160,7 +160,7 @@ class TaylorIntegrator : public PlainIntegrator {
   }
 
   auto heading_at(int i, double share) const {
-    const auto rod = stepper_.glance(i, share);
+    const auto rod = stepper_.at(i, share);
     Heading<Space, LongReal> heading;
     for (std::size_t k = 0; k < Space::dimension; ++k) {
       heading.u[k] = rod.place[k][lane] / chain_.lengths()[i];

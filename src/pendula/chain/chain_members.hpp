@@ -132,7 +132,7 @@ class ChainMembers
   /// Rods of the members whose step was accepted, and their rates, when `share` of it was done, by the polynomial
   /// through its stages; visit(i, ξ, ξ̇).
   template <class Visit>
-  void for_each_glance(double share, Visit visit) {
+  void for_each_at(double share, Visit visit) {
     const typename Columns::Shares& weights = this->columns_.shares(share);
     const L inverse_h = L(1.0) / this->columns_.h();
     for (int i = 0; i < links(); ++i) {

@@ -52,7 +52,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   }
 
   /// The state within the last step, x steps after its beginning, by the polynomials through its rates.
-  State glance(const Place& begin, double time, double x) const {
+  State at(const Place& begin, double time, double x) const {
     State state = empty_state(time);
     const auto up_to = columns_.integrals(Real(x));
     for (int i = 0; i < links(); ++i) {

@@ -122,7 +122,7 @@ class TurnCounter {
         anchor.turn_to(u, turn.turned[lane]);
       } else {  // by a pole: along the polynomial of the member's step
         const auto direction_at = [&](double share) {
-          sight.glance(share, rods_);
+          sight.at(share, rods_);
           return direction_of(rods_[i].place, lane);
         };
         anchor.follow_path(direction_at, 1.0);

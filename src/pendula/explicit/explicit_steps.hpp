@@ -97,11 +97,11 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
 
   /// Dense output: a part and its rate at the fraction `share` of the last accepted step, by the quintic Hermite
   /// polynomial through both ends with rates and accelerations.
-  MovingPart<L, D> glance(int i, double share) const { return Quintic(share).at(*this, i); }
+  MovingPart<L, D> at(int i, double share) const { return Quintic(share).at(*this, i); }
 
   /// Calls visit(i, ξ, ξ̇) for all parts, by dense output.
   template <class Visit>
-  void for_each_glance(double share, Visit visit) const {
+  void for_each_at(double share, Visit visit) const {
     const Quintic path(share);
     for (int i = 0; i < links(); ++i) {
       const MovingPart<L, D> there = path.at(*this, i);
@@ -111,7 +111,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
 
   /// Calls visit(i, ξ, ξ̇) for all parts, after a step that ends there.
   template <class Visit>
-  void for_each_look(double share, Visit visit) {
+  void for_each_at_full_order(double share, Visit visit) {
     go_back();
     solve(begin_, L(share) * step_, step_ > L(0.0));
     for (int i = 0; i < links(); ++i) {

@@ -81,7 +81,7 @@ class ExplicitSystem {
   template <class Steps>
   void read_within(const Steps& steps, double share, double* q, double* v) const {
     for (int i = 0; i < steps.links(); ++i) {
-      const auto there = steps.glance(i, share);
+      const auto there = steps.at(i, share);
       read_near(i, there.place, there.rate, q, v);
     }
   }

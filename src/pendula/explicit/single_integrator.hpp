@@ -64,7 +64,7 @@ class SingleIntegrator final : public PlainIntegrator {
   /// Nothing to do: the start of the last step is always kept.
   void remember_steps(bool /*wanted*/) override {}
 
-  void glance(double time, double* q, double* v) override {
+  void at(double time, double* q, double* v) override {
     if (step_ == 0 || time == this->time()) return read_state(q, v);
     subject_.read_within(steps_, (time - begin_) / step_, q, v);
   }
@@ -83,14 +83,14 @@ class SingleIntegrator final : public PlainIntegrator {
     }
   }
 
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     work = statistics_.load_work;
     if (step_ == 0 || time == this->time()) {
       read_state(q, v);
     } else if (parts_of_last_ == 1) {
       const double share = (time - begin_) / step_;
       subject_.read_within(steps_, share, q, v);
-      steps_.for_each_look(
+      steps_.for_each_at_full_order(
           share, [&](int i, const auto& place, const auto& rate) { subject_.read_near(i, place, rate, q, v); });
     } else {
       look_in_parts(time, q, v);

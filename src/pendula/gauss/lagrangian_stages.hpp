@@ -96,7 +96,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
 
   /// The state at x of the last step, which began there, by the polynomials through its rates.
-  Motion glance(const Place& begin, double time, double x) const {
+  Motion at(const Place& begin, double time, double x) const {
     const auto up_to = columns_.up_to(x), rate_at = columns_.rate_at(x, prediction_.last_h());
     Motion motion(time, Eigen::VectorXd(eigen_count()), Eigen::VectorXd(eigen_count()));
     for (std::size_t k = 0; k < count_; ++k) {

@@ -38,7 +38,7 @@ class StageIterations {
     stages_.go_to(place);
     choice_.begin_look();
   }
-  State glance(const Place& begin, double time, double x) const { return stages_.glance(begin, time, x); }
+  State at(const Place& begin, double time, double x) const { return stages_.at(begin, time, x); }
   bool bound_excursions(const Place& begin, double* q, double* v) const {
     return stages_.bound_excursions(begin, q, v);
   }

@@ -52,7 +52,7 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
   fixed.keep(place);
   solver.go_to(kept);
   // The state within the last step, by the polynomials through its stages: x steps after the place where it began.
-  { fixed.glance(kept, time, x) } -> std::convertible_to<typename S::State>;
+  { fixed.at(kept, time, x) } -> std::convertible_to<typename S::State>;
   // Bounds of how far each coordinate and its rate get, anywhere in the last step, from where they were when it began;
   // whether they are known.
   { fixed.bound_excursions(kept, each, each) } -> std::same_as<bool>;

@@ -68,7 +68,7 @@ class GaussStepper : private StepSolution<Solver> {
     return started(status);
   }
 
-  /// Whether the start of each step is remembered from now on, for glance and look.
+  /// Whether the start of each step is remembered from now on, for at and at_full_order.
   void remember_steps(bool wanted) {
     remembers_ = wanted;
     before_.step = 0;
@@ -76,12 +76,12 @@ class GaussStepper : private StepSolution<Solver> {
   }
 
   /// The state at `time` within the last step, by the polynomials through its stages: with s stages, positions of order
-  /// s + 1, rates of order s. A step that was taken in parts has left no polynomial: then this is a look.
-  State glance(double time) {
+  /// s + 1, rates of order s. A step that was taken in parts has left no polynomial: then this is at_full_order.
+  State at(double time) {
     if (before_.step == 0) return state();
     State there;
-    if (before_.in_parts && look(time, there)) return there;
-    return solver_.glance(before_.place, time, before_.elapsed(time) / before_.step);
+    if (before_.in_parts && at_full_order(time, there)) return there;
+    return solver_.at(before_.place, time, before_.elapsed(time) / before_.step);
   }
 
   /// Bounds of how far coordinates and rates get, anywhere in the last step, from where they were when it began.
@@ -92,13 +92,13 @@ class GaussStepper : private StepSolution<Solver> {
 
   /// The same at the full order of the method: takes a step from where the last one began to `time`. Its stages are
   /// predicted by the polynomials.
-  Outcome look(double time, State& there) {
+  Outcome at_full_order(double time, State& there) {
     double work = 0;
-    return look(time, there, work);
+    return at_full_order(time, there, work);
   }
 
   /// The same, and the energy that loads have brought by then  [J].
-  Outcome look(double time, State& there, double& work) {
+  Outcome at_full_order(double time, State& there, double& work) {
     work = statistics_.load_work;
     if (before_.step == 0 || is_rounding(time - this->time())) {
       there = solver_.state(time);
@@ -373,7 +373,8 @@ class GaussStepper : private StepSolution<Solver> {
   bool remembers_ = false, looks_ = false;
   Remembered before_;
   typename Solver::Place start_;  // of a step that is taken in parts
-  std::vector<double> member_;    // saved: of the end of the last step during a look, of the start of a chosen step
+  std::vector<double>
+      member_;  // saved: of the end of the last step during at_full_order, of the start of a chosen step
   std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;
 };
 

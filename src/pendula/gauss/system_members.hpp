@@ -216,7 +216,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   /// Coordinates and rates of the members whose step was accepted, when `share` of it was done, by the polynomial
   /// through its stages; visit(i, q_i, q̇_i).
   template <class Visit>
-  void for_each_glance(double share, Visit visit) {
+  void for_each_at(double share, Visit visit) {
     const typename Columns::Shares& weights = columns_.shares(share);
     const L inverse_h = L(1.0) / columns_.h();
     for (int i = 0; i < links(); ++i) {

@@ -52,7 +52,7 @@ class VelocityStages {
       state_[k] = {state.q[index(k)], 0};
       state_[count_ + k] = {state.v[index(k)], 0};
     }
-    const SystemAt<1>& here = at(time_);
+    const SystemAt<1>& here = system_at(time_);
     pace_.start(here, state.q.data(), state.v.data());
     masses_.start(here, state.q.data());
     if (masses_.singular() >= 0) return Status::singular_mass_matrix;
@@ -102,7 +102,7 @@ class VelocityStages {
 
   Tempo tempo() const {
     read_state(numbers(0), numbers(1));
-    at(time_)(&SystemFunctions::acceleration, numbers(0), numbers(1), numbers(2));
+    system_at(time_)(&SystemFunctions::acceleration, numbers(0), numbers(1), numbers(2));
     return pace_.at(numbers(1), numbers(2));
   }
 
@@ -168,7 +168,7 @@ class VelocityStages {
 
   /// The state within the last step, x steps after its beginning, by the polynomials through its rates and
   /// accelerations.
-  State glance(const Place& begin, double time, double x) const {
+  State at(const Place& begin, double time, double x) const {
     const auto up_to = columns_.up_to(x);
     State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
     for (std::size_t k = 0; k < count_; ++k) {
@@ -224,7 +224,7 @@ class VelocityStages {
   double* numbers(std::size_t which) const { return numbers_.data() + which * count_; }
 
   // The system at one time.
-  const SystemAt<1>& at(double time) const {
+  const SystemAt<1>& system_at(double time) const {
     here_.set_time(time);
     return here_;
   }
@@ -291,7 +291,7 @@ class VelocityStages {
         numbers(3)[k] += up_to[j] * columns_.hb(j) * a(k)[j];
       }
     }
-    return at(time_ + columns_.h() * share);
+    return system_at(time_ + columns_.h() * share);
   }
 
   // Σ M_kk (v_k − polynomial through the stages' rates)² at the start of the step.
@@ -334,7 +334,7 @@ class VelocityStages {
   // Energy, and kinetic energy.
   std::array<double, 2> energies(double time, const double* q, const double* v) const {
     double energy = 0, kinetic = 0;
-    at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
+    system_at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
     return {energy, kinetic};
   }
 

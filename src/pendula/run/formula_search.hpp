@@ -27,8 +27,8 @@ namespace pendula {
 /// interpolated on shorter intervals by dense output, then at full order, and finally by its extremum. A formula of
 /// time alone is known to rounding from the start.
 ///
-/// `Sight` provides size(), time(u), resolution(), glance(u, numbers), by dense output, look(u, numbers), at full
-/// order, value(time, numbers) and reach(time, numbers); u runs from 0 to 1.
+/// `Sight` provides size(), time(u), resolution(), at(u, numbers), by dense output, at_full_order(u, numbers),
+/// value(time, numbers) and reach(time, numbers); u runs from 0 to 1.
 template <class Sight>
 class FormulaSearch {
  public:
@@ -116,9 +116,9 @@ class FormulaSearch {
   const std::vector<double>& sample(double u, By by) {
     --samples_left_;
     if (by == By::polynomial) {
-      sight_.glance(u, numbers_);
+      sight_.at(u, numbers_);
     } else {
-      sight_.look(u, numbers_);
+      sight_.at_full_order(u, numbers_);
     }
     for (std::size_t n = 0; n < numbers_.size(); ++n) {
       if (std::abs(numbers_[n]) > largest_[n]) largest_[n] = std::abs(numbers_[n]);

@@ -20,14 +20,14 @@ class Relay : public PlainIntegrator {
     remembers_ = wanted;
     now_->remember_steps(wanted);
   }
-  void glance(double time, double* q, double* v) override { write(of(time).glance(time), q, v); }
+  void at(double time, double* q, double* v) override { write(of(time).at(time), q, v); }
   bool bound_excursions(double* q, double* v) const override {
     return (before_ ? *before_ : *now_).bound_excursions(q, v);
   }
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     const double done = &of(time) == before_.get() ? before_work_ : done_.load_work;
     Motion motion;
-    const Outcome looked = of(time).look(time, motion, work);
+    const Outcome looked = of(time).at_full_order(time, motion, work);
     work += done;
     if (looked) write(motion, q, v);
     return looked;

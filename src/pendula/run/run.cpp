@@ -29,7 +29,7 @@ Run::Run(RunSetup setup)
       asked_(setup_.options),
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, row_spacing(setup_)),
-            EventWatch(setup_.events, detail::glance_degree(setup_.options)),
+            EventWatch(setup_.events, detail::dense_output_degree(setup_.options)),
             {},
             0,
             static_cast<double>(setup_.every),
@@ -52,7 +52,7 @@ void Run::go_by_series(double tolerance) {
   kept_.series = tolerance;
   integrator_ = setup_.subject->make_integrator(setup_.options);
   description_ = integrator_->describe();
-  kept_.watch.set_degree(detail::glance_degree(setup_.options));
+  kept_.watch.set_degree(detail::dense_output_degree(setup_.options));
 }
 
 RunReport Run::go(const std::function<bool()>& stop) {
@@ -164,7 +164,7 @@ void Run::follow_aim() {
   choose_stages(options);
   integrator_ = setup_.subject->make_integrator(options);
   description_ = integrator_->describe();
-  kept_.watch.set_degree(detail::glance_degree(options));
+  kept_.watch.set_degree(detail::dense_output_degree(options));
 }
 
 RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
@@ -298,7 +298,7 @@ void Run::look_at_end(const RunResult& result) {
   if (time == kept_.record.last().time) return;
   Motion motion;
   double work = 0;
-  if (integrator_->look(time, motion, work)) look_at(motion, work);
+  if (integrator_->at_full_order(time, motion, work)) look_at(motion, work);
 }
 
 void Run::come_by(const RowPlace& place, bool last) {

@@ -178,7 +178,7 @@ struct Course {
   bool row_at(double time) {
     Motion motion;
     double work = 0;
-    const Outcome looked = integrator.look(time, motion, work);
+    const Outcome looked = integrator.at_full_order(time, motion, work);
     if (looked) {
       row(motion, work);
     } else if (looked.status == Status::interrupted) {

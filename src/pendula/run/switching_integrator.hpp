@@ -36,7 +36,7 @@ class SwitchingIntegrator : public Relay {
         options_(options),
         sides_(system_.switches(), 1),
         made_for_(sides_),
-        watch_(events(), detail::glance_degree(options)) {
+        watch_(events(), detail::dense_output_degree(options)) {
     pile_.begin(0, system_.switches());
     use(make());
   }
@@ -143,13 +143,13 @@ class SwitchingIntegrator : public Relay {
   bool is_resolved(double begin) {
     constexpr double near = 0.02;                                            // of the variation
     constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // where nobody looks
-    const auto glance = [&](double u) {
-      return system_.values(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
+    const auto values_at = [&](double u) {
+      return system_.values(sides_, now().at(u == 1 ? time() : begin + u * (time() - begin)));
     };
     std::array<std::vector<double>, points> seen;
-    for (std::size_t i = 0; i < points; ++i) seen[i] = glance(place(i));
+    for (std::size_t i = 0; i < points; ++i) seen[i] = values_at(place(i));
     for (const double u : others) {
-      const std::vector<double> found = glance(u);
+      const std::vector<double> found = values_at(u);
       for (std::size_t k = 0; k < found.size(); ++k) {
         double above = 0, below = 0, least = seen[0][k], most = least;
         for (std::size_t i = 0; i < points; ++i) {
@@ -175,7 +175,7 @@ class SwitchingIntegrator : public Relay {
     std::array<std::vector<double>, BernsteinPolynomial::size> seen;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const double u = sample_place(i);
-      seen[i] = system_.fast_arguments(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
+      seen[i] = system_.fast_arguments(sides_, now().at(u == 1 ? time() : begin + u * (time() - begin)));
     }
     for (std::size_t k = 0; k < seen[0].size(); ++k) {
       BernsteinPolynomial::Numbers values;
@@ -211,7 +211,7 @@ class SwitchingIntegrator : public Relay {
   }
 
   /// Half way through the last step.
-  void see_reach(double begin) { pile_.reach(system_.values(sides_, now().glance((begin + time()) / 2))); }
+  void see_reach(double begin) { pile_.reach(system_.values(sides_, now().at((begin + time()) / 2))); }
 
   /// Takes the step again, to where a switching function is zero, and some roundings on, so that it has its new sign.
   Outcome cut(const Member& before, double begin, double end, const Occurrence& first) {

@@ -132,8 +132,8 @@ class Track {
     numbers_.push_back(0);
   }
 
-  /// Call after every step of `mover`, an Integrator or anything with its time, state, look and glance. `end` is the
-  /// state at which the run ended within the step, if it did.
+  /// Call after every step of `mover`, an Integrator or anything with its time, state, at_full_order and at. `end` is
+  /// the state at which the run ended within the step, if it did.
   template <class Mover>
   void follow(Mover& mover, const std::optional<Motion>& end) {
     ++steps_;
@@ -143,7 +143,7 @@ class Track {
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {
       const double time = times_[states_.size()];
       Motion there;
-      states_.push_back(mover.look(time, there) ? std::move(there) : mover.glance(time));
+      states_.push_back(mover.at_full_order(time, there) ? std::move(there) : mover.at(time));
     }
   }
 

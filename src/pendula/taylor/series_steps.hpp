@@ -276,7 +276,7 @@ class SeriesSteps {
   }
 
   /// A coordinate and its rate at the fraction `share` of the last step, by the series of the coordinate.
-  Part glance(int i, double share) const {
+  Part at(int i, double share) const {
     const L tau = L(share) * step_ / unit_;
     const auto k = static_cast<std::size_t>(i);
     const L place = fma(tau, rise(k, tau), coefficient(0, k));
@@ -284,9 +284,9 @@ class SeriesSteps {
   }
   /// Calls visit(i, q, v) for all coordinates.
   template <class Visit>
-  void for_each_glance(double share, Visit visit) const {
+  void for_each_at(double share, Visit visit) const {
     for (int i = 0; i < links(); ++i) {
-      const Part there = glance(i, share);
+      const Part there = at(i, share);
       visit(i, there.place, there.rate);
     }
   }
@@ -305,7 +305,7 @@ class SeriesSteps {
 
   /// The same where rates are those of the momenta there.
   template <class Visit>
-  void for_each_look(double share, Visit visit) {
+  void for_each_at_full_order(double share, Visit visit) {
     const L tau = L(share) * step_ / unit_;
     for (std::size_t k = 0; k < 2 * n_; ++k) {
       to_row(fma(tau, rise(k, tau), coefficient(0, k)), trial_.state[k]);

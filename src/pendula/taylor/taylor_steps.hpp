@@ -84,19 +84,19 @@ class TaylorSteps : public ExplicitState<Rods> {
   }
 
   /// Dense output: a rod and its rate at the fraction `share` of the last accepted step.
-  auto glance(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
+  auto at(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
 
   /// Calls visit(i, ξ, ξ̇) for all rods.
   template <class Visit>
-  void for_each_glance(double share, Visit visit) const {
+  void for_each_at(double share, Visit visit) const {
     for (int i = 0; i < links(); ++i) {
-      const Part there = glance(i, share);
+      const Part there = at(i, share);
       visit(i, detail::values_of(there.place), detail::values_of(there.rate));
     }
   }
   template <class Visit>
-  void for_each_look(double share, Visit visit) const {
-    for_each_glance(share, visit);
+  void for_each_at_full_order(double share, Visit visit) const {
+    for_each_at(share, visit);
   }
 
   /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
