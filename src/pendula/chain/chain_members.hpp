@@ -46,6 +46,9 @@ class ChainMembers
     }
   }
 
+  /// Links of the chains.
+  int count() const { return links(); }
+
   // --- One member ---
 
   /// A member comes into a lane, with its chain, at q and v  [rad, rad/s]; its next step starts cold.

@@ -25,7 +25,7 @@ class MemberView : public MemberSteps {
         turns_(turns),
         now_(coordinates()),
         views_(most_views, View(coordinates())),
-        parts_(to_size(sight.links())),
+        parts_(to_size(sight.count())),
         on_the_way_(parts_) {}
 
   /// These members have taken steps.
@@ -96,8 +96,8 @@ class MemberView : public MemberSteps {
   };
 
   static std::size_t to_size(int i) { return static_cast<std::size_t>(i); }
-  std::size_t coordinates() const { return dof * to_size(sight_.links()); }
-  std::size_t entry(std::size_t i, std::size_t a) const { return a * to_size(sight_.links()) + i; }
+  std::size_t coordinates() const { return dof * to_size(sight_.count()); }
+  std::size_t entry(std::size_t i, std::size_t a) const { return a * to_size(sight_.count()) + i; }
 
   void look_now() {
     if (now_.share != nothing) return;

@@ -13,14 +13,14 @@ namespace pendula {
 template <class L, std::size_t D>
 class StepSight {
  public:
-  using Parts = std::vector<MovingPart<L, D>>;  ///< of all links
+  using Parts = std::vector<MovingPart<L, D>>;  ///< one for each rod or coordinate
 
   StepSight() = default;
   StepSight(const StepSight&) = delete;
   StepSight& operator=(const StepSight&) = delete;
   virtual ~StepSight() = default;
 
-  virtual int links() const = 0;
+  virtual int count() const = 0;
   /// Where the members are: at the end of the step.
   virtual void now(Parts& parts) = 0;
   /// Where they were when a share of the step was done, 0 to 1, by the polynomial through the step.
@@ -44,7 +44,7 @@ class SightOf : public StepSight<typename Stepper::L, Stepper::SpaceType::dimens
 
   explicit SightOf(Stepper& stepper) : stepper_(stepper) {}
 
-  int links() const override { return stepper_.chain().links(); }
+  int count() const override { return stepper_.chain().count(); }
 
   void now(Parts& parts) override { read(stepper_.chain(), parts); }
 
@@ -67,7 +67,7 @@ class SightOf : public StepSight<typename Stepper::L, Stepper::SpaceType::dimens
   void waypoint(int k, Parts& parts) override {
     auto& chain = stepper_.chain();
     if constexpr (requires { chain.along(0, k); }) {
-      for (int i = 0; i < chain.links(); ++i) parts[index(i)].place = chain.along(i, k);
+      for (int i = 0; i < chain.count(); ++i) parts[index(i)].place = chain.along(i, k);
     } else {
       at((k + 1) / (waypoints() + 1.0), parts);
     }

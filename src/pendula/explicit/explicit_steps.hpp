@@ -40,7 +40,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   using typename State::Vector;
   static constexpr std::size_t D = State::D;
   static constexpr bool has_tangent = State::has_tangent, is_twofold = State::is_twofold;
-  using State::links;
+  using State::count;
   using Controller = ErrorController<L, Method::error_order>;
 
   struct Options {};
@@ -90,7 +90,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   template <class Numbers>
   void member(Numbers& numbers) requires is_twofold {
     numbers(fresh_);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       for (Parts* parts : {&parts_, &low_, &slopes_}) numbers((*parts)[i].place, (*parts)[i].rate);
     }
   }
@@ -103,7 +103,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   template <class Visit>
   void for_each_at(double share, Visit visit) const {
     const Quintic path(share);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const MovingPart<L, D> there = path.at(*this, i);
       visit(i, there.place, there.rate);
     }
@@ -114,7 +114,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   void for_each_at_full_order(double share, Visit visit) {
     go_back();
     solve(begin_, L(share) * step_, step_ > L(0.0));
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       visit(i, detail::values_of(trial_.parts[i].place), detail::values_of(trial_.parts[i].rate));
     }
     go_back();
@@ -158,7 +158,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
 
   /// The first part of the tried step that is not finite; −1: none.
   int part_not_finite() const requires is_twofold {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
         if (!std::isfinite(trial_.parts[i].place[k]) || !std::isfinite(trial_.parts[i].rate[k])) return i;
       }
@@ -195,7 +195,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires(Dynamics::has_tangent) {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       State::scale_tangent(factor, parts_[i]);
       State::scale_tangent(factor, slopes_[i]);
     }
@@ -319,7 +319,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   // Computes the end of the step.
   [[gnu::always_inline]] void arrive(const L& h) {
     if constexpr (is_twofold) {
-      for (int i = 0; i < links(); ++i) {
+      for (int i = 0; i < count(); ++i) {
         const Part moved = weighed<Method::stages>(Method::b, i), &from = parts_[i], &rest = low_[i];
         for (std::size_t k = 0; k < D; ++k) {
           const Twofold<L> place = exact_sum(from.place[k], fma(h, moved.place[k], rest.place[k]));

@@ -76,11 +76,11 @@ class ExplicitSystem {
 
   template <class Steps>
   void read(const Steps& steps, double* q, double* v) const {
-    for (int i = 0; i < steps.links(); ++i) read_near(i, steps.exact_place(i), steps.exact_rate(i), q, v);
+    for (int i = 0; i < steps.count(); ++i) read_near(i, steps.exact_place(i), steps.exact_rate(i), q, v);
   }
   template <class Steps>
   void read_within(const Steps& steps, double share, double* q, double* v) const {
-    for (int i = 0; i < steps.links(); ++i) {
+    for (int i = 0; i < steps.count(); ++i) {
       const auto there = steps.at(i, share);
       read_near(i, there.place, there.rate, q, v);
     }

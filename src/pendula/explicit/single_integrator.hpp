@@ -72,7 +72,7 @@ class SingleIntegrator final : public PlainIntegrator {
   bool bound_excursions(double* q, double* v) const override {
     if constexpr (requires { steps_.excursion(0); }) {
       if (step_ == 0 || parts_of_last_ != 1) return false;
-      for (int i = 0; i < steps_.links(); ++i) {
+      for (int i = 0; i < steps_.count(); ++i) {
         const auto farthest = steps_.excursion(i);
         q[i] = farthest.place[0];
         v[i] = farthest.rate[0];
@@ -101,7 +101,7 @@ class SingleIntegrator final : public PlainIntegrator {
 
   void set_stop_sign(StopSign stop) override {
     constexpr int quick = 1000;  // parts: a step of fewer is faster than asking
-    stop_ = steps_.links() > quick ? stop : StopSign{};
+    stop_ = steps_.count() > quick ? stop : StopSign{};
   }
 
   const Statistics& statistics() const override { return statistics_; }
@@ -198,7 +198,7 @@ class SingleIntegrator final : public PlainIntegrator {
     end_ = steps_.place();
     steps_.go_to(steps_.begin());
     goes_in(parts_of_last_, begin_, time - begin_);
-    for (int i = 0; i < steps_.links(); ++i) {
+    for (int i = 0; i < steps_.count(); ++i) {
       subject_.read_near(i, steps_.exact_place(i), steps_.exact_rate(i), q, v);
     }
     steps_.go_to(end_);

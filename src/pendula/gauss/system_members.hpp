@@ -44,8 +44,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     for (const bool is_angle : dynamics.info().is_angle) may_miss_ = may_miss_ || !is_angle;
   }
 
-  /// Coordinates.
-  int links() const { return static_cast<int>(count_); }
+  /// Coordinates of the system.
+  int count() const { return static_cast<int>(count_); }
 
   // --- One member ---
 
@@ -80,7 +80,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   template <class Visit>
   void for_each_rate(Visit visit) {
     Base::find_rates(time_);
-    for (int i = 0; i < links(); ++i) visit(i, Vector{Base::rate(static_cast<std::size_t>(i))}, L(0.0));
+    for (int i = 0; i < count(); ++i) visit(i, Vector{Base::rate(static_cast<std::size_t>(i))}, L(0.0));
   }
 
   /// Whether fixed points may ask for shorter steps than errors do: forces and lengths may be anything.
@@ -219,7 +219,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   void for_each_at(double share, Visit visit) {
     const typename Columns::Shares& weights = columns_.shares(share);
     const L inverse_h = L(1.0) / columns_.h();
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const auto& advance = pasts_[static_cast<std::size_t>(i)][newest_];
       L ahead(0.0), rate(0.0);
       for (int j = 0; j < S; ++j) {

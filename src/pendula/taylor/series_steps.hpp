@@ -84,12 +84,13 @@ class SeriesSteps {
         scales_(row_),
         rate_scales_(row_),
         unit_row_(1) {
-    for (int i = 0; i < links(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
+    for (int i = 0; i < count(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
   }
 
   SeriesSteps& chain() { return *this; }
   const SeriesSteps& chain() const { return *this; }
-  int links() const { return static_cast<int>(n_); }
+  /// Coordinates of the system.
+  int count() const { return static_cast<int>(n_); }
   const Parts& parts() const { return now_.parts; }
 
   /// A state, with everything that the next steps depend on.
@@ -113,11 +114,11 @@ class SeriesSteps {
     }
     systems_.take(lane, system);
     set(time_, lane, time);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       set(now_.parts[i].place[0], lane, q[i]);
       set(now_.parts[i].rate[0], lane, v[i]);
       to_row(now_.parts[i].place[0], seen_[i]);
-      to_row(now_.parts[i].rate[0], seen_[links() + i]);
+      to_row(now_.parts[i].rate[0], seen_[count() + i]);
     }
     systems_.here(time_, &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
     set(now_.unit, lane, first_unit(lane, q, v));
@@ -140,13 +141,13 @@ class SeriesSteps {
   template <class Numbers>
   void member(Numbers& numbers) requires(!is_batch<L>) {
     numbers(now_.state, now_.low, now_.unit, time_);
-    for (int i = 0; i < links(); ++i) numbers(now_.parts[i].place, now_.parts[i].rate);
+    for (int i = 0; i < count(); ++i) numbers(now_.parts[i].place, now_.parts[i].rate);
     is_expanded_ = false;
   }
 
   std::array<LongReal, 1> exact_place(int i) const requires(!is_batch<L>) { return {sum_of(i)}; }
   std::array<LongReal, 1> exact_rate(int i) const requires(!is_batch<L>) {
-    if (!info_.has_momenta) return {sum_of(links() + i)};
+    if (!info_.has_momenta) return {sum_of(count() + i)};
     return {now_.parts[i].rate[0]};
   }
   const std::array<L, D>& along(int i) const { return now_.parts[i].place; }
@@ -154,14 +155,14 @@ class SeriesSteps {
   /// Calls visit(i, q̇_i, …) for all coordinates.
   template <class Visit>
   void for_each_rate(Visit visit) const {
-    for (int i = 0; i < links(); ++i) visit(i, now_.parts[i].rate, L(0.0));
+    for (int i = 0; i < count(); ++i) visit(i, now_.parts[i].rate, L(0.0));
   }
 
   /// T + U  [J].
   L energy() {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       to_row(now_.parts[i].place[0], seen_[i]);
-      to_row(now_.parts[i].rate[0], seen_[links() + i]);
+      to_row(now_.parts[i].rate[0], seen_[count() + i]);
     }
     double *const kinetic = rates_[n_], *const total = rates_[n_ + 1];
     systems_.here(time_, &SystemFunctions::energies, seen_[0], seen_[n_], kinetic, total);
@@ -196,7 +197,7 @@ class SeriesSteps {
       none = none + (there - there);
     }
     read_rates(time + h, trial_.state, trial_.parts);
-    for (int i = 0; i < links(); ++i) none = none + (trial_.parts[i].rate[0] - trial_.parts[i].rate[0]);
+    for (int i = 0; i < count(); ++i) none = none + (trial_.parts[i].rate[0] - trial_.parts[i].rate[0]);
     // Near the size that its steps will have; a step that the end of a run has cut short says nothing of that.
     trial_.unit = select(longest_ <= most_growth * unit_, longest_, unit_);
     Mask found = wanted & (none == L(0.0));
@@ -220,7 +221,7 @@ class SeriesSteps {
 
   /// The first coordinate of the tried step that is not finite; −1: none.
   int part_not_finite() const requires(!is_batch<L>) {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const Part& part = trial_.parts[i];
       if (!std::isfinite(part.place[0]) || !std::isfinite(part.rate[0])) return i;
     }
@@ -237,7 +238,7 @@ class SeriesSteps {
           to_row(select(which, from_row<L>((*rows.first)[k]), from_row<L>(to)), to);
         }
       }
-      for (int i = 0; i < links(); ++i) {
+      for (int i = 0; i < count(); ++i) {
         const Part& from = trial_.parts[i];
         Part& to = now_.parts[i];
         to = {{select(which, from.place[0], to.place[0])}, {select(which, from.rate[0], to.rate[0])}};
@@ -285,7 +286,7 @@ class SeriesSteps {
   /// Calls visit(i, q, v) for all coordinates.
   template <class Visit>
   void for_each_at(double share, Visit visit) const {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const Part there = at(i, share);
       visit(i, there.place, there.rate);
     }
@@ -311,7 +312,7 @@ class SeriesSteps {
       to_row(fma(tau, rise(k, tau), coefficient(0, k)), trial_.state[k]);
     }
     read_rates(fma(L(share), step_, begin_time_), trial_.state, trial_.parts);
-    for (int i = 0; i < links(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
+    for (int i = 0; i < count(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
   }
 
   const Place& begin() const requires(!is_batch<L>) { return begin_; }
@@ -333,8 +334,8 @@ class SeriesSteps {
   static constexpr double most_turn = 3;                   // rad within a step, so that it is not from hill to hill
 
   Motion motion_of(const Parts& parts, double time) const requires(!is_batch<L>) {
-    Motion motion{time, Eigen::VectorXd(links()), Eigen::VectorXd(links())};
-    for (int i = 0; i < links(); ++i) {
+    Motion motion{time, Eigen::VectorXd(count()), Eigen::VectorXd(count())};
+    for (int i = 0; i < count(); ++i) {
       motion.q[i] = parts[i].place[0];
       motion.v[i] = parts[i].rate[0];
     }
@@ -439,15 +440,15 @@ class SeriesSteps {
     if (info_.has_momenta) {
       systems_.here(time, &SystemFunctions::velocity_from_momentum, state[0], state[n_], rates_[0]);
     }
-    for (int i = 0; i < links(); ++i) {
-      parts[i] = {{from_row<L>(state[i])}, {from_row<L>(info_.has_momenta ? rates_[i] : state[links() + i])}};
+    for (int i = 0; i < count(); ++i) {
+      parts[i] = {{from_row<L>(state[i])}, {from_row<L>(info_.has_momenta ? rates_[i] : state[count() + i])}};
     }
   }
 
   /// In which members the tried step is so long that it may have gone over something that its end is not beside.
   Mask goes_far() const {
     L turn(0.0), way(0.0), size(0.0);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const L from = now_.parts[i].place[0], to = trial_.parts[i].place[0], moved = abs(to - from);
       if (systems_.is_angle(i)) {
         turn = max(turn, moved);

@@ -27,7 +27,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   using typename State::L;
   using typename State::Mask;
   static constexpr bool has_tangent = State::has_tangent;
-  using State::links;
+  using State::count;
   using Controller = SeriesController<L>;
 
   struct Options {
@@ -89,7 +89,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   /// Calls visit(i, ξ, ξ̇) for all rods.
   template <class Visit>
   void for_each_at(double share, Visit visit) const {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const Part there = at(i, share);
       visit(i, detail::values_of(there.place), detail::values_of(there.rate));
     }
@@ -102,7 +102,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires has_tangent {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
-    for (int i = 0; i < links(); ++i) State::scale_tangent(factor, parts_[i]);
+    for (int i = 0; i < count(); ++i) State::scale_tangent(factor, parts_[i]);
     return 0.5 * log(squared);
   }
 
