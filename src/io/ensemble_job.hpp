@@ -48,7 +48,7 @@ class EnsembleJob {
 
   MemberScenarios scenarios_;
   AnyScenario base_;
-  Kept kept_;
+  KeptQuantities kept_;
   EnsembleHead head_;
   MemberRuns runs_;
 };

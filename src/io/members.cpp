@@ -130,7 +130,7 @@ std::shared_ptr<const SystemTable> MemberScenarios::find_system(const ModelName&
   return found;
 }
 
-MemberRuns::MemberRuns(MemberScenarios& scenarios, const Kept& kept, std::function<bool()> stop)
+MemberRuns::MemberRuns(MemberScenarios& scenarios, const KeptQuantities& kept, std::function<bool()> stop)
     : scenarios_(scenarios),
       plan_(scenarios.plan()),
       kept_(kept),

@@ -97,7 +97,7 @@ class MemberScenarios {
 class MemberRuns {
  public:
   /// If `stop` returns true, members stop.
-  MemberRuns(MemberScenarios& scenarios, const Kept& kept, std::function<bool()> stop);
+  MemberRuns(MemberScenarios& scenarios, const KeptQuantities& kept, std::function<bool()> stop);
 
   /// Runs a chunk of members, some of them again as a second look. A member that cannot be run has a message. Throws
   /// Interrupted.
@@ -116,7 +116,7 @@ class MemberRuns {
 
   MemberScenarios& scenarios_;
   const EnsemblePlan& plan_;
-  const Kept& kept_;
+  const KeptQuantities& kept_;
   std::function<bool()> stop_;
   std::size_t width_;
 };

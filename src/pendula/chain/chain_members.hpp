@@ -291,7 +291,7 @@ class ChainMembers
   L restoring_{0.0};  // steps since lengths were restored
   detail::PerLink<Point, N> rates_;
   MemberLoads<Space, N, L> loads_;
-  typename Motion::Rods::Place saved_;
+  typename Motion::Rods::FullState saved_;
 };
 
 }  // namespace pendula

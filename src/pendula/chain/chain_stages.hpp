@@ -362,7 +362,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   Chain<Space, N> chain_;
   std::int64_t
       restoring_interval_;  // steps after which lengths are restored; Gauss methods keep them, but for rounding
-  typename Base::Rods::Place trial_{links()};
+  typename Base::Rods::FullState trial_{links()};
   double fastest_ = 0;  // squared velocity of the fastest bob so far  [m²/s²]
   bool torque_is_set_ = false, is_finished_ = false, is_first_ = true;
 };

@@ -87,8 +87,8 @@ HeldMembers::HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coo
   kind_ = lane_kind(setup, in_lanes_);
 }
 
-HeldMembers::Moved HeldMembers::move(std::span<const double> inputs, std::span<double> states,
-                                     const std::function<bool()>& stop) {
+HeldMembers::MoveResult HeldMembers::move(std::span<const double> inputs, std::span<double> states,
+                                          const std::function<bool()>& stop) {
   const std::size_t row = 2 * coordinates_, count = states.size() / row;
   const auto require = [](const char* what, std::size_t expected, std::size_t got) {
     if (expected == got) return;

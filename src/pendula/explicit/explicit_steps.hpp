@@ -62,18 +62,18 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   const ExplicitSteps& chain() const { return *this; }
 
   /// The state of the members, with everything that their next steps depend on.
-  struct Place {
-    Place(Parts where, LowParts rest) : parts(std::move(where)), slopes(parts), low(std::move(rest)) {}
+  struct FullState {
+    FullState(Parts where, LowParts rest) : parts(std::move(where)), slopes(parts), low(std::move(rest)) {}
 
     Parts parts, slopes;
     [[no_unique_address]] LowParts low;
   };
-  Place place() const {
-    Place here(parts_, low_);
+  FullState place() const {
+    FullState here(parts_, low_);
     here.slopes = slopes_;
     return here;
   }
-  void go_to(const Place& place) {
+  void go_to(const FullState& place) {
     parts_ = place.parts;
     slopes_ = place.slopes;
     low_ = place.low;
@@ -185,12 +185,12 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   }
 
   /// Declares the way from `begin` to the current state a single step.
-  void set_step(const Place& begin, double time, double h) requires is_twofold {
+  void set_step(const FullState& begin, double time, double h) requires is_twofold {
     before_ = begin;
     begin_ = time;
     step_ = h;
   }
-  const Place& begin() const { return before_; }
+  const FullState& begin() const { return before_; }
 
   /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires(Dynamics::has_tangent) {
@@ -250,7 +250,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     L rise_rate_, turn_on_rate_, turn_off_rate_, bend_on_rate_, bend_off_rate_;
   };
 
-  void change_place(Place& with) {
+  void change_place(FullState& with) {
     std::swap(parts_, with.parts);
     std::swap(slopes_, with.slopes);
     std::swap(low_, with.low);
@@ -358,7 +358,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   L tried_{0.0}, step_{1.0};        // tried steps, last accepted steps
   L tried_from_{0.0}, begin_{0.0};  // times at which these began
   Parts slopes_;                    // at the current state
-  Place trial_, before_;            // end of the tried step, start of the last one
+  FullState trial_, before_;        // end of the tried step, start of the last one
   Parts stages_;
   std::vector<Parts> inner_slopes_;  // of all stages but the first
   Parts errors_;                     // error of the step divided by its size

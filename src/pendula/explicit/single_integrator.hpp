@@ -279,7 +279,7 @@ class SingleIntegrator final : public PlainIntegrator {
   Subject subject_;
   Steps steps_;
   typename Steps::Controller controller_;
-  typename Steps::Place kept_, end_;  // for steps taken in parts
+  typename Steps::FullState kept_, end_;  // for steps taken in parts
   double tolerance_;
   Statistics statistics_;
   Compensated<double> time_{};

@@ -19,16 +19,16 @@ struct MembersStepperOptions {
   bool are_chosen = false;  ///< steps are, by their errors
 };
 
-/// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Moved`
+/// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Members`
 /// holds their states and stages: ChainMembers of chains, SystemMembers of systems.
 ///
 /// What becomes of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
 /// and one that fails stays where its last accepted step ended.
-template <class Moved>
+template <class Members>
 class MembersStepper {
  public:
-  using Chain = Moved;
-  using Subject = typename Moved::Subject;
+  using Chain = Members;
+  using Subject = typename Members::Subject;
   using L = typename Chain::L;
   using Mask = typename L::Mask;
   using Options = MembersStepperOptions;

@@ -32,12 +32,13 @@ struct SolverTraits {
 ///   set_stop_sign(stop)  a sign that it looks at within long iterations (StopSign);
 ///   linearize(…)         the derivative of the step (LinearizingSolver).
 template <class S>
-concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::Place& place,
-                               const typename S::Place& kept, const StepTask& task, MemberNumbers& numbers, double time,
-                               double h, double x, double tolerance, double noticed, double* each, Status status) {
+concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::FullState& place,
+                               const typename S::FullState& kept, const StepTask& task, MemberNumbers& numbers,
+                               double time, double h, double x, double tolerance, double noticed, double* each,
+                               Status status) {
   typename S::Model;  // what it is built from, with the number of stages and options of its own
   typename S::Real;   // the number type that it computes in, and that round-off is measured in
-  requires std::default_initializable<typename S::Place>;
+  requires std::default_initializable<typename S::FullState>;
 
   { fixed.traits() } -> std::same_as<SolverTraits>;
   { fixed.iteration() } -> std::same_as<Iteration>;  // that it prefers by now

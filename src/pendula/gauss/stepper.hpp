@@ -345,7 +345,7 @@ class GaussStepper : private StepSolution<Solver> {
     double step = 0;             // its size; 0: there was none
     bool in_parts = false;
     double work = 0;  // that loads had brought before
-    typename Solver::Place place{};
+    typename Solver::FullState place{};
 
     double elapsed(double at) const { return (at - time.value) - time.compensation; }
   };
@@ -372,7 +372,7 @@ class GaussStepper : private StepSolution<Solver> {
   int halved_ = 0;  // steps that were not solved, seldom each, less those since
   bool remembers_ = false, looks_ = false;
   Remembered before_;
-  typename Solver::Place start_;  // of a step that is taken in parts
+  typename Solver::FullState start_;  // of a step that is taken in parts
   std::vector<double>
       member_;  // saved: of the end of the last step during at_full_order, of the start of a chosen step
   std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;

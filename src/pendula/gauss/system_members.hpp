@@ -307,7 +307,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   // By loads, in the step that was solved  [J].
   L brought() const { return any(loaded()) ? select(loaded(), Base::work(), L(0.0)) : L(0.0); }
 
-  typename Base::Place saved_;
+  typename Base::FullState saved_;
   bool may_miss_ = false;  // lengths are among the coordinates
   L loaded_{0.0};
   L scale_{0.0}, turn_{0.0};

@@ -71,19 +71,19 @@ class SystemMotion {
   }
 
   /// Where the motion is, to come back to.
-  struct Place {
+  struct FullState {
     std::vector<Compensated<Num>> state;
     std::vector<Num> turns;
     Num time, fastest;
   };
-  Place place() const { return {state_, turns_, time_, fastest_}; }
-  void keep(Place& place) const {
+  FullState place() const { return {state_, turns_, time_, fastest_}; }
+  void keep(FullState& place) const {
     place.state = state_;
     place.turns = turns_;
     place.time = time_;
     place.fastest = fastest_;
   }
-  void go_to(const Place& place, const Mask& which) {
+  void go_to(const FullState& place, const Mask& which) {
     for (std::size_t k = 0; k < 2 * count_; ++k) assign(which, place.state[k], state_[k]);
     for (std::size_t k = 0; k < count_; ++k) turns_[k] = select(which, place.turns[k], turns_[k]);
     time_ = select(which, place.time, time_);

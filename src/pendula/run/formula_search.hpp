@@ -99,7 +99,7 @@ class FormulaSearch {
   };
 
   /// A subinterval of a fit, as places in [0, 1].
-  struct Part {
+  struct Subinterval {
     double low, high;
   };
 
@@ -204,7 +204,7 @@ class FormulaSearch {
   }
 
   /// Enclosure of the formula on a part of a fit, or at one place of it.
-  Reach reach(const Fit& fit, const Part& part) {
+  Reach reach(const Fit& fit, const Subinterval& part) {
     const bool is_place = part.low == part.high;
     const auto within = [&](const BernsteinPolynomial& polynomial, double band) -> Interval {
       const Interval range = is_place ? polynomial(part.low) : polynomial.part(part.low, part.high).range();
@@ -244,7 +244,7 @@ class FormulaSearch {
     search(fit.at(0.5), to, by, level + 1, fit.roughness, doubtful);
   }
 
-  void follow(const Fit& fit, const Part& part, By by, int level, Doubtful& doubtful) {
+  void follow(const Fit& fit, const Subinterval& part, By by, int level, Doubtful& doubtful) {
     --parts_left_;
     const double from = fit.at(part.low), to = fit.at(part.high), middle = (part.low + part.high) / 2;
     const Reach whole = reach(fit, part);
@@ -279,7 +279,7 @@ class FormulaSearch {
   }
 
   /// Whether the formula, enclosed by `value`, certainly does not change sign in a part of a fit.
-  bool decide(const Reach& reach, const Interval& value, const Fit& fit, const Part& part, By by, int level,
+  bool decide(const Reach& reach, const Interval& value, const Fit& fit, const Subinterval& part, By by, int level,
               Doubtful& doubtful) {
     if (reach.defined == Defined::nowhere) {
       close(doubtful, fit.at(part.low), by, level);

@@ -123,7 +123,7 @@ class FieldLook {
   using Nodes = std::array<double, Gauss::stages>;
 
   /// Where a function changes rapidly, and the distance from there beyond which it hardly changes.
-  struct Place {
+  struct RapidChange {
     double share, distance;
   };
 
@@ -212,8 +212,8 @@ class FieldLook {
     }
   }
 
-  void add(const Place& place) {
-    const auto is_known = [&](const Place& known) {
+  void add(const RapidChange& place) {
+    const auto is_known = [&](const RapidChange& known) {
       return std::abs(known.share - place.share) <= place.distance / 2 && known.distance <= 2 * place.distance;
     };
     if (places_.size() < most_places && std::none_of(places_.begin(), places_.end(), is_known)) {
@@ -224,7 +224,7 @@ class FieldLook {
   // Interval borders around every place, spaced more widely further away from it.
   void find_borders() {
     borders_.clear();
-    for (const Place& place : places_) {
+    for (const RapidChange& place : places_) {
       borders_.push_back(place.share);
       for (double away = place.distance; away < 0.5 / parts_; away *= growth) {
         borders_.push_back(place.share - away);
@@ -298,7 +298,7 @@ class FieldLook {
   double smooth_;
   int parts_;
   std::vector<double> few_, samples_, found_, near_, borders_, here_, most_;
-  std::vector<Place> places_;
+  std::vector<RapidChange> places_;
 };
 
 }  // namespace pendula

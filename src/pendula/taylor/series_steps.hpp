@@ -94,13 +94,13 @@ class SeriesSteps {
   const Parts& parts() const { return now_.parts; }
 
   /// A state, with everything that the next steps depend on.
-  struct Place {
+  struct FullState {
     PackRows<width_of<L>> state, low;  // q, then p or v; and their rounding errors
     Parts parts;                       // q and v
     L unit{1.0};                       // of time, for the series about this state  [s]
   };
-  Place place() const { return now_; }
-  void go_to(const Place& place) {
+  FullState place() const { return now_; }
+  void go_to(const FullState& place) {
     now_ = place;
     is_expanded_ = false;
   }
@@ -315,8 +315,8 @@ class SeriesSteps {
     for (int i = 0; i < count(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
   }
 
-  const Place& begin() const requires(!is_batch<L>) { return begin_; }
-  void set_step(const Place& begin, double time, double h) requires(!is_batch<L>) {
+  const FullState& begin() const requires(!is_batch<L>) { return begin_; }
+  void set_step(const FullState& begin, double time, double h) requires(!is_batch<L>) {
     begin_ = begin;
     begin_time_ = time;
     step_ = h;
@@ -650,8 +650,8 @@ class SeriesSteps {
   PackRows<W> state_;
   PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
   PackRows<W> kept_, operands_, inputs_;
-  Place now_, trial_, begin_;  // begin_: of one motion
-  PackRows<W> seen_;           // a motion on the way of a step
+  FullState now_, trial_, begin_;  // begin_: of one motion
+  PackRows<W> seen_;               // a motion on the way of a step
   PackRows<W> rates_;
   PackRows<W> arguments_;  // of functions that may be narrow, at three places of a step
   // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.
