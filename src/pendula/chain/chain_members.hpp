@@ -9,6 +9,7 @@
 #include <pendula/chain/member_loads.hpp>
 #include <pendula/chain/rod_tangent.hpp>
 #include <pendula/gauss/member_layout.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
@@ -70,7 +71,7 @@ class ChainMembers
       }
       rods_.start(lane, i, Wide(chain[i].length), Heading<Space, Wide>(angles, rates));
     }
-    this->slowest_pace_.set(lane, 0.15 * links() * links() * std::abs(gravity) / length);
+    this->slowest_pace_.set(lane, slowest_pace_squared<double>(links(), gravity, length));
     this->fastest_swing_.set(lane, chain.fastest_swing_squared());
     restoring_.set(lane, 0);
     if constexpr (has_tangent) start_tangent(lane);
@@ -160,7 +161,7 @@ class ChainMembers
   /// The most that a link turns in the step, squared; never less, hardly more  [rad²].
   L turn() const { return this->turn_squared(); }
   /// From where on stages are no motion  [rad].
-  static constexpr double largest_turn(bool /*chosen*/) { return 3; }
+  static constexpr double largest_turn(bool /*chosen*/) { return detail::largest_turn; }
 
   /// R in the middle of the step, squared, times h².
   L pace_squared() const {

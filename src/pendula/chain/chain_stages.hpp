@@ -47,8 +47,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
       length += given[i].length;
     }
     this->gravity_ = Real(chain.gravity());
-    using std::abs;
-    this->slowest_pace_ = Real(0.15) * Real(links()) * Real(links()) * abs(this->gravity_) / length;
+    this->slowest_pace_ = slowest_pace_squared<Real>(Real(links()), this->gravity_, length);
     this->fastest_swing_ = given.fastest_swing_squared();
     if (chain.loaded()) this->expect_loads();
   }

@@ -9,6 +9,7 @@
 #include <pendula/run/library.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -147,7 +148,7 @@ Outcome HeldMembers::go_alone(Numbers inputs, Numbers state, const MemberEnd& en
   const double step = is_adaptive(options_) ? duration_ : options_.step;
   while (outcome && integrator->time() < duration_) {
     const double left = duration_ - integrator->time();
-    outcome = integrator->step(step * (1 + 1e-9) < left ? step : left);
+    outcome = integrator->step(detail::ends_before(step, left) ? step : left);
     if (stop()) outcome.status = Status::interrupted;
   }
   const Motion there = integrator->state();

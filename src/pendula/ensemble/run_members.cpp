@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <pendula/chain/chain_links.hpp>
 #include <pendula/ensemble/lane_exponents.hpp>
 #include <pendula/ensemble/lane_runs.hpp>
 #include <pendula/ensemble/run_members.hpp>
@@ -32,7 +33,7 @@ std::optional<double> natural_pace_in(const Subject& subject) {
   const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
   if (found == nullptr) return {};
   const Chain<Space>& chain = found->chain();
-  return chain.links() * std::sqrt(0.15 * std::abs(chain.gravity()) / chain.lengths().sum());
+  return chain.links() * std::sqrt(slowest_pace_factor * std::abs(chain.gravity()) / chain.lengths().sum());
 }
 
 /// About how fast a chain swings  [1/s]; infinity for other subjects.
@@ -61,6 +62,9 @@ bool goes_by_series(const RunSetup& setup) {
   return links <= most_links && std::isfinite(natural_pace(subject)) && !subject.loaded();
 }
 
+// Tolerance of explicit steps with tangents: of a smaller one rounding leaves nothing.
+constexpr double finest_with_tangents = 1e-13;
+
 // Runs of about the same length go in lanes together.
 double tolerance_of_steps(const RunSetup& setup, double finest) {
   const double length = run_length(setup);
@@ -75,7 +79,7 @@ RunOptions quickest_in_lanes(const RunSetup& setup) {
   if (options.method != Method::gauss || options.step != 0) return options;
   if (detail::goes_by_series(setup)) {
     options.method = Method::taylor;
-    options.tolerance = detail::tolerance_of_steps(setup, 1e-16);
+    options.tolerance = detail::tolerance_of_steps(setup, smallest_tolerance);
     return lane_kind(setup, options) ? options : setup.options;
   }
   if (options.tolerance < 1e-9 || !setup.events.empty()) return options;
@@ -90,7 +94,7 @@ RunOptions quickest_with_tangents(const RunSetup& setup) {
   RunOptions options = setup.options;
   if (options.method != Method::gauss || options.step != 0) return options;
   options.method = Method::fehlberg78;
-  options.tolerance = detail::tolerance_of_steps(setup, 1e-13);
+  options.tolerance = detail::tolerance_of_steps(setup, detail::finest_with_tangents);
   const bool is_tried = tangent_lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
   return is_tried || tangent_lane_kind(setup, setup.options) ? options : setup.options;
 }
@@ -197,7 +201,8 @@ std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(std::span<const 
   };
   const auto finer = [&](const RunSetup& setup) {
     RunOptions options = quickest(setup);
-    if (options.method != setup.options.method) options.tolerance = std::max(1e-13, 0.01 * options.tolerance);
+    if (options.method != setup.options.method)
+      options.tolerance = std::max(detail::finest_with_tangents, 0.01 * options.tolerance);
     return options;
   };
   const std::function<RunOptions(const RunSetup&)> attempts[] = {quickest, finer, detail::options_asked_for};

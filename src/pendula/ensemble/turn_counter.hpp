@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <pendula/chain/heading.hpp>
 #include <pendula/ensemble/step_sight.hpp>
+#include <pendula/numeric/full_turns.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <vector>
 
@@ -83,7 +83,7 @@ class TurnCounter {
       const Mask close = (along > L(0.0)) & (across * across < 3 * (along * along));
       known = select(close, known, L(0.0));
       const L slope = across / along;
-      turned = turned + select(close, slope / fma(L(0.28), slope * slope, L(1.0)), L(0.0));
+      turned = turned + select(close, slope / fma(L(detail::arctangent_bend), slope * slope, L(1.0)), L(0.0));
       x = rod[0];
       y = rod[1];
     }
@@ -152,7 +152,7 @@ class TurnCounter<Planar, L> {
     for (int i = 0; i < links_; ++i) {
       Turn& turn = turns_[at(i)];
       for (std::size_t k = 0; k < 2; ++k) turn.at[k].set(lane, along(i)[k][lane]);
-      turn.count.set(lane, std::round((q[i] - angle(lane, turn)) / full_turn));
+      turn.count.set(lane, std::round((q[i] - angle(lane, turn)) / detail::full_turn));
     }
   }
 
@@ -168,16 +168,16 @@ class TurnCounter<Planar, L> {
   }
 
   std::array<double, 1> angles(int lane, int i) const {
-    return {angle(lane, turns_[at(i)]) + full_turn * turns_[at(i)].count[lane]};
+    return {angle(lane, turns_[at(i)]) + detail::full_turn * turns_[at(i)].count[lane]};
   }
 
   /// θ of a link, of all members.
-  L angles(int i) const { return fma(L(full_turn), turns_[at(i)].count, angle(turns_[at(i)].at)); }
+  L angles(int i) const { return fma(L(detail::full_turn), turns_[at(i)].count, angle(turns_[at(i)].at)); }
 
   /// The angle of a rod that lies nearest to another.
   static L near(const std::array<L, 2>& rod, const L& other) {
     const L x = angle(rod);
-    return fma(L(full_turn), floor(fma(other - x, L(1 / full_turn), L(0.5))), x);
+    return fma(L(detail::full_turn), floor(fma(other - x, L(1 / detail::full_turn), L(0.5))), x);
   }
 
  private:
@@ -203,8 +203,6 @@ class TurnCounter<Planar, L> {
       for (std::size_t k = 0; k < 2; ++k) turn.at[k] = select(which, rod[k], turn.at[k]);
     }
   }
-
-  static constexpr double full_turn = 2 * std::numbers::pi;
 
   static L angle(const std::array<L, 2>& rod) { return atan2(rod[0], -rod[1]); }
   static double angle(int lane, const Turn& turn) {

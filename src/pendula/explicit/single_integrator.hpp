@@ -6,6 +6,7 @@
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <pendula/system/stop_sign.hpp>
 #include <utility>
 #include <vector>
@@ -99,10 +100,7 @@ class SingleIntegrator final : public PlainIntegrator {
     return {.status = Status::ok, .time = time, .step = time - begin_};
   }
 
-  void set_stop_sign(StopSign stop) override {
-    constexpr int quick = 1000;  // parts: a step of fewer is faster than asking
-    stop_ = steps_.count() > quick ? stop : StopSign{};
-  }
+  void set_stop_sign(StopSign stop) override { stop_ = steps_.count() > quick_parts ? stop : StopSign{}; }
 
   const Statistics& statistics() const override { return statistics_; }
   Description describe() const override { return {"", "", subject_.kernel()}; }
@@ -133,7 +131,6 @@ class SingleIntegrator final : public PlainIntegrator {
 
  private:
   static constexpr bool has_tangents = requires(Steps steps) { steps.tangent(); };
-  static constexpr int most_attempts = 100;
   static constexpr int most_parts = 1024;
 
   Outcome ok(double h) const { return {.status = Status::ok, .time = time(), .step = h}; }
@@ -247,7 +244,7 @@ class SingleIntegrator final : public PlainIntegrator {
   }
 
   /// Tries steps from `longest` on, shorter each time.
-  Trial find_step(double longest, int tries = most_attempts) {
+  Trial find_step(double longest, int tries = detail::most_attempts) {
     Trial trial;
     double size = longest;
     for (int attempt = 0; attempt < tries && size > smallest_step() && !is_stopped(); ++attempt) {

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <limits>
 #include <pendula/gauss/fixed_point_stop.hpp>
+#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/gauss/step_controller.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 
 namespace pendula {
@@ -14,7 +16,7 @@ namespace pendula {
 /// How far the stage equations are solved.
 struct MembersStepperOptions {
   /// Of the first correction that is left out, relative to what the step moves: by default a thousandth of a last bit.
-  double enough = 1e-18;
+  double enough = CorrectionLimits().enough;
   int max_iterations = 50;
   bool are_chosen = false;  ///< steps are, by their errors
 };
@@ -88,7 +90,7 @@ class MembersStepper {
   /// what it was.
   Mask solve(const L& time, const L& h, const Mask& wanted) {
     const L ratio = h / last_;
-    const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
+    const Mask alike = (known_ > L(cold)) & (ratio <= L(detail::farthest_extrapolation));
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
     depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(0.0));
     chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_, depth_});
@@ -124,11 +126,11 @@ class MembersStepper {
   /// Members whose stages may be a solution that is not the motion: those that came far from where they began, or turn
   /// far.
   Mask doubtful() const {
-    return (stop_.first() > L(trusted_prediction * trusted_prediction) * chain_.scale()) | turns_far();
+    return (stop_.first() > L(detail::trusted_prediction * detail::trusted_prediction) * chain_.scale()) | turns_far();
   }
 
   /// Members whose angles are to be followed from stage to stage.
-  Mask turns_far() const { return chain_.turn() > L(trusted_turn * trusted_turn); }
+  Mask turns_far() const { return chain_.turn() > L(detail::trusted_turn * detail::trusted_turn); }
 
   /// What is known of the stages of these members is wrong: their next step starts cold.
   void forget(const Mask& which) { known_ = select(which, L(cold), known_); }
@@ -143,8 +145,6 @@ class MembersStepper {
   // Near singular places tangents are rounded to little more than this.
   static constexpr double tangent_enough = 1e-12;
   static constexpr double cold = 0, solved = 1, accepted = 2;
-  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
-  static L farthest_extrapolation() { return L(1.5); }
 
   TempoOf<L> tempo() {
     TempoOf<L> tempo;

@@ -27,8 +27,8 @@ class StepPrediction {
       depth_.forget();
       return {h_ / known_h, {false, true, false, 0, 0}};
     }
-    is_predicted_ =
-        task.from == PredictedFrom::last_step && last_h_ != 0 && std::abs(h_ / last_h_) < farthest_extrapolation;
+    is_predicted_ = task.from == PredictedFrom::last_step && last_h_ != 0 &&
+                    std::abs(h_ / last_h_) < detail::farthest_extrapolation;
     const int depth = depth_.next(is_predicted_ && h_ == last_h_, stages, most);
     const double ratio = is_predicted_ ? h_ / last_h_ : 1;
     last_h_ = 0;
@@ -69,8 +69,6 @@ class StepPrediction {
   }
 
  private:
-  // Steps that are longer by this factor are out of reach of the polynomial of the last step.
-  static constexpr double farthest_extrapolation = 1.5;
   static constexpr std::int64_t looked_at = 8;
 
   PredictionDepth depth_;

@@ -12,6 +12,7 @@
 #include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <pendula/system/stop_sign.hpp>
 #include <utility>
 #include <vector>
@@ -168,46 +169,38 @@ class GaussStepper : private StepSolution<Solver> {
   // limits them, as after motion that was damped fast, not their errors.
   static constexpr int seldom = 4, often = 16;
 
-  // With so many links or coordinates, an iteration takes less time than to ask for the sign to stop.
-  static constexpr int quick_parts = 1000;
-
   // From there on it is asked whether a given step has missed what is damped before its first stage.
   static constexpr double visible_defect = 1e-4;
 
-  // A step of its own choice fails where it would be smaller than this fraction of the time so far, or was tried so
-  // often.
+  // A step of its own choice fails where it would be smaller than this fraction of the time so far.
   static constexpr double smallest_chosen = 1e-13;
-  static constexpr int most_attempts = 100;
 
   /// One step of the controller's choice, at most so long. Forces that depend on time are looked at as if nothing cut
   /// the step short. Where a step that is cut short fails, the next one is looked for as if nothing cut it: so a run
   /// that is interrupted and goes on takes the steps of one that was not.
   Outcome chosen_step(double most) {
     const double longest = solver_.followed(time(), controller_.step(), options_.tolerance);
-    if (is_within(std::min(controller_.step(), longest), most)) return find_step(longest, most);
+    if (detail::ends_before(std::min(controller_.step(), longest), most)) return find_step(longest, most);
     read_member();
     Outcome outcome = find_step(longest, most, 1);
     if (outcome) return outcome;
     write_member();
     outcome = find_step(longest, std::numeric_limits<double>::infinity());
-    if (outcome && is_within(outcome.step, most)) return outcome;
+    if (outcome && detail::ends_before(outcome.step, most)) return outcome;
     write_member();
     forget_linearization();
     return find_step(longest, most);
   }
 
-  /// Whether a step is shorter than the most it may be, and by more than a sliver.
-  static bool is_within(double h, double most) { return h * (1 + 1e-9) < most; }
-
   /// Tries steps until one is good enough. One whose error is too large predicts the stages of the next, shorter one.
-  Outcome find_step(double longest, double most, int tries = most_attempts) {
+  Outcome find_step(double longest, double most, int tries = detail::most_attempts) {
     const StepController<double> before = controller_;
     int shorter = halved_ > often ? 0 : fixed_point_worth;
     halved_ = std::max(0, halved_ - 1);
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
       const double chosen = std::min(controller_.step(), longest);
-      const bool is_cut = !is_within(chosen, most);
+      const bool is_cut = !detail::ends_before(chosen, most);
       const double h = is_cut ? most : chosen;
       const PredictedFrom from = is_found ? PredictedFrom::same_step : PredictedFrom::last_step;
       Outcome outcome = Base::solve(h, from, shorter == 0);

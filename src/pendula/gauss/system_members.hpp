@@ -8,6 +8,7 @@
 #include <pendula/gauss/stage_tangents.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>
@@ -176,8 +177,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     const L infinite(std::numeric_limits<double>::infinity());
     return select(masses_.is_singular(), infinite, turn_ * turn_);
   }
-  /// From where on stages are no motion: where inertia may vanish, coordinates may move faster than all else  [rad].
-  double largest_turn(bool chosen) const { return chosen || dynamics_.constant_masses() ? 3 : 0.25; }
+  /// From where on stages may be no motion  [rad].
+  double largest_turn(bool chosen) const { return detail::largest_turn_of(chosen || dynamics_.constant_masses()); }
 
   /// R in the middle of the step, squared, times h².
   L pace_squared() const { return (columns_.h() * columns_.h()) * pace_squared_; }

@@ -56,6 +56,16 @@ inline bool adds_up_rounding(Method method) {
   return is_explicit(method) && method != Method::taylor;
 }
 
+/// smallest_tolerance for the steps of one method.
+inline double smallest_tolerance_of(Method method) {
+  return adds_up_rounding(method) ? 1e-14 : smallest_tolerance;
+}
+
+/// The number of stages for steps by which a run has the wanted accuracy: their errors add up.
+inline int stages_for_accuracy(Method method, double wanted) {
+  return stages_for(method, 0.01 * wanted);
+}
+
 /// The smallest tolerances that trials use.
 struct FinestTolerance {
   double good;      ///< where the accuracy may still be reached
@@ -66,7 +76,7 @@ struct FinestTolerance {
 /// as a tolerance would take, unless more steps reach the accuracy.
 inline FinestTolerance finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
   constexpr double most_steps = 4;
-  const double rounding = adds_up_rounding(options.method) ? 1e-14 : 1e-16;
+  const double rounding = smallest_tolerance_of(options.method);
   const double few_steps = std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
   if (options.method == Method::taylor) return {rounding, rounding};
   if (!accuracy.chooses_stages) return {few_steps, few_steps};
@@ -178,7 +188,7 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
       return run;
     default:
       run.method = Method::gauss;
-      run.stages = stages_for(run.method, 0.01 * wanted);
+      run.stages = stages_for_accuracy(run.method, wanted);
       run.step = 0;
       return run;
   }
@@ -189,10 +199,10 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
 /// tolerance.
 template <class RunTrial, class Apart>
 void hear_another(double wanted, double start, AccuracyAim& aim, double tolerance, RunTrial run, Apart apart) {
-  constexpr double far = 10, closer = 0.3, finest = 1e-16;  // times the wanted error; the distance before
+  constexpr double far = 10, closer = 0.3;  // times the wanted error; the distance before
   constexpr int most_trials = 3;
   double before = std::numeric_limits<double>::infinity();
-  for (int trial = 0; trial < most_trials && tolerance >= finest; ++trial) {
+  for (int trial = 0; trial < most_trials && tolerance >= smallest_tolerance; ++trial) {
     const std::optional<Track> there = run(tolerance);
     if (!there) return;
     const Separation parted = apart(*there, *aim.finest);

@@ -55,7 +55,8 @@ inline std::string untrusted_after(double until, double start) {
 
 /// Whether the defect of a constant step is larger than that of steps whose size was chosen to resolve the motion.
 inline bool misses(const RunOptions& run, double defect) {
-  return run.stages != 1 && defect > 0.02;
+  constexpr double resolved = 0.02;
+  return run.stages != 1 && defect > resolved;
 }
 
 /// `missed` is when the first such step began.
@@ -132,7 +133,7 @@ inline std::optional<SecondLook> finer(const RunOptions& run, double duration) {
   SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
   if (is_adaptive(run)) {
     look.options.tolerance /= 100;
-    if (look.options.tolerance < (adds_up_rounding(run.method) ? 1e-14 : 1e-16)) return {};
+    if (look.options.tolerance < smallest_tolerance_of(run.method)) return {};
     if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
     return look;
   }

@@ -90,7 +90,7 @@ class FormulaSearch {
     /// Error bound of interpolation between the samples, relative to the largest value; 0 if closer samples would not
     /// help.
     double roughness = 0;
-    bool is_resolved = true;  // the interpolants are accurate to about 1e-3 of their variation
+    bool is_resolved = true;  // the interpolants are accurate to resolved_tail
     bool is_blurred = false;  // the error of an interpolant is comparable to its variation
 
     double width() const { return to - from; }
@@ -191,7 +191,7 @@ class FormulaSearch {
         if (sizes[degree_] > noise) last_[n] = std::max(last_[n], sizes[degree_] * whole);
         miss = missed_[n] + last_[n];
       }
-      fit.is_resolved &= tail <= 1e-3 * variation + noise;
+      fit.is_resolved &= tail <= resolved_tail * variation + noise;
       fit.is_blurred |= tail > 1e-2 * variation + noise;
       if (tail > noise + miss) fit.roughness = std::max(fit.roughness, tail / largest_[n]);
       // Bound of the derivative of a polynomial, by Markov's inequality.

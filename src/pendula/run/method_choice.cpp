@@ -16,7 +16,6 @@ namespace {
 constexpr int most_coordinates = 10;    // a generated kernel writes its series out up to there
 constexpr int always_few = 2, few = 3;  // links: of three, Gauss steps are the faster ones below fine_tolerance
 constexpr double fine_tolerance = 1e-10;
-constexpr double finest = 1e-16;   // tolerance of a step: of a smaller one rounding leaves nothing
 constexpr double short_run = 100;  // steps
 
 /// Why there are no series of a subject, or Gauss steps take less time; empty: series do.
@@ -92,14 +91,14 @@ MethodChoice choose_method(const RunSetup& setup) {
   if (!(setup.duration > 0)) return {0, "no motion"};
   RunOptions options = setup.options;
   options.method = Method::taylor;
-  options.tolerance = step_tolerance(asked, 1, finest);
+  options.tolerance = step_tolerance(asked, 1, smallest_tolerance);
   try {
     if (subject.damped() && becomes_stiff(setup)) return {0, "strong damping"};
     const double step = first_step(setup, options);
     if (step == 0) return {0, "a start from which series take no step"};
     const double steps = setup.duration / step;
-    if (steps * finest > asked) return {0, "a long run, in which series lose energy"};
-    options.tolerance = step_tolerance(asked, steps / short_run, finest);
+    if (steps * smallest_tolerance > asked) return {0, "a long run, in which series lose energy"};
+    options.tolerance = step_tolerance(asked, steps / short_run, smallest_tolerance);
   } catch (const std::invalid_argument& error) {
     return {0, error.what()};
   }

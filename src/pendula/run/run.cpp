@@ -155,7 +155,7 @@ bool Run::aim(const std::function<bool()>& stop) {
 // The same number of stages for all trials and the run: errors with few and with many stages differ in size.
 void Run::choose_stages(RunOptions& options) const {
   const Accuracy& accuracy = setup_.accuracy;
-  if (accuracy.chooses_stages) options.stages = stages_for(options.method, 0.01 * accuracy.error);
+  if (accuracy.chooses_stages) options.stages = detail::stages_for_accuracy(options.method, accuracy.error);
 }
 
 void Run::follow_aim() {

@@ -10,6 +10,7 @@
 #include <pendula/run/row_times.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -48,7 +49,7 @@ inline void require(const Schedule& schedule) {
 /// Size of the next step. A remainder that is one step up to rounding is taken as one step.
 inline double next_step(const Schedule& schedule, double elapsed) {
   const double rest = schedule.duration - elapsed;
-  return rest <= schedule.step * (1 + 1e-9) ? rest : schedule.step;
+  return ends_before(schedule.step, rest) ? schedule.step : rest;
 }
 
 /// Whether the end of the run may affect a step planned to be `h`, after one of size `last`, 0 if unknown. The next

@@ -16,6 +16,7 @@
 #include <pendula/run/pile_up.hpp>
 #include <pendula/run/relay.hpp>
 #include <pendula/run/switching.hpp>
+#include <pendula/system/field_look.hpp>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -170,7 +171,6 @@ class SwitchingIntegrator : public Relay {
   /// Whether functions such as exp and tanh, which the switching functions may hold, change little in the last step:
   /// what is narrow might lie between all places that are looked at.
   bool is_slow(double begin) {
-    constexpr double gone = 60;  // exp(−gone) is negligible
     constexpr double little = 8;
     std::array<std::vector<double>, BernsteinPolynomial::size> seen;
     for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -181,7 +181,9 @@ class SwitchingIntegrator : public Relay {
       BernsteinPolynomial::Numbers values;
       for (std::size_t i = 0; i < seen.size(); ++i) values[i] = seen[i][k];
       const Interval range = BernsteinPolynomial::through(values).range();
-      if (range.low < gone && range.high > -gone && range.high - range.low > little) return false;
+      if (range.low < detail::negligible_exponent && range.high > -detail::negligible_exponent &&
+          range.high - range.low > little)
+        return false;
     }
     return true;
   }

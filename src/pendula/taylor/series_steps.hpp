@@ -9,6 +9,7 @@
 #include <numbers>
 #include <optional>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/explicit/error_size.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
@@ -20,6 +21,7 @@
 #include <pendula/system/series_info.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/taylor/series_controller.hpp>
+#include <pendula/taylor/series_limits.hpp>
 #include <pendula/taylor/series_tangent.hpp>
 #include <span>
 #include <type_traits>
@@ -66,7 +68,7 @@ class SeriesSteps {
         order_(order_for(options.tolerance)),
         look_(most_looks, 2, systems.info().argument_is_base),
         largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
-        log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
+        log_reach_(std::log2(std::max(options.tolerance, detail::finest_of_series)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
         state_((static_cast<std::size_t>(order_) + 5) * row_),
         moved_(row_),
@@ -325,7 +327,7 @@ class SeriesSteps {
  private:
   static constexpr std::size_t W = width_of<L>;
   static constexpr double most_growth = 1e3;  // of the unit from step to step: an equilibrium allows any
-  static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14, shorter_unit = 1e-6;
+  static constexpr double shorter_unit = 1e-6;
   static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 30;
   // Places of a step that goes far where accelerations are compared, the end among them, as in every step; and how
   // closely functions that may be narrow are looked at, in nodes of a Gauss method.
@@ -344,7 +346,7 @@ class SeriesSteps {
 
   /// The order that needs the fewest operations for a tolerance.
   static int order_for(double tolerance) {
-    const double order = 4 - 1.25 * std::log10(std::max(tolerance, finest));
+    const double order = 4 - 1.25 * std::log10(std::max(tolerance, detail::finest_of_series));
     return std::clamp(static_cast<int>(std::lround(order)), least_order, most_order);
   }
 
@@ -486,7 +488,8 @@ class SeriesSteps {
     for (std::size_t i = 0; i < n_; ++i) {
       const L by_series =
           info_.has_momenta ? from_row<L>(bent_[i]) * (inverse * inverse) : from_row<L>(turned_[n_ + i]) * inverse;
-      const L defect = max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(rounded) * farthest, L(0.0));
+      const L defect =
+          max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(ErrorSize::rounding) * farthest, L(0.0));
       found = found & (defect * from_row<L>(rate_scales_[i]) <= L(largest_defect_));
     }
     return found;
@@ -563,20 +566,20 @@ class SeriesSteps {
   /// used, because motions that start at rest, and symmetric ones, have only every second or fourth term.
   L size_by_terms() {
     const int last = order_ - (info_.has_momenta ? 1 : 0);
-    L log_radius(1e3);
+    L log_radius(detail::largest_log_radius);
     Mask is_finite(L(0.0) == L(0.0));
     find_scales();
     for (int k = last - looked_at + 1; k <= last; ++k) {
       const L term = size_of_term(static_cast<std::size_t>(k));
       is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
-      log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(tiny))));
+      log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(detail::almost_zero))));
     }
     return select(is_finite, min(step_of(log_radius), longest_turn()), L(0.0));
   }
 
   /// The time in which no angle turns by more than `most_turn`, as fast as it does now  [s].
   L longest_turn() const {
-    L fastest(tiny);
+    L fastest(detail::almost_zero);
     for (std::size_t i = 0; i < n_; ++i) {
       if (systems_.info().is_angle[i]) fastest = max(fastest, abs(rate(0, i)));
     }
@@ -597,8 +600,8 @@ class SeriesSteps {
       v = max(v, abs(rate(0, i)));
       a = max(a, abs(rate(1, i)));
     }
-    const auto within = [](const L& x) { return min(max(x, L(nothing)), L(1.0)); };
-    const L places = within(max(q, v)), speeds = within(max(max(v, a), L(rounded) * q));
+    const auto within = [](const L& x) { return min(max(x, L(ErrorSize::nothing)), L(1.0)); };
+    const L places = within(max(q, v)), speeds = within(max(max(v, a), L(ErrorSize::rounding) * q));
     for (std::size_t i = 0; i < n_; ++i) {
       const L place = abs(coefficient(0, i)), size = systems_.info().is_angle[i] ? min(place, L(1.0)) : place;
       const L of_rate = L(1.0) / (speeds + abs(rate(0, i)));
