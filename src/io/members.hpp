@@ -50,7 +50,7 @@ class MemberScenarios {
  public:
   using Tell = std::function<void(const std::string&)>;
 
-  /// `tell` is told before a model's kernel is made. Throws InputError.
+  /// `tell` is called before a model's kernel is made. Throws InputError.
   MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell);
 
   const ScenarioText& text() const { return text_; }
@@ -67,7 +67,7 @@ class MemberScenarios {
   MemberScenario quickly_of_member(std::int64_t member);
 
  private:
-  /// A scenario, and of each key where its number stands in the start: in q, then in v.
+  /// A scenario, and for each key the indices of its number in the start: those in q, then those in v.
   struct Shared {
     MemberScenario scenario;
     std::vector<std::vector<Eigen::Index>> places;

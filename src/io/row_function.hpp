@@ -89,8 +89,8 @@ class RowFunction : public Formula {
     return (place.of == MotionIndex::Of::coordinates ? motion.q : motion.v)[place.index];
   }
 
-  /// Of all numbers of the expression; of none where one of them is not in a motion. A row of a motion whose numbers
-  /// are their own places tells them.
+  /// Finds the indices of all numbers of the expression, or none where one of them is not part of a motion. They are
+  /// read off a row: that of a motion whose numbers are their own indices.
   void find_places(Motion motion) {
     const auto count = static_cast<double>(motion.q.size());
     motion.q.setLinSpaced(1, count);

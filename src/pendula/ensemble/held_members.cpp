@@ -49,7 +49,7 @@ bool is_driven(const SystemSubject& subject) {
   return !subject.numbers().sines.empty();
 }
 
-// The same numbers for all members, but for what each holds and where it is.
+// Members of one model with the same numbers, but each with its own state and what it holds.
 template <class Model, class Hold>
 std::vector<PlainMember<Model>> members_of(const Model& model, std::size_t count, double duration, const double* states,
                                            std::size_t coordinates, Hold hold) {
@@ -79,9 +79,9 @@ HeldMembers::HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coo
   if (driven || !subject_->switches().empty()) {
     throw std::invalid_argument("members: expected a system without drives and pieces");
   }
-  subject_->make_integrator(options_);  // what is wrong is told now
+  subject_->make_integrator(options_);  // throws here, not at the first move
   const auto size = static_cast<Eigen::Index>(coordinates_);
-  // What is held may be a load: lanes of chains without loads are not for them.
+  // A held input may be a load, which lanes for chains without loads do not take.
   const RunSetup setup{with_inputs(subject_, std::vector<double>(inputs_, 1)),
                        Motion(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size)), options_, duration_};
   in_lanes_ = quickest_in_lanes(setup);

@@ -14,9 +14,9 @@
 
 namespace pendula {
 
-/// Motions of one system that go on side by side, each with inputs of its own, which are held. They are in lanes where
-/// there are some for the system and the options (lane_kind), and else go one by one. What becomes of a motion depends
-/// on itself alone, to the last bit.
+/// Motions of one system side by side, each with inputs of its own, which are held during a move. They go in lanes
+/// where there are some for the system and the options (lane_kind), else one by one. The result for a motion depends on
+/// that motion alone, to the last bit.
 class HeldMembers {
  public:
   /// `duration` of each move  [s]. `options` are those of a motion alone; in lanes, steps of another kind may take

@@ -67,7 +67,7 @@ class PlainChains : public MemberEnds {
   std::vector<PlainMember<PlainChain>> members_;
 };
 
-/// The same for systems of one kernel, and for planar chains that move as such.
+/// The same for systems of one kernel, and for planar chains that move as systems of their kernel.
 class PlainSystems : public MemberEnds {
  public:
   /// `setups` must outlive it.
@@ -183,7 +183,7 @@ class LaneRuns : private MemberWatch {
     const RunSetup& setup = *setups_[k];
     return !takes_too_long_[k] && (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
   }
-  // Extrapolated from how far it has come.
+  // The number of steps is extrapolated from the share of the run that is done.
   bool takes_too_long(std::size_t k, double time) const {
     const RunSetup& setup = *setups_[k];
     const int most = setup.subject->loaded() ? most_unchecked_steps : most_steps;

@@ -24,9 +24,9 @@ namespace pendula {
 
 /// How members are moved.
 struct QueueOptions {
-  double step = 0;          ///< s; 0: of each member's own choice, by tolerance
-  double tolerance = 1e-9;  ///< of the motion, relative to its size, as RunOptions::tolerance
-  double enough = 0;  ///< MembersStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
+  double step = 0;                ///< s; 0: of each member's own choice, by tolerance
+  double tolerance = 1e-9;        ///< of the motion, relative to its size, as RunOptions::tolerance
+  double enough = 0;              ///< MembersStepperOptions; 0: round-off; with chosen steps, a part of the tolerance
   std::int64_t energy_every = 0;  ///< steps from one look at the energy to the next; 0: it is not looked at
 };
 

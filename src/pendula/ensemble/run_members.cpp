@@ -49,7 +49,8 @@ double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
 }
 
-// Series of few links are summed in registers (library/lane_methods.hpp); those of kernels must fit the nearest memory.
+// Whether a run takes less time by Taylor series. Series of few links are summed in registers
+// (library/lane_methods.hpp). The numbers of a kernel have to fit into the first-level cache.
 bool goes_by_series(const RunSetup& setup) {
   constexpr int most_links = 3, most_operands = 30;
   const Subject& subject = *setup.subject;
@@ -65,7 +66,8 @@ bool goes_by_series(const RunSetup& setup) {
 // Tolerance of explicit steps with tangents: of a smaller one rounding leaves nothing.
 constexpr double finest_with_tangents = 1e-13;
 
-// Runs of about the same length go in lanes together.
+// The tolerance of a step (step_tolerance). It is the same for runs of about the same length, which so go in lanes
+// together.
 double tolerance_of_steps(const RunSetup& setup, double finest) {
   const double length = run_length(setup);
   return step_tolerance(setup.options.tolerance, std::isfinite(length) ? length / short_run : 1, finest);
@@ -117,8 +119,8 @@ struct Tried {
   std::optional<Track> track;  // of a run that gets a second look
 };
 
-// Runs without a report, if their lanes are others than before. Those that are followed by a track go in lanes of their
-// own: looking at every step takes time.
+// Tries the runs without a report in lanes, if these differ from those of the last try. Runs with a track go in lanes
+// of their own, since to look at every step takes time.
 void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(const RunSetup&),
                   const std::function<bool()>& stop, std::vector<Tried>& tried) {
   RunsByKind followed, others;
@@ -142,7 +144,7 @@ void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(con
   }
 }
 
-// Runs that lanes have moved to their ends.
+// Takes second looks at the runs that lanes have moved to their ends.
 void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<bool()>& stop,
                          std::vector<Tried>& tried) {
   std::vector<Doubted> doubted;

@@ -33,7 +33,7 @@ class StepSight {
   virtual void waypoint(int k, Parts& parts) = 0;
 };
 
-/// Of the steps of a MembersStepper, ExplicitSteps or TaylorSteps.
+/// The StepSight of a MembersStepper, ExplicitSteps or TaylorSteps.
 template <class Stepper>
 class SightOf : public StepSight<typename Stepper::L, Stepper::SpaceType::dimension> {
   using L = typename Stepper::L;

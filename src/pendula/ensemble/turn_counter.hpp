@@ -25,7 +25,7 @@ class TurnCounter {
 
   explicit TurnCounter(int links) : links_(links), turns_(at(links)), rods_(at(links)) {}
 
-  /// A member comes into a lane, at angles q; along(i): the rods.
+  /// A member comes into a lane with the angles q; along(i) is its rod i.
   template <class Along>
   void start(int lane, const double* q, Along along) {
     for (int i = 0; i < links_; ++i) {
@@ -57,7 +57,7 @@ class TurnCounter {
     for (int i = 0; i < links_; ++i) end_step(at(i), chain.along(i), sight);
   }
 
-  /// Angles of a member's link that its own are near.
+  /// Angles of the anchor of a member's link. The angles of the link are near these.
   auto angles(int lane, int i) const { return turns_[at(i)].anchors[at(lane)].angles(); }
 
  private:

@@ -152,7 +152,7 @@ class MembersStepper {
     return tempo;
   }
 
-  // Of the step that was solved.
+  // The decay of the step that was solved.
   StepDecay<L> decay() {
     StepDecay<L> decay;
     for (int k = 0; k < stages; ++k) {
@@ -164,7 +164,7 @@ class MembersStepper {
     return decay;
   }
 
-  // Until all have arrived or never will; gives who has. once(active): one iteration.
+  // Iterates until each member has arrived or never will; returns those that have. once(active) makes one iteration.
   template <class Stop, class Once>
   Mask iterate(const Mask& wanted, Stop& stop, const L& scale, Once once) {
     stop.restart(scale);

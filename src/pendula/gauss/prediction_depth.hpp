@@ -11,8 +11,8 @@ namespace pendula {
 /// last step. The first correction of a fixed point tells which is better, and the other one is tried now and then.
 class PredictionDepth {
  public:
-  /// Of the next step, which is as long as the last one or not; 0: from the last step alone. More than `stages` steps
-  /// are needed, `most` are used; of `most` <= `stages` it is always 0.
+  /// The depth for the next step, which is as long as the last one or not; 0: its stages are predicted from the last
+  /// step alone. More than `stages` steps are needed, and `most` are used; if `most` <= `stages`, it is always 0.
   int next(bool as_long, int stages, int most) {
     known_ = as_long ? std::min(known_ + 1, most) : 0;
     const bool prefers_many = by_many_ <= by_last_;

@@ -45,11 +45,10 @@ concept StageSolver = requires(S solver, const S& fixed, const typename S::State
 
   // --- The state ---
 
-  // Takes a state over, unless the mass matrix is singular there; tells the state, at the user's coordinates.
+  // Starts at a state, unless the mass matrix is singular there; returns the state, in the user's coordinates.
   { solver.start(state) } -> std::same_as<Status>;
   { fixed.state(time) } -> std::convertible_to<typename S::State>;
-  // Copies the state to a place, and makes one of the past the state; the stages stay what they are. Only the first
-  // copy to a place allocates.
+  // Copies the state, and goes back to a copy; the stages stay as they are. Only the first copy to an object allocates.
   fixed.keep(place);
   solver.go_to(kept);
   // The state within the last step, by the polynomials through its stages: x steps after the place where it began.

@@ -14,8 +14,8 @@ namespace pendula {
 
 /// Tangents of the motions of several systems, one in each lane, along Gauss steps: the variational equations of
 /// coordinates and rates, (δq)˙ = δq̇, (δq̇)˙ = δq̈, at the stages of a step that was solved, by a fixed point of their
-/// own. With the motion's they are one system of equations by one Gauss method, so that they err by its order; the
-/// derivatives of the steps themselves, which are taken in momenta, they are not.
+/// own. Together with the motion's they are one system of equations, solved by one Gauss method, and so have its order.
+/// They are not the derivatives of the steps themselves, which are taken in momenta.
 template <int S, class L>
 class StageTangents {
  public:
@@ -84,7 +84,7 @@ class StageTangents {
   }
   const L& scale() const { return scale_; }  ///< what changes are compared with, squared
 
-  /// Sums up what the stages add to the tangents, which stay; after it `decay` and `accept`.
+  /// Sums up what the stages add to the tangents; these stay as they are. To be called before `decay` and `accept`.
   void finish() {
     newest_ = (newest_ + pasts - 1) % pasts;
     for (CoordinateTangent& part : parts_) {
@@ -125,8 +125,8 @@ class StageTangents {
     }
   }
 
-  /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
-  /// again after this.
+  /// The logarithm of the growth of these members' tangents since their length was 1. Scales them to the length 1
+  /// again.
   L take_growth(const Mask& which) {
     const L length_squared = squared();
     const L factor = select(which, L(1.0) / sqrt(length_squared), L(1.0));

@@ -18,7 +18,7 @@ namespace pendula {
 
 struct StepperOptions {
   int max_iterations = 50;
-  /// Of the error of a step, relative to the size of the motion; 0: steps have the size that is asked for.
+  /// The error of a step, relative to the size of the motion; 0: steps have the size that is asked for.
   double tolerance = 0;
   /// How steps are chosen; if it is not given, symmetrically where energy is conserved.
   std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
@@ -132,10 +132,10 @@ class StepSolution {
     return Status::ok;
   }
 
-  // The error of a chosen step is known.
+  // No defect is computed for a step of the controller's choice: its error is known.
   bool may_have_defect() const { return !traits_.dissipates && !controller_.chooses(); }
 
-  // Of a step of the controller's choice the error is known, too, so that it may turn farther.
+  // A step of the controller's choice may turn farther, since its error is known.
   double largest_turn() const { return controller_.chooses() ? detail::largest_turn : traits_.largest_turn; }
 };
 

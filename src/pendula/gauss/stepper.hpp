@@ -162,14 +162,14 @@ class GaussStepper : private StepSolution<Solver> {
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
-  // So many halvings of a step are tried by fixed point, which together cost less than the whole step by Newton. Where
-  // they do not help, Newton takes it.
+  // So many halvings of a step are tried by fixed point; together they cost less than the whole step by Newton. If they
+  // do not help, Newton takes the step.
   static constexpr int fixed_point_worth = 3;
-  // Unless steps have been halved for that again and again, more than one of so many: then it is convergence that
-  // limits them, as after motion that was damped fast, not their errors.
+  // If more than one of `often` steps was halved for that, Newton takes them at once: it is convergence that limits
+  // their size, as after motion that was damped fast, not their errors.
   static constexpr int seldom = 4, often = 16;
 
-  // From there on it is asked whether a given step has missed what is damped before its first stage.
+  // From such a defect on, a given step is tested for what is damped before its first stage.
   static constexpr double visible_defect = 1e-4;
 
   // A step of its own choice fails where it would be smaller than this fraction of the time so far.

@@ -150,8 +150,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   }
   const L& scale() const { return scale_; }  ///< size of the step, squared
 
-  /// Goes to the stages of the motion that was solved, each member's to its own, however long those of others took.
-  /// Gives what changes of tangents are compared with, squared.
+  /// Places the stages of the motion where the iteration of each member ended, however long those of others took.
+  /// Returns what changes of tangents are compared with, squared.
   const L& start_tangents() requires with_tangent {
     find_stages();
     return tangent_.scale();
@@ -162,7 +162,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
                             [this](int j, int which) { return Base::call(j, which == 0 ? 4 : 2 * (which - 1)); });
   }
 
-  /// Looks at the stages that were solved; the state stays. After it `turn`, `pace_squared`, `decay` and `accept`.
+  /// Evaluates the stages that were solved; the state stays as it is. To be called before `turn`, `pace_squared`,
+  /// `decay` and `accept`.
   void finish() {
     Base::keep_stages();
     Base::find_speeds();
@@ -261,7 +262,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     NoTangent(MemberSystems<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
 
-  // Of an increment, squared, what is no rounding of coordinates, relative to the size of the motion.
+  // What of a squared increment is not rounding of coordinates, relative to the size of the motion.
   L seen(const L& squared, const L& fastest) const {
     constexpr double visible = StepShape::visible;
     const L share = squared * (pace_squared_ / fastest);

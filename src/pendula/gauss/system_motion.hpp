@@ -173,7 +173,7 @@ class SystemMotion {
     masses_.see();
   }
 
-  // Room for four numbers of each coordinate, of one state; then three numbers.
+  // Workspace: four numbers of each coordinate, of one state; then three numbers.
   double* room(std::size_t which, std::size_t k = 0) const { return room_[which * count_ + k]; }
 
   // Room(0), room(1) and room(2) hold q, p and v of the motion then; v only after find_rates.
@@ -220,8 +220,8 @@ class SystemMotion {
     find_size();
   }
 
-  // Motion that goes on as at the start of the step. What a member was predicted from is not weighed any more; but zero
-  // times what is not finite would not be zero.
+  // Predicts the motion as it goes on at the start of the step. Steps before get no weight, but their numbers are
+  // replaced, too: zero times a number that is not finite would not be zero.
   void start_cold(const Mask& cold) {
     const auto& columns = columns_.at_hand();
     write_state();

@@ -25,8 +25,8 @@ struct AccuracyAim {
   std::optional<Track> finest = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   /// Up to when that trial is as accurate as wanted  [s].
   double trusted_until = std::numeric_limits<double>::infinity();
-  /// How far a trial by steps of another kind is from it, where that does not come closer with its tolerance; since
-  /// when.
+  /// The distance of a trial by steps of another kind from the finest trial, where that does not shrink with the
+  /// tolerance; and since when they differ  [s].
   double disputed = 0, disputed_from = std::numeric_limits<double>::infinity();
 
   template <class Numbers>
@@ -172,9 +172,9 @@ std::optional<AccuracyAim> coarsen_while_enough(double wanted, double coarsest, 
   return best;
 }
 
-/// A trial by steps of another kind, which err elsewhere and by other amounts: what all steps of one kind get wrong
-/// alike, their trials do not show. Series are told from Gauss steps; these by another number of stages, of which what
-/// they do not damp has the other sign.
+/// Options of a trial by steps of another kind, whose errors are others: what all steps of one kind get wrong alike
+/// does not show in trials of that kind. Series are compared with Gauss steps. Implicit steps are compared with another
+/// number of stages: what they do not damp then has the other sign.
 inline RunOptions of_other_kind(RunOptions run, double wanted) {
   switch (run.method) {
     case Method::gauss:
@@ -194,12 +194,12 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
   }
 }
 
-/// Compares the finest trial with others by steps of another kind, `run(tolerance)`, which is nothing where one does
-/// not come to its end in time: then it says nothing. They have to come closer to the finest trial with their
-/// tolerance.
+/// Compares the finest trial with others by steps of another kind. `run(tolerance)` makes one of them, and returns
+/// nothing where it does not come to its end in time; it then says nothing. The smaller their tolerance, the closer
+/// they have to come to the finest trial.
 template <class RunTrial, class Apart>
 void hear_another(double wanted, double start, AccuracyAim& aim, double tolerance, RunTrial run, Apart apart) {
-  constexpr double far = 10, closer = 0.3;  // times the wanted error; the distance before
+  constexpr double far = 10, closer = 0.3;  // of the wanted error; of the distance before
   constexpr int most_trials = 3;
   double before = std::numeric_limits<double>::infinity();
   for (int trial = 0; trial < most_trials && tolerance >= smallest_tolerance; ++trial) {

@@ -120,9 +120,9 @@ class StepStates {
     range.least = begin_;
     range.most = end_;
     if (!step_.bound_excursions(range.most)) return false;
-    // What is damped at once, between the start and the first stage, no polynomial through the stages knows.
+    // The polynomial through the stages does not show what is damped between the start and the first stage.
     range.most.v += (at(0).v - begin_.v).cwiseAbs();
-    // Rates that follow from momenta are rounded as the largest of them.
+    // Rates that are computed from momenta have rounding errors as large as those of the largest rate.
     const auto lay_around = [](const auto& begin, const auto& end, auto& least, auto& most) {
       constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
       most.array() += rounding * (most.array() + begin.cwiseAbs().maxCoeff());

@@ -15,7 +15,7 @@ std::vector<std::string> input_names(const Subject& subject);
 /// Their constant parts.
 std::vector<double> inputs_of(const Subject& subject);
 
-/// slope (t - since), which is added to an input for so long.
+/// A line that is added to an input for a time: slope (t - since).
 struct InputLine {
   std::size_t input = 0;
   double slope = 0;
@@ -23,8 +23,9 @@ struct InputLine {
   double duration = 0;  ///< > 0  [s]
 };
 
-/// The same subject with these as constant parts and with `lines`, which keeps the first one; drives stay. Throws
-/// std::invalid_argument on another number of inputs than it has, and on one that is not finite.
+/// The same subject with `inputs` as the constant parts, and with `lines` added; drives stay. It shares ownership of
+/// `subject`. Throws std::invalid_argument on another number of inputs than the subject has, and on one that is not
+/// finite.
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
                                            std::span<const double> inputs, std::span<const InputLine> lines = {});
 

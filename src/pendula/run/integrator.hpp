@@ -53,8 +53,8 @@ class Integrator {
 
   double time() const { return integrator_->time(); }
 
-  /// Whether the longest step that `step` is told, or was told before, may affect where it comes by, beside where that
-  /// step ends: a longer run would differ.
+  /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
+  /// before, may affect the states on the way. A longer run would differ then.
   bool depends_on_end(double h) const { return integrator_->depends_on_end(h); }
 
   Motion state() const {

@@ -18,7 +18,7 @@ constexpr int always_few = 2, few = 3;  // links: of three, Gauss steps are the 
 constexpr double fine_tolerance = 1e-10;
 constexpr double short_run = 100;  // steps
 
-/// Why there are no series of a subject, or Gauss steps take less time; empty: series do.
+/// Why a subject does not go by Taylor series: it has none, or Gauss steps take less time. Empty if it does.
 std::string against_series(const Subject& subject, double tolerance) {
   if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) {
     if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
@@ -35,7 +35,8 @@ std::string against_series(const Subject& subject, double tolerance) {
   return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";
 }
 
-/// Whether damping at a place is much faster than anything that swings or turns there: explicit steps follow it.
+/// Whether a motion is stiff at a state: damping there is much faster than all that swings or turns, and explicit steps
+/// have to follow it.
 bool is_stiff(const Subject& subject, const Motion& place) {
   constexpr double much = 5;
   const Eigen::Index n = 2 * place.q.size();
@@ -50,8 +51,8 @@ bool is_stiff(const Subject& subject, const Motion& place) {
   return decay > much * pace;
 }
 
-/// Whether it is so at the start, or where coarse steps come to: friction grows as rates fall, and a mass may run into
-/// a damper.
+/// Whether it is stiff at the start, or at a state that coarse steps come to: friction grows as rates fall, and a mass
+/// may run into a damper.
 bool becomes_stiff(const RunSetup& setup) {
   constexpr int most_steps = 256;
   const Subject& subject = *setup.subject;

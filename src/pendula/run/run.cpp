@@ -13,7 +13,7 @@ namespace pendula {
 
 namespace {
 
-// Most steps of a trial of another kind: more than those of the finest trial.
+// Most steps of a trial by steps of another kind: few_steps + times_as_many * (steps of the finest trial).
 constexpr std::int64_t few_steps = 1000, times_as_many = 10;
 
 // Distance of rows in time; 0 if it depends on the steps.
@@ -41,7 +41,7 @@ Run::Run(RunSetup setup)
   if (choice.series_tolerance > 0) go_by_series(choice.series_tolerance);
 }
 
-// A tolerance of 0: by what was asked for.
+// Changes to Taylor series, with this tolerance of a step. 0: changes back to what was asked for.
 void Run::go_by_series(double tolerance) {
   setup_.options = asked_;
   if (tolerance > 0) {

@@ -8,15 +8,15 @@
 
 namespace pendula {
 
-/// What a table of numbers over time adds to an input: linear from knot to knot, or held from each knot to the next.
-/// Before the first knot and from the last one on it is what it is there.
+/// What a table of numbers over time adds to an input: linear from knot to knot, or held from each knot to the next. It
+/// is constant before the first knot, and from the last one on.
 struct Signal {
   std::size_t input = 0;      ///< index among the subject's inputs (inputs.hpp)
   std::vector<double> times;  ///< of the knots, ascending, one at least  [s]
   std::vector<double> values;
   bool is_held = false;
 
-  /// A knot at 0.3 s is also one at the third of 0.1 s, which rounding puts before it.
+  /// A knot at 0.3 s is at the third sample of 0.1 s, too, although rounding may put that sample before it.
   static constexpr double rounding = 1e-12;
 
   /// The knot that a time is at or comes after; −1 before the first one.

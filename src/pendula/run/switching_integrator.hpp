@@ -76,7 +76,7 @@ class SwitchingIntegrator : public Relay {
         continue;
       }
       limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
-      // Where a function is zero is known to rounding, which is another in another step.
+      // The place where a function is zero is known to rounding, and another step is rounded otherwise.
       const std::optional<std::size_t> zero = first ? std::nullopt : zero_at_end();
       if ((first || zero) && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
       if (first) return finish(cut(before, begin, time(), *first));
@@ -130,7 +130,7 @@ class SwitchingIntegrator : public Relay {
 
   Outcome stuck() const { return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_}; }
 
-  /// Steps that are chosen grow from there, so that they do not depend on where the run ends.
+  /// The first limit of chosen steps. They grow from there, so that they do not depend on where the run ends.
   double first_limit(const Motion& motion) const {
     return is_adaptive(options_) ? 4 * system_.pace(sides_, motion) : unlimited;
   }
@@ -139,8 +139,8 @@ class SwitchingIntegrator : public Relay {
     return std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(step));
   }
 
-  /// Whether a polynomial follows each switching function through the last step: else it might come by zero unseen, as
-  /// one that holds a fast sine does in the long steps of a slow motion.
+  /// Whether a polynomial follows each switching function through the last step. Otherwise a function may cross zero
+  /// unseen: one that holds a fast sine may do so in the long steps of a slow motion.
   bool is_resolved(double begin) {
     constexpr double near = 0.02;                                            // of the variation
     constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // where nobody looks
@@ -237,7 +237,7 @@ class SwitchingIntegrator : public Relay {
     return stepped;
   }
 
-  /// By the pieces that the motion goes on by, after a step to a zero.
+  /// Goes on after a step to a zero, by the pieces that the motion takes from there.
   Outcome go_on(const Outcome& stepped, std::size_t switched) {
     count();
     const Motion motion = now().state();

@@ -28,8 +28,8 @@ class PlainIntegrator {
   /// What is held of inputs at a time in the last step; empty but for sampled feedback.
   virtual std::span<const double> held(double /*time*/) const { return {}; }
 
-  /// Whether the longest step that `step` is told, or was told before, may affect where it comes by, beside where that
-  /// step ends: a longer run would differ.
+  /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
+  /// before, may affect the states on the way. A longer run would differ then.
   virtual bool depends_on_end(double /*h*/) const { return false; }
 
   /// Whether to remember steps from now on, so that at and at_full_order can go back into the last one; this costs a
