@@ -213,7 +213,7 @@ TYPED_TEST(RunsInLanes, ReportWhatTheScalarSolverWould) {
 // how fast a chain can swing. What rounding makes of error estimates, which tiny numbers tell, was seen to make 5e-4 of
 // the tolerance, of others 2e-15 of angles.
 TYPED_TEST(RunsInLanes, ChooseTheStepsOfTheScalarSolver) {
-  RunOptions eight_stages = chosen(1e-6);
+  RunOptions eight_stages = chosen(1e-9);
   eight_stages.stages = 8;
   for (RunOptions options : {chosen(1e-8), eight_stages}) {
     options.solver = Solver::chain;

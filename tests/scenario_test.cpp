@@ -647,7 +647,7 @@ TEST(Scenario, TheEstimateIsWantedUnlessItIsNot) {
 TEST(Scenario, WithoutAStepThereAreAsManyStagesAsTheToleranceWants) {
   const auto run = [](const Overrides& overrides) { return parsed<Planar>(planar_text, overrides).run; };
   EXPECT_EQ(run({"run.tolerance=1e-4"}).stages, 4);
-  EXPECT_EQ(run({"run.tolerance=1e-7"}).stages, 6);
+  EXPECT_EQ(run({"run.tolerance=1e-7"}).stages, 8);
   EXPECT_EQ(run({"run.tolerance=1e-4", "run.stages=5"}).stages, 5);
   EXPECT_EQ(run({"run.method=radau"}).stages, 3);
   EXPECT_EQ(run({"run.step=0.01"}).stages, 2);

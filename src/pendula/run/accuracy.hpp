@@ -196,10 +196,10 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
 
 /// Compares the finest trial with others by steps of another kind. `run(tolerance)` makes one of them, and returns
 /// nothing where it does not come to its end in time; it then says nothing. The smaller their tolerance, the closer
-/// they have to come to the finest trial.
+/// they have to come to the finest trial; where they come no closer than `near`, that is the error.
 template <class RunTrial, class Apart>
 void hear_another(double wanted, double start, AccuracyAim& aim, double tolerance, RunTrial run, Apart apart) {
-  constexpr double far = 10, closer = 0.3;  // of the wanted error; of the distance before
+  constexpr double near = 0.5, far = 10, closer = 0.3;  // of the wanted error; `closer` of the distance before
   constexpr int most_trials = 3;
   double before = std::numeric_limits<double>::infinity();
   for (int trial = 0; trial < most_trials && tolerance >= smallest_tolerance; ++trial) {
@@ -207,7 +207,10 @@ void hear_another(double wanted, double start, AccuracyAim& aim, double toleranc
     if (!there) return;
     const Separation parted = apart(*there, *aim.finest);
     const double off = parted.largest();
-    if (off <= close_to_wanted * wanted) return;
+    if (off <= close_to_wanted * wanted) {
+      if (off > near * wanted) aim.error = std::max(aim.error, off);
+      return;
+    }
     if (off > far * wanted && off > closer * before) {
       aim.disputed = off;
       aim.disputed_from = parted.within(close_to_wanted * wanted, start);
