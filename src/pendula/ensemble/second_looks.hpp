@@ -100,7 +100,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
     const RunOptions& run = member->report.options;
     std::optional<SecondLook> look = choose(*member);
     if (!look) continue;
-    const double share = is_adaptive(run) ? 0.01 * run.tolerance : 0;
+    const double share = is_adaptive(run) ? start_share * run.tolerance : 0;
     RunSetup setup = member->setup;
     setup.options = in_lanes(look->options, run);
     setup.start.q *= 1 + std::max(share, std::numeric_limits<double>::epsilon());

@@ -90,8 +90,8 @@ class IterationChoice {
     return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
   }
 
-  // A trial cannot pay where two iterations of the rival already cost more than a step does now: a step that needs a
-  // single Newton iteration needs hardly fewer of the fixed point.
+  // A trial cannot pay where two iterations of the rival already cost more than a step does now. Fewer than two are not
+  // expected: a step that takes one Newton iteration hardly takes more of the fixed point.
   bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
 
   // A fixed point that has given up is tried again soon, since it may have been one long step, and then ever more

@@ -165,8 +165,8 @@ class GaussStepper : private StepSolution<Solver> {
   // So many halvings of a step are tried by fixed point; together they cost less than the whole step by Newton. If they
   // do not help, Newton takes the step.
   static constexpr int fixed_point_worth = 3;
-  // If more than one of `often` steps was halved for that, Newton takes them at once: it is convergence that limits
-  // their size, as after motion that was damped fast, not their errors.
+  // If steps were halved for that again and again, more than one in `seldom`, Newton takes them at once: it is
+  // convergence that limits them, as after motion that was damped fast, not their errors.
   static constexpr int seldom = 4, often = 16;
 
   // From such a defect on, a given step is tested for what is damped before its first stage.

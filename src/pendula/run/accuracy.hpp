@@ -102,6 +102,9 @@ inline constexpr double close_to_wanted = 2;
 /// The expected error may be `enough` times the wanted one; trials aim at `aimed_at` times it.
 inline constexpr double enough = 0.3, aimed_at = 0.1;
 
+/// By how much the start of a trial or of a second look is moved, in tolerances: no two runs start alike.
+inline constexpr double start_share = 0.01;
+
 /// Largest distance of two runs that still measures an error; beyond it they have diverged.
 inline constexpr double together = 0.01;
 

@@ -124,7 +124,7 @@ bool Run::aim(const std::function<bool()>& stop) {
     return track;
   };
   const auto run = [&](double tolerance) {
-    share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
+    share = std::copysign(std::max(detail::start_share * tolerance, std::numeric_limits<double>::epsilon()), -share);
     std::optional<Track> track = run_alike(tolerance);  // no two trials start alike
     if (track) alike = Track::beside(*track);
     return track;
@@ -141,7 +141,7 @@ bool Run::aim(const std::function<bool()>& stop) {
     RunOptions other = detail::of_other_kind(setup_.options, wanted);
     const auto run_other = [&](double tolerance) -> std::optional<Track> {
       other.tolerance = tolerance;
-      Track track = try_out(other, std::copysign(0.01 * tolerance, -share), *alike, is_long);
+      Track track = try_out(other, std::copysign(detail::start_share * tolerance, -share), *alike, is_long);
       if (!track.is_complete()) return {};
       return track;
     };
@@ -346,7 +346,7 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   if (is_aimed()) asked = std::min(asked, setup_.accuracy.error);
   const auto compare = [&](const detail::SecondLook& look) {
     const double share =
-        std::max(0.01 * std::min(asked, look.options.tolerance), std::numeric_limits<double>::epsilon());
+        std::max(detail::start_share * std::min(asked, look.options.tolerance), std::numeric_limits<double>::epsilon());
     Divergence divergence(*setup_.subject, *track_);
     const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {
       stopped = stopped || stop();
