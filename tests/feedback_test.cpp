@@ -68,10 +68,10 @@ TEST(Feedback, IsThatOfTheLastStepWhereOneLooksBack) {
   EXPECT_NE(before, after);
   Motion within;
   double work = 0;
-  ASSERT_TRUE(found->look(0.045, within, work));
+  ASSERT_TRUE(found->at_full_order(0.045, within, work));
   EXPECT_EQ(within.held[0], before);
-  EXPECT_EQ(found->glance(0.045).held[0], before);
-  EXPECT_LT(apart(found->glance(0.045), within), 1e-8);  // measured 1.2e-9
+  EXPECT_EQ(found->at(0.045).held[0], before);
+  EXPECT_LT(apart(found->at(0.045), within), 1e-8);  // measured 1.2e-9
   EXPECT_GT(work, 0);
   EXPECT_LT(work, found->statistics().load_work);
 }

@@ -102,7 +102,7 @@ TEST(HeldMembers, StayWhereOneFailsOrAllAreStopped) {
   EXPECT_EQ(moved.move(members.held, states, [] { return true; }).outcome.status, Status::interrupted);
   EXPECT_EQ(states, members.states);
   members.states[7] = states[7] = std::numeric_limits<double>::infinity();
-  const HeldMembers::Moved found = moved.move(members.held, states, go_on);
+  const HeldMembers::MoveResult found = moved.move(members.held, states, go_on);
   EXPECT_FALSE(found.outcome);
   EXPECT_EQ(found.member, 1U);
   EXPECT_EQ(states, members.states);

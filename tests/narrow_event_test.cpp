@@ -281,7 +281,7 @@ class EventsWithinBounds : public ::testing::TestWithParam<Bounding> {
       const double h = integrator->time() - begin.time;
       ASSERT_TRUE(integrator->bound_excursions(farthest.q.data(), farthest.v.data()));
       for (const double share : {0.05, 0.3, 0.5, 0.8, 0.97, 1.0}) {
-        ASSERT_TRUE(integrator->look(begin.time + share * h, there));
+        ASSERT_TRUE(integrator->at_full_order(begin.time + share * h, there));
         for (const auto& [at, from, bound] :
              {std::tuple(&there.q, &begin.q, &farthest.q), std::tuple(&there.v, &begin.v, &farthest.v)}) {
           const Eigen::ArrayXd rounding = 8 * epsilon * (bound->array() + from->cwiseAbs().maxCoeff());

@@ -524,8 +524,8 @@ struct HurryingMover {
   int steps = 0;
   double time() const { return steps; }
   Motion state() const { return {time(), Eigen::VectorXd::Constant(1, steps + (steps >= 777 ? 500 : 0)), {}}; }
-  bool look(double /*time*/, Motion& /*there*/) const { return false; }
-  Motion glance(double time) const { return {time, Eigen::VectorXd::Zero(1), {}}; }
+  bool at_full_order(double /*time*/, Motion& /*there*/) const { return false; }
+  Motion at(double time) const { return {time, Eigen::VectorXd::Zero(1), {}}; }
 };
 
 // Of thousand steps every eighth is kept besides.

@@ -60,9 +60,9 @@ TEST(SeriesSteps, LooksIntoStepsAreStepsThatEndThere) {
   const double middle = begin + 0.6 * (whole->time() - begin);
   ASSERT_TRUE(cut->step(middle - begin));
   Motion found;
-  ASSERT_TRUE(whole->look(middle, found));
-  EXPECT_LT(apart(found, cut->state()), 4e-14);           // measured 4e-15
-  EXPECT_LT(apart(whole->glance(middle), found), 3e-13);  // measured 3e-14
+  ASSERT_TRUE(whole->at_full_order(middle, found));
+  EXPECT_LT(apart(found, cut->state()), 4e-14);       // measured 4e-15
+  EXPECT_LT(apart(whole->at(middle), found), 3e-13);  // measured 3e-14
 }
 
 TEST(SeriesSteps, GoOnFromACopyToTheBit) {

@@ -235,26 +235,26 @@ double farthest_in_step(double h, Find find) {
   return farthest;
 }
 template <class Space, int S>
-double farthest_glance(double h) {
-  return farthest_in_step<Space, S>(h, [](auto& stepper, double time) { return stepper.glance(time); });
+double farthest_at(double h) {
+  return farthest_in_step<Space, S>(h, [](auto& stepper, double time) { return stepper.at(time); });
 }
 template <class Space, int S>
-double farthest_look(double h) {
+double farthest_at_full_order(double h) {
   return farthest_in_step<Space, S>(h, [](auto& stepper, double time) {
     State<Space> there;
-    EXPECT_TRUE(stepper.look(time, there));
+    EXPECT_TRUE(stepper.at_full_order(time, there));
     return there;
   });
 }
 
 // Halving the step: rates are of order s within a step, looks of order 2 s + 1 as one step is.
 TEST(DenseOutput, HasItsOrders) {
-  EXPECT_NEAR(std::log2(farthest_glance<Planar, 3>(0.02) / farthest_glance<Planar, 3>(0.01)), 3, 0.3);
-  EXPECT_NEAR(std::log2(farthest_glance<Spatial, 4>(0.04) / farthest_glance<Spatial, 4>(0.02)), 4, 0.5);
-  EXPECT_NEAR(std::log2(farthest_look<Planar, 2>(0.02) / farthest_look<Planar, 2>(0.01)), 5, 0.5);
-  EXPECT_NEAR(std::log2(farthest_look<Spatial, 3>(0.04) / farthest_look<Spatial, 3>(0.02)), 7, 1);
-  EXPECT_LT((farthest_look<Planar, 8>(0.02)), 1e-13);
-  EXPECT_LT((farthest_look<Spatial, 8>(0.02)), 1e-13);
+  EXPECT_NEAR(std::log2(farthest_at<Planar, 3>(0.02) / farthest_at<Planar, 3>(0.01)), 3, 0.3);
+  EXPECT_NEAR(std::log2(farthest_at<Spatial, 4>(0.04) / farthest_at<Spatial, 4>(0.02)), 4, 0.5);
+  EXPECT_NEAR(std::log2(farthest_at_full_order<Planar, 2>(0.02) / farthest_at_full_order<Planar, 2>(0.01)), 5, 0.5);
+  EXPECT_NEAR(std::log2(farthest_at_full_order<Spatial, 3>(0.04) / farthest_at_full_order<Spatial, 3>(0.02)), 7, 1);
+  EXPECT_LT((farthest_at_full_order<Planar, 8>(0.02)), 1e-13);
+  EXPECT_LT((farthest_at_full_order<Spatial, 8>(0.02)), 1e-13);
 }
 
 TEST(DenseOutput, LeavesTheRunAsItIs) {
@@ -271,8 +271,8 @@ TEST(DenseOutput, LeavesTheRunAsItIs) {
     looked.step(1e9);
     State<Spatial> there;
     for (const double part : {0.9, 0.2}) {
-      EXPECT_TRUE(looked.look(before + part * (looked.time() - before), there));
-      looked.glance(before + part * (looked.time() - before));
+      EXPECT_TRUE(looked.at_full_order(before + part * (looked.time() - before), there));
+      looked.at(before + part * (looked.time() - before));
     }
     ASSERT_EQ(member_of(plain), member_of(looked)) << k;
   }
@@ -291,7 +291,7 @@ TEST(DenseOutput, DependsOnNoLookBefore) {
     integrator->remember_steps(true);
     for (int step = 0; step < 3; ++step) EXPECT_TRUE(integrator->step(0.2));
     Motion motion;
-    for (const double share : shares) EXPECT_TRUE(integrator->look(0.4 + 0.2 * share, motion));
+    for (const double share : shares) EXPECT_TRUE(integrator->at_full_order(0.4 + 0.2 * share, motion));
     return motion;
   };
   for (const Iteration iteration : {Iteration::automatic, Iteration::fixed_point, Iteration::newton}) {
@@ -324,10 +324,10 @@ TEST(DenseOutput, KnowsStepsThatWereTakenInParts) {
   exact.start(start);
   exact.step(0.6);
   State<Planar> there;
-  ASSERT_TRUE(stepper.look(0.6, there));
+  ASSERT_TRUE(stepper.at_full_order(0.6, there));
   const ChainSubject<Planar> subject(chain);
-  EXPECT_LT(subject.distance(exact.state(), there), 1e-13);                // measured 0
-  EXPECT_LT(subject.distance(exact.state(), stepper.glance(0.6)), 1e-13);  // measured 0
+  EXPECT_LT(subject.distance(exact.state(), there), 1e-13);            // measured 0
+  EXPECT_LT(subject.distance(exact.state(), stepper.at(0.6)), 1e-13);  // measured 0
 }
 
 // What hardly moves has no step that is too long: upright, rounding alone makes it fall.

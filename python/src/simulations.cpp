@@ -31,7 +31,7 @@ namespace pendula::python {
 namespace {
 
 /// A simulation, and what it needs; copies share that.
-struct Moved {
+struct SharedSimulation {
   std::shared_ptr<const Prepared> made;
   Simulation simulation;
 };
@@ -63,19 +63,20 @@ class Heeding {
 
 void define_simulations(nb::module_& module) {
   nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);  // NOLINT(bugprone-unused-raii)
-  nb::class_<Moved>(module, "Simulation")
+  nb::class_<SharedSimulation>(module, "Simulation")
       .def("__init__",
-           [](Moved* self, const std::shared_ptr<const Prepared>& made) {
+           [](SharedSimulation* self, const std::shared_ptr<const Prepared>& made) {
              if (made->subject->part_at(0)) throw std::invalid_argument(signals_are_not_here);
-             new (self) Moved{made, Simulation(model_of(*made), made->start, made->options)};
+             new (self) SharedSimulation{made, Simulation(model_of(*made), made->start, made->options)};
            })
-      .def("copy", [](const Moved& self) { return Moved(self); })
-      .def_prop_ro("time", [](const Moved& self) { return self.simulation.time(); })
-      .def_prop_ro("steps", [](const Moved& self) { return self.simulation.steps(); })
+      .def("copy", [](const SharedSimulation& self) { return SharedSimulation(self); })
+      .def_prop_ro("time", [](const SharedSimulation& self) { return self.simulation.time(); })
+      .def_prop_ro("steps", [](const SharedSimulation& self) { return self.simulation.steps(); })
       .def_prop_ro(
-          "state", [](const Moved& self) { return vector_of(state_of(self.simulation.motion())); }, nb::rv_policy::move)
+          "state", [](const SharedSimulation& self) { return vector_of(state_of(self.simulation.motion())); },
+          nb::rv_policy::move)
       .def("advance_to",
-           [](Moved& self, double time) {
+           [](SharedSimulation& self, double time) {
              Interruption interruption;
              {
                const nb::gil_scoped_release others_may_go_on;
@@ -84,25 +85,25 @@ void define_simulations(nb::module_& module) {
              }
              if (interruption.is_requested()) throw nb::python_error();
            })
-      .def("at", [](Moved& self, double time) { return vector_of(state_of(self.simulation.at(time))); })
-      .def("number", [](const Moved& self, const std::string& column) { return self.simulation[column]; })
+      .def("at", [](SharedSimulation& self, double time) { return vector_of(state_of(self.simulation.at(time))); })
+      .def("number", [](const SharedSimulation& self, const std::string& column) { return self.simulation[column]; })
       .def("hold",
-           [](Moved& self, const std::vector<double>& inputs) {
+           [](SharedSimulation& self, const std::vector<double>& inputs) {
              self.simulation.hold(
                  Eigen::Map<const Eigen::VectorXd>(inputs.data(), static_cast<Eigen::Index>(inputs.size())));
            })
       .def_prop_ro("held",
-                   [](const Moved& self) {
+                   [](const SharedSimulation& self) {
                      const Eigen::VectorXd held = self.simulation.held();
                      return std::vector<double>(held.data(), held.data() + held.size());
                    })
       .def("linearize",
-           [](const Moved& self) {
+           [](const SharedSimulation& self) {
              const auto [a, b] = self.simulation.linearize();
              return std::pair(array_of(a), array_of(b));
            })
-      .def("save", [](const Moved& self) { return vector_of(self.simulation.save().numbers); })
-      .def("resume", [](Moved& self, const Numbers& saved) {
+      .def("save", [](const SharedSimulation& self) { return vector_of(self.simulation.save().numbers); })
+      .def("resume", [](SharedSimulation& self, const Numbers& saved) {
         self.simulation.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
       });
   nb::class_<Held>(module, "HeldMembers")
@@ -113,7 +114,7 @@ void define_simulations(nb::module_& module) {
            })
       .def("move", [](Held& self, const Starts& inputs, const Starts& states) {
         std::vector<double> moved(states.data(), states.data() + states.size());
-        HeldMembers::Moved found;
+        HeldMembers::MoveResult found;
         Interruption interruption;
         {
           const nb::gil_scoped_release others_may_go_on;

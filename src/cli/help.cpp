@@ -230,7 +230,7 @@ std::string summary_help() {
   std::string text = wrapped("", 0,
                              "The keys of the JSON object that pendula simulate --json prints. Numbers have the digits "
                              "that give the same double back; what does not apply is null.");
-  const auto add = [&](std::string_view title, io::Moved of) {
+  const auto add = [&](std::string_view title, io::SummaryScope of) {
     text += "\n" + std::string(title) + "\n";
     for (const io::SummaryKey& key : io::summary_keys()) {
       if (key.of != of) continue;
@@ -238,9 +238,9 @@ std::string summary_help() {
       text += wrapped("  " + std::string(key.name), 22, std::string(key.hint) + unit);
     }
   };
-  add("Always", io::Moved::anything);
-  add("Of chains", io::Moved::chains);
-  add("Of other systems", io::Moved::systems);
+  add("Always", io::SummaryScope::anything);
+  add("Of chains", io::SummaryScope::chains);
+  add("Of other systems", io::SummaryScope::systems);
   return text;
 }
 

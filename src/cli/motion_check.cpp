@@ -61,8 +61,8 @@ std::vector<CheckLine> MotionCheck::lines() const {
   }
   add([this](const Span& span) { return way_back(span); });
   add([this](const Span& span) { return iterations(span); });
-  add([this](const Span& span) { return look(span); });
-  add([this](const Span& span) { return glance(span); });
+  add([this](const Span& span) { return full_order(span); });
+  add([this](const Span& span) { return dense_output(span); });
   add([this](const Span& span) { return event(span); });
   const bool differentiates = !subject_.loaded() && subject_.switches().empty();
   if (differentiates) add([this](const Span& span) { return tangents(span); });
@@ -292,21 +292,21 @@ double MotionCheck::farthest_within(double step, const Span& span, Find find) co
   return farthest;
 }
 
-CheckLine MotionCheck::look(const Span& span) const {
-  const auto look = [](Integrator& integrator, double time) {
+CheckLine MotionCheck::full_order(const Span& span) const {
+  const auto state = [](Integrator& integrator, double time) {
     Motion there;
-    integrator.look(time, there);
+    integrator.at_full_order(time, there);
     return there;
   };
-  const double off = farthest_within(span.time / 16, span, look);
+  const double off = farthest_within(span.time / 16, span, state);
   return at_most("looks into a step, 6 stages", off / (32 * epsilon * span.growth));
 }
 
-/// Glances: their order is that of rates among the stages.
-CheckLine MotionCheck::glance(const Span& span) const {
-  const auto glance = [](Integrator& integrator, double time) { return integrator.glance(time); };
+/// Dense output: its order is that of rates among the stages.
+CheckLine MotionCheck::dense_output(const Span& span) const {
+  const auto state = [](Integrator& integrator, double time) { return integrator.at(time); };
   const double step = span.time / 8;
-  const double off = farthest_within(step, span, glance), nearer = farthest_within(step / 2, span, glance);
+  const double off = farthest_within(step, span, state), nearer = farthest_within(step / 2, span, state);
   if (off < span.noise) return at_most("glances into a step, 6 stages", off / (32 * epsilon * span.growth));
   return at_least("order of glances into a step, 6 stages", nearer < span.noise ? none : std::log2(off / nearer), 5);
 }

@@ -75,8 +75,8 @@ class MotionCheck {
   CheckLine iterations(const Span& span) const;
   template <class Find>
   double farthest_within(double step, const Span& span, Find find) const;
-  CheckLine look(const Span& span) const;
-  CheckLine glance(const Span& span) const;
+  CheckLine full_order(const Span& span) const;
+  CheckLine dense_output(const Span& span) const;
   CheckLine event(const Span& span) const;
   CheckLine tangents(const Span& span) const;
 

@@ -36,7 +36,7 @@ Mover::Mover(std::shared_ptr<const Subject> subject, const RunOptions& options, 
       integrator_(subject_->make_integrator(options)),
       held_{{-std::numeric_limits<double>::infinity(), inputs_of(*subject_)}},
       remembers_(remembers),
-      watch_({}, detail::glance_degree(options)) {}
+      watch_({}, detail::dense_output_degree(options)) {}
 
 Mover::Mover(const Mover& other)
     : model_(other.model_),
@@ -135,7 +135,7 @@ Advance Mover::step() {
   stopped_by_.reset();
   integrator_->remember_steps(true);
   seen_since_ = never;
-  const Heeding heeding(*integrator_, stop_sign(stop_));
+  const ScopedStopSign sign(*integrator_, stop_sign(stop_));
   const double begin = integrator_->time();
   const Outcome outcome = integrator_->step(is_adaptive(options_) ? never : options_.step);
   if (outcome.status == Status::interrupted) return {.outcome = {}, .stopped = true};
@@ -157,7 +157,7 @@ std::optional<Motion> Mover::after_step() {
   ++steps_;
   std::optional<Motion> end;
   if (!watch_.events().empty()) {
-    const Heeding nothing(*integrator_, {});  // what is found has to be right
+    const ScopedStopSign none(*integrator_, {});  // what is found has to be right
     for (const Occurrence& happened : watch_.after_step(*integrator_)) {
       const std::size_t k = happened.event;
       const bool stops = happened_[k] && happened_[k](happened.up, happened.motion);
@@ -185,7 +185,7 @@ Outcome Mover::at(double time, Motion& motion) {
     motion = motion_;
     return {};
   }
-  if (time >= seen_since_ && time < motion_.time) return integrator_->look(time, motion);
+  if (time >= seen_since_ && time < motion_.time) return integrator_->at_full_order(time, motion);
   if (!history_.covers(time)) {
     throw std::invalid_argument("time: expected one since the start that steps were kept of, until " +
                                 shortest(motion_.time) + " s, got " + shortest(time));

@@ -102,7 +102,7 @@ class Mover {
   Outcome at(double time, Motion& motion);
 
   /// Asked after every step, and within long ones.
-  void heed(std::function<bool()> stop) { stop_ = std::move(stop); }
+  void set_stop(std::function<bool()> stop) { stop_ = std::move(stop); }
   void on(Event event, Happened happened);
   /// Other callbacks, as many as there are events.
   void replace(std::vector<Event> events, std::vector<Happened> happened);

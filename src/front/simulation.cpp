@@ -195,7 +195,7 @@ pendula_status pendula_resume(pendula_simulation* simulation, const double* numb
 
 pendula_status pendula_heed(pendula_simulation* simulation, int (*stop)(void* context), void* context) {
   return guarded([&] {
-    simulation->mover.heed([stop, context, asked = &simulation->asked_to_stop] {
+    simulation->mover.set_stop([stop, context, asked = &simulation->asked_to_stop] {
       return *asked || (stop != nullptr && stop(context) != 0);
     });
     return PENDULA_OK;

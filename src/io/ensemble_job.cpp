@@ -19,8 +19,9 @@ std::int64_t chunk_of(std::int64_t members, bool in_lanes) {
   return std::clamp<std::int64_t>(members / 128, in_lanes ? 32 : 1, 512);
 }
 
-Kept kept_of(const AnyScenario& any, const EnsemblePlan& plan) {
-  return std::visit([&](const auto& scenario) { return Kept(plan, *subject_of(scenario), scenario.events); }, any);
+KeptQuantities kept_of(const AnyScenario& any, const EnsemblePlan& plan) {
+  return std::visit([&](const auto& scenario) { return KeptQuantities(plan, *subject_of(scenario), scenario.events); },
+                    any);
 }
 
 std::optional<NaturalUnits> natural_units_of(const AnyScenario& any) {

@@ -24,7 +24,7 @@ struct EnsembleSource {
 /// An ensemble that a scenario asks for. Its members are moved in chunks, by any threads, in any order.
 class EnsembleJob {
  public:
-  /// `tell` is told before a model's kernel is made; if `stop` returns true, members stop. Throws InputError.
+  /// `tell` is called before a model's kernel is made; if `stop` returns true, members stop. Throws InputError.
   EnsembleJob(const EnsembleSource& source, MemberScenarios::Tell tell, std::function<bool()> stop);
   EnsembleJob(const EnsembleJob&) = delete;
   EnsembleJob& operator=(const EnsembleJob&) = delete;
@@ -48,7 +48,7 @@ class EnsembleJob {
 
   MemberScenarios scenarios_;
   AnyScenario base_;
-  Kept kept_;
+  KeptQuantities kept_;
   EnsembleHead head_;
   MemberRuns runs_;
 };

@@ -37,8 +37,8 @@ class EnsembleOutput {
   /// Whether a file is replaced that neither shards share nor an interrupted ensemble has left.
   bool replaces() const;
 
-  /// Chunks of this shard that are not done. Throws InputError if there are journals that are not to go on with, or of
-  /// another ensemble; whether they are, `on_all` asks all processes of a job.
+  /// Chunks of this shard that are not done. Throws InputError if there are journals, but the run is not to go on with
+  /// them, or they belong to another ensemble. `on_all` asks all processes of a job whether that is so on each.
   std::vector<std::int64_t> find_missing(const std::function<bool(bool)>& on_all = [](bool mine) { return mine; });
   /// Members that were done before.
   std::int64_t already() const { return already_; }

@@ -26,8 +26,8 @@ struct FeedbackPlan {
 /// Reads the values of [[system.drive]], which are laws, too. Throws InputError.
 std::vector<FeedbackPlan> read_drive_values(const Section& system);
 
-/// The same as the generator reads them, which knows whether an input, or a motion, has such a name. Throws InputError
-/// if an expression cannot be read, or is not of time alone.
+/// The same as laws in the words of the generator, which knows whether an input, or a motion, has such a name. Throws
+/// InputError if an expression cannot be read, or is not of time alone.
 std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans);
 
 /// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Throws InputError.
@@ -36,11 +36,11 @@ std::vector<FeedbackPlan> read_feedback(const Section& system);
 /// The index of an input of a subject. Throws InputError with the place of its name.
 std::size_t input_named(const std::string& input, const std::string& place, const Subject& subject);
 
-/// One of them, continuous or sampled, as the generator reads it. Throws InputError as continuous_laws.
+/// One plan, continuous or sampled, in the words of the generator. Throws InputError as continuous_laws.
 InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
 
-/// The continuous ones, as the generator reads them. Throws InputError if an expression cannot be read, names something
-/// unknown, or is not smooth.
+/// The continuous ones, in the words of the generator. Throws InputError if an expression cannot be read, names
+/// something unknown, or is not smooth.
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system);
 
 /// The same as functions, with those of drives of inputs. `system` is without feedback.

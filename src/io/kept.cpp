@@ -15,7 +15,7 @@ constexpr std::string_view event_prefix = "event:";
 
 }  // namespace
 
-Kept::Kept(const EnsemblePlan& plan, const Subject& subject, const std::vector<EventPlan>& events) {
+KeptQuantities::KeptQuantities(const EnsemblePlan& plan, const Subject& subject, const std::vector<EventPlan>& events) {
   const std::vector<Quantity> quantities = subject.quantities();
   std::vector<std::string> keep = plan.keep;
   if (keep.empty()) {
@@ -25,8 +25,8 @@ Kept::Kept(const EnsemblePlan& plan, const Subject& subject, const std::vector<E
   for (const std::string& what : keep) add(what, plan.keep_place, quantities, events);
 }
 
-void Kept::add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
-               const std::vector<EventPlan>& events) {
+void KeptQuantities::add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,
+                         const std::vector<EventPlan>& events) {
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(columns_, [&](const Column& each) { return each.column.name == name; });
   };
@@ -73,7 +73,7 @@ void Kept::add(const std::string& what, const std::string& place, const std::vec
   columns_.push_back({{what + ":count", "1", true}, Source::event_count, index});
 }
 
-void Kept::add_last(const std::vector<Quantity>& quantities, bool points) {
+void KeptQuantities::add_last(const std::vector<Quantity>& quantities, bool points) {
   const std::vector<std::string> names = columns_of(quantities);
   for (const Quantity& quantity : quantities) {
     const bool is_place = quantity.role == Role::point || quantity.role == Role::energy;
@@ -86,21 +86,21 @@ void Kept::add_last(const std::vector<Quantity>& quantities, bool points) {
   }
 }
 
-std::vector<EnsembleColumn> Kept::columns() const {
+std::vector<EnsembleColumn> KeptQuantities::columns() const {
   std::vector<EnsembleColumn> columns;
   columns.reserve(columns_.size());
   for (const Column& each : columns_) columns.push_back(each.column);
   return columns;
 }
 
-bool Kept::chaos() const {
+bool KeptQuantities::chaos() const {
   return std::ranges::any_of(columns_, [](const Column& each) {
     return each.source == Source::exponent || each.source == Source::ftle || each.source == Source::megno;
   });
 }
 
-void Kept::append(const Subject& subject, const RunReport& report, const LyapunovSpectrum& spectrum,
-                  std::vector<double>& row) const {
+void KeptQuantities::append(const Subject& subject, const RunReport& report, const LyapunovSpectrum& spectrum,
+                            std::vector<double>& row) const {
   std::vector<double> last;
   subject.append_row(report.last, subject.observe(report.last), last);
   for (const Column& each : columns_) {

@@ -13,10 +13,10 @@
 namespace pendula::io {
 
 /// What is kept of every member of an ensemble.
-class Kept {
+class KeptQuantities {
  public:
   /// Throws InputError if the ensemble asks for an unknown quantity.
-  Kept(const EnsemblePlan& plan, const Subject& subject, const std::vector<EventPlan>& events);
+  KeptQuantities(const EnsemblePlan& plan, const Subject& subject, const std::vector<EventPlan>& events);
 
   std::vector<EnsembleColumn> columns() const;
   /// Whether anything is kept that needs tangents.

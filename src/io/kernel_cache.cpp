@@ -121,7 +121,7 @@ ModelKernel kept_kernel(const ModelName& model, const Toolchain& toolchain,
     fs::last_write_time(kept, fs::file_time_type::clock::now(), none);  // marks it as used
   } else {
     const Workshop workshop(cache);
-    // Not before: what is wrong with a model is told alone.
+    // Told only once the model is known to be right: an error of the model stands alone.
     const auto derived = [&] {
       tell("derived the kernel of " + name + (model.laws.empty() ? "" : " with drives or feedback") + ", once; " +
            how_made(kind, toolchain) + (problem.empty() ? "" : " (not loaded: " + problem + ")"));

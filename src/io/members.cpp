@@ -62,7 +62,7 @@ double& number_at(Motion& start, Eigen::Index place) {
   return place < start.q.size() ? start.q[place] : start.v[place - start.q.size()];
 }
 
-/// Whether its start is one that is read without an error.
+/// Whether the start of a member would be read without an error.
 bool can_start(const MemberScenario& member) {
   const Motion& start = member.start;
   if (!start.q.allFinite() || !start.v.allFinite()) return false;
@@ -124,7 +124,8 @@ MemberScenario MemberScenarios::quickly_of_member(std::int64_t member) {
   return MemberScenario(with(numbers));
 }
 
-/// Two scenarios are read with other numbers: these must be found in the start, which else does not depend on them.
+/// Reads two scenarios with different numbers. These have to be found in the start, and nothing else in the start may
+/// depend on them.
 std::optional<MemberScenarios::Shared> MemberScenarios::find_shared() {
   const std::vector<std::string> keys = plan().keys();
   const auto is_of_start = [](const std::string& key) { return key.starts_with("start."); };
@@ -164,7 +165,7 @@ std::shared_ptr<const SystemTable> MemberScenarios::find_system(const ModelName&
   return found;
 }
 
-MemberRuns::MemberRuns(MemberScenarios& scenarios, const Kept& kept, std::function<bool()> stop)
+MemberRuns::MemberRuns(MemberScenarios& scenarios, const KeptQuantities& kept, std::function<bool()> stop)
     : scenarios_(scenarios),
       plan_(scenarios.plan()),
       kept_(kept),

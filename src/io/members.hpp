@@ -75,7 +75,7 @@ class MemberScenarios {
  public:
   using Tell = std::function<void(const std::string&)>;
 
-  /// `tell` is told before a model's kernel is made. Throws InputError.
+  /// `tell` is called before a model's kernel is made. Throws InputError.
   MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell);
 
   const ScenarioText& text() const { return text_; }
@@ -92,7 +92,7 @@ class MemberScenarios {
   MemberScenario quickly_of_member(std::int64_t member);
 
  private:
-  /// A scenario, and of each key where its number stands in the start: in q, then in v.
+  /// A scenario, and for each key the indices of its number in the start: those in q, then those in v.
   struct Shared {
     MemberScenario scenario;
     std::vector<std::vector<Eigen::Index>> places;
@@ -122,7 +122,7 @@ class MemberScenarios {
 class MemberRuns {
  public:
   /// If `stop` returns true, members stop.
-  MemberRuns(MemberScenarios& scenarios, const Kept& kept, std::function<bool()> stop);
+  MemberRuns(MemberScenarios& scenarios, const KeptQuantities& kept, std::function<bool()> stop);
 
   /// Runs a chunk of members, some of them again as a second look. A member that cannot be run has a message. Throws
   /// Interrupted.
@@ -141,7 +141,7 @@ class MemberRuns {
 
   MemberScenarios& scenarios_;
   const EnsemblePlan& plan_;
-  const Kept& kept_;
+  const KeptQuantities& kept_;
   std::function<bool()> stop_;
   std::size_t width_;
 };

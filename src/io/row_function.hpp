@@ -80,17 +80,17 @@ class RowFunction : public Formula {
   const std::vector<std::size_t>& columns() const { return expression_->columns(); }
 
   /// Where a number of a row stands in a motion.
-  struct Place {
+  struct MotionIndex {
     enum class Of { time, coordinates, rates } of = Of::time;
     Eigen::Index index = 0;
   };
-  static double at(const Place& place, const Motion& motion) {
-    if (place.of == Place::Of::time) return motion.time;
-    return (place.of == Place::Of::coordinates ? motion.q : motion.v)[place.index];
+  static double at(const MotionIndex& place, const Motion& motion) {
+    if (place.of == MotionIndex::Of::time) return motion.time;
+    return (place.of == MotionIndex::Of::coordinates ? motion.q : motion.v)[place.index];
   }
 
-  /// Of all numbers of the expression; of none where one of them is not in a motion. A row of a motion whose numbers
-  /// are their own places tells them.
+  /// Finds the indices of all numbers of the expression, or none where one of them is not part of a motion. They are
+  /// read off a row: that of a motion whose numbers are their own indices.
   void find_places(Motion motion) {
     const auto count = static_cast<double>(motion.q.size());
     motion.q.setLinSpaced(1, count);
@@ -102,9 +102,9 @@ class RowFunction : public Formula {
       const auto quantity = std::ranges::find_if(quantities, [&](const Quantity& one) { return one.holds(column); });
       if (quantity->role > Role::rate) return places_.clear();
       const auto index = static_cast<Eigen::Index>(std::abs(row_[column])) - 1;
-      places_.push_back(quantity->role == Role::time         ? Place{}
-                        : quantity->role == Role::coordinate ? Place{Place::Of::coordinates, index}
-                                                             : Place{Place::Of::rates, index});
+      places_.push_back(quantity->role == Role::time         ? MotionIndex{}
+                        : quantity->role == Role::coordinate ? MotionIndex{MotionIndex::Of::coordinates, index}
+                                                             : MotionIndex{MotionIndex::Of::rates, index});
     }
   }
 
@@ -127,7 +127,7 @@ class RowFunction : public Formula {
   std::vector<Reach> reaches_;
   bool observes_ = false;  // whether the expression needs energy or points, which cost more
   bool has_time_ = false;
-  std::vector<Place> places_;  // of the columns; empty if a motion has not all of them
+  std::vector<MotionIndex> places_;  // of the columns; empty if a motion has not all of them
 };
 
 }  // namespace pendula::io

@@ -9,7 +9,7 @@
 
 namespace pendula::io {
 
-/// What expressions in the columns of a row change by beside a motion, exactly: an expression a row.
+/// Derivatives of expressions in the columns of a row at a motion, exactly: one row for each expression.
 struct RowSlopes {
   Eigen::VectorXd by_time;
   Eigen::MatrixXd by_state, by_inputs;  ///< coordinates, then rates, in the order of state_columns; inputs

@@ -85,7 +85,7 @@ namespace {
 enum Column : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
 constexpr std::size_t numbers_so_far = 4;
 
-// Raised where members of as many numbers have another order, or other meanings.
+// Raised when the numbers of members get another order or other meanings while there are as many.
 constexpr double layout = 1;
 
 // Rows of the table, written in turn.

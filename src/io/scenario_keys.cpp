@@ -140,7 +140,7 @@ constexpr std::array<ScenarioKey, 6> start = {
 };
 
 /// Smaller errors cannot be told from rounding.
-constexpr Bound errors{1e-16, false};
+constexpr Bound errors{smallest_tolerance, false};
 
 /// Those of Method, then "auto".
 constexpr auto methods = [] {

@@ -132,7 +132,7 @@ std::string to_json(const Summary& summary);
 std::string to_json_of_file(const Summary& summary);
 
 /// The summaries that have a key.
-enum class Moved { anything, chains, systems };
+enum class SummaryScope { anything, chains, systems };
 
 // A key of the JSON object. NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct SummaryKey {
@@ -140,7 +140,7 @@ struct SummaryKey {
   std::string_view type;  ///< JSON types, separated by blanks, or a JSON Schema
   std::string_view hint;
   std::string_view unit = {};  ///< SI; natural units have the same dimension
-  Moved of = Moved::anything;
+  SummaryScope of = SummaryScope::anything;
   std::span<const std::string_view> choices = {};
 };  // NOLINTEND(readability-redundant-member-init)
 

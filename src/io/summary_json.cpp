@@ -154,7 +154,8 @@ constexpr std::string_view final_schema = R"({"type": "object", "required": ["t"
 
 constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial::name},
                                           unit_systems = {"SI", "natural"};
-constexpr Moved anything = Moved::anything, chains = Moved::chains, systems = Moved::systems;
+constexpr SummaryScope anything = SummaryScope::anything, chains = SummaryScope::chains,
+                       systems = SummaryScope::systems;
 
 constexpr std::array<JsonRow, 43> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
@@ -257,7 +258,7 @@ Json schema_of(const SummaryKey& key) {
 }
 
 /// Names of keys of one kind.
-Json names(Moved of) {
+Json names(SummaryScope of) {
   Json all = Json::array();
   for (const JsonRow& row : rows) {
     if (row.key.of == of) all.push_back(row.key.name);

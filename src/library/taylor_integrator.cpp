@@ -8,6 +8,8 @@
 #include <pendula/chain/heading.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/long_real.hpp>
+#include <pendula/system/step_rules.hpp>
+#include <pendula/taylor/series_limits.hpp>
 #include <pendula/taylor/taylor_steps.hpp>
 #include <stdexcept>
 #include <string>
@@ -37,7 +39,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   Outcome start(double time, const double* q, const double* v) override {
     statistics_ = {};
-    longest_ = unlimited;
+    longest_ = detail::unlimited_step;
     seat(time, q, v);
     const std::size_t count = coordinates();
     const auto is_finite = [](double x) { return std::isfinite(x); };
@@ -48,8 +50,8 @@ class TaylorIntegrator : public PlainIntegrator {
   // As MemberQueue takes steps of a member.
   Outcome step(double h) override {
     double wanted = std::min(longest_, stepper_.longest_step()[lane]);
-    for (int attempt = 0; attempt < most_attempts; ++attempt) {
-      const bool is_cut = !(wanted * (1 + 1e-9) < h);
+    for (int attempt = 0; attempt < detail::most_attempts_in_lanes; ++attempt) {
+      const bool is_cut = !detail::ends_before(wanted, h);
       const double size = is_cut ? h : wanted;
       if (size > 0 && solves(size)) {
         accept(size);
@@ -71,7 +73,7 @@ class TaylorIntegrator : public PlainIntegrator {
   /// Nothing to do: the series is kept until the next step.
   void remember_steps(bool /*wanted*/) override {}
 
-  void glance(double time, double* q, double* v) override {
+  void at(double time, double* q, double* v) override {
     if (step_ == 0 || time == this->time()) return read_state(q, v);
     const double share = (time - begin_) / step_;
     for (int i = 0; i < chain_.links(); ++i) {
@@ -81,9 +83,9 @@ class TaylorIntegrator : public PlainIntegrator {
     }
   }
 
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     work = statistics_.load_work;
-    glance(time, q, v);
+    at(time, q, v);
     return {.status = Status::ok, .time = time, .step = time - begin_};
   }
 
@@ -99,8 +101,7 @@ class TaylorIntegrator : public PlainIntegrator {
  private:
   using Anchor = AngleAnchor<Space>;
 
-  static constexpr int lane = 0, most_attempts = 40;
-  static constexpr double unlimited = 1e300;
+  static constexpr int lane = 0;
 
   std::size_t coordinates() const { return Space::dof * static_cast<std::size_t>(chain_.links()); }
   std::size_t entry(int i, std::size_t a) const {
@@ -126,7 +127,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   void accept(double size) {
     stepper_.accept(L(1.0) > L(0.0));
-    longest_ = unlimited;
+    longest_ = detail::unlimited_step;
     begin_ = time();
     step_ = size;
     begin_anchors_ = anchors_;
@@ -139,7 +140,7 @@ class TaylorIntegrator : public PlainIntegrator {
 
   // Follows the angles from the start of the last step to the fraction `share` of it.
   void follow(int i, double share, Anchor& anchor) const {
-    const auto direction = [&](double at) { return direction_of(stepper_.glance(i, at).place); };
+    const auto direction = [&](double at) { return direction_of(stepper_.at(i, at).place); };
     const Direction there = direction(share);
     double squared = 0;
     for (std::size_t k = 0; k < there.size(); ++k) {
@@ -160,7 +161,7 @@ class TaylorIntegrator : public PlainIntegrator {
   }
 
   auto heading_at(int i, double share) const {
-    const auto rod = stepper_.glance(i, share);
+    const auto rod = stepper_.at(i, share);
     Heading<Space, LongReal> heading;
     for (std::size_t k = 0; k < Space::dimension; ++k) {
       heading.u[k] = rod.place[k][lane] / chain_.lengths()[i];
@@ -184,8 +185,8 @@ class TaylorIntegrator : public PlainIntegrator {
   Stepper stepper_;
   Statistics statistics_;
   Compensated<double> time_{};
-  double longest_ = unlimited;   // limit of the next step after a failure
-  double begin_ = 0, step_ = 0;  // of the last step; 0: there was none
+  double longest_ = detail::unlimited_step;  // limit of the next step after a failure
+  double begin_ = 0, step_ = 0;              // of the last step; 0: there was none
   std::vector<Anchor> anchors_, begin_anchors_;
 };
 

@@ -23,8 +23,8 @@ class Looks : public MemberWatch {
       if (!steps.took_step(lane)) continue;
       Motion &look = looked[steps.member(lane)], &glance = glanced[steps.member(lane)];
       look.time = glance.time = steps.begin(lane) + share_ * (steps.end(lane) - steps.begin(lane));
-      if (!steps.look(lane, share_, look.q.data(), look.v.data())) ++failed;
-      steps.glance(lane, share_, glance.q.data(), glance.v.data());
+      if (!steps.at_full_order(lane, share_, look.q.data(), look.v.data())) ++failed;
+      steps.at(lane, share_, glance.q.data(), glance.v.data());
     }
   }
   bool stops() override { return false; }

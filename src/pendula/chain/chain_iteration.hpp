@@ -180,7 +180,7 @@ class ChainIteration {
   template <int First, int Count, class Who, class Visit>
   [[gnu::always_inline]] void sweep(const Who& active, Sum& change, Visit& visit) {
     if constexpr (is_short) {
-      std::array<typename Motion::template Kept<Count>, static_cast<std::size_t>(N)> kept;
+      std::array<typename Motion::template Elimination<Count>, static_cast<std::size_t>(N)> kept;
       sweep_inward<First, Count>(kept);
       sweep_outward<First, Count>(kept, active, change, visit);
     } else {
@@ -302,7 +302,7 @@ class ChainIteration {
   const bool pulls_more_;
   Stage* const stages_;
   typename Motion::Pulled* const pulled_;
-  typename Motion::template Kept<Layout::together>* const kept_;
+  typename Motion::template Elimination<Layout::together>* const kept_;
   const LinkConstants<C>* const constants_;
   const Num *const along_, *const along_low_, *const free_, *const free_low_, *const product_;
   const C gravity_;

@@ -189,6 +189,20 @@ struct LinkConstants {
   }
 };
 
+namespace detail {
+
+/// κ over n² |g|/L, for n links of the length L together: κ is close to what a chain's modes swing with.
+inline constexpr double slowest_pace_factor = 0.15;
+
+}  // namespace detail
+
+/// κ, which R² of a chain at rest is (docs/explanation/steps.md)  [1/s²]; `length` is the sum of the links' lengths.
+template <class Real>
+Real slowest_pace_squared(Real links, Real gravity, Real length) {
+  using std::abs;
+  return Real(detail::slowest_pace_factor) * links * links * abs(gravity) / length;
+}
+
 /// The constants of a chain link by link.
 template <class Space, int N = Eigen::Dynamic, class Real = double>
 class ChainLinks {

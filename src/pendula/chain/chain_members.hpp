@@ -9,6 +9,7 @@
 #include <pendula/chain/member_loads.hpp>
 #include <pendula/chain/rod_tangent.hpp>
 #include <pendula/gauss/member_layout.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
@@ -46,6 +47,9 @@ class ChainMembers
     }
   }
 
+  /// Links of the chains.
+  int count() const { return links(); }
+
   // --- One member ---
 
   /// A member comes into a lane, with its chain, at q and v  [rad, rad/s]; its next step starts cold.
@@ -67,7 +71,7 @@ class ChainMembers
       }
       rods_.start(lane, i, Wide(chain[i].length), Heading<Space, Wide>(angles, rates));
     }
-    this->slowest_pace_.set(lane, 0.15 * links() * links() * std::abs(gravity) / length);
+    this->slowest_pace_.set(lane, slowest_pace_squared<double>(links(), gravity, length));
     this->fastest_swing_.set(lane, chain.fastest_swing_squared());
     restoring_.set(lane, 0);
     if constexpr (has_tangent) start_tangent(lane);
@@ -132,7 +136,7 @@ class ChainMembers
   /// Rods of the members whose step was accepted, and their rates, when `share` of it was done, by the polynomial
   /// through its stages; visit(i, ξ, ξ̇).
   template <class Visit>
-  void for_each_glance(double share, Visit visit) {
+  void for_each_at(double share, Visit visit) {
     const typename Columns::Shares& weights = this->columns_.shares(share);
     const L inverse_h = L(1.0) / this->columns_.h();
     for (int i = 0; i < links(); ++i) {
@@ -157,7 +161,7 @@ class ChainMembers
   /// The most that a link turns in the step, squared; never less, hardly more  [rad²].
   L turn() const { return this->turn_squared(); }
   /// From where on stages are no motion  [rad].
-  static constexpr double largest_turn(bool /*chosen*/) { return 3; }
+  static constexpr double largest_turn(bool /*chosen*/) { return detail::largest_turn; }
 
   /// R in the middle of the step, squared, times h².
   L pace_squared() const {
@@ -288,7 +292,7 @@ class ChainMembers
   L restoring_{0.0};  // steps since lengths were restored
   detail::PerLink<Point, N> rates_;
   MemberLoads<Space, N, L> loads_;
-  typename Motion::Rods::Place saved_;
+  typename Motion::Rods::FullState saved_;
 };
 
 }  // namespace pendula

@@ -107,7 +107,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
   };
   // What the sweep inward keeps for the sweep outward, of one link at some cells.
   template <int Count>
-  struct Kept {
+  struct Elimination {
     std::array<std::array<typename Layout::Slot, D>, static_cast<std::size_t>(Count)> freed;  // Z − z
     std::array<typename Layout::Slot, static_cast<std::size_t>(Count)> offset, coupling;      // MultiplierRow
   };
@@ -213,7 +213,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
   detail::PerLink<std::array<Past, pasts>, N> pasts_;
   typename Rods::template Numbers<Num> moved_, total_pull_;  // over the step
   static constexpr bool is_short = detail::is_short_chain<N>;
-  detail::PerLink<Kept<Layout::together>, is_short && is_batch<Num> ? 1 : N> kept_;
+  detail::PerLink<Elimination<Layout::together>, is_short && is_batch<Num> ? 1 : N> kept_;
 
  private:
   friend class ChainIteration<ChainMotion>;

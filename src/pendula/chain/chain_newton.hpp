@@ -35,7 +35,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
       : block_(kept), gains_(std::min(links, kept)), below_(static_cast<std::size_t>(std::max(links - 1, 0) / kept)) {}
 
   /// From now on asks `stop` after every `most_kept` links. What an iteration finds that it ends is of no use.
-  void heed(StopSign stop) { stop_ = stop; }
+  void set_stop_sign(StopSign stop) { stop_ = stop; }
 
   /// Improves increments and multipliers once.
   Correction correct(Stages& stages) {
@@ -85,7 +85,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     PerStage residual[D], slip[1];
   };
 
-  struct Carried {  // δG = P δw + g, and G
+  struct CarriedMomentum {  // δG = P δw + g, and G
     Block<vectors, vectors> P;
     Real g[vectors] = {};
     Vector G = zero();
@@ -110,7 +110,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   // Adds the mass of the next bob to the diagonal of P one link early, where nothing has to wait for it.
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     positive_ = true;
-    Carried carried;
+    CarriedMomentum carried;
     const int last = stages.links() - 1;
     for (std::size_t k = 0; k < vectors; ++k) carried.P.set_row(k, carried.P.unit(k, stages.constants(last).mass));
     for (int end = stages.links(); end > 0 && !stop_();) {
@@ -121,7 +121,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  PENDULA_IN_REGISTERS [[gnu::noinline]] void inward(Stages& stages, int begin, int end, Carried& carried) {
+  PENDULA_IN_REGISTERS [[gnu::noinline]] void inward(Stages& stages, int begin, int end, CarriedMomentum& carried) {
     Vector G = carried.G;
     Terms terms;
     for (int i = end; i-- > begin;) {
@@ -157,7 +157,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   }
 
   // Nothing moves before the first link; below the last one there is its own bob, P = m I.
-  void eliminate(const Stages& stages, int i, const Terms& terms, Carried& carried, Gain& gain) {
+  void eliminate(const Stages& stages, int i, const Terms& terms, CarriedMomentum& carried, Gain& gain) {
     const bool first = i == 0, last = i + 1 == stages.links();
     Tangents BZ, own;
     Block<unknowns, vectors> across;       // L
@@ -182,7 +182,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
   }
 
   // P ← B + B Z K with the mass of the bob before on its diagonal, g ← g + B (v₀ + Z k).
-  static void hand_on(const Tangents& BZ, const Gain& gain, const Real& mass_before, Carried& carried) {
+  static void hand_on(const Tangents& BZ, const Gain& gain, const Real& mass_before, CarriedMomentum& carried) {
     using Row = typename Block<vectors, vectors>::Row;
     for (std::size_t u = 0; u < vectors; ++u) {
       Row row = carried.P.row(u) + carried.P.unit(u, mass_before);
@@ -204,7 +204,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     for (int begin = 0; begin < stages.links() && !stop_(); begin += block_) {
       const int end = std::min(begin + block_, stages.links());
       if (begin > 0) {
-        Carried again = below_[static_cast<std::size_t>(begin / block_ - 1)];
+        CarriedMomentum again = below_[static_cast<std::size_t>(begin / block_ - 1)];
         inward(stages, begin, end, again);
       }
       outward(stages, begin, end, dw, change, worst);
@@ -250,8 +250,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
 
   StopSign stop_;
   int block_;
-  detail::PerLink<Gain, N> gains_;  // of one block
-  std::vector<Carried> below_;      // from each block but the first to the one before
+  detail::PerLink<Gain, N> gains_;      // of one block
+  std::vector<CarriedMomentum> below_;  // from each block but the first to the one before
 };
 
 }  // namespace pendula

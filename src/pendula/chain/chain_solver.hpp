@@ -9,6 +9,7 @@
 #include <pendula/chain/chain_stages.hpp>
 #include <pendula/chain/chain_tangent.hpp>
 #include <pendula/gauss/stage_iterations.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/system/forcing_look.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
@@ -52,7 +53,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
   }
 
   Correction correct() { return Base::correct(newton_, stages_.links()); }
-  void heed(StopSign stop) { newton_.heed(stop); }
+  void set_stop_sign(StopSign stop) { newton_.set_stop_sign(stop); }
 
   /// Iterations do not note which link they change most: one more finds out.
   int part_of(Status status) {
@@ -69,7 +70,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
     return fastest > 0 ? std::min(h, turn_.within(tolerance) / fastest) : h;
   }
   SolverTraits traits() const {
-    return {stages_.links(),          Space::dof * stages_.links(), S, 3, stages_.loaded(),
+    return {stages_.links(),          Space::dof * stages_.links(), S, detail::largest_turn, stages_.loaded(),
             stages_.chain().damped(), family_ == Family::radau};
   }
   double energy_defect() {

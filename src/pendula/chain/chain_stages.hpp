@@ -47,8 +47,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
       length += given[i].length;
     }
     this->gravity_ = Real(chain.gravity());
-    using std::abs;
-    this->slowest_pace_ = Real(0.15) * Real(links()) * Real(links()) * abs(this->gravity_) / length;
+    this->slowest_pace_ = slowest_pace_squared<Real>(Real(links()), this->gravity_, length);
     this->fastest_swing_ = given.fastest_swing_squared();
     if (chain.loaded()) this->expect_loads();
   }
@@ -362,7 +361,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   Chain<Space, N> chain_;
   std::int64_t
       restoring_interval_;  // steps after which lengths are restored; Gauss methods keep them, but for rounding
-  typename Base::Rods::Place trial_{links()};
+  typename Base::Rods::FullState trial_{links()};
   double fastest_ = 0;  // squared velocity of the fastest bob so far  [m²/s²]
   bool torque_is_set_ = false, is_finished_ = false, is_first_ = true;
 };

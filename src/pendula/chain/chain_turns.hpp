@@ -38,21 +38,21 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   }
 
   /// The state of the chain.
-  struct Place {
-    typename Base::Rods::Place rods{};
+  struct FullState {
+    typename Base::Rods::FullState rods{};
     detail::PerLink<AngleAnchor<Space, Real>, N> anchors{0};
   };
-  void keep(Place& place) const {
+  void keep(FullState& place) const {
     place.rods = rods_.place();
     place.anchors = anchors_;
   }
-  void go_to(const Place& place) {
+  void go_to(const FullState& place) {
     rods_.place() = place.rods;
     anchors_ = place.anchors;
   }
 
   /// The state within the last step, x steps after its beginning, by the polynomials through its rates.
-  State glance(const Place& begin, double time, double x) const {
+  State at(const FullState& begin, double time, double x) const {
     State state = empty_state(time);
     const auto up_to = columns_.integrals(Real(x));
     for (int i = 0; i < links(); ++i) {
@@ -67,7 +67,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
 
   /// Bounds of how far angles and their rates get within the last step from where they began: infinite for those near
   /// a pole.
-  bool bound_excursions(const Place& begin, double* q, double* v) const {
+  bool bound_excursions(const FullState& begin, double* q, double* v) const {
     using std::abs;
     const Real h = abs(Real(prediction_.last_h()));
     for (int i = 0; i < links(); ++i) {

@@ -10,6 +10,13 @@
 
 namespace pendula {
 
+namespace detail {
+
+/// x / (1 + arctangent_bend x²) is the arctangent of up to √3 to 0.005.
+inline constexpr double arctangent_bend = 0.28;
+
+}  // namespace detail
+
 /// Direction of a link and its rate, along the axes of the world.
 template <class Space, class Real = double>
 struct Heading {
@@ -200,7 +207,7 @@ class AngleAnchor {
       const Real along = x * next_x + y * next_y, across = x * next_y - y * next_x;
       if (!(along > 0 && across * across < 3 * along * along)) return false;  // a sixth of a turn
       const Real slope = across / along;
-      turned += slope / (1 + Real(0.28) * slope * slope);  // arctangent to 0.005
+      turned += slope / (1 + Real(detail::arctangent_bend) * slope * slope);
       x = next_x;
       y = next_y;
     }

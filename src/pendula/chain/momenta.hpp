@@ -40,7 +40,7 @@ bool at_pole(double theta) {
 
 /// P of all bobs from a link on, linear in the velocity V of the bob before it: P = inertia V + bias.
 template <class Space>
-struct Carried {
+struct CarriedMomentum {
   Eigen::Matrix<double, Space::dimension, Space::dimension> inertia =
       Eigen::Matrix<double, Space::dimension, Space::dimension>::Zero();
   Eigen::Matrix<double, Space::dimension, 1> bias = Eigen::Matrix<double, Space::dimension, 1>::Zero();
@@ -56,7 +56,7 @@ class LinkRates {
 
  public:
   /// J  l ∂û/∂q; `carried` is told behind the link, its bob's mass included, and becomes what it is before the link.
-  LinkRates(const Lever& J, bool at_pole, const Rates& p, Carried<Space>& carried)
+  LinkRates(const Lever& J, bool at_pole, const Rates& p, CarriedMomentum<Space>& carried)
       : J_(J), BJ_(carried.inertia * J), D_inverse_(decltype(D_inverse_)::Zero()) {
     const Eigen::Matrix<double, Space::dof, Space::dof> D = J.transpose() * BJ_;
     if (at_pole) {
@@ -99,7 +99,7 @@ Coordinates<Space, Eigen::Dynamic> rates_from_momenta(const Chain<Space>& chain,
   const State<Space> placed{0, q, Coordinates<Space, Eigen::Dynamic>::Zero(q.size())};
   std::vector<detail::LinkRates<Space>> links;  // from the last to the first
   links.reserve(static_cast<std::size_t>(n));
-  detail::Carried<Space> carried;
+  detail::CarriedMomentum<Space> carried;
   for (int i = n; i-- > 0;) {
     Eigen::Matrix<double, Space::dof, 1> of_link;
     for (int a = 0; a < Space::dof; ++a) of_link[a] = p[a * n + i];

@@ -40,8 +40,8 @@ class RodState : public RodBlocks<Space, N, Num> {
   using Wide = std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, LongReal, C>;
 
   /// A state as a value.
-  struct Place {
-    explicit Place(int links = 0) : along(links), along_low(links), free(links), free_low(links) {}
+  struct FullState {
+    explicit FullState(int links = 0) : along(links), along_low(links), free(links), free_low(links) {}
     Numbers<Num> along, along_low;  ///< ξ  [m], and what it lost to rounding
     Numbers<Num> free, free_low;    ///< z  [m/s]
   };
@@ -61,8 +61,8 @@ class RodState : public RodBlocks<Space, N, Num> {
     std::fill_n(inverse_mass_low_[i], D, inverse_mass.low);
   }
 
-  const Place& place() const { return at_; }
-  Place& place() { return at_; }
+  const FullState& place() const { return at_; }
+  FullState& place() { return at_; }
   const Num* along(int i) const { return at_.along[i]; }  ///< ξ_i, (dimension)
   const Num* along_low(int i) const { return at_.along_low[i]; }
   const Num* free(int i) const { return at_.free[i]; }  ///< z_i, (dimension)
@@ -212,9 +212,9 @@ class RodState : public RodBlocks<Space, N, Num> {
 
   /// Goes to `place` where `which` is true.
   template <class Who>
-  void go_to(const Place& place, const Who& which) {
+  void go_to(const FullState& place, const Who& which) {
     for (int i = 0; i < links(); ++i) {
-      for (auto part : {&Place::along, &Place::along_low, &Place::free, &Place::free_low}) {
+      for (auto part : {&FullState::along, &FullState::along_low, &FullState::free, &FullState::free_low}) {
         Num* here = (at_.*part)[i];
         const Num* there = (place.*part)[i];
         for (std::size_t k = 0; k < D; ++k) here[k] = select(which, there[k], here[k]);
@@ -369,7 +369,7 @@ class RodState : public RodBlocks<Space, N, Num> {
     }
   }
 
-  Place at_;
+  FullState at_;
   Numbers<C> inverse_mass_, inverse_mass_low_;
   detail::PerLink<Num, N> product_;
   mutable detail::PerLink<MultiplierRow<Num>, N> rows_;

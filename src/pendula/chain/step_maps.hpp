@@ -58,7 +58,7 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
     this->set_coefficients(stages.columns());
     positive_ = true;
     find_bobs(stages);
-    Carried carried;
+    CarriedMass carried;
     const int last = links_ - 1;
     for (std::size_t k = 0; k < vectors; ++k)
       carried.mass.set_row(k, carried.mass.unit(k, stages.constants(last).mass));
@@ -72,7 +72,7 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
   const ParameterMaps& of_parameters(int i) const { return parameter_maps_[i]; }
 
  private:
-  struct Carried {
+  struct CarriedMass {
     Block<vectors, vectors> mass;  // B
     Numbers momentum{};            // y
   };
@@ -152,7 +152,7 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
     });
   }
 
-  void find_maps(const Stages& stages, int i, Carried& carried) {
+  void find_maps(const Stages& stages, int i, CarriedMass& carried) {
     static constexpr std::size_t slipping = u + f + 1, all = u + sources;
     const Real length = stages.constants(i).length;
     Link link;
@@ -201,7 +201,7 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
   template <class Sources, class Slipping, class Whole, class Pivots>
   void keep(const Stages& stages, int i, const Link& link, const Sources& source, const Slipping& Z, const Slipping& BZ,
             const Whole& whole, const Pivots& pivots, const Block<u, vectors>& push, const Block<u, vectors>& follow,
-            const EndMomentum& end, const Carried& carried) {
+            const EndMomentum& end, const CarriedMass& carried) {
     Maps& maps = maps_[i];
     ParameterMaps& parameter = parameter_maps_[i];
     for (std::size_t r = 0; r < u; ++r) {
@@ -285,7 +285,8 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
 
   // B ← B + B Z K with the mass of the bob before on its diagonal; y of the link before is still without that bob.
   template <class Slipping>
-  static void hand_on(const Slipping& BZ, const Block<u, vectors>& follow, const Real& mass_before, Carried& carried) {
+  static void hand_on(const Slipping& BZ, const Block<u, vectors>& follow, const Real& mass_before,
+                      CarriedMass& carried) {
     using BlockRow = typename Block<vectors, vectors>::Row;
     for (std::size_t v = 0; v < vectors; ++v) {
       BlockRow row = carried.mass.row(v) + carried.mass.unit(v, mass_before);

@@ -66,7 +66,7 @@ class ChainSeats {
   }
 
  private:
-  int links() const { return stepper_.chain().links(); }
+  int links() const { return stepper_.chain().count(); }
 
   Stepper& stepper_;
   SightOf<Stepper> sight_;

@@ -9,6 +9,7 @@
 #include <pendula/run/library.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <pendula/run/system_subject.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,10 +18,10 @@ namespace pendula {
 
 namespace {
 
-// Ends what takes many steps, as stiff motions do that explicit steps move: implicit steps move it anew.
-class Impatience : public MemberWatch {
+// Ends a motion that takes more explicit steps than this, as a stiff one does: implicit steps move it anew.
+class StepBudget : public MemberWatch {
  public:
-  Impatience(std::size_t members, const std::function<bool()>& stop) : steps_(members), stop_(stop) {}
+  StepBudget(std::size_t members, const std::function<bool()>& stop) : steps_(members), stop_(stop) {}
 
   bool is_slow(std::size_t member) const { return steps_[member] >= most_steps; }
 
@@ -48,7 +49,7 @@ bool is_driven(const SystemSubject& subject) {
   return !subject.numbers().sines.empty();
 }
 
-// The same numbers for all members, but for what each holds and where it is.
+// Members of one model with the same numbers, but each with its own state and what it holds.
 template <class Model, class Hold>
 std::vector<PlainMember<Model>> members_of(const Model& model, std::size_t count, double duration, const double* states,
                                            std::size_t coordinates, Hold hold) {
@@ -78,17 +79,17 @@ HeldMembers::HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coo
   if (driven || !subject_->switches().empty()) {
     throw std::invalid_argument("members: expected a system without drives and pieces");
   }
-  subject_->make_integrator(options_);  // what is wrong is told now
+  subject_->make_integrator(options_);  // throws here, not at the first move
   const auto size = static_cast<Eigen::Index>(coordinates_);
-  // What is held may be a load: lanes of chains without loads are not for them.
+  // A held input may be a load, which lanes for chains without loads do not take.
   const RunSetup setup{with_inputs(subject_, std::vector<double>(inputs_, 1)),
                        Motion(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size)), options_, duration_};
   in_lanes_ = quickest_in_lanes(setup);
   kind_ = lane_kind(setup, in_lanes_);
 }
 
-HeldMembers::Moved HeldMembers::move(std::span<const double> inputs, std::span<double> states,
-                                     const std::function<bool()>& stop) {
+HeldMembers::MoveResult HeldMembers::move(std::span<const double> inputs, std::span<double> states,
+                                          const std::function<bool()>& stop) {
   const std::size_t row = 2 * coordinates_, count = states.size() / row;
   const auto require = [](const char* what, std::size_t expected, std::size_t got) {
     if (expected == got) return;
@@ -104,7 +105,7 @@ HeldMembers::Moved HeldMembers::move(std::span<const double> inputs, std::span<d
     ends[k].v = ends[k].q + coordinates_;
     if (!kind_) ends[k].status = Status::not_converged;
   }
-  Impatience watch(count, stop);
+  StepBudget watch(count, stop);
   if (kind_ && !go_in_lanes(inputs, states, ends, watch)) return {{.status = Status::interrupted}, 0};
   for (std::size_t k = 0; k < count; ++k) {
     if (ends[k].status == Status::ok && !watch.is_slow(k)) continue;
@@ -147,7 +148,7 @@ Outcome HeldMembers::go_alone(Numbers inputs, Numbers state, const MemberEnd& en
   const double step = is_adaptive(options_) ? duration_ : options_.step;
   while (outcome && integrator->time() < duration_) {
     const double left = duration_ - integrator->time();
-    outcome = integrator->step(step * (1 + 1e-9) < left ? step : left);
+    outcome = integrator->step(detail::ends_before(step, left) ? step : left);
     if (stop()) outcome.status = Status::interrupted;
   }
   const Motion there = integrator->state();

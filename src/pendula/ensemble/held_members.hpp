@@ -14,9 +14,9 @@
 
 namespace pendula {
 
-/// Motions of one system that go on side by side, each with inputs of its own, which are held. They are in lanes where
-/// there are some for the system and the options (lane_kind), and else go one by one. What becomes of a motion depends
-/// on itself alone, to the last bit.
+/// Motions of one system side by side, each with inputs of its own, which are held during a move. They go in lanes
+/// where there are some for the system and the options (lane_kind), else one by one. The result for a motion depends on
+/// that motion alone, to the last bit.
 class HeldMembers {
  public:
   /// `duration` of each move  [s]. `options` are those of a motion alone; in lanes, steps of another kind may take
@@ -29,7 +29,7 @@ class HeldMembers {
   std::size_t inputs() const { return inputs_; }
 
   /// What became of the members: how the first failed, and which it was; ok where none did.
-  struct Moved {
+  struct MoveResult {
     Outcome outcome;
     std::size_t member = 0;
   };
@@ -37,7 +37,7 @@ class HeldMembers {
   /// Moves each of `states`, (members x 2 coordinates): coordinates, then rates, over the duration with its row of
   /// `inputs`, (members x inputs). If one fails, or `stop` stops them, states are where they began. Throws
   /// std::invalid_argument on sizes that do not fit.
-  Moved move(std::span<const double> inputs, std::span<double> states, const std::function<bool()>& stop);
+  MoveResult move(std::span<const double> inputs, std::span<double> states, const std::function<bool()>& stop);
 
  private:
   using Numbers = std::span<const double>;

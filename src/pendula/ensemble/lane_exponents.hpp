@@ -38,7 +38,7 @@ class LaneExponent {
   }
 
  private:
-  static constexpr double entries = 320;  // ten of each of the shortest blocks that errors are read off
+  static constexpr double entries = 320;  // ten in each of the shortest blocks whose scatter gives the errors
 
   void note() {
     history_.add(time_, Eigen::VectorXd::Constant(1, tangent_.grown() - noted_));
@@ -54,8 +54,8 @@ class LaneExponent {
 template <class Members>
 class LaneExponents : private MemberWatch {
  public:
-  /// `setups`, whose tangent_lane_kind by `options` is `kind`, must outlive it; their own options are how they would be
-  /// run alone.
+  /// `kind` is the tangent_lane_kind of all `setups` with `options`; their own options tell how they would be run
+  /// alone. `setups` must outlive this object.
   LaneExponents(const LaneKind& kind, std::span<const RunSetup* const> setups, const RunOptions& options,
                 const std::function<bool()>& stop)
       : setups_(setups), options_(options), stop_(stop), members_(setups, kind) {

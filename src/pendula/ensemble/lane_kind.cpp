@@ -25,7 +25,8 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tang
   }
   if (!is_explicit(options.method)) {
     if (options.solver == Solver::dense) return false;
-    // Fixed points hardly converge by steps that do not resolve a chain; chosen steps become shorter.
+    // With constant steps that do not resolve a chain, fixed points hardly converge. Chosen steps become shorter
+    // instead.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
   return true;

@@ -25,10 +25,11 @@ struct LaneKind {
   bool operator==(const LaneKind& other) const { return tied() == other.tied(); }
 };
 
-/// The kind of a run that goes in lanes by `options`; none of others. By Gauss steps, of as many stages as lanes were
-/// compiled for, chains of the chain solver that constant steps resolve, and systems of generated kernels that depend
-/// on time by nothing but inputs; systems by Taylor series; all chains and systems by fehlberg78.
-/// None of systems whose forces may be narrow by other functions than powers and logarithms.
+/// The kind of a run that goes in lanes with `options`; nothing for a run that does not. By Gauss steps, with the
+/// numbers of stages that lanes are compiled for, go chains with the chain solver, if constant steps resolve them, and
+/// systems of generated kernels that depend on time by inputs only; by Taylor series, systems; by fehlberg78, all
+/// chains and systems. Systems whose forces may be narrow by functions other than powers and logarithms do not go in
+/// lanes.
 std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options);
 std::optional<LaneKind> lane_kind(const RunSetup& setup);
 /// The same where each member has a tangent.
@@ -36,8 +37,8 @@ std::optional<LaneKind> tangent_lane_kind(const RunSetup& setup, const RunOption
 
 namespace detail {
 
-/// Whether only a trial tells that a substituted method serves, as for systems and loaded chains: it must keep the
-/// energy of a motion that conserves it, and finish soon.
+/// Whether a substituted method has to be tried, as for systems and loaded chains: it must keep the energy of a motion
+/// that conserves it, and finish soon.
 bool has_to_be_tried(const Subject& subject);
 
 }  // namespace detail

@@ -67,7 +67,7 @@ class PlainChains : public MemberEnds {
   std::vector<PlainMember<PlainChain>> members_;
 };
 
-/// The same for systems of one kernel, and for planar chains that move as such.
+/// The same for systems of one kernel, and for planar chains that move as systems of their kernel.
 class PlainSystems : public MemberEnds {
  public:
   /// `setups` must outlive it.
@@ -116,7 +116,7 @@ class LaneRuns : private MemberWatch {
     watches_.reserve(setups.size());
     for (std::size_t k = 0; k < setups.size(); ++k) {
       const RunSetup& setup = *setups[k];
-      watches_.emplace_back(setup.events, detail::glance_degree(options));
+      watches_.emplace_back(setup.events, detail::dense_output_degree(options));
       if (!setup.events.empty()) watches_.back().start(setup.start);
       wants_looks_ |= !setup.events.empty();
       if (tracks[k] != nullptr) tracks[k]->begin(setup.start);
@@ -183,7 +183,7 @@ class LaneRuns : private MemberWatch {
     const RunSetup& setup = *setups_[k];
     return !takes_too_long_[k] && (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
   }
-  // Extrapolated from how far it has come.
+  // The number of steps is extrapolated from the share of the run that is done.
   bool takes_too_long(std::size_t k, double time) const {
     const RunSetup& setup = *setups_[k];
     const int most = setup.subject->loaded() ? most_unchecked_steps : most_steps;
@@ -203,14 +203,14 @@ class LaneRuns : private MemberWatch {
       prepare(steps_.end(lane_), motion);
       steps_.state(lane_, motion.q.data(), motion.v.data());
     }
-    void glance(double share, double time, Motion& motion) const {
+    void at(double share, double time, Motion& motion) const {
       prepare(time, motion);
-      steps_.glance(lane_, share, motion.q.data(), motion.v.data());
+      steps_.at(lane_, share, motion.q.data(), motion.v.data());
     }
-    bool look(const Motion& begin, double time, Motion& motion) {
+    bool at_full_order(const Motion& begin, double time, Motion& motion) {
       prepare(time, motion);
       const double share = (time - begin.time) / (steps_.end(lane_) - begin.time);
-      return steps_.look(lane_, share, motion.q.data(), motion.v.data());
+      return steps_.at_full_order(lane_, share, motion.q.data(), motion.v.data());
     }
 
    private:
@@ -236,11 +236,11 @@ class LaneRuns : private MemberWatch {
       step_.state(motion);
       return motion;
     }
-    bool look(double /*time*/, Motion& /*motion*/) const { return false; }
-    Motion glance(double time) const {
+    bool at_full_order(double /*time*/, Motion& /*motion*/) const { return false; }
+    Motion at(double time) const {
       Motion motion;
       const double begin = steps_.begin(lane_);
-      step_.glance((time - begin) / (steps_.end(lane_) - begin), time, motion);
+      step_.at((time - begin) / (steps_.end(lane_) - begin), time, motion);
       return motion;
     }
 

@@ -12,7 +12,9 @@
 #include <pendula/explicit/system_accelerations.hpp>
 #include <pendula/gauss/members_stepper.hpp>
 #include <pendula/gauss/system_members.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/run/plain_members.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <pendula/taylor/series_steps.hpp>
 #include <pendula/taylor/taylor_steps.hpp>
 #include <span>
@@ -22,9 +24,9 @@ namespace pendula {
 
 /// How members are moved.
 struct QueueOptions {
-  double step = 0;          ///< s; 0: of each member's own choice, by tolerance
-  double tolerance = 1e-9;  ///< of the motion, relative to its size, as RunOptions::tolerance
-  double enough = 0;  ///< MembersStepperOptions; 0: round-off of constant steps, of chosen ones a part of the tolerance
+  double step = 0;                ///< s; 0: of each member's own choice, by tolerance
+  double tolerance = 1e-9;        ///< of the motion, relative to its size, as RunOptions::tolerance
+  double enough = 0;              ///< MembersStepperOptions; 0: round-off; with chosen steps, a part of the tolerance
   std::int64_t energy_every = 0;  ///< steps from one look at the energy to the next; 0: it is not looked at
 };
 
@@ -83,17 +85,15 @@ class MemberQueue {
   // The scale of the energy of a system is known only after the run: the largest |T| + |U|.
   static constexpr bool sums_energies = requires(const Stepper& stepper) { stepper.energy_sum(); };
   static constexpr bool may_be_stiff = requires(const Stepper& stepper) { stepper.chain().may_be_stiff(); };
-  static constexpr double most_attempts = 40;                        // at one step
   static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // failed steps: in all, and for each accepted step
-  static constexpr double largest_energy_defect = 0.02;
-  static constexpr double smallest_step = 1e-10;  // of the time that is left
+  static constexpr double smallest_step = 1e-10;                     // of the time that is left
 
   // An iteration error of a ten-thousandth of the tolerance does not show beside the error of a step.
   static typename Stepper::Options stepper_options(const QueueOptions& options) {
     if constexpr (Stepper::is_implicit) {
       typename Stepper::Options given;
       given.are_chosen = options.step == 0;
-      if (given.are_chosen) given.enough = std::max(1e-18, 1e-4 * options.tolerance);
+      if (given.are_chosen) given.enough = std::max(given.enough, 1e-4 * options.tolerance);
       if constexpr (requires { Stepper::Chain::most_iterations; }) {
         if (given.are_chosen && options.enough == 0) given.max_iterations = Stepper::Chain::most_iterations;
       }
@@ -116,7 +116,7 @@ class MemberQueue {
   void step() {
     const L remaining = (end_ - time_.value) - time_.low;
     const L wanted = chooses() ? controller_.step(stepper_) : L(options_.step);
-    const Mask is_cut = !(wanted * L(1 + 1e-9) < remaining);
+    const Mask is_cut = !detail::ends_before(wanted, remaining);
     const L h = select(running() & is_cut, remaining, wanted);
     const Mask found = stepper_.solve(time_.value, h, running() & (h > smallest_step * remaining));
     Mask good = found, wrong = found & !found;
@@ -161,7 +161,7 @@ class MemberQueue {
     chain.save();
     stepper_.accept(good);
     const L after = chain.energy();
-    const L bound = largest_energy_defect * chain.energy_scale(due);
+    const L bound = detail::largest_energy_defect * chain.energy_scale(due);
     const Mask wrong = doubtful & !(abs(after - due) <= bound);
     chain.restore(wrong);
     stepper_.forget(wrong);
@@ -199,7 +199,8 @@ class MemberQueue {
     Mask lost = bad;
     if (chooses()) {
       controller_.shrink(bad & !solved, h, L(0.5));
-      lost = bad & ((attempts_ >= L(most_attempts)) | !(h > smallest_step * remaining) | is_stiff(bad & !solved));
+      lost = bad & ((attempts_ >= L(detail::most_attempts_in_lanes)) | !(h > smallest_step * remaining) |
+                    is_stiff(bad & !solved));
     }
     if (xsimd::any(lost)) retire(lost, Status::not_converged);
   }

@@ -25,7 +25,7 @@ class MemberView : public MemberSteps {
         turns_(turns),
         now_(coordinates()),
         views_(most_views, View(coordinates())),
-        parts_(at(sight.links())),
+        parts_(to_size(sight.count())),
         on_the_way_(parts_) {}
 
   /// These members have taken steps.
@@ -55,15 +55,15 @@ class MemberView : public MemberSteps {
     now_.read(lane, q, v);
   }
 
-  void glance(int lane, double share, double* q, double* v) override {
+  void at(int lane, double share, double* q, double* v) override {
     look_now();
     view_at(share).read(lane, q, v);
   }
 
-  bool look(int lane, double share, double* q, double* v) override {
+  bool at_full_order(int lane, double share, double* q, double* v) override {
     look_now();
     const L begin = L::load(begin_);
-    if (!sight_.look(lane, begin, L::load(end_) - begin, share, parts_)) return false;
+    if (!sight_.at_full_order(lane, begin, L::load(end_) - begin, share, parts_)) return false;
     View& view = views_.back();  // the one that was filled last
     view.share = nothing;
     write(share, view);
@@ -95,9 +95,9 @@ class MemberView : public MemberSteps {
     std::vector<Numbers> q, v;
   };
 
-  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
-  std::size_t coordinates() const { return dof * at(sight_.links()); }
-  std::size_t entry(std::size_t i, std::size_t a) const { return a * at(sight_.links()) + i; }
+  static std::size_t to_size(int i) { return static_cast<std::size_t>(i); }
+  std::size_t coordinates() const { return dof * to_size(sight_.count()); }
+  std::size_t entry(std::size_t i, std::size_t a) const { return a * to_size(sight_.count()) + i; }
 
   void look_now() {
     if (now_.share != nothing) return;
@@ -122,7 +122,7 @@ class MemberView : public MemberSteps {
     View& view = views_[k];
     if (view.share == share) return view;
     view.share = share;
-    sight_.glance(share, parts_);
+    sight_.at(share, parts_);
     write(share, view);
     return view;
   }
@@ -184,7 +184,7 @@ class MemberView : public MemberSteps {
   std::array<double, 2> angles_near(int lane, std::size_t i, const std::array<double, D>& u,
                                     double share) requires(D == 3) {
     const auto direction_at = [&](double back) {
-      back == 0 ? sight_.now(on_the_way_) : sight_.glance(1 - back, on_the_way_);
+      back == 0 ? sight_.now(on_the_way_) : sight_.at(1 - back, on_the_way_);
       return direction_of(on_the_way_[i].place, lane);
     };
     AngleAnchor<Space> anchor;

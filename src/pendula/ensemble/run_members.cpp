@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <pendula/chain/chain_links.hpp>
 #include <pendula/ensemble/lane_exponents.hpp>
 #include <pendula/ensemble/lane_runs.hpp>
 #include <pendula/ensemble/run_members.hpp>
@@ -32,7 +33,7 @@ std::optional<double> natural_pace_in(const Subject& subject) {
   const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
   if (found == nullptr) return {};
   const Chain<Space>& chain = found->chain();
-  return chain.links() * std::sqrt(0.15 * std::abs(chain.gravity()) / chain.lengths().sum());
+  return chain.links() * std::sqrt(slowest_pace_factor * std::abs(chain.gravity()) / chain.lengths().sum());
 }
 
 /// About how fast a chain swings  [1/s]; infinity for other subjects.
@@ -48,7 +49,8 @@ double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
 }
 
-// Series of few links are summed in registers (library/lane_methods.hpp); those of kernels must fit the nearest memory.
+// Whether a run takes less time by Taylor series. Series of few links are summed in registers
+// (library/lane_methods.hpp). The numbers of a kernel have to fit into the first-level cache.
 bool goes_by_series(const RunSetup& setup) {
   constexpr int most_links = 3, most_operands = 30;
   const Subject& subject = *setup.subject;
@@ -61,7 +63,11 @@ bool goes_by_series(const RunSetup& setup) {
   return links <= most_links && std::isfinite(natural_pace(subject)) && !subject.loaded();
 }
 
-// Runs of about the same length go in lanes together.
+// Tolerance of explicit steps with tangents: of a smaller one rounding leaves nothing.
+constexpr double finest_with_tangents = 1e-13;
+
+// The tolerance of a step (step_tolerance). It is the same for runs of about the same length, which so go in lanes
+// together.
 double tolerance_of_steps(const RunSetup& setup, double finest) {
   const double length = run_length(setup);
   return step_tolerance(setup.options.tolerance, std::isfinite(length) ? length / short_run : 1, finest);
@@ -75,7 +81,7 @@ RunOptions quickest_in_lanes(const RunSetup& setup) {
   if (options.method != Method::gauss || options.step != 0) return options;
   if (detail::goes_by_series(setup)) {
     options.method = Method::taylor;
-    options.tolerance = detail::tolerance_of_steps(setup, 1e-16);
+    options.tolerance = detail::tolerance_of_steps(setup, smallest_tolerance);
     return lane_kind(setup, options) ? options : setup.options;
   }
   if (options.tolerance < 1e-9 || !setup.events.empty()) return options;
@@ -90,7 +96,7 @@ RunOptions quickest_with_tangents(const RunSetup& setup) {
   RunOptions options = setup.options;
   if (options.method != Method::gauss || options.step != 0) return options;
   options.method = Method::fehlberg78;
-  options.tolerance = detail::tolerance_of_steps(setup, 1e-13);
+  options.tolerance = detail::tolerance_of_steps(setup, detail::finest_with_tangents);
   const bool is_tried = tangent_lane_kind(setup, options) && detail::has_to_be_tried(*setup.subject);
   return is_tried || tangent_lane_kind(setup, setup.options) ? options : setup.options;
 }
@@ -113,8 +119,8 @@ struct Tried {
   std::optional<Track> track;  // of a run that gets a second look
 };
 
-// Runs without a report, if their lanes are others than before. Those that are followed by a track go in lanes of their
-// own: looking at every step takes time.
+// Tries the runs without a report in lanes, if these differ from those of the last try. Runs with a track go in lanes
+// of their own, since to look at every step takes time.
 void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(const RunSetup&),
                   const std::function<bool()>& stop, std::vector<Tried>& tried) {
   RunsByKind followed, others;
@@ -138,7 +144,7 @@ void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(con
   }
 }
 
-// Runs that lanes have moved to their ends.
+// Takes second looks at the runs that lanes have moved to their ends.
 void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<bool()>& stop,
                          std::vector<Tried>& tried) {
   std::vector<Doubted> doubted;
@@ -197,7 +203,8 @@ std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(std::span<const 
   };
   const auto finer = [&](const RunSetup& setup) {
     RunOptions options = quickest(setup);
-    if (options.method != setup.options.method) options.tolerance = std::max(1e-13, 0.01 * options.tolerance);
+    if (options.method != setup.options.method)
+      options.tolerance = std::max(detail::finest_with_tangents, 0.01 * options.tolerance);
     return options;
   };
   const std::function<RunOptions(const RunSetup&)> attempts[] = {quickest, finer, detail::options_asked_for};

@@ -11,14 +11,14 @@
 
 namespace pendula {
 
-/// The options of a run, or of an explicit method that comes to the same error sooner in lanes. A Gauss run by
-/// tolerance goes by Taylor series if it is a short chain; else by Fehlberg's pair, if the tolerance is not extreme,
-/// there are no events, and the run is so short that the energy which an explicit method loses stays below the error of
-/// the motion.
+/// The options of a run, or those of an explicit method that comes to the same error in less time in lanes. A Gauss run
+/// with a tolerance goes by Taylor series if few links, or a small kernel, make these cheap. Otherwise it goes by
+/// Fehlberg's pair if the tolerance is not extreme, there are no events, and the run is so short that the energy which
+/// an explicit method loses stays below the error of the motion.
 RunOptions quickest_in_lanes(const RunSetup& setup);
 
-/// The same for the leading exponent of a run of any length: the longer it is, the smaller the tolerance, so that no
-/// more energy is lost in all. Only of chains the length is known in swings.
+/// The same for the leading exponent of a run of any length. The longer the run, the smaller the tolerance, so that it
+/// loses no more energy in all. The length in swings is known of chains only.
 RunOptions quickest_with_tangents(const RunSetup& setup);
 
 /// The options by which a run goes in lanes: by quickest_in_lanes if its method is to be chosen.

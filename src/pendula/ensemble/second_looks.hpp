@@ -39,8 +39,8 @@ struct Doubted {
   Doubt doubt = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// Lanes are compiled for four and eight stages. By a tolerance it is the other of the two; of constant steps, whose
-/// sizes differ, the same.
+/// Lanes are compiled for four and eight stages. With a tolerance, the other run has the other of these numbers. With
+/// constant steps it has the same number: the step sizes differ.
 inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
   if (options.method == Method::gauss) options.stages = is_adaptive(run) ? 12 - run.stages : run.stages;
   return options;
@@ -100,7 +100,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
     const RunOptions& run = member->report.options;
     std::optional<SecondLook> look = choose(*member);
     if (!look) continue;
-    const double share = is_adaptive(run) ? 0.01 * run.tolerance : 0;
+    const double share = is_adaptive(run) ? start_share * run.tolerance : 0;
     RunSetup setup = member->setup;
     setup.options = in_lanes(look->options, run);
     setup.start.q *= 1 + std::max(share, std::numeric_limits<double>::epsilon());

@@ -13,27 +13,27 @@ namespace pendula {
 template <class L, std::size_t D>
 class StepSight {
  public:
-  using Parts = std::vector<MovingPart<L, D>>;  ///< of all links
+  using Parts = std::vector<MovingPart<L, D>>;  ///< one for each rod or coordinate
 
   StepSight() = default;
   StepSight(const StepSight&) = delete;
   StepSight& operator=(const StepSight&) = delete;
   virtual ~StepSight() = default;
 
-  virtual int links() const = 0;
+  virtual int count() const = 0;
   /// Where the members are: at the end of the step.
   virtual void now(Parts& parts) = 0;
   /// Where they were when a share of the step was done, 0 to 1, by the polynomial through the step.
-  virtual void glance(double share, Parts& parts) = 0;
+  virtual void at(double share, Parts& parts) = 0;
   /// The same of one member, at the full order of the method, in a step from `begin` of the length `h`; false where it
   /// is not found.
-  virtual bool look(int lane, const L& begin, const L& h, double share, Parts& parts) = 0;
+  virtual bool at_full_order(int lane, const L& begin, const L& h, double share, Parts& parts) = 0;
   /// Places on the way through the step, between which links turn little; rates may be left as they are.
   virtual int waypoints() const = 0;
   virtual void waypoint(int k, Parts& parts) = 0;
 };
 
-/// Of the steps of a MembersStepper, ExplicitSteps or TaylorSteps.
+/// The StepSight of a MembersStepper, ExplicitSteps or TaylorSteps.
 template <class Stepper>
 class SightOf : public StepSight<typename Stepper::L, Stepper::SpaceType::dimension> {
   using L = typename Stepper::L;
@@ -44,15 +44,15 @@ class SightOf : public StepSight<typename Stepper::L, Stepper::SpaceType::dimens
 
   explicit SightOf(Stepper& stepper) : stepper_(stepper) {}
 
-  int links() const override { return stepper_.chain().links(); }
+  int count() const override { return stepper_.chain().count(); }
 
   void now(Parts& parts) override { read(stepper_.chain(), parts); }
 
-  void glance(double share, Parts& parts) override { stepper_.chain().for_each_glance(share, into(parts)); }
+  void at(double share, Parts& parts) override { stepper_.chain().for_each_at(share, into(parts)); }
 
-  bool look(int lane, const L& begin, const L& h, double share, Parts& parts) override {
+  bool at_full_order(int lane, const L& begin, const L& h, double share, Parts& parts) override {
     if constexpr (!Stepper::is_implicit) {
-      stepper_.chain().for_each_look(share, into(parts));
+      stepper_.chain().for_each_at_full_order(share, into(parts));
       return true;
     } else if constexpr (Stepper::has_tangent) {
       return false;  // not asked for: exponents have no events
@@ -67,21 +67,21 @@ class SightOf : public StepSight<typename Stepper::L, Stepper::SpaceType::dimens
   void waypoint(int k, Parts& parts) override {
     auto& chain = stepper_.chain();
     if constexpr (requires { chain.along(0, k); }) {
-      for (int i = 0; i < chain.links(); ++i) parts[at(i)].place = chain.along(i, k);
+      for (int i = 0; i < chain.count(); ++i) parts[index(i)].place = chain.along(i, k);
     } else {
-      glance((k + 1) / (waypoints() + 1.0), parts);
+      at((k + 1) / (waypoints() + 1.0), parts);
     }
   }
 
  private:
-  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
   static auto into(Parts& parts) {
-    return [&parts](int i, const auto& place, const auto& rate) { parts[at(i)] = {place, rate}; };
+    return [&parts](int i, const auto& place, const auto& rate) { parts[index(i)] = {place, rate}; };
   }
   template <class Chain>
   static void read(Chain& chain, Parts& parts) {
-    chain.for_each_rate([&](int i, const auto& rate, const auto&) { parts[at(i)] = {chain.along(i), rate}; });
+    chain.for_each_rate([&](int i, const auto& rate, const auto&) { parts[index(i)] = {chain.along(i), rate}; });
   }
 
   // Takes a step of one member from where its last one began.

@@ -22,7 +22,7 @@ class SystemSeats {
 
   void show(std::optional<View>& view) { view.emplace(sight_, turns_); }
 
-  int coordinates() const { return stepper_.chain().links(); }
+  int coordinates() const { return stepper_.chain().count(); }
   void require(const MemberType& /*member*/, std::size_t /*number*/) const {}
 
   void take(int lane, const MemberType& next) { stepper_.start(lane, next.start, next.model, next.q, next.v); }

@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <pendula/chain/heading.hpp>
 #include <pendula/ensemble/step_sight.hpp>
+#include <pendula/numeric/full_turns.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <vector>
 
@@ -25,7 +25,7 @@ class TurnCounter {
 
   explicit TurnCounter(int links) : links_(links), turns_(at(links)), rods_(at(links)) {}
 
-  /// A member comes into a lane, at angles q; along(i): the rods.
+  /// A member comes into a lane with the angles q; along(i) is its rod i.
   template <class Along>
   void start(int lane, const double* q, Along along) {
     for (int i = 0; i < links_; ++i) {
@@ -57,7 +57,7 @@ class TurnCounter {
     for (int i = 0; i < links_; ++i) end_step(at(i), chain.along(i), sight);
   }
 
-  /// Angles of a member's link that its own are near.
+  /// Angles of the anchor of a member's link. The angles of the link are near these.
   auto angles(int lane, int i) const { return turns_[at(i)].anchors[at(lane)].angles(); }
 
  private:
@@ -83,7 +83,7 @@ class TurnCounter {
       const Mask close = (along > L(0.0)) & (across * across < 3 * (along * along));
       known = select(close, known, L(0.0));
       const L slope = across / along;
-      turned = turned + select(close, slope / fma(L(0.28), slope * slope, L(1.0)), L(0.0));
+      turned = turned + select(close, slope / fma(L(detail::arctangent_bend), slope * slope, L(1.0)), L(0.0));
       x = rod[0];
       y = rod[1];
     }
@@ -122,7 +122,7 @@ class TurnCounter {
         anchor.turn_to(u, turn.turned[lane]);
       } else {  // by a pole: along the polynomial of the member's step
         const auto direction_at = [&](double share) {
-          sight.glance(share, rods_);
+          sight.at(share, rods_);
           return direction_of(rods_[i].place, lane);
         };
         anchor.follow_path(direction_at, 1.0);
@@ -152,7 +152,7 @@ class TurnCounter<Planar, L> {
     for (int i = 0; i < links_; ++i) {
       Turn& turn = turns_[at(i)];
       for (std::size_t k = 0; k < 2; ++k) turn.at[k].set(lane, along(i)[k][lane]);
-      turn.count.set(lane, std::round((q[i] - angle(lane, turn)) / full_turn));
+      turn.count.set(lane, std::round((q[i] - angle(lane, turn)) / detail::full_turn));
     }
   }
 
@@ -168,16 +168,16 @@ class TurnCounter<Planar, L> {
   }
 
   std::array<double, 1> angles(int lane, int i) const {
-    return {angle(lane, turns_[at(i)]) + full_turn * turns_[at(i)].count[lane]};
+    return {angle(lane, turns_[at(i)]) + detail::full_turn * turns_[at(i)].count[lane]};
   }
 
   /// θ of a link, of all members.
-  L angles(int i) const { return fma(L(full_turn), turns_[at(i)].count, angle(turns_[at(i)].at)); }
+  L angles(int i) const { return fma(L(detail::full_turn), turns_[at(i)].count, angle(turns_[at(i)].at)); }
 
   /// The angle of a rod that lies nearest to another.
   static L near(const std::array<L, 2>& rod, const L& other) {
     const L x = angle(rod);
-    return fma(L(full_turn), floor(fma(other - x, L(1 / full_turn), L(0.5))), x);
+    return fma(L(detail::full_turn), floor(fma(other - x, L(1 / detail::full_turn), L(0.5))), x);
   }
 
  private:
@@ -203,8 +203,6 @@ class TurnCounter<Planar, L> {
       for (std::size_t k = 0; k < 2; ++k) turn.at[k] = select(which, rod[k], turn.at[k]);
     }
   }
-
-  static constexpr double full_turn = 2 * std::numbers::pi;
 
   static L angle(const std::array<L, 2>& rod) { return atan2(rod[0], -rod[1]); }
   static double angle(int lane, const Turn& turn) {

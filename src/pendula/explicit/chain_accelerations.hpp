@@ -110,7 +110,7 @@ class ChainAccelerations {
       }
     }
     set(swing_squared_, lane, std::abs(gravity) / length);
-    set(slowest_pace_, lane, 0.15 * links() * links() * std::abs(gravity) / length);
+    set(slowest_pace_, lane, slowest_pace_squared<double>(links(), gravity, length));
     if constexpr (has_tangent) start_tangent(lane, rods);
   }
 

@@ -36,7 +36,7 @@ class ErrorController {
   /// Which of the tried steps `h` are accepted. Rejected members get a shorter step.
   template <class Stepper>
   Mask accepts(const Mask& which, const L& h, Stepper& stepper) {
-    const L log_error = 0.5 * log(max(stepper.error_squared(), L(tiny)));
+    const L log_error = 0.5 * log(max(stepper.error_squared(), L(detail::almost_zero)));
     const Mask good = which & (log_error <= L(log_tolerance_));
     const L factor = exp(min((L(log_tolerance_) - log_error) * L(exponent), L(2.0)));
     grown_ = h * min(L(most_growth), max(L(least), L(cautious) * factor));
@@ -60,7 +60,7 @@ class ErrorController {
 
  private:
   static constexpr double exponent = 1.0 / (Order + 1);
-  static constexpr double cautious = 0.9, least = 0.2, most_growth = 5, tiny = 1e-300;
+  static constexpr double cautious = 0.9, least = 0.2, most_growth = 5;
 
   double tolerance_, log_tolerance_, first_;
   L next_{1.0}, grown_{1.0}, longest_{1.0};

@@ -23,16 +23,17 @@ class ErrorSize {
       v = std::max({v, std::abs(x[k]), std::abs(x[k] + moved[k])});
       a = std::max(a, std::abs(rate[k]));
     }
-    const double rounding = rounded * q / (tolerance * h);  // of rates at rest
+    const double rounded = rounding * q / (tolerance * h);
     place_ = std::clamp(std::max(q, h * v), nothing, 1.0);
-    turn_ = std::clamp(std::max({v, h * a, rounding}), nothing, 1.0);
+    turn_ = std::clamp(std::max({v, h * a, rounded}), nothing, 1.0);
   }
 
   double operator[](std::size_t i) const { return (i < half_ ? place_ : turn_) + std::abs(x_[i]); }
 
- private:
-  static constexpr double rounded = 1e-14, nothing = 1e-16;
+  /// What rates at rest are rounded by, relative to coordinates over the step; and the size of a motion that has none.
+  static constexpr double rounding = 1e-14, nothing = 1e-16;
 
+ private:
   const std::vector<double>& x_;
   std::size_t half_;
   double place_, turn_;

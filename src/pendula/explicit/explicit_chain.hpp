@@ -48,7 +48,7 @@ class ExplicitChain {
   template <class Steps>
   void read_within(const Steps& steps, double share, double* q, double* v) const {
     for (int i = 0; i < chain_.links(); ++i) {
-      const auto there = steps.glance(i, share);
+      const auto there = steps.at(i, share);
       angles_.read_within(i, share, places(steps), there.place, there.rate, q, v);
     }
   }
@@ -79,7 +79,7 @@ class ExplicitChain {
   // The rod vectors within the last step.
   template <class Steps>
   static auto places(const Steps& steps) {
-    return [&steps](int i, double share) { return share == 1 ? steps.parts()[i].place : steps.glance(i, share).place; };
+    return [&steps](int i, double share) { return share == 1 ? steps.parts()[i].place : steps.at(i, share).place; };
   }
 
   Chain<Space> chain_;

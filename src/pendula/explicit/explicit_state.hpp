@@ -23,7 +23,8 @@ class ExplicitState {
   static constexpr std::size_t D = Dynamics::D;
   using Vector = std::array<L, D>;
 
-  int links() const { return dynamics_.parts(); }
+  /// How many parts move: links of a chain, coordinates of a system.
+  int count() const { return dynamics_.parts(); }
   const auto& parts() const { return parts_; }
 
   auto heading(int lane, int i) const { return dynamics_.heading(lane, i, parts_); }
@@ -36,13 +37,13 @@ class ExplicitState {
   /// Calls visit(i, ξ̇_i, …) for all rods.
   template <class Visit>
   void for_each_rate(Visit visit) const {
-    for (int i = 0; i < links(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
+    for (int i = 0; i < count(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
   }
 
   /// Visits the numbers of the member in a lane, as MemberNumbers does.
   template <class Numbers>
   void member(int lane, Numbers& numbers) requires(!has_tangent) {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       for (auto* vector : {&parts_[i].place, &parts_[i].rate}) {
         for (L& x : *vector) {
           double number = get(x, lane);
@@ -67,9 +68,9 @@ class ExplicitState {
 
   explicit ExplicitState(typename Dynamics::Subject subject)
       : dynamics_(subject), parts_(dynamics_.parts()), low_(parts_) {
-    for (int i = 0; i < links(); ++i) parts_[i] = Dynamics::resting();
+    for (int i = 0; i < count(); ++i) parts_[i] = Dynamics::resting();
     if constexpr (is_twofold) {
-      for (int i = 0; i < links(); ++i) low_[i] = Part::zero();
+      for (int i = 0; i < count(); ++i) low_[i] = Part::zero();
     }
   }
 

@@ -40,7 +40,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   using typename State::Vector;
   static constexpr std::size_t D = State::D;
   static constexpr bool has_tangent = State::has_tangent, is_twofold = State::is_twofold;
-  using State::links;
+  using State::count;
   using Controller = ErrorController<L, Method::error_order>;
 
   struct Options {};
@@ -62,18 +62,18 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   const ExplicitSteps& chain() const { return *this; }
 
   /// The state of the members, with everything that their next steps depend on.
-  struct Place {
-    Place(Parts where, LowParts rest) : parts(std::move(where)), slopes(parts), low(std::move(rest)) {}
+  struct FullState {
+    FullState(Parts where, LowParts rest) : parts(std::move(where)), slopes(parts), low(std::move(rest)) {}
 
     Parts parts, slopes;
     [[no_unique_address]] LowParts low;
   };
-  Place place() const {
-    Place here(parts_, low_);
+  FullState place() const {
+    FullState here(parts_, low_);
     here.slopes = slopes_;
     return here;
   }
-  void go_to(const Place& place) {
+  void go_to(const FullState& place) {
     parts_ = place.parts;
     slopes_ = place.slopes;
     low_ = place.low;
@@ -90,20 +90,20 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   template <class Numbers>
   void member(Numbers& numbers) requires is_twofold {
     numbers(fresh_);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       for (Parts* parts : {&parts_, &low_, &slopes_}) numbers((*parts)[i].place, (*parts)[i].rate);
     }
   }
 
   /// Dense output: a part and its rate at the fraction `share` of the last accepted step, by the quintic Hermite
   /// polynomial through both ends with rates and accelerations.
-  MovingPart<L, D> glance(int i, double share) const { return Quintic(share).at(*this, i); }
+  MovingPart<L, D> at(int i, double share) const { return Quintic(share).at(*this, i); }
 
   /// Calls visit(i, ξ, ξ̇) for all parts, by dense output.
   template <class Visit>
-  void for_each_glance(double share, Visit visit) const {
+  void for_each_at(double share, Visit visit) const {
     const Quintic path(share);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const MovingPart<L, D> there = path.at(*this, i);
       visit(i, there.place, there.rate);
     }
@@ -111,10 +111,10 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
 
   /// Calls visit(i, ξ, ξ̇) for all parts, after a step that ends there.
   template <class Visit>
-  void for_each_look(double share, Visit visit) {
+  void for_each_at_full_order(double share, Visit visit) {
     go_back();
     solve(begin_, L(share) * step_, step_ > L(0.0));
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       visit(i, detail::values_of(trial_.parts[i].place), detail::values_of(trial_.parts[i].rate));
     }
     go_back();
@@ -158,7 +158,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
 
   /// The first part of the tried step that is not finite; −1: none.
   int part_not_finite() const requires is_twofold {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       for (std::size_t k = 0; k < D; ++k) {
         if (!std::isfinite(trial_.parts[i].place[k]) || !std::isfinite(trial_.parts[i].rate[k])) return i;
       }
@@ -185,17 +185,17 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   }
 
   /// Declares the way from `begin` to the current state a single step.
-  void set_step(const Place& begin, double time, double h) requires is_twofold {
+  void set_step(const FullState& begin, double time, double h) requires is_twofold {
     before_ = begin;
     begin_ = time;
     step_ = h;
   }
-  const Place& begin() const { return before_; }
+  const FullState& begin() const { return before_; }
 
   /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires(Dynamics::has_tangent) {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       State::scale_tangent(factor, parts_[i]);
       State::scale_tangent(factor, slopes_[i]);
     }
@@ -250,7 +250,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     L rise_rate_, turn_on_rate_, turn_off_rate_, bend_on_rate_, bend_off_rate_;
   };
 
-  void change_place(Place& with) {
+  void change_place(FullState& with) {
     std::swap(parts_, with.parts);
     std::swap(slopes_, with.slopes);
     std::swap(low_, with.low);
@@ -319,7 +319,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   // Computes the end of the step.
   [[gnu::always_inline]] void arrive(const L& h) {
     if constexpr (is_twofold) {
-      for (int i = 0; i < links(); ++i) {
+      for (int i = 0; i < count(); ++i) {
         const Part moved = weighed<Method::stages>(Method::b, i), &from = parts_[i], &rest = low_[i];
         for (std::size_t k = 0; k < D; ++k) {
           const Twofold<L> place = exact_sum(from.place[k], fma(h, moved.place[k], rest.place[k]));
@@ -358,7 +358,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   L tried_{0.0}, step_{1.0};        // tried steps, last accepted steps
   L tried_from_{0.0}, begin_{0.0};  // times at which these began
   Parts slopes_;                    // at the current state
-  Place trial_, before_;            // end of the tried step, start of the last one
+  FullState trial_, before_;        // end of the tried step, start of the last one
   Parts stages_;
   std::vector<Parts> inner_slopes_;  // of all stages but the first
   Parts errors_;                     // error of the step divided by its size

@@ -9,6 +9,7 @@
 #include <pendula/explicit/forced_steps.hpp>
 #include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
+#include <pendula/system/forcing_look.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
@@ -76,12 +77,12 @@ class ExplicitSystem {
 
   template <class Steps>
   void read(const Steps& steps, double* q, double* v) const {
-    for (int i = 0; i < steps.links(); ++i) read_near(i, steps.exact_place(i), steps.exact_rate(i), q, v);
+    for (int i = 0; i < steps.count(); ++i) read_near(i, steps.exact_place(i), steps.exact_rate(i), q, v);
   }
   template <class Steps>
   void read_within(const Steps& steps, double share, double* q, double* v) const {
-    for (int i = 0; i < steps.links(); ++i) {
-      const auto there = steps.glance(i, share);
+    for (int i = 0; i < steps.count(); ++i) {
+      const auto there = steps.at(i, share);
       read_near(i, there.place, there.rate, q, v);
     }
   }
@@ -115,7 +116,8 @@ class ExplicitSystem {
       });
     }
     for (std::size_t k = 0; k < count(); ++k) fastest_[k] = std::max(fastest_[k], std::abs(end_[count() + k]));
-    const double least = std::max(beside * *std::max_element(fastest_.begin(), fastest_.end()), nothing);
+    const double least =
+        std::max(FieldSteps::beside * *std::max_element(fastest_.begin(), fastest_.end()), ForcingLook::negligible);
     return field_.unseen(*forward_, time, h, x_, end_, [&](const std::vector<double>&) {
       return [this, least](std::size_t k) { return std::max(fastest_[k], least); };
     });
@@ -130,8 +132,6 @@ class ExplicitSystem {
   }
 
  private:
-  static constexpr double nothing = 1e-280, beside = 1e-3;
-
   std::size_t count() const { return model_.coordinates(); }
 
   template <class Parts>

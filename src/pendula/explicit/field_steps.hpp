@@ -36,6 +36,9 @@ class FieldSteps {
         rates_(coordinates),
         arguments_(dynamics.arguments().size()) {}
 
+  /// What the speed of a coordinate at rest counts for, relative to the fastest.
+  static constexpr double beside = 1e-3;
+
   bool has_to_look() const { return look_.has_to_look(); }
 
   /// The next step begins at an unknown state; or where the last step examined ended.
@@ -174,8 +177,6 @@ class FieldSteps {
   static constexpr std::size_t width = 8;
   static constexpr int few_samples = width;
   using Lanes = Pack<8, RegisterFor<8>>;
-
-  static constexpr double beside = 1e-3;  // of the fastest, for a coordinate at rest
 
   FieldLook look_;
   bool is_blind_, begin_is_known_ = false, end_is_known_ = false;

@@ -6,6 +6,7 @@
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_integrator.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <pendula/system/stop_sign.hpp>
 #include <utility>
 #include <vector>
@@ -64,7 +65,7 @@ class SingleIntegrator final : public PlainIntegrator {
   /// Nothing to do: the start of the last step is always kept.
   void remember_steps(bool /*wanted*/) override {}
 
-  void glance(double time, double* q, double* v) override {
+  void at(double time, double* q, double* v) override {
     if (step_ == 0 || time == this->time()) return read_state(q, v);
     subject_.read_within(steps_, (time - begin_) / step_, q, v);
   }
@@ -72,7 +73,7 @@ class SingleIntegrator final : public PlainIntegrator {
   bool bound_excursions(double* q, double* v) const override {
     if constexpr (requires { steps_.excursion(0); }) {
       if (step_ == 0 || parts_of_last_ != 1) return false;
-      for (int i = 0; i < steps_.links(); ++i) {
+      for (int i = 0; i < steps_.count(); ++i) {
         const auto farthest = steps_.excursion(i);
         q[i] = farthest.place[0];
         v[i] = farthest.rate[0];
@@ -83,14 +84,14 @@ class SingleIntegrator final : public PlainIntegrator {
     }
   }
 
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     work = statistics_.load_work;
     if (step_ == 0 || time == this->time()) {
       read_state(q, v);
     } else if (parts_of_last_ == 1) {
       const double share = (time - begin_) / step_;
       subject_.read_within(steps_, share, q, v);
-      steps_.for_each_look(
+      steps_.for_each_at_full_order(
           share, [&](int i, const auto& place, const auto& rate) { subject_.read_near(i, place, rate, q, v); });
     } else {
       look_in_parts(time, q, v);
@@ -99,10 +100,7 @@ class SingleIntegrator final : public PlainIntegrator {
     return {.status = Status::ok, .time = time, .step = time - begin_};
   }
 
-  void heed(StopSign stop) override {
-    constexpr int quick = 1000;  // parts: a step of fewer is faster than asking
-    stop_ = steps_.links() > quick ? stop : StopSign{};
-  }
+  void set_stop_sign(StopSign stop) override { stop_ = steps_.count() > quick_parts ? stop : StopSign{}; }
 
   const Statistics& statistics() const override { return statistics_; }
   Description describe() const override { return {"", "", subject_.kernel()}; }
@@ -133,7 +131,6 @@ class SingleIntegrator final : public PlainIntegrator {
 
  private:
   static constexpr bool has_tangents = requires(Steps steps) { steps.tangent(); };
-  static constexpr int most_attempts = 100;
   static constexpr int most_parts = 1024;
 
   Outcome ok(double h) const { return {.status = Status::ok, .time = time(), .step = h}; }
@@ -198,7 +195,7 @@ class SingleIntegrator final : public PlainIntegrator {
     end_ = steps_.place();
     steps_.go_to(steps_.begin());
     goes_in(parts_of_last_, begin_, time - begin_);
-    for (int i = 0; i < steps_.links(); ++i) {
+    for (int i = 0; i < steps_.count(); ++i) {
       subject_.read_near(i, steps_.exact_place(i), steps_.exact_rate(i), q, v);
     }
     steps_.go_to(end_);
@@ -247,7 +244,7 @@ class SingleIntegrator final : public PlainIntegrator {
   }
 
   /// Tries steps from `longest` on, shorter each time.
-  Trial find_step(double longest, int tries = most_attempts) {
+  Trial find_step(double longest, int tries = detail::most_attempts) {
     Trial trial;
     double size = longest;
     for (int attempt = 0; attempt < tries && size > smallest_step() && !is_stopped(); ++attempt) {
@@ -279,7 +276,7 @@ class SingleIntegrator final : public PlainIntegrator {
   Subject subject_;
   Steps steps_;
   typename Steps::Controller controller_;
-  typename Steps::Place kept_, end_;  // for steps taken in parts
+  typename Steps::FullState kept_, end_;  // for steps taken in parts
   double tolerance_;
   Statistics statistics_;
   Compensated<double> time_{};

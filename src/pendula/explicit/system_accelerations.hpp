@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/explicit/error_size.hpp>
 #include <pendula/kernels/gauss_tableaux.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/lanes.hpp>
@@ -222,8 +223,9 @@ class SystemAccelerations {
       v = std::max(v, larger(before[i].rate, after[i].rate));
       a = std::max(a, std::abs(slopes[i].rate[0]));
     });
-    const double place = std::clamp(std::max(q, h * v), 1e-16, 1.0), rate = std::clamp(std::max(v, h * a), 1e-16, 1.0);
-    const double rounding = 1e-14 * q / h;  // of rates at rest
+    const double place = std::clamp(std::max(q, h * v), ErrorSize::nothing, 1.0),
+                 rate = std::clamp(std::max(v, h * a), ErrorSize::nothing, 1.0);
+    const double rounding = ErrorSize::rounding * q / h;  // of rates at rest
     double largest = 0;
     for_parts([&](int i) {
       const double speed = std::abs(before[i].rate[0]), push = std::abs(slopes[i].rate[0]);
@@ -235,7 +237,7 @@ class SystemAccelerations {
   }
 
   // If both are zero the result is zero: the part rests.
-  static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(1e-300)); }
+  static L relative(const L& error, const L& squared) { return (error * error) / max(squared, L(detail::almost_zero)); }
 
   static const L& value(const Number& number) { return detail::value_of(number); }
 

@@ -50,7 +50,7 @@ class FixedPointStop {
     last_.fill(Num(0.0));
   }
 
-  /// Takes the corrections just made; what has arrived, and what never will.
+  /// Takes the corrections just made. Verdict: which iterations have arrived, and which never will.
   struct Verdict {
     Mask done, lost;
   };

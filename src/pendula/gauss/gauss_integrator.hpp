@@ -55,15 +55,15 @@ class GaussIntegrator : public PlainIntegrator {
   double time() const override { return stepper_.time(); }
   void read_state(double* q, double* v) const override { write(stepper_.state(), q, v); }
   void remember_steps(bool wanted) override { stepper_.remember_steps(wanted); }
-  void glance(double time, double* q, double* v) override { write(stepper_.glance(time), q, v); }
+  void at(double time, double* q, double* v) override { write(stepper_.at(time), q, v); }
   bool bound_excursions(double* q, double* v) const override { return stepper_.bound_excursions(q, v); }
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     State state;
-    const Outcome outcome = stepper_.look(time, state, work);
+    const Outcome outcome = stepper_.at_full_order(time, state, work);
     if (outcome) write(state, q, v);
     return named(outcome);
   }
-  void heed(StopSign stop) override { stepper_.heed(stop); }
+  void set_stop_sign(StopSign stop) override { stepper_.set_stop_sign(stop); }
   const Statistics& statistics() const override { return stepper_.statistics(); }
   void member(MemberNumbers& numbers) override { numbers(stepper_); }
   int linearize() override {

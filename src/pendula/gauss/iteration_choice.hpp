@@ -40,7 +40,7 @@ class IterationChoice {
     if (is_automatic() && is_time_for_trial() && may_win(other(preferred_))) active_ = other(preferred_);
   }
 
-  /// A look back into a step: not the time for a trial, and no matter how the step was solved.
+  /// Begins a step for a state within the last one: no trial is made, and how it is solved does not count.
   void begin_look() {
     active_ = preferred_;
     iterations_ = {};
@@ -90,11 +90,12 @@ class IterationChoice {
     return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
   }
 
-  // A trial is for nothing where two iterations cost more than steps do: a step that needs but one of Newton's takes
-  // hardly more of the other.
+  // A trial cannot pay where two iterations of the rival already cost more than a step does now. Fewer than two are not
+  // expected: a step that takes one Newton iteration hardly takes more of the fixed point.
   bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
 
-  // A fixed point that has given up is tried again soon, and then ever more seldom: it may have been one long step.
+  // A fixed point that has given up is tried again soon, since it may have been one long step, and then ever more
+  // seldom.
   bool is_time_for_trial() {
     const bool is_turn = ++steps_ % trial_interval == trial_step;
     return wait_ > 0 ? --wait_ == 0 : is_turn;

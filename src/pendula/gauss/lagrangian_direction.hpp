@@ -38,8 +38,9 @@ class LagrangianDirection {
     has_rates_ = false;
   }
 
-  /// Replaces tangents at the start of the step, (2 coordinates x directions) row by row, no more of them than there
-  /// are coordinates, by those at its end. False, and they are as they were, where one does not come to round-off.
+  /// Replaces tangents at the start of the step, (2 coordinates x directions) row by row, by those at its end. There
+  /// are no more of them than coordinates. Returns false, and leaves them as they were, if one does not converge to
+  /// round-off.
   bool push(const Jacobians& jacobians, const typename Stages::Columns& columns, double* tangents, int directions) {
     find_rates(jacobians);
     const auto width = static_cast<std::size_t>(directions);
@@ -54,7 +55,8 @@ class LagrangianDirection {
   using L = typename Stages::L;
 
   static constexpr int most_iterations = 50;
-  // Corrections, relative, of which the next is below rounding; and those that have stopped shrinking by rounding.
+  // Relative sizes of corrections: below `negligible` the next one is less than rounding; below `rounding` they may
+  // stop shrinking.
   static constexpr double negligible = 4e-16, rounding = 1e-14;
 
   double* v_D_q(std::size_t i, std::size_t j) { return rates_[i * count_ + j]; }
@@ -90,7 +92,7 @@ class LagrangianDirection {
     }
   }
 
-  // One column of tangents, and of where they are pushed to.
+  // Propagates one column of tangents.
   PENDULA_IN_REGISTERS bool push_one(const Jacobians& jacobians, const typename Stages::Columns& columns,
                                      const double* tangent, double* pushed, std::size_t width) {
     std::fill_n(increments_[0], 2 * count_ * static_cast<std::size_t>(Width), 0.0);
@@ -145,7 +147,7 @@ class LagrangianDirection {
     return largest(change) / largest(size);
   }
 
-  // NaN where any number is none.
+  // NaN if one of the numbers is NaN.
   static double largest(const L& lanes) {
     alignas(pack_alignment) typename Stages::Stored numbers;
     lanes.store(numbers);

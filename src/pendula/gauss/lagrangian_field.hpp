@@ -56,8 +56,8 @@ class LagrangianField {
   static constexpr auto width = static_cast<std::size_t>(Width);
   static constexpr int few_stages = 4;  // fewer tell little of their error where a small event is short
 
-  // Finds so many numbers at all shares of the step: by() does at `there_` and leaves them in found_. Lanes beyond the
-  // shares repeat the last.
+  // Finds so many numbers at all shares of the step: by() computes them at `there_`, and writes them to found_. Lanes
+  // beyond the last share repeat it.
   template <class By>
   void in_lanes(const Stages& stages, std::span<const double> shares, double* found, std::size_t numbers, By&& by) {
     for (std::size_t first = 0; first < shares.size(); first += width) {

@@ -30,13 +30,13 @@ class LagrangianJacobians {
     }
   }
 
-  /// p and f there.
+  /// Evaluates p and f at the stages.
   void evaluate_forms(const Stages& stages) {
     place(stages);
     stages.at_stages()(&SystemFunctions::momentum_form, q(), v(), vector(2), vector(3));
   }
 
-  /// All of it.
+  /// Evaluates p, f and their derivatives at the stages.
   void evaluate(const Stages& stages) {
     place(stages);
     stages.at_stages()(&SystemFunctions::momentum_form_with_jacobians, q(), v(), vector(2), vector(3), matrix(0),

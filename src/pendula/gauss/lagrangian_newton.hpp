@@ -22,7 +22,8 @@ class LagrangianNewton {
 
   LagrangianNewton(std::size_t coordinates, int stages) : system_(coordinates, stages), jacobians_(coordinates) {}
 
-  /// Improves the increments of the coordinates once. Those of the momenta become what follows from the rates before.
+  /// Improves the increments of the coordinates once. Those of the momenta are computed from the rates before the
+  /// correction.
   Correction correct(Stages& stages) {
     const typename Stages::Columns& columns = stages.columns();
     jacobians_.evaluate(stages);

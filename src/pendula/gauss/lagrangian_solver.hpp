@@ -12,6 +12,7 @@
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/system/options.hpp>
 #include <stdexcept>
 #include <string>
@@ -86,9 +87,9 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
   }
   SolverTraits traits() const {
     const SystemModel& model = stages_.model();
-    // Where inertia may vanish, a coordinate may move faster than everything else.
-    return {coordinates(),  coordinates(),  stages_.stages(),        model.info().constant_masses ? 3 : 0.25,
-            model.loaded(), model.damped(), family_ == Family::radau};
+    return {
+        coordinates(),  coordinates(),  stages_.stages(),        detail::largest_turn_of(model.info().constant_masses),
+        model.loaded(), model.damped(), family_ == Family::radau};
   }
   double energy_defect() {
     find_forces();

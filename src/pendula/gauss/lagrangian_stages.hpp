@@ -89,14 +89,14 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     }
   }
   using Base::keep;
-  using typename Base::Place;
-  void go_to(const Place& there) {
+  using typename Base::FullState;
+  void go_to(const FullState& there) {
     Base::go_to(there, true);
     see_masses();  // here, not where a step failed
   }
 
   /// The state at x of the last step, which began there, by the polynomials through its rates.
-  Motion glance(const Place& begin, double time, double x) const {
+  Motion at(const FullState& begin, double time, double x) const {
     const auto up_to = columns_.up_to(x), rate_at = columns_.rate_at(x, prediction_.last_h());
     Motion motion(time, Eigen::VectorXd(eigen_count()), Eigen::VectorXd(eigen_count()));
     for (std::size_t k = 0; k < count_; ++k) {
@@ -114,7 +114,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
 
   /// Bounds of how far coordinates and rates get within the last step from where they began.
-  bool bound_excursions(const Place& /*begin*/, double* q, double* v) const {
+  bool bound_excursions(const FullState& /*begin*/, double* q, double* v) const {
     for (std::size_t k = 0; k < count_; ++k) {
       const auto [moved_by, changed_by] = columns_.excursion(moved(k));
       q[k] = moved_by;

@@ -20,9 +20,9 @@ namespace pendula {
 /// Coordinates of the tangent space are (δq, δp), canonical. Parameters are those of the kernel, then its inputs, which
 /// are varied by what is constant through the step; both in the order of their names.
 ///
-/// With C what the end of the step changes by with V, and A Newton's matrix, E = −C A⁻¹ is what it changes by with the
-/// residuals of the stages: everything else follows by products. A few tangents take less by themselves, each by a
-/// fixed point on what the stages of it are, all of them in the lanes of SIMD registers (lagrangian_direction.hpp).
+/// With C the derivative of the end of the step by V, and A Newton's matrix, E = −C A⁻¹ is its derivative by the
+/// residuals of the stages; all else follows by products. A few tangents take less time each for itself, by a fixed
+/// point on its stages, which are all in the lanes of SIMD registers (lagrangian_direction.hpp).
 template <int Width>
 class LagrangianTangent {
  public:
@@ -90,7 +90,7 @@ class LagrangianTangent {
   static Eigen::Index index(std::size_t k) { return static_cast<Eigen::Index>(k); }
   Eigen::Index eigen_count() const { return index(count()); }
 
-  // Lanes of the stages into a column of numbers, stages of coordinate `row` of which stand together.
+  // Writes the lanes of the stages into a column of numbers, in which the stages of coordinate `row` are adjacent.
   template <class Matrix>
   void write(const L& lanes, Matrix& to, std::size_t row, Eigen::Index column) const {
     alignas(pack_alignment) typename Stages::Stored numbers;
@@ -105,7 +105,7 @@ class LagrangianTangent {
     return total;
   }
 
-  // Only where a few tangents are not all that is asked for.
+  // Done only if more is asked for than a few tangents.
   void find_state() {
     if (has_state_) return;
     has_state_ = true;
@@ -126,7 +126,7 @@ class LagrangianTangent {
     state_.leftCols(K) += of_residuals_.transpose().lazyProduct(residuals_);
   }
 
-  // Eᵀ, of Aᵀ Eᵀ = −Cᵀ: rows of a stage are what its residual does to (q, p) at the end.
+  // Eᵀ, from Aᵀ Eᵀ = −Cᵀ: the rows of a stage are the derivatives of (q, p) at the end by the residual of that stage.
   void find_response() {
     const Eigen::Index K = eigen_count();
     of_residuals_.setZero();
@@ -150,7 +150,7 @@ class LagrangianTangent {
     system_.solve(of_residuals_.data(), 2 * K);
   }
 
-  // Only where somebody asks.
+  // Done only if derivatives by parameters are asked for.
   void find_parameters() {
     if (has_parameters_) return;
     find_state();
@@ -175,7 +175,7 @@ class LagrangianTangent {
     of_parameters_ += of_residuals_.transpose().lazyProduct(residuals_);
   }
 
-  // y += A x, row by row: what stands in a row is many directions.
+  // y += A x, row by row. A row has one number for each direction.
   template <class A>
   static void add(double* y, int count, const A& a, const double* x) {
     for (Eigen::Index i = 0; i < a.rows(); ++i) {

@@ -47,7 +47,7 @@ class Linearization {
     push(tangents.data(), columns(tangents), parameters.data());
   }
 
-  /// The same of plain numbers, row by row, whose sizes are the caller's to know; where parameters do not vary, null.
+  /// The same with plain numbers, row by row; the caller has to know their sizes. Null where parameters do not vary.
   void push(Real* tangents, int count, const Real* parameters) {
     for (std::size_t k = 0; k < used_; ++k) {
       parameters == nullptr ? parts_[k].push(tangents, count) : parts_[k].push(tangents, count, parameters);
@@ -68,7 +68,7 @@ class Linearization {
     pull(gradients.data(), columns(gradients), parameters.data());
   }
 
-  /// The same of plain numbers; where nothing is asked of parameters, null.
+  /// The same with plain numbers. Null where no gradients by parameters are asked for.
   void pull(Real* gradients, int count, Real* parameters) {
     for (std::size_t k = used_; k-- > 0;) {
       parameters == nullptr ? parts_[k].pull(gradients, count) : parts_[k].pull(gradients, count, parameters);

@@ -75,8 +75,8 @@ class MemberColumns {
   static constexpr int most_depth = S <= 3 ? 8 : 1;
 
   /// Predictions are for a step that begins at `from`, in steps from the start of the last one, and is `ratio` times as
-  /// long. Where the last `depth` steps had one size, they are made stage by stage: values of one stage follow each
-  /// other smoothly, which those of one step do not, by their errors of order S + 1.
+  /// long. Where the last `depth` steps had one size, they are made stage by stage: the values of one stage are smooth
+  /// from step to step, but those within a step are not, by their errors of order S + 1.
   PENDULA_IN_REGISTERS void predict_at(const L& from, const L& ratio, const L& depth) {
     if (!xsimd::all((from == from_) & (ratio == ratio_))) {
       from_ = from;
@@ -163,7 +163,7 @@ class MemberColumns {
     return sum;
   }
 
-  /// What stage values, times h, are weighed with when a share of the step is done.
+  /// Weights of stage values, times h, for when a share of the step is done.
   struct Shares {
     double share = -1;
     std::array<double, static_cast<std::size_t>(S)> values,

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <limits>
 #include <pendula/gauss/fixed_point_stop.hpp>
+#include <pendula/gauss/stage_prediction.hpp>
 #include <pendula/gauss/step_controller.hpp>
 #include <pendula/gauss/step_shape.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 
 namespace pendula {
@@ -14,21 +16,21 @@ namespace pendula {
 /// How far the stage equations are solved.
 struct MembersStepperOptions {
   /// Of the first correction that is left out, relative to what the step moves: by default a thousandth of a last bit.
-  double enough = 1e-18;
+  double enough = CorrectionLimits().enough;
   int max_iterations = 50;
   bool are_chosen = false;  ///< steps are, by their errors
 };
 
-/// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Moved`
+/// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Members`
 /// holds their states and stages: ChainMembers of chains, SystemMembers of systems.
 ///
 /// What becomes of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
 /// and one that fails stays where its last accepted step ended.
-template <class Moved>
+template <class Members>
 class MembersStepper {
  public:
-  using Chain = Moved;
-  using Subject = typename Moved::Subject;
+  using Chain = Members;
+  using Subject = typename Members::Subject;
   using L = typename Chain::L;
   using Mask = typename L::Mask;
   using Options = MembersStepperOptions;
@@ -88,7 +90,7 @@ class MembersStepper {
   /// what it was.
   Mask solve(const L& time, const L& h, const Mask& wanted) {
     const L ratio = h / last_;
-    const Mask alike = (known_ > L(cold)) & (ratio <= farthest_extrapolation());
+    const Mask alike = (known_ > L(cold)) & (ratio <= L(detail::farthest_extrapolation));
     const Mask follows = alike & (known_ == L(accepted)), again = alike & (known_ == L(solved));
     depth_ = select(follows & (h == last_), min(depth_ + L(1.0), L(double(Chain::Columns::most_depth))), L(0.0));
     chain_.prepare(time, h, select(alike, ratio, L(1.0)), {follows, again, !alike, depth_, depth_});
@@ -124,11 +126,11 @@ class MembersStepper {
   /// Members whose stages may be a solution that is not the motion: those that came far from where they began, or turn
   /// far.
   Mask doubtful() const {
-    return (stop_.first() > L(trusted_prediction * trusted_prediction) * chain_.scale()) | turns_far();
+    return (stop_.first() > L(detail::trusted_prediction * detail::trusted_prediction) * chain_.scale()) | turns_far();
   }
 
   /// Members whose angles are to be followed from stage to stage.
-  Mask turns_far() const { return chain_.turn() > L(trusted_turn * trusted_turn); }
+  Mask turns_far() const { return chain_.turn() > L(detail::trusted_turn * detail::trusted_turn); }
 
   /// What is known of the stages of these members is wrong: their next step starts cold.
   void forget(const Mask& which) { known_ = select(which, L(cold), known_); }
@@ -143,8 +145,6 @@ class MembersStepper {
   // Near singular places tangents are rounded to little more than this.
   static constexpr double tangent_enough = 1e-12;
   static constexpr double cold = 0, solved = 1, accepted = 2;
-  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // GaussStepper's
-  static L farthest_extrapolation() { return L(1.5); }
 
   TempoOf<L> tempo() {
     TempoOf<L> tempo;
@@ -152,7 +152,7 @@ class MembersStepper {
     return tempo;
   }
 
-  // Of the step that was solved.
+  // The decay of the step that was solved.
   StepDecay<L> decay() {
     StepDecay<L> decay;
     for (int k = 0; k < stages; ++k) {
@@ -164,7 +164,7 @@ class MembersStepper {
     return decay;
   }
 
-  // Until all have arrived or never will; gives who has. once(active): one iteration.
+  // Iterates until each member has arrived or never will; returns those that have. once(active) makes one iteration.
   template <class Stop, class Once>
   Mask iterate(const Mask& wanted, Stop& stop, const L& scale, Once once) {
     stop.restart(scale);

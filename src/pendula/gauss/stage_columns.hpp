@@ -43,7 +43,7 @@ class StageColumns {
     from_ = from;
     ratio_ = from == 1 ? ratio : Real(0);
     const auto values = polynomials_.lagrange(fma(L(ratio), L::load(c_), L(from)));
-    // b_i/b_j, not of h b: of a step of no length that would be no number.
+    // b_i/b_j by b, not by h b: for a step of length zero that would be NaN.
     for (std::size_t j = 0; j < stages_; ++j) {
       values[j].store(extrapolation_[j]);
       (L::load(b_) * L(Real(ratio * inverse_b_[j])) * values[j]).store(increments_[j]);

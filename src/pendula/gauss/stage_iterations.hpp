@@ -17,7 +17,7 @@ class StageIterations {
  public:
   using Real = typename Stages::Real;
   using State = typename Stages::State;
-  using Place = typename Stages::Place;
+  using FullState = typename Stages::FullState;
 
   void prepare(const StepTask& task) {
     stages_.prepare(task);
@@ -33,13 +33,13 @@ class StageIterations {
   Tempo tempo() const { return stages_.tempo(); }
 
   State state(double time) const { return stages_.state(time); }
-  void keep(Place& place) const { stages_.keep(place); }
-  void go_to(const Place& place) {
+  void keep(FullState& place) const { stages_.keep(place); }
+  void go_to(const FullState& place) {
     stages_.go_to(place);
     choice_.begin_look();
   }
-  State glance(const Place& begin, double time, double x) const { return stages_.glance(begin, time, x); }
-  bool bound_excursions(const Place& begin, double* q, double* v) const {
+  State at(const FullState& begin, double time, double x) const { return stages_.at(begin, time, x); }
+  bool bound_excursions(const FullState& begin, double* q, double* v) const {
     return stages_.bound_excursions(begin, q, v);
   }
 

@@ -51,7 +51,7 @@ struct StagesInLanes {
   }
   static Real total(const L& sum) { return total(Stored(sum).x); }
 
-  /// What a cell holds of one stage, and the largest of all.
+  /// The number of one stage in a cell, and the largest of all.
   static Real of_stage(const L& cell, int stage) { return Stored(cell).x[stage]; }
   static Real largest(const L& cell, int count) {
     const Stored stored(cell);
@@ -75,8 +75,8 @@ struct StagesInLanes {
     void prepare(const Real& h) { Base::prepare(h, Real(0)); }
 
     /// Predictions are for a step that begins at `from`, in steps from the start of the last one, and is `ratio` times
-    /// as long. Where the last `depth` steps had one size, they are made stage by stage: values of one stage follow
-    /// each other smoothly, which those of one step do not, by their errors of order S + 1.
+    /// as long. Where the last `depth` steps had one size, they are made stage by stage: the values of one stage are
+    /// smooth from step to step, but those within a step are not, by their errors of order S + 1.
     void predict_at(const Real& from, const Real& ratio, const Real& depth) {
       ratio_ = ratio;
       depth_ = static_cast<int>(depth);

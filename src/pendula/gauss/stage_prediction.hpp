@@ -12,4 +12,11 @@ struct StagePrediction {
   C known;  ///< how many there are
 };
 
+namespace detail {
+
+/// Steps that are longer than the last one by more than this factor are out of reach of its polynomial.
+inline constexpr double farthest_extrapolation = 1.5;
+
+}  // namespace detail
+
 }  // namespace pendula

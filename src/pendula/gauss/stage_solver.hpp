@@ -28,31 +28,31 @@ struct SolverTraits {
 
 /// What solves the stage equations of a step: it owns the model, the state and the stages. GaussStepper takes steps
 /// with any such solver. A solver may have, too:
-///   unseen()      what forces do between the stages that were solved (Unseen);
-///   heed(stop)    a sign that it looks at within long iterations (StopSign);
-///   linearize(…)  the derivative of the step (LinearizingSolver).
+///   unseen()             what forces do between the stages that were solved (Unseen);
+///   set_stop_sign(stop)  a sign that it looks at within long iterations (StopSign);
+///   linearize(…)         the derivative of the step (LinearizingSolver).
 template <class S>
-concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::Place& place,
-                               const typename S::Place& kept, const StepTask& task, MemberNumbers& numbers, double time,
-                               double h, double x, double tolerance, double noticed, double* each, Status status) {
+concept StageSolver = requires(S solver, const S& fixed, const typename S::State& state, typename S::FullState& place,
+                               const typename S::FullState& kept, const StepTask& task, MemberNumbers& numbers,
+                               double time, double h, double x, double tolerance, double noticed, double* each,
+                               Status status) {
   typename S::Model;  // what it is built from, with the number of stages and options of its own
   typename S::Real;   // the number type that it computes in, and that round-off is measured in
-  requires std::default_initializable<typename S::Place>;
+  requires std::default_initializable<typename S::FullState>;
 
   { fixed.traits() } -> std::same_as<SolverTraits>;
   { fixed.iteration() } -> std::same_as<Iteration>;  // that it prefers by now
 
   // --- The state ---
 
-  // Takes a state over, unless the mass matrix is singular there; tells the state, at the user's coordinates.
+  // Starts at a state, unless the mass matrix is singular there; returns the state, in the user's coordinates.
   { solver.start(state) } -> std::same_as<Status>;
   { fixed.state(time) } -> std::convertible_to<typename S::State>;
-  // Copies the state to a place, and makes one of the past the state; the stages stay what they are. Only the first
-  // copy to a place allocates.
+  // Copies the state, and goes back to a copy; the stages stay as they are. Only the first copy to an object allocates.
   fixed.keep(place);
   solver.go_to(kept);
   // The state within the last step, by the polynomials through its stages: x steps after the place where it began.
-  { fixed.glance(kept, time, x) } -> std::convertible_to<typename S::State>;
+  { fixed.at(kept, time, x) } -> std::convertible_to<typename S::State>;
   // Bounds of how far each coordinate and its rate get, anywhere in the last step, from where they were when it began;
   // whether they are known.
   { fixed.bound_excursions(kept, each, each) } -> std::same_as<bool>;

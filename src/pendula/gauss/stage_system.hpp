@@ -27,7 +27,7 @@ class StageSystem : public LinearSystem {
   /// Of coordinate k at stage i.
   double correction(std::size_t k, std::size_t i) const { return solution[at(k, i)]; }
 
-  /// Where coordinate k at stage i stands.
+  /// The row of coordinate k at stage i.
   Index at(std::size_t k, std::size_t i) const { return static_cast<Index>(k * stages_ + i); }
 
  private:

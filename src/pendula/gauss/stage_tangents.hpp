@@ -14,8 +14,8 @@ namespace pendula {
 
 /// Tangents of the motions of several systems, one in each lane, along Gauss steps: the variational equations of
 /// coordinates and rates, (δq)˙ = δq̇, (δq̇)˙ = δq̈, at the stages of a step that was solved, by a fixed point of their
-/// own. With the motion's they are one system of equations by one Gauss method, so that they err by its order; the
-/// derivatives of the steps themselves, which are taken in momenta, they are not.
+/// own. Together with the motion's they are one system of equations, solved by one Gauss method, and so have its order.
+/// They are not the derivatives of the steps themselves, which are taken in momenta.
 template <int S, class L>
 class StageTangents {
  public:
@@ -44,7 +44,7 @@ class StageTangents {
 
   /// Predicts the stages of the step that `columns` are prepared for; those that start cold, from (q, q̇) at `time`.
   void prepare(const StagePrediction<L>& from, const L& time, const double* q, const double* v) {
-    for (Part& part : parts_) {
+    for (CoordinateTangent& part : parts_) {
       typename Columns::History history;
       for (std::size_t d = 0; d < pasts; ++d) history[d] = &part.past[(newest_ + d) % pasts].sped;
       Stages advance;
@@ -59,7 +59,7 @@ class StageTangents {
   /// 1), (j, 2): times, q and q̇ of stage j.
   template <class Stage>
   L iterate(const Mask& active, Stage stage) {
-    for (Part& part : parts_) {
+    for (CoordinateTangent& part : parts_) {
       find_rates(part);
       columns_.integrate(part.moved, part.place, part.places);
     }
@@ -84,10 +84,10 @@ class StageTangents {
   }
   const L& scale() const { return scale_; }  ///< what changes are compared with, squared
 
-  /// Sums up what the stages add to the tangents, which stay; after it `decay` and `accept`.
+  /// Sums up what the stages add to the tangents; these stay as they are. To be called before `decay` and `accept`.
   void finish() {
     newest_ = (newest_ + pasts - 1) % pasts;
-    for (Part& part : parts_) {
+    for (CoordinateTangent& part : parts_) {
       find_rates(part);  // by the last pushes, however long the iteration of other members went on
       Past& past = part.past[newest_];
       detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT {
@@ -108,7 +108,7 @@ class StageTangents {
   }
 
   void accept(const Mask& which) {
-    for (Part& part : parts_) {
+    for (CoordinateTangent& part : parts_) {
       part.place = select(which, part.place + Columns::total(part.moved), part.place);
       part.rate = select(which, part.rate + Columns::total(part.sped), part.rate);
     }
@@ -116,21 +116,21 @@ class StageTangents {
 
   /// Keeps the tangents, and goes back there.
   void save() {
-    for (Part& part : parts_) part.saved = {part.place, part.rate};
+    for (CoordinateTangent& part : parts_) part.saved = {part.place, part.rate};
   }
   void restore(const Mask& which) {
-    for (Part& part : parts_) {
+    for (CoordinateTangent& part : parts_) {
       part.place = select(which, part.saved[0], part.place);
       part.rate = select(which, part.saved[1], part.rate);
     }
   }
 
-  /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
-  /// again after this.
+  /// The logarithm of the growth of these members' tangents since their length was 1. Scales them to the length 1
+  /// again.
   L take_growth(const Mask& which) {
     const L length_squared = squared();
     const L factor = select(which, L(1.0) / sqrt(length_squared), L(1.0));
-    for (Part& part : parts_) {
+    for (CoordinateTangent& part : parts_) {
       part.place = factor * part.place;
       part.rate = factor * part.rate;
       for (Past& past : part.past) {
@@ -149,7 +149,7 @@ class StageTangents {
   struct Past {
     Stages moved{}, sped{};
   };
-  struct Part {
+  struct CoordinateTangent {
     L place{0.0}, rate{0.0};  // δq, δq̇
     std::array<L, 2> saved{};
     Stages moved{}, sped{};          // h b δq̇, h b δq̈
@@ -158,8 +158,8 @@ class StageTangents {
   };
 
   int count() const { return static_cast<int>(parts_.size()); }
-  Part& at(int k) { return parts_[static_cast<std::size_t>(k)]; }
-  const Part& at(int k) const { return parts_[static_cast<std::size_t>(k)]; }
+  CoordinateTangent& at(int k) { return parts_[static_cast<std::size_t>(k)]; }
+  const CoordinateTangent& at(int k) const { return parts_[static_cast<std::size_t>(k)]; }
   double* numbers(int which, int k) { return calls_[which * count() + k]; }
 
   L squared() const {
@@ -167,7 +167,7 @@ class StageTangents {
                             [&](int k) -> const L& { return at(k).rate; });
   }
 
-  void find_rates(Part& part) {
+  void find_rates(CoordinateTangent& part) {
     columns_.integrate(part.sped, part.rate, part.rates);
     detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { part.moved[j] = columns_.hb(j) * part.rates[j]; });
   }
@@ -191,7 +191,7 @@ class StageTangents {
     dynamics_.here(time, &SystemFunctions::acceleration_along, q, v, numbers(0, 0), numbers(1, 0), numbers(2, 0),
                    numbers(3, 0));
     for (int k = 0; k < count(); ++k) {
-      Part& part = at(k);
+      CoordinateTangent& part = at(k);
       const L push = L::load(numbers(3, k));
       for (std::size_t j = 0; j < static_cast<std::size_t>(S); ++j) {
         part.sped[j] = select(cold, columns_.hb(static_cast<int>(j)) * push, part.sped[j]);
@@ -205,7 +205,7 @@ class StageTangents {
   MemberSystems<L>& dynamics_;
   const Columns& columns_;
   SystemTangents<L> measure_;
-  std::vector<Part> parts_;
+  std::vector<CoordinateTangent> parts_;
   PackRows<L::width> calls_;
   std::size_t newest_ = 0;
   L scale_{0.0};

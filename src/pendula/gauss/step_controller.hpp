@@ -63,14 +63,14 @@ class StepController {
     Num log_excess = log_error_ - Num(log_tolerance_);
     if (!all(decay.imbalance == Num(0.0))) {
       const Num most = max(Num(most_imbalance * tolerance_) * decay.time(), Num(energy_rounding));
-      log_excess = max(log_excess, log(max(decay.imbalance, Num(tiny)) / most));
+      log_excess = max(log_excess, log(max(decay.imbalance, Num(detail::almost_zero)) / most));
     }
     const Mask sees_start = decay.log_unseen(stages_) <= Num(log_tolerance_ - std::log(safety));
     const Mask good = (log_excess <= Num(0.0)) & sees_start;
     const Mask bad = which & !good;
     if (any(bad)) {
-      const Num factor = Num(0.9) * exp(log_excess * Num(-1.0 / order_));
-      shrink(bad, h, select((factor > Num(0.2)) & sees_start, factor, Num(0.2)));
+      const Num factor = Num(cautious) * exp(log_excess * Num(-1.0 / order_));
+      shrink(bad, h, select((factor > Num(least_shrinking)) & sees_start, factor, Num(least_shrinking)));
     }
     return which & good;
   }
@@ -158,8 +158,8 @@ class StepController {
   static constexpr double most_imbalance = 5, energy_rounding = 1e-13;
   static constexpr double greedy_aim = 0.03, greedy_growth = 1.5, least_growth = 0.3;
   static constexpr double most_growth = 4, worthwhile = 1.05;
-  static constexpr double farthest = 2;   // of the density from the pace
-  static constexpr double tiny = 1e-300;  // in place of zero
+  static constexpr double cautious = 0.9, least_shrinking = 0.2;  // of the step after one that was too large
+  static constexpr double farthest = 2;                           // of the density from the pace
 
   int stages_, order_;
   double tolerance_, log_tolerance_, first_scale_;

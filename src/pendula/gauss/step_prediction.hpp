@@ -14,8 +14,8 @@ namespace pendula {
 /// last step. The first correction of a fixed point tells which is better, and the other one is tried now and then.
 class PredictionDepth {
  public:
-  /// Of the next step, which is as long as the last one or not; 0: from the last step alone. More than `stages` steps
-  /// are needed, `most` are used; of `most` <= `stages` it is always 0.
+  /// The depth for the next step, which is as long as the last one or not; 0: its stages are predicted from the last
+  /// step alone. More than `stages` steps are needed, and `most` are used; if `most` <= `stages`, it is always 0.
   int next(bool as_long, int stages, int most) {
     known_ = as_long ? std::min(known_ + 1, most) : 0;
     const bool prefers_many = by_many_ <= by_last_;
@@ -69,8 +69,8 @@ class StepPrediction {
       depth_.forget();
       return {h_ / known_h, {false, true, false, 0, 0}};
     }
-    is_predicted_ =
-        task.from == PredictedFrom::last_step && last_h_ != 0 && std::abs(h_ / last_h_) < farthest_extrapolation;
+    is_predicted_ = task.from == PredictedFrom::last_step && last_h_ != 0 &&
+                    std::abs(h_ / last_h_) < detail::farthest_extrapolation;
     const int depth = depth_.next(is_predicted_ && h_ == last_h_, stages, most);
     const double ratio = is_predicted_ ? h_ / last_h_ : 1;
     last_h_ = 0;
@@ -111,8 +111,6 @@ class StepPrediction {
   }
 
  private:
-  // Steps that are longer by this factor are out of reach of the polynomial of the last step.
-  static constexpr double farthest_extrapolation = 1.5;
   static constexpr std::int64_t looked_at = 8;
 
   PredictionDepth depth_;

@@ -64,12 +64,11 @@ struct StepDecay {
   static constexpr double shortest = 1e-3;
   static constexpr double shortest_damped = 1e-9;  // where rates may be damped far faster than anything else happens
   static constexpr double small = 10;              // h R over the largest coefficient
-  static constexpr double jump = 10;      // from the last coefficients that are known to the next, as no motion has it
-  static constexpr double tiny = 1e-300;  // in place of zero
+  static constexpr double jump = 10;  // from the last coefficients that are known to the next, as no motion has it
   // Coefficients that are smaller, relative to h R, may be rounding; what follows from them would not show.
   static constexpr double rounding = 1e-13;
 
-  static Num log_root(const Num& square) { return Num(0.5) * log(max(square, Num(tiny))); }
+  static Num log_root(const Num& square) { return Num(0.5) * log(max(square, Num(detail::almost_zero))); }
   const Num& at(int k) const { return squares[static_cast<std::size_t>(k)]; }
 
   Num log_of_step(const Num& log_moved, int stages, int order) const {
@@ -90,8 +89,8 @@ struct StepDecay {
     const Num next = log_root(at(stages - 2));
     error = max(error, extended(next, stages - 2));
     if (stages == 3) return error;
-    const Num later = max(at(stages - 1), Num(tiny)) + max(at(stages - 2), Num(tiny));
-    const Num before = max(at(stages - 3), Num(tiny)) + at(stages - 4);
+    const Num later = max(at(stages - 1), Num(detail::almost_zero)) + max(at(stages - 2), Num(detail::almost_zero));
+    const Num before = max(at(stages - 3), Num(detail::almost_zero)) + at(stages - 4);
     const Num ratio = min(Num(0.0), Num(0.25) * log(later / before));  // from degree to degree
     const Num goes_on = fma(ratio, Num(double(order - stages + 1)), max(last, ratio + next));
     return select(error > Num(never), max(error, goes_on), error);

@@ -9,6 +9,7 @@
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/step_controller.hpp>
 #include <pendula/gauss/step_task.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/stop_sign.hpp>
@@ -17,7 +18,7 @@ namespace pendula {
 
 struct StepperOptions {
   int max_iterations = 50;
-  /// Of the error of a step, relative to the size of the motion; 0: steps have the size that is asked for.
+  /// The error of a step, relative to the size of the motion; 0: steps have the size that is asked for.
   double tolerance = 0;
   /// How steps are chosen; if it is not given, symmetrically where energy is conserved.
   std::optional<Steering> steering = {};  // NOLINT(readability-redundant-member-init): left out in designated lists
@@ -98,11 +99,6 @@ class StepSolution {
   // symplecticity, and long chains are right in modes far slower than their fastest.
   static constexpr double noticed_defect = 1e-6;
 
-  // Where the first correction is larger than this, relative to the unknowns, or a link turns farther, the iteration
-  // may have found a solution of the stage equations that is not the motion: its energy is looked at.
-  static constexpr double trusted_prediction = 0.02, trusted_turn = 0.5;  // rad
-  static constexpr double largest_energy_defect = 0.02;
-
   // Not inlined into the loop of iterations: there it would crowd out what every iteration calls.
   [[gnu::noinline]] void prepare(const StepTask& task) { solver_.prepare(task); }
 
@@ -127,20 +123,20 @@ class StepSolution {
   Status status_of_solution(double first) {
     const double turn = solver_.turn();
     if (!(turn < largest_turn())) return Status::wrong_root;
-    if (first > trusted_prediction || turn > trusted_turn) {
+    if (first > detail::trusted_prediction || turn > detail::trusted_turn) {
       const double energy = solver_.energy_defect();
-      if (!(energy < largest_energy_defect)) return Status::wrong_root;
-      if (!(energy > -largest_energy_defect) && !traits_.damped) return Status::wrong_root;
+      if (!(energy < detail::largest_energy_defect)) return Status::wrong_root;
+      if (!(energy > -detail::largest_energy_defect) && !traits_.damped) return Status::wrong_root;
     }
     defect_ = may_have_defect() ? solver_.defect(noticed_defect) : 0;
     return Status::ok;
   }
 
-  // The error of a chosen step is known.
+  // No defect is computed for a step of the controller's choice: its error is known.
   bool may_have_defect() const { return !traits_.dissipates && !controller_.chooses(); }
 
-  // Of a step of the controller's choice the error is known, too, so that it may turn farther.
-  double largest_turn() const { return controller_.chooses() ? 3 : traits_.largest_turn; }
+  // A step of the controller's choice may turn farther, since its error is known.
+  double largest_turn() const { return controller_.chooses() ? detail::largest_turn : traits_.largest_turn; }
 };
 
 }  // namespace pendula

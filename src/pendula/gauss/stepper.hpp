@@ -12,6 +12,7 @@
 #include <pendula/system/member.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <pendula/system/stop_sign.hpp>
 #include <utility>
 #include <vector>
@@ -68,7 +69,7 @@ class GaussStepper : private StepSolution<Solver> {
     return started(status);
   }
 
-  /// Whether the start of each step is remembered from now on, for glance and look.
+  /// Whether the start of each step is remembered from now on, for at and at_full_order.
   void remember_steps(bool wanted) {
     remembers_ = wanted;
     before_.step = 0;
@@ -76,12 +77,12 @@ class GaussStepper : private StepSolution<Solver> {
   }
 
   /// The state at `time` within the last step, by the polynomials through its stages: with s stages, positions of order
-  /// s + 1, rates of order s. A step that was taken in parts has left no polynomial: then this is a look.
-  State glance(double time) {
+  /// s + 1, rates of order s. A step that was taken in parts has left no polynomial: then this is at_full_order.
+  State at(double time) {
     if (before_.step == 0) return state();
     State there;
-    if (before_.in_parts && look(time, there)) return there;
-    return solver_.glance(before_.place, time, before_.elapsed(time) / before_.step);
+    if (before_.in_parts && at_full_order(time, there)) return there;
+    return solver_.at(before_.place, time, before_.elapsed(time) / before_.step);
   }
 
   /// Bounds of how far coordinates and rates get, anywhere in the last step, from where they were when it began.
@@ -92,13 +93,13 @@ class GaussStepper : private StepSolution<Solver> {
 
   /// The same at the full order of the method: takes a step from where the last one began to `time`. Its stages are
   /// predicted by the polynomials.
-  Outcome look(double time, State& there) {
+  Outcome at_full_order(double time, State& there) {
     double work = 0;
-    return look(time, there, work);
+    return at_full_order(time, there, work);
   }
 
   /// The same, and the energy that loads have brought by then  [J].
-  Outcome look(double time, State& there, double& work) {
+  Outcome at_full_order(double time, State& there, double& work) {
     work = statistics_.load_work;
     if (before_.step == 0 || is_rounding(time - this->time())) {
       there = solver_.state(time);
@@ -132,9 +133,9 @@ class GaussStepper : private StepSolution<Solver> {
 
   /// From now on asks `stop` between iterations, where one iteration takes long. A step that ends by it leaves the
   /// state as it was, but not everything else that the next steps depend on.
-  void heed(StopSign stop) {
+  void set_stop_sign(StopSign stop) {
     stop_ = traits_.parts > quick_parts ? stop : StopSign{};
-    if constexpr (requires { solver_.heed(stop_); }) solver_.heed(stop_);
+    if constexpr (requires { solver_.set_stop_sign(stop_); }) solver_.set_stop_sign(stop_);
   }
 
   double time() const { return Base::time(); }
@@ -161,53 +162,45 @@ class GaussStepper : private StepSolution<Solver> {
   static constexpr double smallest_part = 1.0 / 1024;
 
  private:
-  // So many halvings of a step are tried by fixed point, which together cost less than the whole step by Newton. Where
-  // they do not help, Newton takes it.
+  // So many halvings of a step are tried by fixed point; together they cost less than the whole step by Newton. If they
+  // do not help, Newton takes the step.
   static constexpr int fixed_point_worth = 3;
-  // Unless steps have been halved for that again and again, more than one of so many: then it is convergence that limits
-  // them, as after motion that was damped fast, not their errors.
+  // If steps were halved for that again and again, more than one in `seldom`, Newton takes them at once: it is
+  // convergence that limits them, as after motion that was damped fast, not their errors.
   static constexpr int seldom = 4, often = 16;
 
-  // With so many links or coordinates, an iteration takes less time than to ask for the sign to stop.
-  static constexpr int quick_parts = 1000;
-
-  // From there on it is asked whether a given step has missed what is damped before its first stage.
+  // From such a defect on, a given step is tested for what is damped before its first stage.
   static constexpr double visible_defect = 1e-4;
 
-  // A step of its own choice fails where it would be smaller than this fraction of the time so far, or was tried so
-  // often.
+  // A step of its own choice fails where it would be smaller than this fraction of the time so far.
   static constexpr double smallest_chosen = 1e-13;
-  static constexpr int most_attempts = 100;
 
   /// One step of the controller's choice, at most so long. Forces that depend on time are looked at as if nothing cut
   /// the step short. Where a step that is cut short fails, the next one is looked for as if nothing cut it: so a run
   /// that is interrupted and goes on takes the steps of one that was not.
   Outcome chosen_step(double most) {
     const double longest = solver_.followed(time(), controller_.step(), options_.tolerance);
-    if (is_within(std::min(controller_.step(), longest), most)) return find_step(longest, most);
+    if (detail::ends_before(std::min(controller_.step(), longest), most)) return find_step(longest, most);
     read_member();
     Outcome outcome = find_step(longest, most, 1);
     if (outcome) return outcome;
     write_member();
     outcome = find_step(longest, std::numeric_limits<double>::infinity());
-    if (outcome && is_within(outcome.step, most)) return outcome;
+    if (outcome && detail::ends_before(outcome.step, most)) return outcome;
     write_member();
     forget_linearization();
     return find_step(longest, most);
   }
 
-  /// Whether a step is shorter than the most it may be, and by more than a sliver.
-  static bool is_within(double h, double most) { return h * (1 + 1e-9) < most; }
-
   /// Tries steps until one is good enough. One whose error is too large predicts the stages of the next, shorter one.
-  Outcome find_step(double longest, double most, int tries = most_attempts) {
+  Outcome find_step(double longest, double most, int tries = detail::most_attempts) {
     const StepController<double> before = controller_;
     int shorter = halved_ > often ? 0 : fixed_point_worth;
     halved_ = std::max(0, halved_ - 1);
     bool is_found = false;
     for (int attempts = 1;; ++attempts) {
       const double chosen = std::min(controller_.step(), longest);
-      const bool is_cut = !is_within(chosen, most);
+      const bool is_cut = !detail::ends_before(chosen, most);
       const double h = is_cut ? most : chosen;
       const PredictedFrom from = is_found ? PredictedFrom::same_step : PredictedFrom::last_step;
       Outcome outcome = Base::solve(h, from, shorter == 0);
@@ -345,7 +338,7 @@ class GaussStepper : private StepSolution<Solver> {
     double step = 0;             // its size; 0: there was none
     bool in_parts = false;
     double work = 0;  // that loads had brought before
-    typename Solver::Place place{};
+    typename Solver::FullState place{};
 
     double elapsed(double at) const { return (at - time.value) - time.compensation; }
   };
@@ -372,8 +365,9 @@ class GaussStepper : private StepSolution<Solver> {
   int halved_ = 0;  // steps that were not solved, seldom each, less those since
   bool remembers_ = false, looks_ = false;
   Remembered before_;
-  typename Solver::Place start_;  // of a step that is taken in parts
-  std::vector<double> member_;    // saved: of the end of the last step during a look, of the start of a chosen step
+  typename Solver::FullState start_;  // of a step that is taken in parts
+  std::vector<double>
+      member_;  // saved: of the end of the last step during at_full_order, of the start of a chosen step
   std::optional<typename detail::LinearizationOf<Solver>::type> linearization_;
 };
 

@@ -8,6 +8,7 @@
 #include <pendula/gauss/stage_tangents.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lane_pack.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/system/forcing_look.hpp>
@@ -44,8 +45,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     for (const bool is_angle : dynamics.info().is_angle) may_miss_ = may_miss_ || !is_angle;
   }
 
-  /// Coordinates.
-  int links() const { return static_cast<int>(count_); }
+  /// Coordinates of the system.
+  int count() const { return static_cast<int>(count_); }
 
   // --- One member ---
 
@@ -80,7 +81,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   template <class Visit>
   void for_each_rate(Visit visit) {
     Base::find_rates(time_);
-    for (int i = 0; i < links(); ++i) visit(i, Vector{Base::rate(static_cast<std::size_t>(i))}, L(0.0));
+    for (int i = 0; i < count(); ++i) visit(i, Vector{Base::rate(static_cast<std::size_t>(i))}, L(0.0));
   }
 
   /// Whether fixed points may ask for shorter steps than errors do: forces and lengths may be anything.
@@ -149,8 +150,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   }
   const L& scale() const { return scale_; }  ///< size of the step, squared
 
-  /// Goes to the stages of the motion that was solved, each member's to its own, however long those of others took.
-  /// Gives what changes of tangents are compared with, squared.
+  /// Places the stages of the motion where the iteration of each member ended, however long those of others took.
+  /// Returns what changes of tangents are compared with, squared.
   const L& start_tangents() requires with_tangent {
     find_stages();
     return tangent_.scale();
@@ -161,7 +162,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
                             [this](int j, int which) { return Base::call(j, which == 0 ? 4 : 2 * (which - 1)); });
   }
 
-  /// Looks at the stages that were solved; the state stays. After it `turn`, `pace_squared`, `decay` and `accept`.
+  /// Evaluates the stages that were solved; the state stays as it is. To be called before `turn`, `pace_squared`,
+  /// `decay` and `accept`.
   void finish() {
     Base::keep_stages();
     Base::find_speeds();
@@ -176,8 +178,8 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     const L infinite(std::numeric_limits<double>::infinity());
     return select(masses_.is_singular(), infinite, turn_ * turn_);
   }
-  /// From where on stages are no motion: where inertia may vanish, coordinates may move faster than all else  [rad].
-  double largest_turn(bool chosen) const { return chosen || dynamics_.constant_masses() ? 3 : 0.25; }
+  /// From where on stages may be no motion  [rad].
+  double largest_turn(bool chosen) const { return detail::largest_turn_of(chosen || dynamics_.constant_masses()); }
 
   /// R in the middle of the step, squared, times h².
   L pace_squared() const { return (columns_.h() * columns_.h()) * pace_squared_; }
@@ -216,10 +218,10 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   /// Coordinates and rates of the members whose step was accepted, when `share` of it was done, by the polynomial
   /// through its stages; visit(i, q_i, q̇_i).
   template <class Visit>
-  void for_each_glance(double share, Visit visit) {
+  void for_each_at(double share, Visit visit) {
     const typename Columns::Shares& weights = columns_.shares(share);
     const L inverse_h = L(1.0) / columns_.h();
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const auto& advance = pasts_[static_cast<std::size_t>(i)][newest_];
       L ahead(0.0), rate(0.0);
       for (int j = 0; j < S; ++j) {
@@ -260,7 +262,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
     NoTangent(MemberSystems<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
 
-  // Of an increment, squared, what is no rounding of coordinates, relative to the size of the motion.
+  // What of a squared increment is not rounding of coordinates, relative to the size of the motion.
   L seen(const L& squared, const L& fastest) const {
     constexpr double visible = StepShape::visible;
     const L share = squared * (pace_squared_ / fastest);
@@ -307,7 +309,7 @@ class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>,
   // By loads, in the step that was solved  [J].
   L brought() const { return any(loaded()) ? select(loaded(), Base::work(), L(0.0)) : L(0.0); }
 
-  typename Base::Place saved_;
+  typename Base::FullState saved_;
   bool may_miss_ = false;  // lengths are among the coordinates
   L loaded_{0.0};
   L scale_{0.0}, turn_{0.0};

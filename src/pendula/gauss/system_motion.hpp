@@ -71,19 +71,19 @@ class SystemMotion {
   }
 
   /// Where the motion is, to come back to.
-  struct Place {
+  struct FullState {
     std::vector<Compensated<Num>> state;
     std::vector<Num> turns;
     Num time, fastest;
   };
-  Place place() const { return {state_, turns_, time_, fastest_}; }
-  void keep(Place& place) const {
+  FullState place() const { return {state_, turns_, time_, fastest_}; }
+  void keep(FullState& place) const {
     place.state = state_;
     place.turns = turns_;
     place.time = time_;
     place.fastest = fastest_;
   }
-  void go_to(const Place& place, const Mask& which) {
+  void go_to(const FullState& place, const Mask& which) {
     for (std::size_t k = 0; k < 2 * count_; ++k) assign(which, place.state[k], state_[k]);
     for (std::size_t k = 0; k < count_; ++k) turns_[k] = select(which, place.turns[k], turns_[k]);
     time_ = select(which, place.time, time_);
@@ -173,7 +173,7 @@ class SystemMotion {
     masses_.see();
   }
 
-  // Room for four numbers of each coordinate, of one state; then three numbers.
+  // Workspace: four numbers of each coordinate, of one state; then three numbers.
   double* room(std::size_t which, std::size_t k = 0) const { return room_[which * count_ + k]; }
 
   // Room(0), room(1) and room(2) hold q, p and v of the motion then; v only after find_rates.
@@ -220,8 +220,8 @@ class SystemMotion {
     find_size();
   }
 
-  // Motion that goes on as at the start of the step. What a member was predicted from is not weighed any more; but zero
-  // times what is not finite would not be zero.
+  // Predicts the motion as it goes on at the start of the step. Steps before get no weight, but their numbers are
+  // replaced, too: zero times a number that is not finite would not be zero.
   void start_cold(const Mask& cold) {
     const auto& columns = columns_.at_hand();
     write_state();

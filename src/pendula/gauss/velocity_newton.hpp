@@ -9,6 +9,7 @@
 #include <pendula/gauss/step_task.hpp>
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/velocity_stages.hpp>
+#include <pendula/gauss/wrong_root.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/system/field_look.hpp>
 #include <pendula/system/system_model.hpp>
@@ -77,8 +78,13 @@ class VelocityNewton : public VelocityStages<Width> {
   }
   SolverTraits traits() const {
     const int coordinates = static_cast<int>(count_);
-    return {coordinates,          coordinates,          Base::stages(),          info().constant_masses ? 3 : 0.25,
-            at_.model().loaded(), at_.model().damped(), family_ == Family::radau};
+    return {coordinates,
+            coordinates,
+            Base::stages(),
+            detail::largest_turn_of(info().constant_masses),
+            at_.model().loaded(),
+            at_.model().damped(),
+            family_ == Family::radau};
   }
   double followed(double time, double h, double tolerance) {
     return forcing_.followed(h, tolerance, [&] {

@@ -52,7 +52,7 @@ class VelocityStages {
       state_[k] = {state.q[index(k)], 0};
       state_[count_ + k] = {state.v[index(k)], 0};
     }
-    const SystemAt<1>& here = at(time_);
+    const SystemAt<1>& here = system_at(time_);
     pace_.start(here, state.q.data(), state.v.data());
     masses_.start(here, state.q.data());
     if (masses_.singular() >= 0) return Status::singular_mass_matrix;
@@ -102,7 +102,7 @@ class VelocityStages {
 
   Tempo tempo() const {
     read_state(numbers(0), numbers(1));
-    at(time_)(&SystemFunctions::acceleration, numbers(0), numbers(1), numbers(2));
+    system_at(time_)(&SystemFunctions::acceleration, numbers(0), numbers(1), numbers(2));
     return pace_.at(numbers(1), numbers(2));
   }
 
@@ -156,9 +156,9 @@ class VelocityStages {
   void member(Numbers& numbers) {
     numbers(time_, state_, acceleration_, last_h_, masses_, pace_, fastest_, most_kinetic_, last_a_);
   }
-  using Place = std::vector<Compensated<double>>;  // q, then v
-  void keep(Place& place) const { place = state_; }
-  void go_to(const Place& place) { state_ = place; }
+  using FullState = std::vector<Compensated<double>>;  // q, then v
+  void keep(FullState& place) const { place = state_; }
+  void go_to(const FullState& place) { state_ = place; }
 
   State state(double time) const {
     State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
@@ -168,7 +168,7 @@ class VelocityStages {
 
   /// The state within the last step, x steps after its beginning, by the polynomials through its rates and
   /// accelerations.
-  State glance(const Place& begin, double time, double x) const {
+  State at(const FullState& begin, double time, double x) const {
     const auto up_to = columns_.up_to(x);
     State state(time, Eigen::VectorXd(index(count_)), Eigen::VectorXd(index(count_)));
     for (std::size_t k = 0; k < count_; ++k) {
@@ -186,7 +186,7 @@ class VelocityStages {
   }
 
   /// Bounds of how far coordinates and rates get within the last step from where they began.
-  bool bound_excursions(const Place& begin, double* q, double* v) const {
+  bool bound_excursions(const FullState& begin, double* q, double* v) const {
     for (std::size_t k = 0; k < count_; ++k) {
       alignas(pack_alignment) Stored pushed, moved;
       find_advances(begin, k, pushed, moved);
@@ -202,7 +202,7 @@ class VelocityStages {
   using Stored = double[static_cast<std::size_t>(Width)];
 
   // h b times the accelerations and the rates at the stages of the last step.
-  void find_advances(const Place& begin, std::size_t k, Stored& pushed, Stored& moved) const {
+  void find_advances(const FullState& begin, std::size_t k, Stored& pushed, Stored& moved) const {
     (columns_.hb() * L::load(last_a_[k])).store(pushed);
     (columns_.hb() * columns_.integral(pushed, L(begin[count_ + k].value))).store(moved);
   }
@@ -224,7 +224,7 @@ class VelocityStages {
   double* numbers(std::size_t which) const { return numbers_.data() + which * count_; }
 
   // The system at one time.
-  const SystemAt<1>& at(double time) const {
+  const SystemAt<1>& system_at(double time) const {
     here_.set_time(time);
     return here_;
   }
@@ -291,7 +291,7 @@ class VelocityStages {
         numbers(3)[k] += up_to[j] * columns_.hb(j) * a(k)[j];
       }
     }
-    return at(time_ + columns_.h() * share);
+    return system_at(time_ + columns_.h() * share);
   }
 
   // Σ M_kk (v_k − polynomial through the stages' rates)² at the start of the step.
@@ -334,7 +334,7 @@ class VelocityStages {
   // Energy, and kinetic energy.
   std::array<double, 2> energies(double time, const double* q, const double* v) const {
     double energy = 0, kinetic = 0;
-    at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
+    system_at(time)(&SystemFunctions::energies, q, v, &kinetic, &energy);
     return {energy, kinetic};
   }
 
@@ -344,7 +344,7 @@ class VelocityStages {
   std::size_t count_;
   Rows stages_;  // K, Q, V, E
   Rows last_a_;  // of the last step
-  Place state_;
+  FullState state_;
   std::vector<double> acceleration_;  // at the start of the run: predicts stages where no step does
   std::vector<double> weight_;
   MassScale<double> masses_;

@@ -10,6 +10,13 @@
 /// treated as a pack of one. For packs the same names are friend functions, found by argument-dependent lookup.
 namespace pendula {
 
+namespace detail {
+
+/// In place of zero, which has no logarithm and divides nothing.
+inline constexpr double almost_zero = 1e-300;
+
+}  // namespace detail
+
 template <class L>
 struct Dual;
 

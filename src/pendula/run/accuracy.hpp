@@ -25,8 +25,8 @@ struct AccuracyAim {
   std::optional<Track> finest = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
   /// Up to when that trial is as accurate as wanted  [s].
   double trusted_until = std::numeric_limits<double>::infinity();
-  /// How far a trial by steps of another kind is from it, where that does not come closer with its tolerance; since
-  /// when.
+  /// The distance of a trial by steps of another kind from the finest trial, where that does not shrink with the
+  /// tolerance; and since when they differ  [s].
   double disputed = 0, disputed_from = std::numeric_limits<double>::infinity();
 
   template <class Numbers>
@@ -56,6 +56,16 @@ inline bool adds_up_rounding(Method method) {
   return is_explicit(method) && method != Method::taylor;
 }
 
+/// smallest_tolerance for the steps of one method.
+inline double smallest_tolerance_of(Method method) {
+  return adds_up_rounding(method) ? 1e-14 : smallest_tolerance;
+}
+
+/// The number of stages for steps by which a run has the wanted accuracy: their errors add up.
+inline int stages_for_accuracy(Method method, double wanted) {
+  return stages_for(method, 0.01 * wanted);
+}
+
 /// The smallest tolerances that trials use.
 struct FinestTolerance {
   double good;      ///< where the accuracy may still be reached
@@ -66,7 +76,7 @@ struct FinestTolerance {
 /// as a tolerance would take, unless more steps reach the accuracy.
 inline FinestTolerance finest_tolerance(const RunOptions& options, const Accuracy& accuracy) {
   constexpr double most_steps = 4;
-  const double rounding = adds_up_rounding(options.method) ? 1e-14 : 1e-16;
+  const double rounding = smallest_tolerance_of(options.method);
   const double few_steps = std::max(rounding, accuracy.error * std::pow(most_steps, -order_of(options)));
   if (options.method == Method::taylor) return {rounding, rounding};
   if (!accuracy.chooses_stages) return {few_steps, few_steps};
@@ -91,6 +101,9 @@ inline constexpr double close_to_wanted = 2;
 
 /// The expected error may be `enough` times the wanted one; trials aim at `aimed_at` times it.
 inline constexpr double enough = 0.3, aimed_at = 0.1;
+
+/// By how much the start of a trial or of a second look is moved, in tolerances: no two runs start alike.
+inline constexpr double start_share = 0.01;
 
 /// Largest distance of two runs that still measures an error; beyond it they have diverged.
 inline constexpr double together = 0.01;
@@ -162,9 +175,9 @@ std::optional<AccuracyAim> coarsen_while_enough(double wanted, double coarsest, 
   return best;
 }
 
-/// A trial by steps of another kind, which err elsewhere and by other amounts: what all steps of one kind get wrong
-/// alike, their trials do not show. Series are told from Gauss steps; these by another number of stages, of which what
-/// they do not damp has the other sign.
+/// Options of a trial by steps of another kind, whose errors are others: what all steps of one kind get wrong alike
+/// does not show in trials of that kind. Series are compared with Gauss steps. Implicit steps are compared with another
+/// number of stages: what they do not damp then has the other sign.
 inline RunOptions of_other_kind(RunOptions run, double wanted) {
   switch (run.method) {
     case Method::gauss:
@@ -178,21 +191,21 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
       return run;
     default:
       run.method = Method::gauss;
-      run.stages = stages_for(run.method, 0.01 * wanted);
+      run.stages = stages_for_accuracy(run.method, wanted);
       run.step = 0;
       return run;
   }
 }
 
-/// Compares the finest trial with others by steps of another kind, `run(tolerance)`, which is nothing where one does
-/// not come to its end in time: then it says nothing. They have to come closer to the finest trial with their
-/// tolerance; where they come no closer than `near`, that is the error.
+/// Compares the finest trial with others by steps of another kind. `run(tolerance)` makes one of them, and returns
+/// nothing where it does not come to its end in time; it then says nothing. The smaller their tolerance, the closer
+/// they have to come to the finest trial; where they come no closer than `near`, that is the error.
 template <class RunTrial, class Apart>
 void hear_another(double wanted, double start, AccuracyAim& aim, double tolerance, RunTrial run, Apart apart) {
-  constexpr double near = 0.5, far = 10, closer = 0.3, finest = 1e-16;  // times the wanted error; the distance before
+  constexpr double near = 0.5, far = 10, closer = 0.3;  // of the wanted error; `closer` of the distance before
   constexpr int most_trials = 3;
   double before = std::numeric_limits<double>::infinity();
-  for (int trial = 0; trial < most_trials && tolerance >= finest; ++trial) {
+  for (int trial = 0; trial < most_trials && tolerance >= smallest_tolerance; ++trial) {
     const std::optional<Track> there = run(tolerance);
     if (!there) return;
     const Separation parted = apart(*there, *aim.finest);

@@ -13,7 +13,7 @@
 namespace pendula {
 namespace {
 
-/// How (δq, δv) and variations of parameters make a tangent of an integrator at one motion, and the way back.
+/// Maps (δq, δv) and variations of parameters to a tangent of an integrator at one motion, and back.
 struct TangentMap {
   Directions<> in, in_by;    ///< (rows x 2 coordinates), (rows x varied)
   Directions<> out, out_by;  ///< (2 coordinates x rows), (2 coordinates x varied)

@@ -20,11 +20,11 @@ struct Varied {
   bool is_input;
 };
 
-/// What a motion is differentiated by besides its start: parameters, then inputs, the rows of a variation of them. An
-/// input is varied by a constant.
+/// What a motion is differentiated by besides its start: the parameters, then the inputs. These are the rows of a
+/// variation. An input is varied by a constant.
 std::vector<Varied> varied_by(const Subject& subject);
 
-/// A motion that is differentiated exactly as its steps move it, whose sizes are held.
+/// A motion to differentiate, exactly as its steps move it; their sizes are held fixed.
 struct MotionTask {
   const Subject& subject;
   const RunOptions& options;  ///< gauss or radau in momentum form
@@ -33,7 +33,7 @@ struct MotionTask {
   std::function<bool()> stop = [] { return false; };
 };
 
-/// How a motion went on: up to where it failed, or was stopped (interrupted).
+/// The result of a motion, up to where it failed or was stopped (Status::interrupted).
 struct MovedTo {
   std::vector<Motion> motions;  ///< at the times
   Outcome outcome;
@@ -44,8 +44,8 @@ struct Forward : MovedTo {
   std::vector<Directions<>> variations;
 };
 
-/// Moves on what the start, (2 coordinates x any), and the parameters, (varied x as many), are varied by. Throws
-/// std::invalid_argument for methods that have no derivative, and for wrong sizes.
+/// Propagates variations of the start, (2 coordinates x any), and of the parameters, (varied x as many), to the times.
+/// Throws std::invalid_argument for methods that have no derivative, and for wrong sizes.
 Forward move_variations(const MotionTask& task, const Directions<>& of_start, const Directions<>& of_parameters);
 
 /// Gradients by the start, (2 coordinates), and by parameters, (varied).
@@ -53,11 +53,11 @@ struct Backward : MovedTo {
   Eigen::VectorXd of_start, of_parameters;
 };
 
-/// The transpose: moves back what a number depends on the motions at the times by, (2 coordinates x times), to its
-/// gradients. Steps are taken once more for it. Throws as move_variations.
+/// The transpose: propagates the gradients of a number by the motions at the times, (2 coordinates x times), back to
+/// those by the start and the parameters. Steps are taken a second time for it. Throws as move_variations.
 Backward move_gradients(const MotionTask& task, const Directions<>& gradients);
 
-/// Throws std::invalid_argument where a link in space is at a pole: nothing is a derivative by phi there.
+/// Throws std::invalid_argument where a link in space is at a pole: there is no derivative by phi there.
 void require_regular(const Subject& subject, const Motion& motion);
 
 /// dq/dt, dv/dt at a motion, (2 coordinates).

@@ -55,7 +55,8 @@ inline std::string untrusted_after(double until, double start) {
 
 /// Whether the defect of a constant step is larger than that of steps whose size was chosen to resolve the motion.
 inline bool misses(const RunOptions& run, double defect) {
-  return run.stages != 1 && defect > 0.02;
+  constexpr double resolved = 0.02;
+  return run.stages != 1 && defect > resolved;
 }
 
 /// `missed` is when the first such step began.
@@ -67,8 +68,8 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
          " of the fastest: " + rows_after(*missed, setup.start.time) + " may be wrong; " + smaller_step_advice(run);
 }
 
-/// Steps missed something narrow in the forces, from a time on whose effect shows in rows. What one constant step has
-/// met of it may show already, before what the next one adds is told.
+/// Steps missed something narrow in the forces, and rows show the effect from some time on. With constant steps, they
+/// may show a part of it one step earlier: that step may have met the beginning.
 inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trust& trust) {
   if (std::isinf(statistics.unseen_from)) return {};
   const double before = is_adaptive(setup.options) ? 0 : setup.options.step;
@@ -80,7 +81,7 @@ inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trus
          smaller_step_advice(setup.options);
 }
 
-/// A start from which the equations lead on in more than one way.
+/// A start from which the equations have more than one solution.
 inline Doubt of_fork(const RunSetup& setup, Trust& trust) {
   const std::optional<std::size_t> at = setup.subject->fork(setup.start);
   if (!at) return {};
@@ -132,7 +133,7 @@ inline std::optional<SecondLook> finer(const RunOptions& run, double duration) {
   SecondLook look{run, "with a hundredth of the tolerance", 1, 1.5};
   if (is_adaptive(run)) {
     look.options.tolerance /= 100;
-    if (look.options.tolerance < (adds_up_rounding(run.method) ? 1e-14 : 1e-16)) return {};
+    if (look.options.tolerance < smallest_tolerance_of(run.method)) return {};
     if (run.method == Method::gauss) look.options.stages += run.stages < 8 ? 1 : -1;
     return look;
   }
@@ -166,8 +167,8 @@ inline SecondLook coarser(const RunOptions& run, const Statistics& statistics, d
   return look;
 }
 
-/// A comparison run by other stages, of constant steps that end where functions switch from piece to piece: from one
-/// such place to the next there may be a single step, which is the same whatever the size of steps.
+/// A comparison run with another number of stages, for constant steps that end where functions switch from piece to
+/// piece. From one such place to the next there may be a single step, which is the same for every step size.
 inline SecondLook by_other_stages(const RunOptions& run) {
   SecondLook look{run, "with other stages", 1, 1.5};
   look.options.stages += run.stages < (run.method == Method::radau ? 3 : 8) ? 1 : -1;

@@ -35,6 +35,9 @@ inline double place_of_miss(std::size_t degree) {
   return next_to_middle[degree];
 }
 
+/// What an interpolant may be off by, relative to how much it varies, so that it shows where a function changes sign.
+inline constexpr double resolved_tail = 1e-3;
+
 /// The sign change implied by the signs at both ends of a step.
 inline std::vector<SignChange> changes_by_ends(int first, int last) {
   if (first * last >= 0) return {};
@@ -208,7 +211,7 @@ class SignSearch {
     if (sizes[0] > variation + safety * (tail + missed)) return node(interval.to, interval.sign);
     const double largest = std::abs(*std::ranges::max_element(values, {}, [](double v) { return std::abs(v); }));
     const double noise = 4 * epsilon * largest;
-    if (tail > 1e-3 * variation + noise) return unresolved(interval, values, halvings, by);
+    if (tail > resolved_tail * variation + noise) return unresolved(interval, values, halvings, by);
     // Derivatives of polynomials by Markov's inequality, on an interval of length 1.
     const auto steepest = [](double value, double degree) { return 2 * degree * degree * value; };
     const auto band = [&](double miss) {

@@ -20,7 +20,7 @@ namespace pendula {
 namespace detail {
 
 /// Degree of dense output: the stages of an implicit method, the series of taylor, else a cubic.
-inline int glance_degree(const RunOptions& options) {
+inline int dense_output_degree(const RunOptions& options) {
   if (options.method == Method::taylor) return 8;
   return is_explicit(options.method) ? 3 : options.stages;
 }
@@ -32,13 +32,15 @@ class LastStep {
   explicit LastStep(Integrator& integrator) : integrator_(integrator) {}
 
   void state(Motion& motion) const { integrator_.read_state(motion); }
-  void glance(double /*share*/, double time, Motion& motion) { integrator_.glance(time, motion); }
+  void at(double /*share*/, double time, Motion& motion) { integrator_.at(time, motion); }
   /// Bounds of how far coordinates and rates get from where the step began; whether they are known.
   bool bound_excursions(Motion& farthest) const {
     return integrator_.bound_excursions(farthest.q.data(), farthest.v.data());
   }
   /// `begin` is the state at the start of the step.
-  bool look(const Motion& /*begin*/, double time, Motion& motion) { return bool(integrator_.look(time, motion)); }
+  bool at_full_order(const Motion& /*begin*/, double time, Motion& motion) {
+    return bool(integrator_.at_full_order(time, motion));
+  }
 
  private:
   Integrator& integrator_;
@@ -93,22 +95,22 @@ class StepStates {
   }
 
   /// By dense output.
-  const Motion& glance(double u) {
+  const Motion& at(double u) {
     for (StepViews::View& view : views_.kept) {
       if (view.share == u) return view.motion;
       if (view.share >= 0) continue;
       view.share = u;
-      return new_glance(u, view.motion);
+      return new_state(u, view.motion);
     }
-    return new_glance(u, views_.passing);
+    return new_state(u, views_.passing);
   }
 
   /// At full order; by dense output if the step fails.
-  const Motion& look(double u) {
+  const Motion& at_full_order(double u) {
     if (u <= 0) return begin_;
     if (u >= 1) return end_;
     ++cost_.looks;
-    if (!step_.look(begin_, time(u), views_.passing)) return new_glance(u, views_.passing);
+    if (!step_.at_full_order(begin_, time(u), views_.passing)) return new_state(u, views_.passing);
     views_.passing.time = time(u);
     return views_.passing;
   }
@@ -118,9 +120,9 @@ class StepStates {
     range.least = begin_;
     range.most = end_;
     if (!step_.bound_excursions(range.most)) return false;
-    // What is damped at once, between the start and the first stage, no polynomial through the stages knows.
-    range.most.v += (glance(0).v - begin_.v).cwiseAbs();
-    // Rates that follow from momenta are rounded as the largest of them.
+    // The polynomial through the stages does not show what is damped between the start and the first stage.
+    range.most.v += (at(0).v - begin_.v).cwiseAbs();
+    // Rates that are computed from momenta have rounding errors as large as those of the largest rate.
     const auto lay_around = [](const auto& begin, const auto& end, auto& least, auto& most) {
       constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
       most.array() += rounding * (most.array() + begin.cwiseAbs().maxCoeff());
@@ -132,9 +134,9 @@ class StepStates {
            lay_around(begin_.v, end_.v, range.least.v, range.most.v);
   }
 
-  const Motion& new_glance(double u, Motion& motion) {
+  const Motion& new_state(double u, Motion& motion) {
     ++cost_.glances;
-    step_.glance(u, time(u), motion);
+    step_.at(u, time(u), motion);
     return motion;
   }
 
@@ -151,9 +153,9 @@ class StepValues {
   StepValues(StepStates<Step>& states, const std::function<double(const Motion&)>& function)
       : states_(states), function_(function) {}
 
-  double value(double u) { return function_(states_.glance(u)); }
+  double value(double u) { return function_(states_.at(u)); }
   double exact_value(double u) {
-    seen_ = &states_.look(u);
+    seen_ = &states_.at_full_order(u);
     return function_(*seen_);
   }
 
@@ -176,22 +178,22 @@ class FormulaValues {
   std::size_t size() const { return formula_.size(); }
   double time(double u) const { return states_.time(u); }
   double resolution() const { return states_.resolution(); }
-  void glance(double u, std::span<double> numbers) { formula_.read(states_.glance(u), numbers); }
-  void look(double u, std::span<double> numbers) { formula_.read(states_.look(u), numbers); }
+  void at(double u, std::span<double> numbers) { formula_.read(states_.at(u), numbers); }
+  void at_full_order(double u, std::span<double> numbers) { formula_.read(states_.at_full_order(u), numbers); }
   double value(double time, std::span<const double> numbers) { return formula_.value(time, numbers); }
   Reach reach(const Reach& time, std::span<const Reach> numbers) { return formula_.reach(time, numbers); }
 
   double exact_value(double u) {
     place_ = u;
     if (size() > 0) {
-      seen_ = &states_.look(u);
+      seen_ = &states_.at_full_order(u);
       formula_.read(*seen_, numbers_);
     }
     return value(time(u), numbers_);
   }
 
   /// The state of the last exact value.
-  const Motion& seen() { return size() > 0 ? *seen_ : states_.look(place_); }
+  const Motion& seen() { return size() > 0 ? *seen_ : states_.at_full_order(place_); }
 
  private:
   StepStates<Step>& states_;

@@ -24,13 +24,13 @@ struct Fed {
   std::vector<Signal> signals;
   std::vector<double> inputs;
 
-  /// What a law says of a motion, within its limit; NaN where it has no value.
+  /// The value of a law at a motion, within its limit; NaN where it has no value.
   static double said(const SampledLaw& law, const Motion& motion) {
     const double value = law.value(motion);
     return std::isnan(value) ? value : std::clamp(value, -law.limit, law.limit);
   }
 
-  /// The subject while laws hold these values, from the knots of signals that a time comes after.
+  /// The subject while laws hold these values, and signals follow their lines from the last knots before `time`.
   std::shared_ptr<const Subject> part(const std::vector<double>& held, double time) const {
     std::vector<double> all = inputs;
     for (std::size_t k = 0; k < laws.size(); ++k) all[laws[k].input] += held[k];
@@ -52,7 +52,7 @@ struct Fed {
     return next;
   }
 
-  /// Of all signals on an input.
+  /// The sum of all signals on an input.
   double signal(std::size_t input, double time) const {
     double sum = 0;
     for (const Signal& one : signals) {
@@ -101,7 +101,7 @@ class HeldInputs : public Relay {
   }
 
   std::span<const double> held(double time) const override {
-    // A row at 0.3 s is at the third sample of 0.1 s, which rounding puts behind it.
+    // A row at 0.3 s is at the third sample of 0.1 s, although rounding puts it before that sample.
     return has_before() && time < now().time() * (1 - rounding) ? before_held_ : held_;
   }
 
@@ -222,7 +222,7 @@ class FedSubject : public Subject {
   }
   bool has_poles() const override { return fed_.subject->has_poles(); }
 
-  /// A chain has no columns of torques otherwise: those with feedback come last.
+  /// Without feedback a chain has no columns of torques. Those with feedback come last.
   std::vector<Quantity> motion_quantities() const override {
     std::vector<Quantity> quantities = fed_.subject->motion_quantities();
     if (own_) return quantities;
@@ -277,7 +277,7 @@ class FedSubject : public Subject {
   }
 
  private:
-  /// A start holds what is sampled there.
+  /// The start holds the value that is sampled there.
   double held(std::size_t law, const Motion& motion) const {
     return motion.held.size() > 0 ? motion.held[static_cast<Eigen::Index>(law)] : Fed::said(fed_.laws[law], motion);
   }

@@ -27,8 +27,8 @@ namespace pendula {
 /// interpolated on shorter intervals by dense output, then at full order, and finally by its extremum. A formula of
 /// time alone is known to rounding from the start.
 ///
-/// `Sight` provides size(), time(u), resolution(), glance(u, numbers), by dense output, look(u, numbers), at full
-/// order, value(time, numbers) and reach(time, numbers); u runs from 0 to 1.
+/// `Sight` provides size(), time(u), resolution(), at(u, numbers), by dense output, at_full_order(u, numbers),
+/// value(time, numbers) and reach(time, numbers); u runs from 0 to 1.
 template <class Sight>
 class FormulaSearch {
  public:
@@ -90,7 +90,7 @@ class FormulaSearch {
     /// Error bound of interpolation between the samples, relative to the largest value; 0 if closer samples would not
     /// help.
     double roughness = 0;
-    bool is_resolved = true;  // the interpolants are accurate to about 1e-3 of their variation
+    bool is_resolved = true;  // the interpolants are accurate to resolved_tail
     bool is_blurred = false;  // the error of an interpolant is comparable to its variation
 
     double width() const { return to - from; }
@@ -99,7 +99,7 @@ class FormulaSearch {
   };
 
   /// A subinterval of a fit, as places in [0, 1].
-  struct Part {
+  struct Subinterval {
     double low, high;
   };
 
@@ -116,9 +116,9 @@ class FormulaSearch {
   const std::vector<double>& sample(double u, By by) {
     --samples_left_;
     if (by == By::polynomial) {
-      sight_.glance(u, numbers_);
+      sight_.at(u, numbers_);
     } else {
-      sight_.look(u, numbers_);
+      sight_.at_full_order(u, numbers_);
     }
     for (std::size_t n = 0; n < numbers_.size(); ++n) {
       if (std::abs(numbers_[n]) > largest_[n]) largest_[n] = std::abs(numbers_[n]);
@@ -191,7 +191,7 @@ class FormulaSearch {
         if (sizes[degree_] > noise) last_[n] = std::max(last_[n], sizes[degree_] * whole);
         miss = missed_[n] + last_[n];
       }
-      fit.is_resolved &= tail <= 1e-3 * variation + noise;
+      fit.is_resolved &= tail <= resolved_tail * variation + noise;
       fit.is_blurred |= tail > 1e-2 * variation + noise;
       if (tail > noise + miss) fit.roughness = std::max(fit.roughness, tail / largest_[n]);
       // Bound of the derivative of a polynomial, by Markov's inequality.
@@ -204,7 +204,7 @@ class FormulaSearch {
   }
 
   /// Enclosure of the formula on a part of a fit, or at one place of it.
-  Reach reach(const Fit& fit, const Part& part) {
+  Reach reach(const Fit& fit, const Subinterval& part) {
     const bool is_place = part.low == part.high;
     const auto within = [&](const BernsteinPolynomial& polynomial, double band) -> Interval {
       const Interval range = is_place ? polynomial(part.low) : polynomial.part(part.low, part.high).range();
@@ -244,7 +244,7 @@ class FormulaSearch {
     search(fit.at(0.5), to, by, level + 1, fit.roughness, doubtful);
   }
 
-  void follow(const Fit& fit, const Part& part, By by, int level, Doubtful& doubtful) {
+  void follow(const Fit& fit, const Subinterval& part, By by, int level, Doubtful& doubtful) {
     --parts_left_;
     const double from = fit.at(part.low), to = fit.at(part.high), middle = (part.low + part.high) / 2;
     const Reach whole = reach(fit, part);
@@ -279,7 +279,7 @@ class FormulaSearch {
   }
 
   /// Whether the formula, enclosed by `value`, certainly does not change sign in a part of a fit.
-  bool decide(const Reach& reach, const Interval& value, const Fit& fit, const Part& part, By by, int level,
+  bool decide(const Reach& reach, const Interval& value, const Fit& fit, const Subinterval& part, By by, int level,
               Doubtful& doubtful) {
     if (reach.defined == Defined::nowhere) {
       close(doubtful, fit.at(part.low), by, level);

@@ -37,7 +37,7 @@ std::vector<double> inputs(const ChainSubject<Space>& chain) {
   return {torque.data(), torque.data() + torque.size()};
 }
 
-/// A line as the sine of a turn so small that it is one to the last digit: sin(x) = x (1 - x^2/6 ...).
+/// A line as a sine of so small an angle that the two agree to the last digit: sin(x) = x (1 - x^2/6 ...).
 InputSine sine_of(const InputLine& line) {
   constexpr double turn = 1e-9;
   const double frequency = turn / line.duration;

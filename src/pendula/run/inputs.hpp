@@ -18,7 +18,7 @@ std::vector<std::string> input_names(const Subject& subject);
 /// Their constant parts.
 std::vector<double> inputs_of(const Subject& subject);
 
-/// slope (t - since), which is added to an input for so long.
+/// A line that is added to an input for a time: slope (t - since).
 struct InputLine {
   std::size_t input = 0;
   double slope = 0;
@@ -26,20 +26,21 @@ struct InputLine {
   double duration = 0;  ///< > 0  [s]
 };
 
-/// The same subject with these as constant parts and with `lines`, which keeps the first one; drives stay. Throws
-/// std::invalid_argument on another number of inputs than it has, and on one that is not finite.
+/// The same subject with `inputs` as the constant parts, and with `lines` added; drives stay. It shares ownership of
+/// `subject`. Throws std::invalid_argument on another number of inputs than the subject has, and on one that is not
+/// finite.
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
                                            std::span<const double> inputs, std::span<const InputLine> lines = {});
 
-/// What a table of numbers over time adds to an input: linear from knot to knot, or held from each knot to the next.
-/// Before the first knot and from the last one on it is what it is there.
+/// What a table of numbers over time adds to an input: linear from knot to knot, or held from each knot to the next. It
+/// is constant before the first knot, and from the last one on.
 struct Signal {
   std::size_t input = 0;      ///< index among the subject's inputs (inputs.hpp)
   std::vector<double> times;  ///< of the knots, ascending, one at least  [s]
   std::vector<double> values;
   bool is_held = false;
 
-  /// A knot at 0.3 s is also one at the third of 0.1 s, which rounding puts before it.
+  /// A knot at 0.3 s is at the third sample of 0.1 s, too, although rounding may put that sample before it.
   static constexpr double rounding = 1e-12;
 
   /// The knot that a time is at or comes after; −1 before the first one.

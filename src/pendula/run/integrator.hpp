@@ -53,8 +53,8 @@ class Integrator {
 
   double time() const { return integrator_->time(); }
 
-  /// Whether the longest step that `step` is told, or was told before, may affect where it comes by, beside where that
-  /// step ends: a longer run would differ.
+  /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
+  /// before, may affect the states on the way. A longer run would differ then.
   bool depends_on_end(double h) const { return integrator_->depends_on_end(h); }
 
   Motion state() const {
@@ -67,43 +67,43 @@ class Integrator {
     integrator_->read_state(motion.q.data(), motion.v.data());
   }
 
-  /// Whether to remember steps from now on, so that glance and look can go back into the last one; this costs a copy of
-  /// the state per step.
+  /// Whether to remember steps from now on, so that at and at_full_order can go back into the last one; this costs a
+  /// copy of the state per step.
   void remember_steps(bool wanted) { integrator_->remember_steps(wanted); }
 
   /// The state at `time` within the last step by dense output, the polynomial through its stages: cheap. Its order is
   /// one more than the number of stages for positions, that number for rates.
-  Motion glance(double time) {
+  Motion at(double time) {
     Motion motion;
-    glance(time, motion);
+    at(time, motion);
     return motion;
   }
-  void glance(double time, Motion& motion) {
+  void at(double time, Motion& motion) {
     make_room(time, motion);
-    integrator_->glance(time, motion.q.data(), motion.v.data());
+    integrator_->at(time, motion.q.data(), motion.v.data());
   }
 
   /// Bounds of how far coordinates and rates get, anywhere in the last step, from where they were when it began:
-  /// cheaper than a glance. Returns whether they are known.
+  /// cheaper than by dense output. Returns whether they are known.
   bool bound_excursions(double* q, double* v) const { return integrator_->bound_excursions(q, v); }
 
   /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
   /// began. The integrator is unchanged; `motion` is set if the outcome is ok.
-  Outcome look(double time, Motion& motion) {
+  Outcome at_full_order(double time, Motion& motion) {
     double work = 0;
-    return look(time, motion, work);
+    return at_full_order(time, motion, work);
   }
 
   /// Also sets `work` to the work of loads until then  [J].
-  Outcome look(double time, Motion& motion, double& work) {
+  Outcome at_full_order(double time, Motion& motion, double& work) {
     make_room(time, motion);
-    return integrator_->look(time, motion.q.data(), motion.v.data(), work);
+    return integrator_->at_full_order(time, motion.q.data(), motion.v.data(), work);
   }
 
-  /// From now on, long steps and looks end with Status::interrupted when `stop` says so. Replaces and returns the sign
-  /// used before.
-  StopSign heed(StopSign stop) {
-    integrator_->heed(stop);
+  /// From now on, long steps, and those of at_full_order, end with Status::interrupted when `stop` says so. Replaces
+  /// and returns the sign used before.
+  StopSign set_stop_sign(StopSign stop) {
+    integrator_->set_stop_sign(stop);
     return std::exchange(stop_, stop);
   }
 
@@ -199,13 +199,14 @@ class Integrator {
   StopSign stop_;
 };
 
-/// Makes an integrator heed a stop sign within a scope.
-class Heeding {
+/// Sets a stop sign of an integrator for a scope.
+class ScopedStopSign {
  public:
-  Heeding(Integrator& integrator, StopSign stop) : integrator_(integrator), before_(integrator.heed(stop)) {}
-  ~Heeding() { integrator_.heed(before_); }
-  Heeding(const Heeding&) = delete;
-  Heeding& operator=(const Heeding&) = delete;
+  ScopedStopSign(Integrator& integrator, StopSign stop)
+      : integrator_(integrator), before_(integrator.set_stop_sign(stop)) {}
+  ~ScopedStopSign() { integrator_.set_stop_sign(before_); }
+  ScopedStopSign(const ScopedStopSign&) = delete;
+  ScopedStopSign& operator=(const ScopedStopSign&) = delete;
 
  private:
   Integrator& integrator_;

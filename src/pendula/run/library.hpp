@@ -72,8 +72,8 @@ const SystemTable* kernel_of(int links) {
   return nullptr;
 }
 
-/// The kernel by whose Taylor series a chain moves; nullptr where it moves by those of rods, which need no kernel but
-/// take no loads and are the faster ones in lanes.
+/// The kernel whose Taylor series a chain moves by; nullptr where it moves by the series of rods. Those need no kernel
+/// and take less time in lanes, but they take no loads.
 template <class Space>
 const SystemTable* series_kernel(int links, bool is_loaded, bool in_lanes) {
   const SystemTable* const kernel = kernel_of<Space>(links);

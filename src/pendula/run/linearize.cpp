@@ -16,7 +16,7 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// A column for each coordinate, then for each rate; so many at once as a kernel's functions take.
+/// One column for each coordinate, then one for each rate; as many at once as a kernel's functions take.
 void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
   constexpr std::size_t width = 8;
   const auto n = static_cast<std::size_t>(motion.q.size());
@@ -103,7 +103,7 @@ Motion equilibrium(const Subject& subject, const Motion& near) {
     if (size > largest * scale) change *= largest * scale / size;
     at.q += change;
     if (size > smallest * scale) continue;
-    // Where accelerations cannot vanish, a smallest sum of their squares is found.
+    // Where accelerations cannot vanish, the iteration ends at a minimum of the sum of their squares.
     const double swing = a.bottomLeftCorner(n, n).cwiseAbs().maxCoeff();
     if (acceleration.cwiseAbs().maxCoeff() > 1e-9 * swing * scale) break;
     at.q = (at.q.array().abs() < smallest * scale).select(0, at.q);

@@ -16,10 +16,9 @@ namespace {
 constexpr int most_coordinates = 10;    // a generated kernel writes its series out up to there
 constexpr int always_few = 2, few = 3;  // links: of three, Gauss steps are the faster ones below fine_tolerance
 constexpr double fine_tolerance = 1e-10;
-constexpr double finest = 1e-16;   // tolerance of a step: of a smaller one rounding leaves nothing
 constexpr double short_run = 100;  // steps
 
-/// Why there are no series of a subject, or Gauss steps take less time; empty: series do.
+/// Why a subject does not go by Taylor series: it has none, or Gauss steps take less time. Empty if it does.
 std::string against_series(const Subject& subject, double tolerance) {
   if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) {
     if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
@@ -36,7 +35,8 @@ std::string against_series(const Subject& subject, double tolerance) {
   return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";
 }
 
-/// Whether damping at a place is much faster than anything that swings or turns there: explicit steps follow it.
+/// Whether a motion is stiff at a state: damping there is much faster than all that swings or turns, and explicit steps
+/// have to follow it.
 bool is_stiff(const Subject& subject, const Motion& place) {
   constexpr double much = 5;
   const Eigen::Index n = 2 * place.q.size();
@@ -51,8 +51,8 @@ bool is_stiff(const Subject& subject, const Motion& place) {
   return decay > much * pace;
 }
 
-/// Whether it is so at the start, or where coarse steps come to: friction grows as rates fall, and a mass may run into
-/// a damper.
+/// Whether it is stiff at the start, or at a state that coarse steps come to: friction grows as rates fall, and a mass
+/// may run into a damper.
 bool becomes_stiff(const RunSetup& setup) {
   constexpr int most_steps = 256;
   const Subject& subject = *setup.subject;
@@ -92,14 +92,14 @@ MethodChoice choose_method(const RunSetup& setup) {
   if (!(setup.duration > 0)) return {0, "no motion"};
   RunOptions options = setup.options;
   options.method = Method::taylor;
-  options.tolerance = step_tolerance(asked, 1, finest);
+  options.tolerance = step_tolerance(asked, 1, smallest_tolerance);
   try {
     if (subject.damped() && becomes_stiff(setup)) return {0, "strong damping"};
     const double step = first_step(setup, options);
     if (step == 0) return {0, "a start from which series take no step"};
     const double steps = setup.duration / step;
-    if (steps * finest > asked) return {0, "a long run, in which series lose energy"};
-    options.tolerance = step_tolerance(asked, steps / short_run, finest);
+    if (steps * smallest_tolerance > asked) return {0, "a long run, in which series lose energy"};
+    options.tolerance = step_tolerance(asked, steps / short_run, smallest_tolerance);
   } catch (const std::invalid_argument& error) {
     return {0, error.what()};
   }

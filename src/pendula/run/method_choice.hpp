@@ -11,9 +11,10 @@ struct MethodChoice {
   std::string reason;           ///< a few words
 };
 
-/// A tolerance of a step by which a motion keeps the tolerance that is asked for: a hundredth, since the motion
-/// amplifies the errors of steps; less for a run that is `longer` than a short one, as many times, since errors of the
-/// energy add up. Rounded to a power of ten, so that runs of about the same length have the same one.
+/// The tolerance of a step for a motion with the tolerance `asked`: a hundredth of it, since the motion amplifies the
+/// errors of steps. For a run that is `longer` than a short one by some factor, it is smaller by that factor, too,
+/// since errors of the energy add up. It is rounded to a power of ten, so that runs of about the same length have the
+/// same one.
 double step_tolerance(double asked, double longer, double finest);
 
 /// Whether a run that is set up for Gauss steps takes less time by Taylor series: of models and planar chains of few

@@ -32,9 +32,9 @@ class MemberSteps {
   virtual void state(int lane, double* q, double* v) = 0;
   /// Its state at the fraction `share` of the step, 0 to 1, by dense output; cheap if several lanes ask for the same
   /// share.
-  virtual void glance(int lane, double share, double* q, double* v) = 0;
-  /// The same at the full order of the method, for a watch that wants looks; false if the step there fails.
-  virtual bool look(int lane, double share, double* q, double* v) = 0;
+  virtual void at(int lane, double share, double* q, double* v) = 0;
+  /// The same at the full order of the method, for a watch with wants_looks; false if the step there fails.
+  virtual bool at_full_order(int lane, double share, double* q, double* v) = 0;
   /// Logarithm of the growth of its tangent in the step; 0 if members have no tangents.
   virtual double growth(int lane) const = 0;
   /// Ends its motion now.
@@ -51,7 +51,7 @@ class MemberWatch {
 
   /// Whether `after_step` is to be called: for the steps of all lanes together.
   virtual bool wants_steps() const = 0;
-  /// Whether `after_step` will ask for states at full order within steps (MemberSteps::look).
+  /// Whether `after_step` will ask for states at full order within steps (MemberSteps::at_full_order).
   virtual bool wants_looks() const = 0;
   virtual void after_step(MemberSteps& steps) = 0;
   /// Whether to stop; asked after every step.

@@ -20,23 +20,23 @@ class Relay : public PlainIntegrator {
     remembers_ = wanted;
     now_->remember_steps(wanted);
   }
-  void glance(double time, double* q, double* v) override { write(of(time).glance(time), q, v); }
+  void at(double time, double* q, double* v) override { write(of(time).at(time), q, v); }
   bool bound_excursions(double* q, double* v) const override {
     return (before_ ? *before_ : *now_).bound_excursions(q, v);
   }
-  Outcome look(double time, double* q, double* v, double& work) override {
+  Outcome at_full_order(double time, double* q, double* v, double& work) override {
     const double done = &of(time) == before_.get() ? before_work_ : done_.load_work;
     Motion motion;
-    const Outcome looked = of(time).look(time, motion, work);
+    const Outcome looked = of(time).at_full_order(time, motion, work);
     work += done;
     if (looked) write(motion, q, v);
     return looked;
   }
 
-  void heed(StopSign stop) override {
+  void set_stop_sign(StopSign stop) override {
     stop_ = stop;
-    now_->heed(stop);
-    if (before_) before_->heed(stop);
+    now_->set_stop_sign(stop);
+    if (before_) before_->set_stop_sign(stop);
   }
 
   const Statistics& statistics() const override { return all_; }
@@ -70,7 +70,7 @@ class Relay : public PlainIntegrator {
   void use(std::unique_ptr<Integrator> integrator) {
     now_ = std::move(integrator);
     now_->remember_steps(remembers_);
-    now_->heed(stop_);
+    now_->set_stop_sign(stop_);
   }
 
   Outcome begin(const Motion& motion) {

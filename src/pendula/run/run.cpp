@@ -13,7 +13,7 @@ namespace pendula {
 
 namespace {
 
-// Most steps of a trial of another kind: more than those of the finest trial.
+// Most steps of a trial by steps of another kind: few_steps + times_as_many * (steps of the finest trial).
 constexpr std::int64_t few_steps = 1000, times_as_many = 10;
 
 // Distance of rows in time; 0 if it depends on the steps.
@@ -29,7 +29,7 @@ Run::Run(RunSetup setup)
       asked_(setup_.options),
       integrator_(setup_.subject->make_integrator(setup_.options)),
       kept_{RunRecord(*setup_.subject, setup_.start, setup_.duration, row_spacing(setup_)),
-            EventWatch(setup_.events, detail::glance_degree(setup_.options)),
+            EventWatch(setup_.events, detail::dense_output_degree(setup_.options)),
             {},
             0,
             static_cast<double>(setup_.every),
@@ -41,7 +41,7 @@ Run::Run(RunSetup setup)
   if (choice.series_tolerance > 0) go_by_series(choice.series_tolerance);
 }
 
-// A tolerance of 0: by what was asked for.
+// Changes to Taylor series, with this tolerance of a step. 0: changes back to what was asked for.
 void Run::go_by_series(double tolerance) {
   setup_.options = asked_;
   if (tolerance > 0) {
@@ -52,7 +52,7 @@ void Run::go_by_series(double tolerance) {
   kept_.series = tolerance;
   integrator_ = setup_.subject->make_integrator(setup_.options);
   description_ = integrator_->describe();
-  kept_.watch.set_degree(detail::glance_degree(setup_.options));
+  kept_.watch.set_degree(detail::dense_output_degree(setup_.options));
 }
 
 RunReport Run::go(const std::function<bool()>& stop) {
@@ -124,7 +124,7 @@ bool Run::aim(const std::function<bool()>& stop) {
     return track;
   };
   const auto run = [&](double tolerance) {
-    share = std::copysign(std::max(0.01 * tolerance, std::numeric_limits<double>::epsilon()), -share);
+    share = std::copysign(std::max(detail::start_share * tolerance, std::numeric_limits<double>::epsilon()), -share);
     std::optional<Track> track = run_alike(tolerance);  // no two trials start alike
     if (track) alike = Track::beside(*track);
     return track;
@@ -141,7 +141,7 @@ bool Run::aim(const std::function<bool()>& stop) {
     RunOptions other = detail::of_other_kind(setup_.options, wanted);
     const auto run_other = [&](double tolerance) -> std::optional<Track> {
       other.tolerance = tolerance;
-      Track track = try_out(other, std::copysign(0.01 * tolerance, -share), *alike, is_long);
+      Track track = try_out(other, std::copysign(detail::start_share * tolerance, -share), *alike, is_long);
       if (!track.is_complete()) return {};
       return track;
     };
@@ -155,7 +155,7 @@ bool Run::aim(const std::function<bool()>& stop) {
 // The same number of stages for all trials and the run: errors with few and with many stages differ in size.
 void Run::choose_stages(RunOptions& options) const {
   const Accuracy& accuracy = setup_.accuracy;
-  if (accuracy.chooses_stages) options.stages = stages_for(options.method, 0.01 * accuracy.error);
+  if (accuracy.chooses_stages) options.stages = detail::stages_for_accuracy(options.method, accuracy.error);
 }
 
 void Run::follow_aim() {
@@ -164,7 +164,7 @@ void Run::follow_aim() {
   choose_stages(options);
   integrator_ = setup_.subject->make_integrator(options);
   description_ = integrator_->describe();
-  kept_.watch.set_degree(detail::glance_degree(options));
+  kept_.watch.set_degree(detail::dense_output_degree(options));
 }
 
 RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
@@ -256,7 +256,7 @@ void Run::take(const Motion& motion, double work) {
 // The first event that ends the run is the last one reported.
 std::optional<Motion> Run::take_events(RunReport& report) {
   if (setup_.events.empty()) return {};
-  const Heeding nothing(*integrator_, {});  // events have to be right: no interruption
+  const ScopedStopSign none(*integrator_, {});  // events have to be right: no interruption
   for (const Occurrence& happened : kept_.watch.after_step(*integrator_)) {
     tell(happened);
     if (!setup_.events[happened.event].stop) continue;
@@ -298,7 +298,7 @@ void Run::look_at_end(const RunResult& result) {
   if (time == kept_.record.last().time) return;
   Motion motion;
   double work = 0;
-  if (integrator_->look(time, motion, work)) look_at(motion, work);
+  if (integrator_->at_full_order(time, motion, work)) look_at(motion, work);
 }
 
 void Run::come_by(const RowPlace& place, bool last) {
@@ -346,7 +346,7 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
   if (is_aimed()) asked = std::min(asked, setup_.accuracy.error);
   const auto compare = [&](const detail::SecondLook& look) {
     const double share =
-        std::max(0.01 * std::min(asked, look.options.tolerance), std::numeric_limits<double>::epsilon());
+        std::max(detail::start_share * std::min(asked, look.options.tolerance), std::numeric_limits<double>::epsilon());
     Divergence divergence(*setup_.subject, *track_);
     const Track other = try_out(look.options, share, Track::at_times_of(*track_), [&](const Track& track) {
       stopped = stopped || stop();

@@ -89,7 +89,7 @@ class Run {
   bool is_estimated() const { return setup_.doubted && setup_.estimate; }
 
   /// The state of a run besides its integrator, for checkpoints.
-  struct Kept {
+  struct CheckpointState {
     RunRecord record;  // of the rows; with rows at times also of the first and the last state
     EventWatch watch;
     AccuracyAim aim;
@@ -109,7 +109,7 @@ class Run {
   std::vector<Viewer> viewers_;                // observers with row times of their own
   double viewing_seconds_ = 0;
   std::optional<Track> track_;  // of this run, if another is compared with it
-  Kept kept_;
+  CheckpointState kept_;
   Description description_;
   std::string method_reason_;
   std::int64_t rows_ = 0;           // so far

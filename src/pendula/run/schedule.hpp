@@ -10,6 +10,7 @@
 #include <pendula/run/row_times.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/outcome.hpp>
+#include <pendula/system/step_rules.hpp>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -48,7 +49,7 @@ inline void require(const Schedule& schedule) {
 /// Size of the next step. A remainder that is one step up to rounding is taken as one step.
 inline double next_step(const Schedule& schedule, double elapsed) {
   const double rest = schedule.duration - elapsed;
-  return rest <= schedule.step * (1 + 1e-9) ? rest : schedule.step;
+  return ends_before(schedule.step, rest) ? schedule.step : rest;
 }
 
 /// Whether the end of the run may affect a step planned to be `h`, after one of size `last`, 0 if unknown. The next
@@ -178,7 +179,7 @@ struct Course {
   bool row_at(double time) {
     Motion motion;
     double work = 0;
-    const Outcome looked = integrator.look(time, motion, work);
+    const Outcome looked = integrator.at_full_order(time, motion, work);
     if (looked) {
       row(motion, work);
     } else if (looked.status == Status::interrupted) {
@@ -210,7 +211,7 @@ RunResult go_on(Integrator& integrator, double begin, const Schedule& schedule, 
   detail::Course<OnRow, Stop, OnWay, OnStep> course{integrator, begin, schedule, place, on_row, stop, on_way, on_step};
   const bool at_times = schedule.rows.any();
   if (at_times) integrator.remember_steps(true);
-  const Heeding heeding(integrator, stop_sign(stop));
+  const ScopedStopSign sign(integrator, stop_sign(stop));
   on_way(place, true);
   while (course.goes_on() && !course.is_over()) {
     const auto before = Clock::now();

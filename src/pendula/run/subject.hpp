@@ -82,8 +82,8 @@ class Subject {
 
   virtual std::shared_ptr<Subject> copy() const = 0;
 
-  /// The subject that moves it about a time, where signals add lines to inputs; null where one moves it all the time,
-  /// and for sampled feedback.
+  /// The subject that moves this one around a time, where signals add lines to inputs. Null where this one moves
+  /// itself, and for sampled feedback.
   virtual std::shared_ptr<const Subject> part_at(double /*time*/) const { return nullptr; }
 
   /// The columns of inputs that feedback or signals add to.
@@ -100,7 +100,7 @@ class Subject {
 
   /// Switching functions of a system with functions of several pieces.
   virtual std::span<const std::string_view> switches() const { return {}; }
-  /// The one that drives a motion away on both sides where it starts.
+  /// The switching function that drives a motion away on both sides where it starts.
   virtual std::optional<std::size_t> fork(const Motion& /*start*/) const { return {}; }
 
   /// The columns of a short table: index of the first, and how many.

@@ -31,7 +31,7 @@ auto as_its_kind(const Subject& subject, Act act) {
   throw std::invalid_argument(subject.part_at(0) ? signals_are_not_here : sampled_has_no_derivatives);
 }
 
-/// The same with what moves it about a time, which signals may change.
+/// The same with the subject that moves it around a time (Subject::part_at).
 template <class Act>
 auto as_its_kind_at(const Subject& subject, double time, Act act) {
   const std::shared_ptr<const Subject> part = subject.part_at(time);

@@ -30,10 +30,10 @@ class SwitchingSystem {
   /// Its numbers where these pieces are taken.
   SystemNumbers numbers(const Sides& sides) const;
 
-  /// g by these pieces, on which one may depend itself.
+  /// The values of g by these pieces. A switching function may depend on the pieces itself.
   std::vector<double> values(const Sides& sides, const Motion& motion) const;
 
-  /// What its functions that may change fast are taken of, but for bases of powers (field_look.hpp).
+  /// The arguments of the functions that may change fast, without bases of powers (field_look.hpp).
   std::vector<double> fast_arguments(const Sides& sides, const Motion& motion) const;
 
   /// The sides on which a motion goes on, which at zeros of g depends on where it goes. Both may drive it back to one
@@ -44,8 +44,8 @@ class SwitchingSystem {
   };
   Way way(const Motion& motion) const;
 
-  /// A switching function at whose zero a motion stands that is driven away from it on both sides: where it goes is not
-  /// told.
+  /// A switching function that is zero at a motion, and drives it away on both sides: the equations do not tell where
+  /// it goes.
   std::optional<std::size_t> fork(const Motion& motion) const;
 
   /// A time in which the motion changes  [s].
@@ -107,7 +107,7 @@ inline std::vector<double> SwitchingSystem::fast_arguments(const Sides& sides, c
   return found;
 }
 
-/// The sides of the values there.
+/// The sides that the values at a motion have.
 inline Sides SwitchingSystem::sides_at(const Motion& motion) const {
   Sides sides(switches(), 1);
   for (std::size_t pass = 0; pass <= sides.size(); ++pass) {  // one may depend on another
@@ -117,7 +117,7 @@ inline Sides SwitchingSystem::sides_at(const Motion& motion) const {
   return sides;
 }
 
-/// Those that are zero but for rounding: a moment ago or later they are of another size.
+/// The switching functions that are zero to rounding: they change by more within a moment.
 inline std::vector<std::size_t> SwitchingSystem::zeros(const Sides& sides, const Motion& motion) const {
   constexpr std::size_t most_at_once = 8;
   constexpr double moment = 1e-10;
@@ -162,7 +162,7 @@ inline std::optional<std::size_t> SwitchingSystem::fork(const Motion& motion) co
   return {};
 }
 
-/// The sign that g soon changes by; 0 if it does not.
+/// The sign of the change of g soon after; 0 if it does not change.
 inline int SwitchingSystem::drift(std::size_t k, const Sides& sides, const Motion& motion) const {
   constexpr std::array<double, 7> moments{1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4};
   const double whole = pace(sides, motion), now = values(sides, motion)[k];

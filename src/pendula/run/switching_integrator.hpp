@@ -15,6 +15,7 @@
 #include <pendula/run/library.hpp>
 #include <pendula/run/relay.hpp>
 #include <pendula/run/switching.hpp>
+#include <pendula/system/field_look.hpp>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -83,7 +84,7 @@ class SwitchingIntegrator : public Relay {
         options_(options),
         sides_(system_.switches(), 1),
         made_for_(sides_),
-        watch_(events(), detail::glance_degree(options)) {
+        watch_(events(), detail::dense_output_degree(options)) {
     pile_.begin(0, system_.switches());
     use(make());
   }
@@ -122,7 +123,7 @@ class SwitchingIntegrator : public Relay {
         continue;
       }
       limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
-      // Where a function is zero is known to rounding, which is another in another step.
+      // The place where a function is zero is known to rounding, and another step is rounded otherwise.
       const std::optional<std::size_t> zero = first ? std::nullopt : zero_at_end();
       if ((first || zero) && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
       if (first) return finish(cut(before, begin, time(), *first));
@@ -176,7 +177,7 @@ class SwitchingIntegrator : public Relay {
 
   Outcome stuck() const { return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_}; }
 
-  /// Steps that are chosen grow from there, so that they do not depend on where the run ends.
+  /// The first limit of chosen steps. They grow from there, so that they do not depend on where the run ends.
   double first_limit(const Motion& motion) const {
     return is_adaptive(options_) ? 4 * system_.pace(sides_, motion) : unlimited;
   }
@@ -185,18 +186,18 @@ class SwitchingIntegrator : public Relay {
     return std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(step));
   }
 
-  /// Whether a polynomial follows each switching function through the last step: else it might come by zero unseen, as
-  /// one that holds a fast sine does in the long steps of a slow motion.
+  /// Whether a polynomial follows each switching function through the last step. Otherwise a function may cross zero
+  /// unseen: one that holds a fast sine may do so in the long steps of a slow motion.
   bool is_resolved(double begin) {
     constexpr double near = 0.02;                                            // of the variation
     constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // where nobody looks
-    const auto glance = [&](double u) {
-      return system_.values(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
+    const auto values_at = [&](double u) {
+      return system_.values(sides_, now().at(u == 1 ? time() : begin + u * (time() - begin)));
     };
     std::array<std::vector<double>, points> seen;
-    for (std::size_t i = 0; i < points; ++i) seen[i] = glance(place(i));
+    for (std::size_t i = 0; i < points; ++i) seen[i] = values_at(place(i));
     for (const double u : others) {
-      const std::vector<double> found = glance(u);
+      const std::vector<double> found = values_at(u);
       for (std::size_t k = 0; k < found.size(); ++k) {
         double above = 0, below = 0, least = seen[0][k], most = least;
         for (std::size_t i = 0; i < points; ++i) {
@@ -217,18 +218,19 @@ class SwitchingIntegrator : public Relay {
   /// Whether functions such as exp and tanh, which the switching functions may hold, change little in the last step:
   /// what is narrow might lie between all places that are looked at.
   bool is_slow(double begin) {
-    constexpr double gone = 60;  // exp(−gone) is negligible
     constexpr double little = 8;
     std::array<std::vector<double>, BernsteinPolynomial::size> seen;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const double u = sample_place(i);
-      seen[i] = system_.fast_arguments(sides_, now().glance(u == 1 ? time() : begin + u * (time() - begin)));
+      seen[i] = system_.fast_arguments(sides_, now().at(u == 1 ? time() : begin + u * (time() - begin)));
     }
     for (std::size_t k = 0; k < seen[0].size(); ++k) {
       BernsteinPolynomial::Numbers values;
       for (std::size_t i = 0; i < seen.size(); ++i) values[i] = seen[i][k];
       const Interval range = BernsteinPolynomial::through(values).range();
-      if (range.low < gone && range.high > -gone && range.high - range.low > little) return false;
+      if (range.low < detail::negligible_exponent && range.high > -detail::negligible_exponent &&
+          range.high - range.low > little)
+        return false;
     }
     return true;
   }
@@ -243,7 +245,7 @@ class SwitchingIntegrator : public Relay {
 
   /// The first one in the last step.
   std::optional<Occurrence> crossing() {
-    const Heeding nothing(now(), {});
+    const ScopedStopSign none(now(), {});
     std::vector<Occurrence> found = watch_.after_step(now());
     if (found.empty()) return {};
     return std::move(found.front());
@@ -258,7 +260,7 @@ class SwitchingIntegrator : public Relay {
   }
 
   /// Half way through the last step.
-  void see_reach(double begin) { pile_.reach(system_.values(sides_, now().glance((begin + time()) / 2))); }
+  void see_reach(double begin) { pile_.reach(system_.values(sides_, now().at((begin + time()) / 2))); }
 
   /// Takes the step again, to where a switching function is zero, and some roundings on, so that it has its new sign.
   Outcome cut(const Member& before, double begin, double end, const Occurrence& first) {
@@ -282,7 +284,7 @@ class SwitchingIntegrator : public Relay {
     return stepped;
   }
 
-  /// By the pieces that the motion goes on by, after a step to a zero.
+  /// Goes on after a step to a zero, by the pieces that the motion takes from there.
   Outcome go_on(const Outcome& stepped, std::size_t switched) {
     count();
     const Motion motion = now().state();

@@ -17,7 +17,7 @@
 
 namespace pendula {
 
-/// Continuous feedback, which a kernel has among its forces: what rows add to an input for it.
+/// Continuous feedback. A kernel has it among its forces; rows add its value to the input.
 struct InputFunction {
   std::size_t input;
   std::function<double(const Motion&)> value;

@@ -45,13 +45,13 @@ class FastPlaces {
   std::vector<Motion> take() {
     std::vector<Motion> states;
     states.reserve(places_.size());
-    for (Place& place : places_) states.push_back(std::move(place.state));
+    for (FastPlace& place : places_) states.push_back(std::move(place.state));
     places_.clear();
     return states;
   }
 
  private:
-  struct Place {
+  struct FastPlace {
     Motion state;
     double speed;
   };
@@ -78,7 +78,7 @@ class FastPlaces {
   std::int64_t steps_ = 0, stretch_ = 1;
   Motion before_;
   Eigen::VectorXd size_of_q_, size_of_v_;
-  std::vector<Place> places_;
+  std::vector<FastPlace> places_;
 };
 
 /// States of a run along its motion, kept for comparison with another run: at the ends of some of its steps, among them
@@ -132,8 +132,8 @@ class Track {
     numbers_.push_back(0);
   }
 
-  /// Call after every step of `mover`, an Integrator or anything with its time, state, look and glance. `end` is the
-  /// state at which the run ended within the step, if it did.
+  /// Call after every step of `mover`, an Integrator or anything with its time, state, at_full_order and at. `end` is
+  /// the state at which the run ended within the step, if it did.
   template <class Mover>
   void follow(Mover& mover, const std::optional<Motion>& end) {
     ++steps_;
@@ -143,7 +143,7 @@ class Track {
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {
       const double time = times_[states_.size()];
       Motion there;
-      states_.push_back(mover.look(time, there) ? std::move(there) : mover.glance(time));
+      states_.push_back(mover.at_full_order(time, there) ? std::move(there) : mover.at(time));
     }
   }
 
@@ -272,7 +272,7 @@ class Separation {
   /// The largest distance.
   double largest() const {
     double largest = 0;
-    for (const Place& place : places_) largest = std::max(largest, place.off);
+    for (const DistanceAt& place : places_) largest = std::max(largest, place.off);
     return largest;
   }
 
@@ -282,7 +282,7 @@ class Separation {
   /// The last time up to which all distances are at most `limit`; infinity if all are, `start` if none is.
   double within(double limit, double start) const {
     double last = start;
-    for (const Place& place : places_) {
+    for (const DistanceAt& place : places_) {
       if (!(place.off <= limit)) return last;
       last = place.time;
     }
@@ -292,13 +292,13 @@ class Separation {
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
 
-  struct Place {
+  struct DistanceAt {
     double time, off;
   };
 
-  explicit Separation(std::vector<Place> places) : places_(std::move(places)) {}
+  explicit Separation(std::vector<DistanceAt> places) : places_(std::move(places)) {}
 
-  std::vector<Place> places_;
+  std::vector<DistanceAt> places_;
 };
 
 /// Compares a growing track with a complete one at the same times.

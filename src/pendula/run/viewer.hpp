@@ -38,7 +38,7 @@ class Viewer {
     for (double time = 0; is_reached(time = times_.at(next_), integrator.time() - start_); ++next_) {
       if (end && start_ + time > end->time) return;
       Motion there;
-      show(integrator.look(start_ + time, there) ? there : integrator.glance(start_ + time));
+      show(integrator.at_full_order(start_ + time, there) ? there : integrator.at(start_ + time));
     }
   }
 

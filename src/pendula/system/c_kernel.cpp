@@ -7,7 +7,7 @@
 namespace pendula {
 namespace {
 
-struct Kept {
+struct DescribedTable {
   std::shared_ptr<const void> object;
   KernelDescription description;
   SystemTable table;
@@ -20,7 +20,7 @@ std::shared_ptr<const SystemTable> table_of(const CKernel& kernel, std::shared_p
     throw std::invalid_argument("expected a kernel of the interface " + std::to_string(system_interface) + ", got " +
                                 std::to_string(kernel.interface));
   }
-  const auto kept = std::make_shared<Kept>();
+  const auto kept = std::make_shared<DescribedTable>();
   kept->object = std::move(object);
   KernelText text(kernel.description);
   while (text.next()) {

@@ -25,6 +25,9 @@ constexpr std::array<double, n + 1> legendre_polynomials(double x) {
   return values;
 }
 
+/// exp(−negligible_exponent) is negligible.
+inline constexpr double negligible_exponent = 60;
+
 }  // namespace detail
 
 /// Checks whether forces change between the nodes of a step: a wall or a pulse narrower than their spacing is seen by
@@ -123,7 +126,7 @@ class FieldLook {
   using Nodes = std::array<double, Gauss::stages>;
 
   /// Where a function changes rapidly, and the distance from there beyond which it hardly changes.
-  struct Place {
+  struct RapidChange {
     double share, distance;
   };
 
@@ -131,7 +134,6 @@ class FieldLook {
   // Largest change of an argument from sample to sample that counts as flat; of the base of a power, relative to
   // itself.
   static constexpr double flat = 0.25;
-  static constexpr double gone = 60;   // exp(−gone) is negligible
   static constexpr double growth = 3;  // of the intervals' lengths, away from a place
   static constexpr std::size_t most_places = 64;
 
@@ -174,7 +176,7 @@ class FieldLook {
     for (const double sign : {1.0, -1.0}) {
       const double near = nearness(a, sign, here);
       if (near < nearness(a, sign, before) || near < nearness(a, sign, after)) continue;
-      if (!is_base_[a] && near + reach < -gone) continue;
+      if (!is_base_[a] && near + reach < -detail::negligible_exponent) continue;
       zoom(a, sign, samples_[i - (i > 0)], samples_[i + (i < last)], arguments);
       if (is_base_[a]) return;
     }
@@ -203,7 +205,7 @@ class FieldLook {
       }
       const bool is_flat = !changes(a, value(low), value(best), flat) && !changes(a, value(best), value(high), flat);
       if (is_flat || round == most_rounds) {
-        const bool is_gone = sign != 0 && !is_base_[a] && nearness(a, sign, value(best)) < -gone;
+        const bool is_gone = sign != 0 && !is_base_[a] && nearness(a, sign, value(best)) < -detail::negligible_exponent;
         if (!is_gone) add({sign == 0 ? (shares[low] + shares[high]) / 2 : shares[best], distance});
         return;
       }
@@ -212,8 +214,8 @@ class FieldLook {
     }
   }
 
-  void add(const Place& place) {
-    const auto is_known = [&](const Place& known) {
+  void add(const RapidChange& place) {
+    const auto is_known = [&](const RapidChange& known) {
       return std::abs(known.share - place.share) <= place.distance / 2 && known.distance <= 2 * place.distance;
     };
     if (places_.size() < most_places && std::none_of(places_.begin(), places_.end(), is_known)) {
@@ -224,7 +226,7 @@ class FieldLook {
   // Interval borders around every place, spaced more widely further away from it.
   void find_borders() {
     borders_.clear();
-    for (const Place& place : places_) {
+    for (const RapidChange& place : places_) {
       borders_.push_back(place.share);
       for (double away = place.distance; away < 0.5 / parts_; away *= growth) {
         borders_.push_back(place.share - away);
@@ -298,7 +300,7 @@ class FieldLook {
   double smooth_;
   int parts_;
   std::vector<double> few_, samples_, found_, near_, borders_, here_, most_;
-  std::vector<Place> places_;
+  std::vector<RapidChange> places_;
 };
 
 }  // namespace pendula

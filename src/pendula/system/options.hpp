@@ -81,6 +81,9 @@ struct RunOptions {
   double tolerance = 1e-9;
 };
 
+/// The smallest tolerance of a step: of a smaller one rounding leaves nothing.
+inline constexpr double smallest_tolerance = 1e-16;
+
 /// Whether step sizes follow from the tolerance.
 constexpr bool is_adaptive(const RunOptions& options) {
   return is_adaptive(options.method) || (!is_explicit(options.method) && options.step == 0);

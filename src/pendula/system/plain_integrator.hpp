@@ -28,26 +28,26 @@ class PlainIntegrator {
   /// What is held of inputs at a time in the last step; empty but for sampled feedback.
   virtual std::span<const double> held(double /*time*/) const { return {}; }
 
-  /// Whether the longest step that `step` is told, or was told before, may affect where it comes by, beside where that
-  /// step ends: a longer run would differ.
+  /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
+  /// before, may affect the states on the way. A longer run would differ then.
   virtual bool depends_on_end(double /*h*/) const { return false; }
 
-  /// Whether to remember steps from now on, so that glance and look can go back into the last one; this costs a copy of
-  /// the state per step.
+  /// Whether to remember steps from now on, so that at and at_full_order can go back into the last one; this costs a
+  /// copy of the state per step.
   virtual void remember_steps(bool wanted) = 0;
   /// The state at `time` within the last step by dense output, polynomials through what the step has computed: cheap,
   /// but less accurate.
-  virtual void glance(double time, double* q, double* v) = 0;
+  virtual void at(double time, double* q, double* v) = 0;
   /// Bounds of how far each coordinate and rate gets, anywhere in the last step, from where it was when the step began:
-  /// cheaper than a glance. Whether they are known.
+  /// cheaper than by dense output. Whether they are known.
   virtual bool bound_excursions(double* /*q*/, double* /*v*/) const { return false; }
   /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
   /// began. The integrator is left unchanged. `work` is set to the work of loads until then  [J].
-  virtual Outcome look(double time, double* q, double* v, double& work) = 0;
+  virtual Outcome at_full_order(double time, double* q, double* v, double& work) = 0;
 
-  /// Lets long steps and looks end with Status::interrupted when `stop` says so; the integrator cannot be continued
-  /// from there. Methods and systems with short steps may ignore it.
-  virtual void heed(StopSign /*stop*/) {}
+  /// Lets long steps, and those of at_full_order, end with Status::interrupted when `stop` says so; the integrator
+  /// cannot be continued from there. Methods and systems with short steps may ignore it.
+  virtual void set_stop_sign(StopSign /*stop*/) {}
 
   virtual const Statistics& statistics() const = 0;
   virtual Description describe() const = 0;

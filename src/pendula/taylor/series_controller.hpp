@@ -1,6 +1,7 @@
 #pragma once
 
 #include <pendula/numeric/numeric.hpp>
+#include <pendula/taylor/series_limits.hpp>
 
 namespace pendula {
 
@@ -15,7 +16,7 @@ class SeriesController {
 
   template <class Stepper>
   void start(const Mask& which, Stepper& /*stepper*/) {
-    longest_ = select(which, L(unlimited), longest_);
+    longest_ = select(which, L(detail::unlimited_step), longest_);
   }
 
   /// Size of the next step, unless the run ends before.
@@ -34,7 +35,7 @@ class SeriesController {
 
   template <class Stepper>
   void move_on(const Mask& which, const L& /*h*/, Stepper& /*stepper*/) {
-    longest_ = select(which, L(unlimited), longest_);
+    longest_ = select(which, L(detail::unlimited_step), longest_);
   }
 
   /// Visits the numbers of one motion, as MemberNumbers does.
@@ -44,9 +45,7 @@ class SeriesController {
   }
 
  private:
-  static constexpr double unlimited = 1e300;
-
-  L longest_{unlimited};
+  L longest_{detail::unlimited_step};
 };
 
 }  // namespace pendula

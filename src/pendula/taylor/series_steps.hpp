@@ -9,6 +9,7 @@
 #include <numbers>
 #include <optional>
 #include <pendula/chain/chain_links.hpp>
+#include <pendula/explicit/error_size.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
@@ -20,6 +21,7 @@
 #include <pendula/system/series_info.hpp>
 #include <pendula/system/system_table.hpp>
 #include <pendula/taylor/series_controller.hpp>
+#include <pendula/taylor/series_limits.hpp>
 #include <pendula/taylor/series_tangent.hpp>
 #include <span>
 #include <type_traits>
@@ -66,7 +68,7 @@ class SeriesSteps {
         order_(order_for(options.tolerance)),
         look_(most_looks, 2, systems.info().argument_is_base),
         largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
-        log_reach_(std::log2(std::max(options.tolerance, finest)) / order_),
+        log_reach_(std::log2(std::max(options.tolerance, detail::finest_of_series)) / order_),
         // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
         state_((static_cast<std::size_t>(order_) + 5) * row_),
         moved_(row_),
@@ -84,22 +86,23 @@ class SeriesSteps {
         scales_(row_),
         rate_scales_(row_),
         unit_row_(1) {
-    for (int i = 0; i < links(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
+    for (int i = 0; i < count(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
   }
 
   SeriesSteps& chain() { return *this; }
   const SeriesSteps& chain() const { return *this; }
-  int links() const { return static_cast<int>(n_); }
+  /// Coordinates of the system.
+  int count() const { return static_cast<int>(n_); }
   const Parts& parts() const { return now_.parts; }
 
   /// A state, with everything that the next steps depend on.
-  struct Place {
+  struct FullState {
     PackRows<width_of<L>> state, low;  // q, then p or v; and their rounding errors
     Parts parts;                       // q and v
     L unit{1.0};                       // of time, for the series about this state  [s]
   };
-  Place place() const { return now_; }
-  void go_to(const Place& place) {
+  FullState place() const { return now_; }
+  void go_to(const FullState& place) {
     now_ = place;
     is_expanded_ = false;
   }
@@ -113,11 +116,11 @@ class SeriesSteps {
     }
     systems_.take(lane, system);
     set(time_, lane, time);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       set(now_.parts[i].place[0], lane, q[i]);
       set(now_.parts[i].rate[0], lane, v[i]);
       to_row(now_.parts[i].place[0], seen_[i]);
-      to_row(now_.parts[i].rate[0], seen_[links() + i]);
+      to_row(now_.parts[i].rate[0], seen_[count() + i]);
     }
     systems_.here(time_, &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
     set(now_.unit, lane, first_unit(lane, q, v));
@@ -140,13 +143,13 @@ class SeriesSteps {
   template <class Numbers>
   void member(Numbers& numbers) requires(!is_batch<L>) {
     numbers(now_.state, now_.low, now_.unit, time_);
-    for (int i = 0; i < links(); ++i) numbers(now_.parts[i].place, now_.parts[i].rate);
+    for (int i = 0; i < count(); ++i) numbers(now_.parts[i].place, now_.parts[i].rate);
     is_expanded_ = false;
   }
 
   std::array<LongReal, 1> exact_place(int i) const requires(!is_batch<L>) { return {sum_of(i)}; }
   std::array<LongReal, 1> exact_rate(int i) const requires(!is_batch<L>) {
-    if (!info_.has_momenta) return {sum_of(links() + i)};
+    if (!info_.has_momenta) return {sum_of(count() + i)};
     return {now_.parts[i].rate[0]};
   }
   const std::array<L, D>& along(int i) const { return now_.parts[i].place; }
@@ -154,14 +157,14 @@ class SeriesSteps {
   /// Calls visit(i, q̇_i, …) for all coordinates.
   template <class Visit>
   void for_each_rate(Visit visit) const {
-    for (int i = 0; i < links(); ++i) visit(i, now_.parts[i].rate, L(0.0));
+    for (int i = 0; i < count(); ++i) visit(i, now_.parts[i].rate, L(0.0));
   }
 
   /// T + U  [J].
   L energy() {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       to_row(now_.parts[i].place[0], seen_[i]);
-      to_row(now_.parts[i].rate[0], seen_[links() + i]);
+      to_row(now_.parts[i].rate[0], seen_[count() + i]);
     }
     double *const kinetic = rates_[n_], *const total = rates_[n_ + 1];
     systems_.here(time_, &SystemFunctions::energies, seen_[0], seen_[n_], kinetic, total);
@@ -196,7 +199,7 @@ class SeriesSteps {
       none = none + (there - there);
     }
     read_rates(time + h, trial_.state, trial_.parts);
-    for (int i = 0; i < links(); ++i) none = none + (trial_.parts[i].rate[0] - trial_.parts[i].rate[0]);
+    for (int i = 0; i < count(); ++i) none = none + (trial_.parts[i].rate[0] - trial_.parts[i].rate[0]);
     // Near the size that its steps will have; a step that the end of a run has cut short says nothing of that.
     trial_.unit = select(longest_ <= most_growth * unit_, longest_, unit_);
     Mask found = wanted & (none == L(0.0));
@@ -220,7 +223,7 @@ class SeriesSteps {
 
   /// The first coordinate of the tried step that is not finite; −1: none.
   int part_not_finite() const requires(!is_batch<L>) {
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const Part& part = trial_.parts[i];
       if (!std::isfinite(part.place[0]) || !std::isfinite(part.rate[0])) return i;
     }
@@ -237,7 +240,7 @@ class SeriesSteps {
           to_row(select(which, from_row<L>((*rows.first)[k]), from_row<L>(to)), to);
         }
       }
-      for (int i = 0; i < links(); ++i) {
+      for (int i = 0; i < count(); ++i) {
         const Part& from = trial_.parts[i];
         Part& to = now_.parts[i];
         to = {{select(which, from.place[0], to.place[0])}, {select(which, from.rate[0], to.rate[0])}};
@@ -276,7 +279,7 @@ class SeriesSteps {
   }
 
   /// A coordinate and its rate at the fraction `share` of the last step, by the series of the coordinate.
-  Part glance(int i, double share) const {
+  Part at(int i, double share) const {
     const L tau = L(share) * step_ / unit_;
     const auto k = static_cast<std::size_t>(i);
     const L place = fma(tau, rise(k, tau), coefficient(0, k));
@@ -284,9 +287,9 @@ class SeriesSteps {
   }
   /// Calls visit(i, q, v) for all coordinates.
   template <class Visit>
-  void for_each_glance(double share, Visit visit) const {
-    for (int i = 0; i < links(); ++i) {
-      const Part there = glance(i, share);
+  void for_each_at(double share, Visit visit) const {
+    for (int i = 0; i < count(); ++i) {
+      const Part there = at(i, share);
       visit(i, there.place, there.rate);
     }
   }
@@ -305,17 +308,17 @@ class SeriesSteps {
 
   /// The same where rates are those of the momenta there.
   template <class Visit>
-  void for_each_look(double share, Visit visit) {
+  void for_each_at_full_order(double share, Visit visit) {
     const L tau = L(share) * step_ / unit_;
     for (std::size_t k = 0; k < 2 * n_; ++k) {
       to_row(fma(tau, rise(k, tau), coefficient(0, k)), trial_.state[k]);
     }
     read_rates(fma(L(share), step_, begin_time_), trial_.state, trial_.parts);
-    for (int i = 0; i < links(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
+    for (int i = 0; i < count(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
   }
 
-  const Place& begin() const requires(!is_batch<L>) { return begin_; }
-  void set_step(const Place& begin, double time, double h) requires(!is_batch<L>) {
+  const FullState& begin() const requires(!is_batch<L>) { return begin_; }
+  void set_step(const FullState& begin, double time, double h) requires(!is_batch<L>) {
     begin_ = begin;
     begin_time_ = time;
     step_ = h;
@@ -324,7 +327,7 @@ class SeriesSteps {
  private:
   static constexpr std::size_t W = width_of<L>;
   static constexpr double most_growth = 1e3;  // of the unit from step to step: an equilibrium allows any
-  static constexpr double finest = 1e-17, tiny = 1e-300, nothing = 1e-16, rounded = 1e-14, shorter_unit = 1e-6;
+  static constexpr double shorter_unit = 1e-6;
   static constexpr int least_order = 6, most_order = 32, looked_at = 4, most_units = 30;
   // Places of a step that goes far where accelerations are compared, the end among them, as in every step; and how
   // closely functions that may be narrow are looked at, in nodes of a Gauss method.
@@ -333,8 +336,8 @@ class SeriesSteps {
   static constexpr double most_turn = 3;                   // rad within a step, so that it is not from hill to hill
 
   Motion motion_of(const Parts& parts, double time) const requires(!is_batch<L>) {
-    Motion motion{time, Eigen::VectorXd(links()), Eigen::VectorXd(links())};
-    for (int i = 0; i < links(); ++i) {
+    Motion motion{time, Eigen::VectorXd(count()), Eigen::VectorXd(count())};
+    for (int i = 0; i < count(); ++i) {
       motion.q[i] = parts[i].place[0];
       motion.v[i] = parts[i].rate[0];
     }
@@ -343,7 +346,7 @@ class SeriesSteps {
 
   /// The order that needs the fewest operations for a tolerance.
   static int order_for(double tolerance) {
-    const double order = 4 - 1.25 * std::log10(std::max(tolerance, finest));
+    const double order = 4 - 1.25 * std::log10(std::max(tolerance, detail::finest_of_series));
     return std::clamp(static_cast<int>(std::lround(order)), least_order, most_order);
   }
 
@@ -439,15 +442,15 @@ class SeriesSteps {
     if (info_.has_momenta) {
       systems_.here(time, &SystemFunctions::velocity_from_momentum, state[0], state[n_], rates_[0]);
     }
-    for (int i = 0; i < links(); ++i) {
-      parts[i] = {{from_row<L>(state[i])}, {from_row<L>(info_.has_momenta ? rates_[i] : state[links() + i])}};
+    for (int i = 0; i < count(); ++i) {
+      parts[i] = {{from_row<L>(state[i])}, {from_row<L>(info_.has_momenta ? rates_[i] : state[count() + i])}};
     }
   }
 
   /// In which members the tried step is so long that it may have gone over something that its end is not beside.
   Mask goes_far() const {
     L turn(0.0), way(0.0), size(0.0);
-    for (int i = 0; i < links(); ++i) {
+    for (int i = 0; i < count(); ++i) {
       const L from = now_.parts[i].place[0], to = trial_.parts[i].place[0], moved = abs(to - from);
       if (systems_.is_angle(i)) {
         turn = max(turn, moved);
@@ -485,7 +488,8 @@ class SeriesSteps {
     for (std::size_t i = 0; i < n_; ++i) {
       const L by_series =
           info_.has_momenta ? from_row<L>(bent_[i]) * (inverse * inverse) : from_row<L>(turned_[n_ + i]) * inverse;
-      const L defect = max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(rounded) * farthest, L(0.0));
+      const L defect =
+          max(h * unit_ * abs(from_row<L>(rates_[i]) - by_series) - L(ErrorSize::rounding) * farthest, L(0.0));
       found = found & (defect * from_row<L>(rate_scales_[i]) <= L(largest_defect_));
     }
     return found;
@@ -562,20 +566,20 @@ class SeriesSteps {
   /// used, because motions that start at rest, and symmetric ones, have only every second or fourth term.
   L size_by_terms() {
     const int last = order_ - (info_.has_momenta ? 1 : 0);
-    L log_radius(1e3);
+    L log_radius(detail::largest_log_radius);
     Mask is_finite(L(0.0) == L(0.0));
     find_scales();
     for (int k = last - looked_at + 1; k <= last; ++k) {
       const L term = size_of_term(static_cast<std::size_t>(k));
       is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
-      log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(tiny))));
+      log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(detail::almost_zero))));
     }
     return select(is_finite, min(step_of(log_radius), longest_turn()), L(0.0));
   }
 
   /// The time in which no angle turns by more than `most_turn`, as fast as it does now  [s].
   L longest_turn() const {
-    L fastest(tiny);
+    L fastest(detail::almost_zero);
     for (std::size_t i = 0; i < n_; ++i) {
       if (systems_.info().is_angle[i]) fastest = max(fastest, abs(rate(0, i)));
     }
@@ -596,8 +600,8 @@ class SeriesSteps {
       v = max(v, abs(rate(0, i)));
       a = max(a, abs(rate(1, i)));
     }
-    const auto within = [](const L& x) { return min(max(x, L(nothing)), L(1.0)); };
-    const L places = within(max(q, v)), speeds = within(max(max(v, a), L(rounded) * q));
+    const auto within = [](const L& x) { return min(max(x, L(ErrorSize::nothing)), L(1.0)); };
+    const L places = within(max(q, v)), speeds = within(max(max(v, a), L(ErrorSize::rounding) * q));
     for (std::size_t i = 0; i < n_; ++i) {
       const L place = abs(coefficient(0, i)), size = systems_.info().is_angle[i] ? min(place, L(1.0)) : place;
       const L of_rate = L(1.0) / (speeds + abs(rate(0, i)));
@@ -649,8 +653,8 @@ class SeriesSteps {
   PackRows<W> state_;
   PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
   PackRows<W> kept_, operands_, inputs_;
-  Place now_, trial_, begin_;  // begin_: of one motion
-  PackRows<W> seen_;           // a motion on the way of a step
+  FullState now_, trial_, begin_;  // begin_: of one motion
+  PackRows<W> seen_;               // a motion on the way of a step
   PackRows<W> rates_;
   PackRows<W> arguments_;  // of functions that may be narrow, at three places of a step
   // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.

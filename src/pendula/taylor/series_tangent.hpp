@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <pendula/numeric/directions.hpp>
+#include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/lagrangian_variation.hpp>
 #include <pendula/system/motion.hpp>
@@ -14,6 +15,7 @@
 #include <pendula/system/series_sums.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
+#include <pendula/taylor/series_limits.hpp>
 #include <utility>
 #include <vector>
 
@@ -78,11 +80,11 @@ class SeriesTangent {
   /// that of tangents, which may move where the motion does not.
   double log_radius(std::size_t terms) const {
     const std::size_t last = order_ - (info().has_momenta ? 1 : 0);
-    double log_radius = 1e3;
+    double log_radius = detail::largest_log_radius;
     for (std::size_t k = last - terms + 1; k <= last; ++k) {
       const double term = size_of_term(k);
       if (!std::isfinite(term)) return -std::numeric_limits<double>::infinity();
-      log_radius = std::min(log_radius, -std::log2(std::max(term, 1e-300)) / static_cast<double>(k));
+      log_radius = std::min(log_radius, -std::log2(std::max(term, detail::almost_zero)) / static_cast<double>(k));
     }
     return log_radius;
   }

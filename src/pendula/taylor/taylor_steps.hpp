@@ -9,6 +9,7 @@
 #include <pendula/numeric/tangent_numbers.hpp>
 #include <pendula/taylor/chain_series.hpp>
 #include <pendula/taylor/series_controller.hpp>
+#include <pendula/taylor/series_limits.hpp>
 
 namespace pendula {
 
@@ -27,7 +28,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   using typename State::L;
   using typename State::Mask;
   static constexpr bool has_tangent = State::has_tangent;
-  using State::links;
+  using State::count;
   using Controller = SeriesController<L>;
 
   struct Options {
@@ -35,7 +36,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   };
   explicit TaylorSteps(Subject subject, Options options = {})
       : State(subject), series_(dynamics_, order_for(options.tolerance)), trial_(parts_), terms_(parts_) {
-    log_reach_ = std::log2(std::max(options.tolerance, finest)) / series_.order();
+    log_reach_ = std::log2(std::max(options.tolerance, detail::finest_of_series)) / series_.order();
   }
 
   TaylorSteps& chain() { return *this; }
@@ -84,25 +85,25 @@ class TaylorSteps : public ExplicitState<Rods> {
   }
 
   /// Dense output: a rod and its rate at the fraction `share` of the last accepted step.
-  auto glance(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
+  auto at(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
 
   /// Calls visit(i, ξ, ξ̇) for all rods.
   template <class Visit>
-  void for_each_glance(double share, Visit visit) const {
-    for (int i = 0; i < links(); ++i) {
-      const Part there = glance(i, share);
+  void for_each_at(double share, Visit visit) const {
+    for (int i = 0; i < count(); ++i) {
+      const Part there = at(i, share);
       visit(i, detail::values_of(there.place), detail::values_of(there.rate));
     }
   }
   template <class Visit>
-  void for_each_look(double share, Visit visit) const {
-    for_each_glance(share, visit);
+  void for_each_at_full_order(double share, Visit visit) const {
+    for_each_at(share, visit);
   }
 
   /// Logarithm of the growth of these members' tangents since they had length 1; scales them to length 1 again.
   L take_growth(const Mask& which) requires has_tangent {
     const L squared = dynamics_.tangent_squared(parts_), factor = State::to_unit_length(which, squared);
-    for (int i = 0; i < links(); ++i) State::scale_tangent(factor, parts_[i]);
+    for (int i = 0; i < count(); ++i) State::scale_tangent(factor, parts_[i]);
     return 0.5 * log(squared);
   }
 
@@ -113,14 +114,13 @@ class TaylorSteps : public ExplicitState<Rods> {
   using typename State::Part;
   using typename State::Parts;
 
-  static constexpr double finest = 1e-17, tiny = 1e-300;
   static constexpr int least_order = 6, looked_at = 4;
   static constexpr int most_units = 8;
   static constexpr double shorter_unit = 1e6;
 
   /// The order that needs the fewest operations for a tolerance.
   static int order_for(double tolerance) {
-    const double order = 3.5 - 1.15 * std::log10(std::max(tolerance, finest));
+    const double order = 3.5 - 1.15 * std::log10(std::max(tolerance, detail::finest_of_series));
     return std::clamp(static_cast<int>(std::lround(order)), least_order, ChainSeries<Rods>::most_order);
   }
 
@@ -129,15 +129,15 @@ class TaylorSteps : public ExplicitState<Rods> {
   PENDULA_IN_REGISTERS [[gnu::noinline]] L size_by_terms(const L& now) {
     const L pace = now * now, units = pace_ / now;
     const L moves = (units * units) * term_squared(1, pace);  // where it is, or will be
-    const L log_size = log2_near(max(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)), L(tiny)));
-    L log_radius(1e3);
+    const L log_size = log2_near(max(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)), L(detail::almost_zero)));
+    L log_radius(detail::largest_log_radius);
     for (int k = series_.order() - looked_at + 1; k <= series_.order(); ++k) {
       L squared = term_squared(k, pace);
       if constexpr (has_tangent) {
         const L tangent = dynamics_.tangent_squared(terms_) / dynamics_.tangent_squared(parts_);
         squared = max(squared, L(tangent_share * tangent_share) * tangent);
       }
-      log_radius = min(log_radius, L(-0.5 / k) * (log2_near(max(squared, L(tiny))) - log_size));
+      log_radius = min(log_radius, L(-0.5 / k) * (log2_near(max(squared, L(detail::almost_zero))) - log_size));
     }
     return exp(std::numbers::ln2 * min(log_radius + L(log_reach_), L(900.0))) / pace_;
   }
