@@ -39,17 +39,18 @@ struct StepDecay {
   /// The logarithm of the error of a step by a method of this order and so many stages, relative to the size of the
   /// motion and `time`.
   ///
-  /// Coefficients of analytic motion decay geometrically, and the quadrature misses those from a degree of `order` on:
-  /// the last ones go on as they have come from h R, or, of swings that are small beside a radian, from what the
-  /// coefficients begin with, also where the swing turns; or, where that is worse, as from those before them.
+  /// Coefficients of analytic motion decay geometrically, and the quadrature misses those from the degree `order` on.
+  /// The last known ones are taken to go on as they have decayed from h R; or, in swings that are small beside a
+  /// radian, as from the first coefficients, also where the swing turns; or as from those before them, where that is
+  /// worse.
   Num log_error(int stages, int order) const {
     const Num log_moved = log_root(moved);
     const Num least = select(beyond > Num(0.0), Num(std::log(shortest_damped)), Num(std::log(shortest)));
     return log_of_step(log_moved, stages, order) - max(log_moved, least);
   }
 
-  /// The logarithm of what no stage has seen of the rates at the start of the step, relative to those of the motion: of
-  /// what is damped before the first stage the coefficients know nothing, however small they are.
+  /// The logarithm of what no stage has seen of the rates at the start of the step, relative to those of the motion.
+  /// The coefficients, however small, know nothing of what is damped before the first stage.
   Num log_unseen(int stages) const {
     if (!any(beyond > Num(0.0))) return Num(never);
     const Num missed = log_root(beyond) - log_root(moved);

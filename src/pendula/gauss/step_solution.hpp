@@ -118,8 +118,8 @@ class StepSolution {
             .certainly = 8};
   }
 
-  // Whether the stages are the solution that goes over into the state as the step goes to zero. Where there is damping,
-  // only energy that grows speaks against that.
+  // Whether the stages are the solution that tends to the state as the step size goes to zero. With damping, only
+  // energy that grows speaks against that.
   Status status_of_solution(double first) {
     const double turn = solver_.turn();
     if (!(turn < largest_turn())) return Status::wrong_root;

@@ -362,7 +362,7 @@ class GaussStepper : private StepSolution<Solver> {
       Base::traits_;
 
   Unseen unseen_;
-  int halved_ = 0;  // steps that were not solved, seldom each, less those since
+  int halved_ = 0;  // `seldom` for each step that was not solved, less one for each since
   bool remembers_ = false, looks_ = false;
   Remembered before_;
   typename Solver::FullState start_;  // of a step that is taken in parts

@@ -24,8 +24,8 @@ class SystemForcing {
     double pace;
   };
 
-  /// The longest step up to h from where `look`, which gives a Here, says that the system is. Inputs that are sines
-  /// turn by no more than stages sum up: one that is weak and turns often within a step shows in no stage what it does.
+  /// The longest step up to h from the state that `look` returns, a Here. Inputs that are sines turn in it by no more
+  /// than stages sum up: no stage shows what a weak one does that turns often within a step.
   template <class Look>
   double followed(double h, double tolerance, Look&& look) {
     const SystemModel& model = at_times_.model();
