@@ -19,40 +19,6 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.exact import MOST_DENOMINATOR, exact
 from pendula_codegen.model import Input, Model, rate_name
 
-_SIGNS: dict[str, Callable[[Expr, Expr], Expr]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "^": lambda base, exponent: base ** _exponent(exponent),
-}
-_COMPARISONS: dict[str, Callable[[Expr, Expr], Boolean]] = {
-    "<": sympy.StrictLessThan,
-    "<=": sympy.LessThan,
-    ">": sympy.StrictGreaterThan,
-    ">=": sympy.GreaterThan,
-}
-_SYMPY_NAMES = (
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "exp",
-    "log",
-    "sqrt",
-    "sign",
-)
-_FUNCTIONS = {
-    **{name: getattr(sympy, name) for name in _SYMPY_NAMES},
-    "abs": sympy.Abs,
-}
-_OF_TWO = {"min": sympy.Min, "max": sympy.Max}
-
 
 def close_loops(model: Model, laws: Iterable[str]) -> None:
     """Adds to inputs what laws say: each INPUT=WORDS, operands before what is done with them: `x 9 * ~` is −(x · 9).
@@ -146,29 +112,36 @@ def _truth(value: Expr) -> Boolean:
     return Or(value > 0, value < 0)
 
 
+_OF_ONE = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "sign")
+
+# How many operands a word takes, and what is made of them.
+_OPERATIONS: dict[str, tuple[int, Callable[..., Expr]]] = {
+    "+": (2, operator.add),
+    "-": (2, operator.sub),
+    "*": (2, operator.mul),
+    "/": (2, operator.truediv),
+    "^": (2, lambda base, exponent: base ** _exponent(exponent)),
+    "~": (1, operator.neg),
+    "<": (2, lambda x, y: _number(x < y)),
+    "<=": (2, lambda x, y: _number(x <= y)),
+    ">": (2, lambda x, y: _number(x > y)),
+    ">=": (2, lambda x, y: _number(x >= y)),
+    "&&": (2, lambda x, y: _number(And(_truth(x), _truth(y)))),
+    "||": (2, lambda x, y: _number(Or(_truth(x), _truth(y)))),
+    "?:": (3, lambda x, yes, no: Piecewise((yes, _truth(x)), (no, True))),
+    **{f"{name}()": (1, getattr(sympy, name)) for name in _OF_ONE},
+    "abs()": (1, sympy.Abs),
+    "min()": (2, sympy.Min),
+    "max()": (2, sympy.Max),
+}
+
+
 def _value(words: str, names: Mapping[str, Expr]) -> Expr:
     stack: list[Expr] = []
     for word in words.split():
-        if word in _SIGNS:
-            right = stack.pop()
-            stack.append(_SIGNS[word](stack.pop(), right))
-        elif word == "~":
-            stack.append(-stack.pop())
-        elif word in _COMPARISONS:
-            right = stack.pop()
-            stack.append(_number(_COMPARISONS[word](stack.pop(), right)))
-        elif word in ("&&", "||"):
-            right = _truth(stack.pop())
-            both = (And if word == "&&" else Or)(_truth(stack.pop()), right)
-            stack.append(_number(both))
-        elif word == "?:":
-            no, yes = stack.pop(), stack.pop()
-            stack.append(Piecewise((yes, _truth(stack.pop())), (no, True)))
-        elif word.endswith("()") and word[:-2] in _FUNCTIONS:
-            stack.append(_FUNCTIONS[word[:-2]](stack.pop()))
-        elif word.endswith("()") and word[:-2] in _OF_TWO:
-            right = stack.pop()
-            stack.append(_OF_TWO[word[:-2]](stack.pop(), right))
+        if word in _OPERATIONS:
+            count, made = _OPERATIONS[word]
+            stack[-count:] = [made(*stack[-count:])]
         elif word in names:
             stack.append(names[word])
         else:

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/expression_program.hpp"
+#include "io/expression_reader.hpp"
 
 namespace pendula::io {
 

@@ -26,34 +26,9 @@ constexpr std::size_t longest_text = 10'000;
 constexpr std::size_t most_listed = 24;
 constexpr int deepest = 200;
 
-struct Function {
-  std::string_view name;
-  Operation operation;
-  int operands;
-};
-constexpr std::array<Function, 23> functions = {{{"sin", Operation::sine, 1},
-                                                 {"cos", Operation::cosine, 1},
-                                                 {"tan", Operation::tangent, 1},
-                                                 {"asin", Operation::arcsine, 1},
-                                                 {"acos", Operation::arccosine, 1},
-                                                 {"atan", Operation::arctangent, 1},
-                                                 {"atan2", Operation::arctangent2, 2},
-                                                 {"sinh", Operation::hyperbolic_sine, 1},
-                                                 {"cosh", Operation::hyperbolic_cosine, 1},
-                                                 {"tanh", Operation::hyperbolic_tangent, 1},
-                                                 {"exp", Operation::exponential, 1},
-                                                 {"log", Operation::logarithm, 1},
-                                                 {"ln", Operation::logarithm, 1},
-                                                 {"log2", Operation::logarithm2, 1},
-                                                 {"log10", Operation::logarithm10, 1},
-                                                 {"sqrt", Operation::root, 1},
-                                                 {"abs", Operation::size, 1},
-                                                 {"sign", Operation::sign, 1},
-                                                 {"rint", Operation::rint, 1},
-                                                 {"floor", Operation::floor, 1},
-                                                 {"fmod", Operation::remainder, 2},
-                                                 {"min", Operation::least, 2},
-                                                 {"max", Operation::largest, 2}}};
+/// Signs between two operands, by how strongly they bind. None stands after one that it begins with.
+constexpr std::array<std::array<std::string_view, 6>, 5> signs = {
+    {{"||"}, {"&&"}, {"<=", ">=", "<", ">", "==", "!="}, {"+", "-"}, {"*", "/"}}};
 
 std::string quoted(const std::string& text) {
   constexpr std::size_t longest_shown = 60;
@@ -108,72 +83,27 @@ class ExpressionReader {
 
   std::size_t choice() {
     const Deeper deeper(*this);
-    const std::size_t condition = any();
+    const std::size_t condition = bound_by(0);
     if (!take("?")) return condition;
     const std::size_t yes = choice();
     need(":");
-    return add(Operation::choose, {condition, yes, choice()});
+    return add("?:", {condition, yes, choice()});
   }
-  std::size_t any() {
-    std::size_t value = all();
-    while (take("||")) value = add(Operation::either, {value, all()});
-    return value;
-  }
-  std::size_t all() {
-    std::size_t value = comparison();
-    while (take("&&")) value = add(Operation::both, {value, comparison()});
-    return value;
-  }
-  std::size_t comparison() {
-    std::size_t value = sum();
+  std::size_t bound_by(std::size_t level) {
+    if (level == signs.size()) return factor();
+    std::size_t value = bound_by(level + 1);
     for (;;) {
-      if (take("<=")) {
-        value = add(Operation::at_most, {value, sum()});
-      } else if (take(">=")) {
-        value = add(Operation::at_least, {value, sum()});
-      } else if (take("<")) {
-        value = add(Operation::less, {value, sum()});
-      } else if (take(">")) {
-        value = add(Operation::greater, {value, sum()});
-      } else if (take("==")) {
-        value = add(Operation::equal, {value, sum()});
-      } else if (take("!=")) {
-        value = add(Operation::unequal, {value, sum()});
-      } else {
-        return value;
-      }
-    }
-  }
-  std::size_t sum() {
-    std::size_t value = product();
-    for (;;) {
-      if (take("+")) {
-        value = add(Operation::sum, {value, product()});
-      } else if (take("-")) {
-        value = add(Operation::difference, {value, product()});
-      } else {
-        return value;
-      }
-    }
-  }
-  std::size_t product() {
-    std::size_t value = factor();
-    for (;;) {
-      if (take("*")) {
-        value = add(Operation::product, {value, factor()});
-      } else if (take("/")) {
-        value = add(Operation::ratio, {value, factor()});
-      } else {
-        return value;
-      }
+      const auto sign = std::ranges::find_if(signs[level], [&](auto each) { return !each.empty() && take(each); });
+      if (sign == signs[level].end()) return value;
+      value = add(*sign, {value, bound_by(level + 1)});
     }
   }
   std::size_t factor() {
     const Deeper deeper(*this);
-    if (take("-")) return add(Operation::negative, {factor()});
+    if (take("-")) return add("~", {factor()});
     if (take("+")) return factor();
     const std::size_t base = operand();
-    return take("^") ? add(Operation::power, {base, factor()}) : base;
+    return take("^") ? add("^", {base, factor()}) : base;
   }
   std::size_t operand() {
     if (take("(")) {
@@ -198,8 +128,7 @@ class ExpressionReader {
     const std::size_t begin = at_;
     while (at_ < text_.size() && (is_letter(text_[at_]) || is_digit(text_[at_]))) ++at_;
     const std::string word = text_.substr(begin, at_ - begin);
-    const auto function = std::ranges::find(functions, word, &Function::name);
-    if (function != functions.end()) return call(*function);
+    if (const Operation* function = operation_named(word)) return call(*function);
     if (word == "pi") return constant(std::numbers::pi);
     auto found = std::ranges::find(names_, word);
     if (found == names_.end()) found = std::ranges::find(names_, present_name(word));
@@ -208,16 +137,16 @@ class ExpressionReader {
   }
 
   /// min and max take any number of operands.
-  std::size_t call(const Function& function) {
+  std::size_t call(const Operation& function) {
     need("(");
     std::size_t value = choice();
-    const bool takes_any = function.operation == Operation::least || function.operation == Operation::largest;
-    if (function.operands == 1) value = add(function.operation, {value});
+    const bool takes_any = function.name == "min" || function.name == "max";
+    if (function.operands == 1) value = add(function.name, {value});
     if (function.operands == 2 && !takes_any) {
       need(",");
-      value = add(function.operation, {value, choice()});
+      value = add(function.name, {value, choice()});
     }
-    while (takes_any && take(",")) value = add(function.operation, {value, choice()});
+    while (takes_any && take(",")) value = add(function.name, {value, choice()});
     need(")");
     return value;
   }
@@ -233,23 +162,24 @@ class ExpressionReader {
     const auto place = static_cast<std::size_t>(found - program_.columns.begin());
     if (found == program_.columns.end()) program_.columns.push_back(of_row);
     const bool is_time = names_[of_row] == "t";
-    return append({Operation::column, place},
+    return append({.a = place, .is_column = true},
                   {.is_plain = true, .has_time = is_time, .has_others = !is_time, .turns = 1});
   }
 
   /// An operation on constants becomes a constant.
-  std::size_t add(Operation operation, std::initializer_list<std::size_t> operands) {
+  std::size_t add(std::string_view name, std::initializer_list<std::size_t> operands) {
+    const Operation& operation = *operation_named(name);
     std::array<std::size_t, 3> of{};
     std::ranges::copy(operands, of.begin());
     const bool is_constant = std::ranges::all_of(operands, [&](std::size_t k) { return kinds_[k].is_constant; });
     if (is_constant) {
-      const double value = detail::applied(operation, program_.nodes[of[0]].number, program_.nodes[of[1]].number,
-                                           program_.nodes[of[2]].number);
+      const auto& nodes = program_.nodes;
+      const double value = operation(nodes[of[0]].number, nodes[of[1]].number, nodes[of[2]].number);
       program_.nodes.resize(program_.nodes.size() - operands.size());
       kinds_.resize(program_.nodes.size());
       return constant(value);
     }
-    return append({operation, of[0], of[1], of[2]}, kind(operation, operands));
+    return append({&operation, of[0], of[1], of[2]}, kind(name, operands));
   }
 
   std::size_t append(const ExpressionProgram::Node& node, const Kind& kind) {
@@ -258,7 +188,7 @@ class ExpressionReader {
     return program_.nodes.size() - 1;
   }
 
-  Kind kind(Operation operation, std::initializer_list<std::size_t> operands) const {
+  Kind kind(std::string_view operation, std::initializer_list<std::size_t> operands) const {
     constexpr double quickest_sine = 2.001;
     Kind made;
     bool are_plain = true;
@@ -270,31 +200,21 @@ class ExpressionReader {
     const std::size_t first = *operands.begin(), last = *(operands.end() - 1);
     const Kind &a = kinds_[first], &b = kinds_[last];
     const double of_a = std::abs(program_.nodes[first].number), of_b = std::abs(program_.nodes[last].number);
-    switch (operation) {
-      case Operation::negative:
-        made.turns = a.turns;
-        made.is_plain = are_plain;
-        break;
-      case Operation::sum:
-      case Operation::difference:
-        made.turns = a.turns + b.turns;
-        made.is_plain = are_plain;
-        break;
-      case Operation::product:
-        if (a.is_constant) made.turns = of_a * b.turns;
-        if (b.is_constant) made.turns = a.turns * of_b;
-        made.is_plain = are_plain && (a.is_constant || b.is_constant);
-        break;
-      case Operation::ratio:
-        if (b.is_constant) made.turns = a.turns / of_b;
-        made.is_plain = are_plain && b.is_constant;
-        break;
-      case Operation::sine:
-      case Operation::cosine:
-        made.is_plain = are_plain && a.turns <= quickest_sine && !a.has_time;
-        break;
-      default:
-        break;
+    if (operation == "~") {
+      made.turns = a.turns;
+      made.is_plain = are_plain;
+    } else if (operation == "+" || operation == "-") {
+      made.turns = a.turns + b.turns;
+      made.is_plain = are_plain;
+    } else if (operation == "*") {
+      if (a.is_constant) made.turns = of_a * b.turns;
+      if (b.is_constant) made.turns = a.turns * of_b;
+      made.is_plain = are_plain && (a.is_constant || b.is_constant);
+    } else if (operation == "/") {
+      if (b.is_constant) made.turns = a.turns / of_b;
+      made.is_plain = are_plain && b.is_constant;
+    } else if (operation == "sin" || operation == "cos") {
+      made.is_plain = are_plain && a.turns <= quickest_sine && !a.has_time;
     }
     return made;
   }
@@ -332,7 +252,9 @@ class ExpressionReader {
   }
   [[noreturn]] void reject_name(const std::string& word) const {
     std::vector<std::string_view> known(names_.begin(), names_.end());
-    for (const Function& function : functions) known.push_back(function.name);
+    for (const Operation& one : operations()) {
+      if (one.is_function()) known.push_back(one.name);
+    }
     throw ExpressionError("an expression in " + listed(names_),
                           "the unknown name " + quoted(word) + did_you_mean(nearest_name(word, known)));
   }
@@ -362,15 +284,6 @@ class ExpressionReader {
 };
 
 }  // namespace
-
-std::string_view function_name(Operation operation) {
-  const auto found = std::ranges::find(functions, operation, &Function::operation);
-  return found == functions.end() ? std::string_view() : found->name;
-}
-
-bool is_function(std::string_view name) {
-  return std::ranges::find(functions, name, &Function::name) != functions.end();
-}
 
 ExpressionProgram read_expression(const std::string& text, std::span<const std::string> names) {
   return ExpressionReader(text, names).read();

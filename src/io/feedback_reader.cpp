@@ -1,7 +1,6 @@
 #include "io/feedback_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <mutex>
 #include <pendula/numeric/number_text.hpp>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "io/expression.hpp"
+#include "io/expression_operations.hpp"
 #include "io/expression_reader.hpp"
 #include "io/nearest_name.hpp"
 #include "io/row_function.hpp"
@@ -68,79 +68,17 @@ std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
   };
 }
 
-/// Functions that models may have, too.
-bool is_function_of_models(Operation operation, bool has_pieces) {
-  using enum Operation;
-  constexpr std::array smooth = {sine,
-                                 cosine,
-                                 tangent,
-                                 arcsine,
-                                 arccosine,
-                                 arctangent,
-                                 hyperbolic_sine,
-                                 hyperbolic_cosine,
-                                 hyperbolic_tangent,
-                                 exponential,
-                                 logarithm,
-                                 root};
-  constexpr std::array of_pieces = {size, sign, least, largest};
-  return std::ranges::find(smooth, operation) != smooth.end() ||
-         (has_pieces && std::ranges::find(of_pieces, operation) != of_pieces.end());
-}
-
-std::string_view sign_of(Operation operation, bool has_pieces) {
-  if (has_pieces) {
-    switch (operation) {
-      case Operation::less:
-        return "<";
-      case Operation::greater:
-        return ">";
-      case Operation::at_most:
-        return "<=";
-      case Operation::at_least:
-        return ">=";
-      case Operation::both:
-        return "&&";
-      case Operation::either:
-        return "||";
-      case Operation::choose:
-        return "?:";
-      default:
-        break;
-    }
-  }
-  switch (operation) {
-    case Operation::sum:
-      return "+";
-    case Operation::difference:
-      return "-";
-    case Operation::product:
-      return "*";
-    case Operation::ratio:
-      return "/";
-    case Operation::power:
-      return "^";
-    case Operation::negative:
-      return "~";
-    default:
-      return "";
-  }
-}
-
 /// A program as the generator reads it: words, operands before what is done with them. `x 9 * ~` is -(x * 9).
 std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names,
                          const FeedbackPlan& plan) {
-  std::vector<std::string> words;
+  using enum Operation::Of;
+  std::string text;
   for (const ExpressionProgram::Node& node : program.nodes) {
-    const std::string_view sign = sign_of(node.operation, plan.is_drive);
-    if (node.operation == Operation::constant) {
-      words.push_back(shortest(node.number));
-    } else if (node.operation == Operation::column) {
-      words.push_back(names[program.columns[node.a]]);
-    } else if (is_function_of_models(node.operation, plan.is_drive)) {
-      words.push_back(std::string(function_name(node.operation)) + "()");
-    } else if (!sign.empty()) {
-      words.emplace_back(sign);
+    if (!text.empty()) text += ' ';
+    if (!node.operation) {
+      text += node.is_column ? names[program.columns[node.a]] : shortest(node.number);
+    } else if (node.operation->of <= (plan.is_drive ? drives : models)) {
+      text.append(node.operation->name).append(node.operation->is_function() ? "()" : "");
     } else if (plan.is_drive) {
       throw ExpressionError(
           "functions that are smooth between pieces in drives (no ==, !=, rint, floor, fmod, atan2, log2, log10; "
@@ -153,8 +91,6 @@ std::string postfix_text(const ExpressionProgram& program, const std::vector<std
                             std::string("another one") + (is_sampled ? "" : "; sample = ... beside it allows all"));
     }
   }
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
   return text;
 }
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "io/expression.hpp"
-#include "io/expression_reader.hpp"
+#include "io/expression_operations.hpp"
 
 namespace pendula::io {
 namespace {
@@ -26,7 +26,7 @@ bool is_name(std::string_view text) {
 bool is_taken(const std::string& name, const Subject& subject) {
   const std::vector<std::string> columns = subject.columns();
   const std::vector<Quantity> quantities = subject.quantities();
-  return name == "pi" || is_function(name) || std::ranges::find(columns, name) != columns.end() ||
+  return name == "pi" || operation_named(name) != nullptr || std::ranges::find(columns, name) != columns.end() ||
          std::ranges::find(quantities, name, &Quantity::name) != quantities.end();
 }
 

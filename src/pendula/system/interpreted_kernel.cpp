@@ -6,6 +6,7 @@
 #include <optional>
 #include <pendula/system/interpreted_kernel.hpp>
 #include <pendula/system/kernel_text.hpp>
+#include <pendula/system/program_operations.hpp>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -118,38 +119,7 @@ constexpr std::array<Signature, Program::many + Program::plain + Program::series
        {"operands", Rows::operands}}}},
 }};
 
-struct OperationName {
-  std::string_view name;
-  Operation operation;
-  int registers;  ///< results and operands
-};
-
-/// All operations but factor and solve, which have any number of operands.
-constexpr std::array<OperationName, 21> operations = {{
-    {"add", Operation::add, 3},
-    {"subtract", Operation::subtract, 3},
-    {"multiply", Operation::multiply, 3},
-    {"multiply_add", Operation::multiply_add, 4},
-    {"multiply_subtract", Operation::multiply_subtract, 4},
-    {"subtract_product", Operation::subtract_product, 4},
-    {"negative", Operation::negative, 2},
-    {"inverse", Operation::inverse, 2},
-    {"sincos", Operation::sincos, 3},
-    {"tan", Operation::tan, 2},
-    {"asin", Operation::asin, 2},
-    {"acos", Operation::acos, 2},
-    {"atan", Operation::atan, 2},
-    {"sinh", Operation::sinh, 2},
-    {"cosh", Operation::cosh, 2},
-    {"tanh", Operation::tanh, 2},
-    {"exp", Operation::exp, 2},
-    {"log", Operation::log, 2},
-    {"sqrt", Operation::sqrt, 2},
-    {"cbrt", Operation::cbrt, 2},
-    {"pow", Operation::pow, 3},
-}};
-
-constexpr std::uint16_t most_of_a_kind = 65535;
+constexpr int longest_run = 65535;
 constexpr int most_registers = 65535, most_unknowns = 361;  // whose lower triangle fits into the registers
 
 /// An array of a function: its name and its number of rows.
@@ -184,8 +154,6 @@ class OwnedFunction {
         missing[found.array][found.row] = false;
         found.array = static_cast<std::uint16_t>(found.array + taken.size());
         writes_.push_back(found);
-      } else if (text.kind() == "factor" || text.kind() == "solve") {
-        take_system(text);
       } else {
         take_operation(text);
       }
@@ -194,7 +162,7 @@ class OwnedFunction {
     for (const auto& rows : missing) {
       if (std::ranges::find(rows, true) != rows.end()) text.fail("a write to every row of every output", text.kind());
     }
-    code_.push_back(static_cast<std::uint16_t>(Operation::end));
+    code_.push_back(end_of_code);
   }
 
   /// Valid as long as this object.
@@ -216,24 +184,22 @@ class OwnedFunction {
   }
 
   void take_operation(KernelText& text) {
-    const auto* known = std::ranges::find(operations, text.kind(), &OperationName::name);
-    if (known == operations.end()) text.fail("an operation", text.kind());
-    // The code of an operation is followed by the number of consecutive operations of that kind.
-    const auto operation = static_cast<std::uint16_t>(known->operation);
-    if (!run_ || code_[*run_] != operation || code_[*run_ + 1] == most_of_a_kind) {
+    const auto* known = std::ranges::find(operation_names, text.kind(), &OperationName::name);
+    if (known == operation_names.end()) text.fail("an operation", text.kind());
+    const auto operation = static_cast<std::uint16_t>(known - operation_names.begin());
+    if (known->registers == 0) return take_system(text, operation);
+    if (!run_ || code_[*run_] != operation || code_[*run_ + 1] > longest_run - known->registers) {
       run_ = code_.size();
       code_.insert(code_.end(), {operation, 0});
     }
-    ++code_[*run_ + 1];
-    for (int k = 0; k < known->registers; ++k) code_.push_back(place(text));
+    for (int k = 0; k < known->registers; ++k, ++code_[*run_ + 1]) code_.push_back(place(text));
   }
 
-  void take_system(KernelText& text) {
+  void take_system(KernelText& text, std::uint16_t operation) {
     const bool factors = text.kind() == "factor";
     const int size = text.whole(1, most_unknowns), entries = size * (size + 1) / 2;
     run_.reset();
-    code_.push_back(static_cast<std::uint16_t>(factors ? Operation::factor : Operation::solve));
-    code_.push_back(static_cast<std::uint16_t>(size));
+    code_.insert(code_.end(), {operation, static_cast<std::uint16_t>(size)});
     code_.push_back(place(text, factors ? entries : size));
     if (!factors) code_.push_back(place(text, entries));
     for (int k = 0; k < (factors ? entries : size); ++k) code_.push_back(place(text));

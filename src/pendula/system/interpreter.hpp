@@ -6,13 +6,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <pendula/numeric/dual.hpp>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/numbers_of_states.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/stage_product.hpp>
 #include <pendula/system/program.hpp>
+#include <pendula/system/program_operations.hpp>
 #include <pendula/system/series_sums.hpp>
+#include <string_view>
+#include <utility>
 
 namespace pendula {
 
@@ -61,102 +65,49 @@ class Interpreter : NumbersOfStates<W> {
     }
   }
 
+  // --- Operations ---
+
+  /// Executes a run of operations of one kind; returns where the next run begins, or none at the end.
+  using Run = const std::uint16_t* (*)(const std::uint16_t* code, double* registers);
+
   static void carry_out(const std::uint16_t* code, double* registers) {
-    using std::acos, std::asin, std::atan, std::cbrt, std::cosh, std::exp, std::log, std::pow, std::sinh, std::sqrt,
-        std::tan, std::tanh;
-    const auto at = [&](int k) { return load(registers + code[k] * width); };
-    // Executes a run of operations of one kind with `places` registers each, the first of which is the result.
-    const auto each = [&](int places, auto result) {
-      for (int left = (code += 2)[-1]; left > 0; --left, code += places) store(result(), registers + code[0] * width);
-    };
-    for (;;) {
-      switch (static_cast<Operation>(*code)) {
-        case Operation::end:
-          return;
-        case Operation::add:
-          each(3, [&] { return at(1) + at(2); });
-          break;
-        case Operation::subtract:
-          each(3, [&] { return at(1) - at(2); });
-          break;
-        case Operation::multiply:
-          each(3, [&] { return at(1) * at(2); });
-          break;
-        case Operation::multiply_add:
-          each(4, [&] { return sum_of_product(at(1), at(2), at(3)); });
-          break;
-        case Operation::multiply_subtract:
-          each(4, [&] { return sum_of_product(at(1), at(2), -at(3)); });
-          break;
-        case Operation::subtract_product:
-          each(4, [&] { return sum_of_product(-at(1), at(2), at(3)); });
-          break;
-        case Operation::negative:
-          each(2, [&] { return -at(1); });
-          break;
-        case Operation::inverse:
-          each(2, [&] { return L(1.0) / at(1); });
-          break;
-        case Operation::sincos:
-          each(3, [&] {
-            L sine, cosine;
-            sincos(at(2), sine, cosine);
-            store(cosine, registers + code[1] * width);
-            return sine;
-          });
-          break;
-        case Operation::tan:
-          each(2, [&] { return tan(at(1)); });
-          break;
-        case Operation::asin:
-          each(2, [&] { return asin(at(1)); });
-          break;
-        case Operation::acos:
-          each(2, [&] { return acos(at(1)); });
-          break;
-        case Operation::atan:
-          each(2, [&] { return atan(at(1)); });
-          break;
-        case Operation::sinh:
-          each(2, [&] { return sinh(at(1)); });
-          break;
-        case Operation::cosh:
-          each(2, [&] { return cosh(at(1)); });
-          break;
-        case Operation::tanh:
-          each(2, [&] { return tanh(at(1)); });
-          break;
-        case Operation::exp:
-          each(2, [&] { return exp(at(1)); });
-          break;
-        case Operation::log:
-          each(2, [&] { return log(at(1)); });
-          break;
-        case Operation::sqrt:
-          each(2, [&] { return sqrt(at(1)); });
-          break;
-        case Operation::cbrt:
-          each(2, [&] { return cbrt(at(1)); });
-          break;
-        case Operation::pow:
-          each(3, [&] { return pow(at(1), at(2)); });
-          break;
-        case Operation::factor:
-          code = factor(code, registers);
-          break;
-        case Operation::solve:
-          code = solve(code, registers);
-          break;
-      }
-    }
+    static constexpr std::array runs = all_runs();
+    while (code) code = runs[*code](code, registers);
   }
 
-  static L sum_of_product(const L& x, const L& y, const L& z) {
-    if constexpr (W == 1) {
-      return detail::fused(x, y, z);
-    } else {
-      return fma(x, y, z);
+  /// In the order of operation_names.
+  static constexpr std::array<Run, operation_names.size()> all_runs() {
+    std::array<Run, operation_names.size()> runs{};
+    Run* next = runs.data();
+    program_operations([&]<class Function>(std::string_view, Function) {
+      *next++ = [](const std::uint16_t* code, double* registers) {
+        return run_of<Function>(code, registers, std::make_index_sequence<detail::operands_of<Function>>());
+      };
+    });
+    const Run end = [](const std::uint16_t*, double*) -> const std::uint16_t* { return nullptr; };
+    for (const Run run : {Run(&sincos_of), Run(&factor), Run(&solve), end}) *next++ = run;
+    return runs;
+  }
+
+  template <class Function, std::size_t... k>
+  static const std::uint16_t* run_of(const std::uint16_t* code, double* registers, std::index_sequence<k...>) {
+    const std::uint16_t* const next = code + 2 + code[1];
+    code += 2;
+    do {
+      store(Function()(load(registers + code[1 + k] * width)...), registers + code[0] * width);
+    } while ((code += 1 + sizeof...(k)) != next);
+    return next;
+  }
+
+  static const std::uint16_t* sincos_of(const std::uint16_t* code, double* registers) {
+    const std::uint16_t* const next = code + 2 + code[1];
+    for (code += 2; code != next; code += 3) {
+      L sine, cosine;
+      sincos(load(registers + code[2] * width), sine, cosine);
+      store(sine, registers + code[0] * width);
+      store(cosine, registers + code[1] * width);
     }
+    return next;
   }
 
   // --- Linear systems ---
@@ -181,7 +132,7 @@ class Interpreter : NumbersOfStates<W> {
       for (std::size_t i = size - 1; i > k; --i) {
         const L l = load(a(i, k)) * inverse;
         for (std::size_t j = k + 1; j <= i; ++j) {
-          store(sum_of_product(-l, load(a(j, k)), load(a(i, j))), a(i, j));
+          store(sum_of_product<L>(-l, load(a(j, k)), load(a(i, j))), a(i, j));
         }
         store(l, a(i, k));
       }
@@ -196,12 +147,12 @@ class Interpreter : NumbersOfStates<W> {
     code += 4;
     for (std::size_t i = 0; i < size; ++i) {
       L sum = load(registers + *code++ * width);
-      for (std::size_t k = 0; k < i; ++k) sum = sum_of_product(-load(a(i, k)), load(x + k * width), sum);
+      for (std::size_t k = 0; k < i; ++k) sum = sum_of_product<L>(-load(a(i, k)), load(x + k * width), sum);
       store(sum, x + i * width);
     }
     for (std::size_t k = size; k-- > 0;) {
       L sum = load(x + k * width) * load(a(k, k));
-      for (std::size_t i = k + 1; i < size; ++i) sum = sum_of_product(-load(a(i, k)), load(x + i * width), sum);
+      for (std::size_t i = k + 1; i < size; ++i) sum = sum_of_product<L>(-load(a(i, k)), load(x + i * width), sum);
       store(sum, x + k * width);
     }
     return code;

@@ -8,36 +8,6 @@
 
 namespace pendula {
 
-/// Operations of a program. In the code, the operation is followed by the number of consecutive operations of that
-/// kind, then for each its result and its operands x, y, z, all of them registers.
-enum class Operation : std::uint16_t {
-  end,
-  add,
-  subtract,
-  multiply,
-  multiply_add,       ///< x y + z
-  multiply_subtract,  ///< x y - z
-  subtract_product,   ///< z - x y
-  negative,
-  inverse,
-  sincos,  ///< two results
-  tan,
-  asin,
-  acos,
-  atan,
-  sinh,
-  cosh,
-  tanh,
-  exp,
-  log,
-  sqrt,
-  cbrt,
-  pow,
-  // A linear system; the operation is followed by its size.
-  factor,  ///< operands: first register of the result, then the lower triangle row by row; result: L and 1/D of L D Lᵀ
-  solve    ///< operands: first register of the solution, first of L and 1/D, then the right-hand side
-};
-
 /// Copies a row of an array to a register before a function begins, or back when it ends.
 struct ProgramMove {
   std::uint16_t place;  ///< the register
@@ -55,7 +25,7 @@ struct ProgramFunction {
   std::size_t registers = 0;
   std::span<const ProgramMove> reads, writes;
   std::span<const ProgramNumber> numbers;
-  std::span<const std::uint16_t> code;  ///< ends with Operation::end
+  std::span<const std::uint16_t> code;  ///< operations, then end_of_code: see operation_names
 };
 
 /// A whole kernel: the context of its SystemTable. Whoever makes one must ensure that operations stay within the
