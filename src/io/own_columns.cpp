@@ -17,7 +17,7 @@ namespace pendula::io {
 namespace {
 
 /// Whether a text can be a name in an expression.
-bool is_name(std::string_view text) {
+bool is_expression_name(std::string_view text) {
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   const auto is_inside = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; };
   return !text.empty() && is_letter(text.front()) && std::ranges::all_of(text, is_inside);
@@ -57,7 +57,7 @@ std::vector<ColumnPlan> read_columns(const Section& output) {
   if (columns->table() == nullptr) columns->fail("a table of expressions by name, { height = \"1 - cos(theta_1)\" }");
   for (const auto& [key, node] : *columns->table()) {
     const Entry value = columns->member(key.str());
-    if (!is_name(key.str())) {
+    if (!is_expression_name(key.str())) {
       throw InputError(value.where(), columns->name(), "names of letters, digits and _ that begin with a letter",
                        toml_string(key.str()));
     }
