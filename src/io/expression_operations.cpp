@@ -90,6 +90,10 @@ constexpr Operation jump(std::string_view name, Operation::Of of, Function) {
   return {name, operands_of<Function>, of, true, {&called<f, double>, &called<of_bounds, Reach>, &without_slope<f>}};
 }
 
+// Of functions that are there for other numbers, too, those of bounds.
+constexpr Reach (*floor_of_bounds)(const Reach&) = &floor;
+constexpr Reach (*rint_of_bounds)(const Reach&) = &rint;
+
 constexpr auto all_operations() {
   using std::sin, std::cos, std::atan2, std::log, std::log2, std::log10, std::fmod, std::abs, std::min, std::max;
   using enum Operation::Of;
@@ -106,8 +110,8 @@ constexpr auto all_operations() {
   add(row("log10", rows, [](const auto& x) { return log10(x); }));
   add(row("abs", drives, [](const auto& x) { return abs(x); }));
   add(jump<sign>("sign", drives, [](double x) { return (x > 0) - (x < 0); }));
-  add(jump<rint>("rint", rows, [](double x) { return std::floor(x + 0.5); }));
-  add(jump<floor>("floor", rows, [](double x) { return std::floor(x); }));
+  add(jump<rint_of_bounds>("rint", rows, [](double x) { return std::floor(x + 0.5); }));
+  add(jump<floor_of_bounds>("floor", rows, [](double x) { return std::floor(x); }));
   add(row("fmod", rows, [](const auto& x, const auto& y) { return fmod(x, y); }));
   add(row("min", drives, [](const auto& x, const auto& y) { return min(x, y); }));
   add(row("max", drives, [](const auto& x, const auto& y) { return max(x, y); }));
