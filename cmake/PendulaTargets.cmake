@@ -12,7 +12,7 @@ endif()
 option(PENDULA_NATIVE "Compile tests and benchmarks for this machine's processor (-march=native)"
        ${_pendula_native_default})
 option(PENDULA_WARNINGS_AS_ERRORS "Treat warnings in pendula's own sources as errors" ${PROJECT_IS_TOP_LEVEL})
-option(PENDULA_JOIN_SOURCES "Compile the program's sources ten at once: a whole build is quicker, one after a small change slower" ON)
+option(PENDULA_JOIN_SOURCES "compile the program's sources many at once: a whole build is quicker, one after a small change slower" ON)
 option(PENDULA_CHECKED "Sanitizers (address, undefined), library assertions, new Eigen storage filled with NaN" OFF)
 
 if(PROJECT_IS_TOP_LEVEL)
@@ -77,7 +77,7 @@ function(pendula_own_target target)
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:${arg_LEVEL}>)
   endif()
   if(arg_JOINED AND PENDULA_JOIN_SOURCES)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 15)
     # There a name of one source may hide one of another; tests/lint.cmake looks at each source alone.
     target_compile_options(${target} PRIVATE -Wno-shadow)
   endif()
