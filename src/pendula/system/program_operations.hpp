@@ -27,8 +27,8 @@ struct OperationName {
   int registers = 0;  ///< results, then operands; 0 for linear systems, which have any number
 };
 
-/// All operations, by their codes. In the code, an operation is followed by how many registers the consecutive operations
-/// of its kind have together, then for each its result and its operands.
+/// All operations, by their codes. In the code, an operation is followed by how many registers the consecutive
+/// operations of its kind have together, then for each its result and its operands.
 inline constexpr std::array operation_names = [] {
   std::array<OperationName, 24> names;
   auto* next = names.data();
