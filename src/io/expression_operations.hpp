@@ -25,7 +25,7 @@ struct Operation {
   Number operator()(const Number& a, const Number& b, const Number& c) const {
     return std::get<Function<Number>>(functions)(a, b, c);
   }
-  bool is_function() const { return name.front() >= 'a'; }
+  bool is_function() const { return name.front() >= 'a' && name.front() <= 'z'; }
 };
 
 std::span<const Operation> operations();
