@@ -4,11 +4,12 @@ include(ProcessorCount)
 ProcessorCount(jobs)
 file(READ "${BUILD}/compile_commands.json" database)
 # Sources that are compiled together are looked at together: their headers are read once.
-file(GLOB files "${BUILD}/src/CMakeFiles/*.dir/Unity/*.cxx")
+file(GLOB joined "${BUILD}/src/CMakeFiles/*.dir/Unity/*.cxx")
 file(GLOB_RECURSE sources "${SOURCE}/src/*.cpp")
 # What is compiled for several spaces and numbers of stages is the same lines: once.
 list(FILTER sources EXCLUDE REGEX "/library/spatial_")
-foreach(source IN LISTS sources)
+set(files "")
+foreach(source IN LISTS joined sources)  # earlier builds may have left some that are no longer compiled
   string(FIND "${database}" "\"file\": \"${source}\"" place)
   if(place GREATER -1)
     list(APPEND files "${source}")
