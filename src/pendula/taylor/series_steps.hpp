@@ -208,7 +208,7 @@ class SeriesSteps {
     if (may_be_narrow) find_arguments(time + h, 2);
     const Mask is_far = found & goes_far();
     for (int k = 1; k < looks && any(found & is_far); ++k) {
-      found = found & (!is_far | solves(time, h, L(static_cast<double>(k) / looks)));
+      found = found & (solves(time, h, L(static_cast<double>(k) / looks)) | !is_far);
     }
     if (!may_be_narrow) return found;
     see(L(0.5) * tau);
