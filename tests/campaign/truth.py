@@ -251,6 +251,9 @@ class ModelSubject(Subject):
         largest: dict[str, float] = {unit: 1.0 for unit in units if unit == "rad"}
         for name, unit in zip(self.model.names, units + rates, strict=True):
             largest[unit] = max(largest.get(unit, 1e-300), np.abs(columns[name]).max())
+        # As docs/reference/scenario.md says of run.accuracy.
+        for unit, rate in zip(units, rates, strict=True):
+            largest[rate] = max(largest[rate], 0.01 * largest[unit] / max(columns["t"].max(), 1e-300))
         return np.array([largest[unit] for unit in units + rates], dtype=Real)
 
 
