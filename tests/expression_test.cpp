@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <functional>
 #include <numbers>
 #include <string>
 #include <vector>
 
+#include "io/expression_operations.hpp"
 #include "support/random_chain.hpp"
 
 namespace pendula::test {
@@ -174,6 +176,14 @@ TEST(Expression, SaysWhatIsWrong) {
   EXPECT_EQ(got(std::string(99, '(') + "x" + std::string(99, ')')), "nothing wrong");
   EXPECT_TRUE(got(std::string(9000, '-') + "x").ends_with(", which is nested too deeply"));
   EXPECT_TRUE(got(std::string(20'000, ' ') + "x").ends_with(", which is too long"));
+}
+
+// The generator is told of functions and of signs in two ways: ~ and || stand behind z.
+TEST(ExpressionOperations, AreFunctionsIfTheirNamesAreWords) {
+  for (const io::Operation& operation : io::operations()) {
+    const bool is_word = std::isalpha(static_cast<unsigned char>(operation.name.front())) != 0;
+    EXPECT_EQ(operation.is_function(), is_word) << operation.name;
+  }
 }
 
 }  // namespace

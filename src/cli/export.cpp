@@ -155,9 +155,10 @@ double tolerance_of(const io::RunPlan& plan) {
 Words library_words(const io::Toolchain& toolchain) {
   std::error_code unknown;
   if (!std::filesystem::is_regular_file(toolchain.library, unknown)) {
-    throw io::InputError(
-        "export: an FMU takes pendula's static library, " +
-        (toolchain.library.empty() ? "which this build has none of" : "and there is no " + toolchain.library.string()));
+    throw io::InputError("export: expected pendula's static library, which goes into an FMU, got " +
+                         (toolchain.library.empty() ? "none with this program: a build of the repository has it"
+                                                    : "no " + toolchain.library.string()) +
+                         "; --as c needs none");
   }
   Words words{"--library=" + toolchain.library.string(), "--headers=" + toolchain.headers.string()};
   for (const std::string& flag : io::flags_of_least_set()) words.push_back("--flag=" + flag);

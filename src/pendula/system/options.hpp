@@ -89,7 +89,8 @@ constexpr bool is_adaptive(const RunOptions& options) {
   return is_adaptive(options.method) || (!is_explicit(options.method) && options.step == 0);
 }
 
-/// The number of stages that needs the fewest evaluations for a tolerance.
+/// The number of stages that takes the least time for a tolerance. Six take 0.95 to 1.8 times what eight take from 1e-5
+/// down (medians, AVX-512: planar chain of 2 links, spatial of 8, swinging Atwood machine).
 constexpr int stages_for(Method method, double tolerance) {
   if (method == Method::radau) return 3;
   return tolerance > 1e-5 ? 4 : 8;
