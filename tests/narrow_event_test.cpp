@@ -279,7 +279,7 @@ class EventsWithinBounds : public ::testing::TestWithParam<Bounding> {
     while (integrator->time() < setup.duration / 4) {
       ASSERT_TRUE(integrator->step(is_adaptive(setup.options) ? 1 : setup.options.step));
       const double h = integrator->time() - begin.time;
-      ASSERT_TRUE(integrator->bound_excursions(farthest.q.data(), farthest.v.data()));
+      ASSERT_TRUE(integrator->bound_excursions(farthest));
       for (const double share : {0.05, 0.3, 0.5, 0.8, 0.97, 1.0}) {
         ASSERT_TRUE(integrator->at_full_order(begin.time + share * h, there));
         for (const auto& [at, from, bound] :

@@ -520,12 +520,15 @@ TEST(Run, SaysWhichAccuracyCannotBeReached) {
 }
 
 /// A motion along a line that hurries once, for a step of 1/1000.
-struct HurryingMover {
+struct HurryingMover : StepView {
+  using StepView::at;
   int steps = 0;
-  double time() const { return steps; }
-  Motion state() const { return {time(), Eigen::VectorXd::Constant(1, steps + (steps >= 777 ? 500 : 0)), {}}; }
-  bool at_full_order(double /*time*/, Motion& /*there*/) const { return false; }
-  Motion at(double time) const { return {time, Eigen::VectorXd::Zero(1), {}}; }
+  double time() const override { return steps; }
+  void read_state(Motion& motion) const override {
+    motion = {time(), Eigen::VectorXd::Constant(1, steps + (steps >= 777 ? 500 : 0)), {}};
+  }
+  Outcome at_full_order(double /*time*/, Motion& /*there*/) override { return {.status = Status::not_converged}; }
+  void at(double time, Motion& motion) override { motion = {time, Eigen::VectorXd::Zero(1), {}}; }
 };
 
 // Of thousand steps every eighth is kept besides.

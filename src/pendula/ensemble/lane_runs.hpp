@@ -17,6 +17,7 @@
 #include <pendula/run/library.hpp>
 #include <pendula/run/run_record.hpp>
 #include <pendula/run/run_report.hpp>
+#include <pendula/run/step_view.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/run/track.hpp>
 #include <pendula/system/system_table.hpp>
@@ -193,27 +194,33 @@ class LaneRuns : private MemberWatch {
 
   // --- After each step ---
 
-  /// The last step of the member in a lane, as an EventWatch looks into it.
-  class Step {
+  /// The last step of the member in a lane.
+  class LaneStep : public StepView {
    public:
-    Step(MemberSteps& steps, int lane, Eigen::Index coordinates)
+    LaneStep(MemberSteps& steps, int lane, Eigen::Index coordinates)
         : steps_(steps), lane_(lane), coordinates_(coordinates) {}
 
-    void state(Motion& motion) const {
-      prepare(steps_.end(lane_), motion);
+    double time() const override { return steps_.end(lane_); }
+    void read_state(Motion& motion) const override {
+      prepare(time(), motion);
       steps_.state(lane_, motion.q.data(), motion.v.data());
     }
-    void at(double share, double time, Motion& motion) const {
+    void at(double time, Motion& motion) override { at(share(time), time, motion); }
+    void at(double share, double time, Motion& motion) override {
       prepare(time, motion);
       steps_.at(lane_, share, motion.q.data(), motion.v.data());
     }
-    bool at_full_order(const Motion& begin, double time, Motion& motion) {
+    Outcome at_full_order(double time, Motion& motion) override {
       prepare(time, motion);
-      const double share = (time - begin.time) / (steps_.end(lane_) - begin.time);
-      return steps_.at_full_order(lane_, share, motion.q.data(), motion.v.data());
+      const bool found = steps_.at_full_order(lane_, share(time), motion.q.data(), motion.v.data());
+      return {.status = found ? Status::ok : Status::not_converged};
     }
 
    private:
+    double share(double time) const {
+      const double begin = steps_.begin(lane_);
+      return (time - begin) / (steps_.end(lane_) - begin);
+    }
     void prepare(double time, Motion& motion) const {
       motion.time = time;
       motion.q.resize(coordinates_);
@@ -223,31 +230,6 @@ class LaneRuns : private MemberWatch {
     MemberSteps& steps_;
     int lane_;
     Eigen::Index coordinates_;
-  };
-
-  /// The same for a Track, by dense output alone.
-  class TrackedStep {
-   public:
-    TrackedStep(MemberSteps& steps, int lane, const Step& step) : steps_(steps), lane_(lane), step_(step) {}
-
-    double time() const { return steps_.end(lane_); }
-    Motion state() const {
-      Motion motion;
-      step_.state(motion);
-      return motion;
-    }
-    bool at_full_order(double /*time*/, Motion& /*motion*/) const { return false; }
-    Motion at(double time) const {
-      Motion motion;
-      const double begin = steps_.begin(lane_);
-      step_.at((time - begin) / (steps_.end(lane_) - begin), time, motion);
-      return motion;
-    }
-
-   private:
-    MemberSteps& steps_;
-    int lane_;
-    const Step& step_;
   };
 
   bool wants_steps() const override { return wants_steps_; }
@@ -270,7 +252,7 @@ class LaneRuns : private MemberWatch {
   void look_into(MemberSteps& steps, int lane) {
     const std::size_t k = steps.member(lane);
     const RunSetup& setup = *setups_[k];
-    Step step(steps, lane, setup.start.q.size());
+    LaneStep step(steps, lane, setup.start.q.size());
     std::optional<Motion> end;
     if (!setup.events.empty()) {
       for (const Occurrence& happened : watches_[k].after_step(step)) {
@@ -282,9 +264,7 @@ class LaneRuns : private MemberWatch {
         steps.finish(lane);
       }
     }
-    if (tracks_[k] == nullptr) return;
-    TrackedStep tracked(steps, lane, step);
-    tracks_[k]->follow(tracked, end);
+    if (tracks_[k] != nullptr) tracks_[k]->follow(step, end);
   }
 
   std::span<const RunSetup* const> setups_;

@@ -28,7 +28,7 @@ inline bool is_estimated(const RunSetup& setup) {
 
 /// A track for a run in lanes: of many at once, so at most 256 kB.
 inline Track lane_track() {
-  return Track(Track::apart / 2, std::size_t{1} << 15);
+  return Track(Track::apart / 2, std::size_t{1} << 15).by_dense_output();
 }
 
 /// A run in lanes that gets a second look.

@@ -1,21 +1,19 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <functional>
-#include <limits>
 #include <pendula/run/event.hpp>
-#include <pendula/run/event_location.hpp>
-#include <pendula/run/formula_search.hpp>
-#include <pendula/run/integrator.hpp>
+#include <pendula/run/step_view.hpp>
+#include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <span>
 #include <utility>
 #include <vector>
 
 namespace pendula {
+
+struct SignChange;
 
 namespace detail {
 
@@ -24,27 +22,6 @@ inline int dense_output_degree(const RunOptions& options) {
   if (options.method == Method::taylor) return 8;
   return is_explicit(options.method) ? 3 : options.stages;
 }
-
-/// The last step of an integrator as the event search sees it; `share` is the fraction of the step that is done, 0 to
-/// 1, which `time` corresponds to.
-class LastStep {
- public:
-  explicit LastStep(Integrator& integrator) : integrator_(integrator) {}
-
-  void state(Motion& motion) const { integrator_.read_state(motion); }
-  void at(double /*share*/, double time, Motion& motion) { integrator_.at(time, motion); }
-  /// Bounds of how far coordinates and rates get from where the step began; whether they are known.
-  bool bound_excursions(Motion& farthest) const {
-    return integrator_.bound_excursions(farthest.q.data(), farthest.v.data());
-  }
-  /// `begin` is the state at the start of the step.
-  bool at_full_order(const Motion& /*begin*/, double time, Motion& motion) {
-    return bool(integrator_.at_full_order(time, motion));
-  }
-
- private:
-  Integrator& integrator_;
-};
 
 /// Cached states of a step: those that the search for every event begins with, and the last one; and bounds of all.
 struct StepViews {
@@ -64,144 +41,7 @@ struct StepViews {
   }
 };
 
-/// States within a step by the fraction of it that is done. `Step` has the interface of LastStep.
-template <class Step>
-class StepStates {
- public:
-  StepStates(Step& step, const Motion& begin, const Motion& end, StepViews& views, EventCost& cost)
-      : step_(step), begin_(begin), end_(end), views_(views), cost_(cost) {
-    views.forget();
-  }
-
-  double time(double u) const { return u == 1 ? end_.time : begin_.time + u * (end_.time - begin_.time); }
-  double length() const { return end_.time - begin_.time; }
-
-  /// Smallest meaningful fraction of the step: a few roundings of the time.
-  double resolution() const {
-    const double latest = std::max(std::abs(begin_.time), std::abs(end_.time));
-    return 2 * std::numeric_limits<double>::epsilon() * (latest / length() + 1);
-  }
-
-  /// Bounds of all states of the step; null where they are not known.
-  const MotionRange* range() {
-    if constexpr (requires(Motion & motion) { step_.bound_excursions(motion); }) {
-      if (views_.range_known == StepViews::Known::not_asked) {
-        views_.range_known = find_range(views_.range) ? StepViews::Known::yes : StepViews::Known::no;
-      }
-      return views_.range_known == StepViews::Known::yes ? &views_.range : nullptr;
-    } else {
-      return nullptr;
-    }
-  }
-
-  /// By dense output.
-  const Motion& at(double u) {
-    for (StepViews::View& view : views_.kept) {
-      if (view.share == u) return view.motion;
-      if (view.share >= 0) continue;
-      view.share = u;
-      return new_state(u, view.motion);
-    }
-    return new_state(u, views_.passing);
-  }
-
-  /// At full order; by dense output if the step fails.
-  const Motion& at_full_order(double u) {
-    if (u <= 0) return begin_;
-    if (u >= 1) return end_;
-    ++cost_.looks;
-    if (!step_.at_full_order(begin_, time(u), views_.passing)) return new_state(u, views_.passing);
-    views_.passing.time = time(u);
-    return views_.passing;
-  }
-
- private:
-  bool find_range(MotionRange& range) {
-    range.least = begin_;
-    range.most = end_;
-    if (!step_.bound_excursions(range.most)) return false;
-    // The polynomial through the stages does not show what is damped between the start and the first stage.
-    range.most.v += (at(0).v - begin_.v).cwiseAbs();
-    // Rates that are computed from momenta have rounding errors as large as those of the largest rate.
-    const auto lay_around = [](const auto& begin, const auto& end, auto& least, auto& most) {
-      constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
-      most.array() += rounding * (most.array() + begin.cwiseAbs().maxCoeff());
-      least -= most;
-      most += begin;
-      return (least.array() <= end.array()).all() && (end.array() <= most.array()).all();
-    };
-    return lay_around(begin_.q, end_.q, range.least.q, range.most.q) &&
-           lay_around(begin_.v, end_.v, range.least.v, range.most.v);
-  }
-
-  const Motion& new_state(double u, Motion& motion) {
-    ++cost_.glances;
-    step_.at(u, time(u), motion);
-    return motion;
-  }
-
-  Step& step_;
-  const Motion &begin_, &end_;
-  StepViews& views_;
-  EventCost& cost_;
-};
-
-/// Values of one event function within a step.
-template <class Step>
-class StepValues {
- public:
-  StepValues(StepStates<Step>& states, const std::function<double(const Motion&)>& function)
-      : states_(states), function_(function) {}
-
-  double value(double u) { return function_(states_.at(u)); }
-  double exact_value(double u) {
-    seen_ = &states_.at_full_order(u);
-    return function_(*seen_);
-  }
-
-  /// The state of the last exact value.
-  const Motion& seen() const { return *seen_; }
-
- private:
-  StepStates<Step>& states_;
-  const std::function<double(const Motion&)>& function_;
-  const Motion* seen_ = nullptr;
-};
-
-/// Values of an event formula within a step. A formula of time alone needs no states except where something happens.
-template <class Step>
-class FormulaValues {
- public:
-  FormulaValues(StepStates<Step>& states, Formula& formula)
-      : states_(states), formula_(formula), numbers_(formula.size()) {}
-
-  std::size_t size() const { return formula_.size(); }
-  double time(double u) const { return states_.time(u); }
-  double resolution() const { return states_.resolution(); }
-  void at(double u, std::span<double> numbers) { formula_.read(states_.at(u), numbers); }
-  void at_full_order(double u, std::span<double> numbers) { formula_.read(states_.at_full_order(u), numbers); }
-  double value(double time, std::span<const double> numbers) { return formula_.value(time, numbers); }
-  Reach reach(const Reach& time, std::span<const Reach> numbers) { return formula_.reach(time, numbers); }
-
-  double exact_value(double u) {
-    place_ = u;
-    if (size() > 0) {
-      seen_ = &states_.at_full_order(u);
-      formula_.read(*seen_, numbers_);
-    }
-    return value(time(u), numbers_);
-  }
-
-  /// The state of the last exact value.
-  const Motion& seen() { return size() > 0 ? *seen_ : states_.at_full_order(place_); }
-
- private:
-  StepStates<Step>& states_;
-  Formula& formula_;
-  std::vector<double> numbers_;
-  double place_ = 0;
-  const Motion* seen_ = nullptr;
-};
+class StepStates;
 
 }  // namespace detail
 
@@ -253,25 +93,8 @@ class EventWatch {
   /// Continues at `motion`, after the numbers of a member were restored.
   void resume(const Motion& motion) { motion_ = motion; }
 
-  /// The events in the last step of `integrator`, in order of time, up to the first that ends the run.
-  std::vector<Occurrence> after_step(Integrator& integrator) { return after_step(detail::LastStep(integrator)); }
-
-  /// The events in the last step of anything with the interface of LastStep.
-  template <class Step>
-  std::vector<Occurrence> after_step(Step step) {
-    std::swap(before_, motion_);
-    step.state(motion_);
-    std::vector<Occurrence> found;
-    detail::StepStates<Step> states(step, before_, motion_, views_, cost_);
-    for (std::size_t k = 0; k < events_.size(); ++k) look_for(k, states, found);
-    const auto place = [](const Occurrence& happened) { return std::pair(happened.motion.time, happened.event); };
-    std::ranges::sort(found, {}, place);
-    const auto ends = [&](const Occurrence& happened) { return events_[happened.event].stop; };
-    const auto end = std::ranges::find_if(found, ends);
-    if (end != found.end()) found.erase(end + 1, found.end());
-    for (const Occurrence& happened : found) tallies_[happened.event].add(happened.motion.time);
-    return found;
-  }
+  /// The events in a step from where the last one ended, in order of time, up to the first that ends the run.
+  std::vector<Occurrence> after_step(StepView& step);
 
   template <class Numbers>
   void member(Numbers& numbers) {
@@ -286,97 +109,20 @@ class EventWatch {
     int sign = 0;      // the last nonzero sign; 0 if unknown
   };
 
-  static Side side_at(const Event& event, const Motion& motion) {
-    const double value = event.value(motion);
-    return {value, std::isfinite(value) ? sign_of(value) : 0};
-  }
-
-  template <class Step>
-  void look_for(std::size_t k, detail::StepStates<Step>& states, std::vector<Occurrence>& found) {
-    if (is_excluded(k, states)) return;
-    if (events_[k].formula == nullptr) {
-      detail::StepValues<Step> values(states, events_[k].value);
-      look_for(k, SignSearch(values, degree_), values, states.resolution(), found);
-    } else {
-      detail::FormulaValues<Step> values(states, *events_[k].formula);
-      look_for(k, FormulaSearch(values, degree_), values, states.resolution(), found);
-    }
-  }
-
-  /// Whether bounds of the states show that the function keeps its sign in the step.
-  template <class Step>
-  bool is_excluded(std::size_t k, detail::StepStates<Step>& states) {
-    constexpr int coarse = 2;  // polynomials of such a degree bound too little to be worth the question
-    if (!events_[k].enclose || sides_[k].sign == 0 || degree_ <= coarse) return false;
-    if (events_[k].formula != nullptr && events_[k].formula->size() == 0) return false;  // of time alone
-    const MotionRange* const range = states.range();
-    if (range == nullptr || events_[k].enclose(*range).side() != sides_[k].sign) return false;
-    sides_[k].value = std::numeric_limits<double>::quiet_NaN();
-    return true;
-  }
-
+  static Side side_at(const Event& event, const Motion& motion);
+  void look_for(std::size_t k, detail::StepStates& states, std::vector<Occurrence>& found);
+  bool is_excluded(std::size_t k, detail::StepStates& states);
   template <class Search, class Values>
-  void look_for(std::size_t k, Search search, Values& values, double resolution, std::vector<Occurrence>& found) {
-    Side before = sides_[k];
-    if (std::isnan(before.value)) before.value = events_[k].value(before_);
-    const double last = events_[k].value(motion_);
-    const int sign = std::isfinite(last) ? sign_of(last) : 0;
-    const auto search_by = [&](SeenBy by) {
-      const std::vector<SignChange> changes = search.find(before.value, last, before.sign, by);
-      return search.is_told() && locate_all(k, changes, values, resolution, found);
-    };
-    // States at full order are expensive: after one failure they are not used again for this function.
-    const bool may_tell = std::isnan(tallies_[k].not_told);
-    const bool is_found =
-        search_by(SeenBy::polynomial) || ((search.is_told() || may_tell) && search_by(SeenBy::full_order));
-    if (!is_found) locate_all(k, changes_by_ends(before.sign, sign), values, resolution, found);
-    sides_[k] = {last, sign != 0 || !std::isfinite(last) ? sign : before.sign};
-    if (!search.is_finite() || !std::isfinite(last)) note(tallies_[k].not_finite);
-    if (!is_found) note(tallies_[k].not_told);
-  }
-
-  /// Adds the occurrences at these changes; adds nothing and returns false if the motion lacks one of them.
+  void look_for(std::size_t k, Search search, Values& values, double resolution, std::vector<Occurrence>& found);
   template <class Values>
   bool locate_all(std::size_t k, const std::vector<SignChange>& changes, Values& values, double resolution,
-                  std::vector<Occurrence>& found) const {
-    const std::size_t before = found.size();
-    for (std::size_t n = 0; n < changes.size(); ++n) {
-      const SignChange& change = changes[n];
-      const bool up = change.sign > 0;
-      if (events_[k].direction != Direction::both && (events_[k].direction == Direction::up) != up) continue;
-      // Where a pair is close to a double zero, the sign of the place between may be a rounding error.
-      const double low = n == 0 ? 0 : changes[n - 1].from, high = n + 1 == changes.size() ? 1 : changes[n + 1].to;
-      if (!locate(values, change, resolution) && !locate_beside(values, change, low, high, resolution)) {
-        found.resize(before);
-        return false;
-      }
-      found.push_back({k, up, values.seen()});
-    }
-    forget_noise(before, resolution * std::abs(motion_.time - before_.time), found);
-    return true;
-  }
-
-  /// Near a root, rounded states may cross zero several times within their rounding. Two crossings in opposite
-  /// directions cancel, two in the same direction count once.
-  static void forget_noise(std::size_t first, double resolution, std::vector<Occurrence>& found) {
-    for (std::size_t n = first; n + 1 < found.size();) {
-      if (found[n + 1].motion.time - found[n].motion.time > most_noise * resolution) {
-        ++n;
-        continue;
-      }
-      const bool is_back = found[n + 1].up != found[n].up;
-      const auto at = found.begin() + static_cast<std::ptrdiff_t>(n);
-      found.erase(is_back ? at : at + 1, at + 2);
-      if (is_back && n > first) --n;
-    }
-  }
+                  std::vector<Occurrence>& found) const;
+  static void forget_noise(std::size_t first, double resolution, std::vector<Occurrence>& found);
 
   /// Keeps the first time.
   void note(double& time) const {
     if (std::isnan(time)) time = motion_.time;
   }
-
-  static constexpr double most_noise = 16;  // between instants, in resolutions; 3.4 were observed
 
   std::vector<Event> events_;
   std::vector<EventTally> tallies_;

@@ -10,6 +10,7 @@
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/no_kernel.hpp>
+#include <pendula/run/step_view.hpp>
 #include <pendula/system/member.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
@@ -33,7 +34,7 @@ struct Description {
 };
 
 /// Any method on any system, chosen at run time.
-class Integrator {
+class Integrator : public StepView {
  public:
   /// `coordinates` is the number of coordinates; `system` is what messages call the system.
   Integrator(std::unique_ptr<PlainIntegrator> integrator, Eigen::Index coordinates, std::string_view system)
@@ -51,18 +52,13 @@ class Integrator {
   /// unchanged.
   Outcome step(double h) { return integrator_->step(h); }
 
-  double time() const { return integrator_->time(); }
+  double time() const override { return integrator_->time(); }
 
   /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
   /// before, may affect the states on the way. A longer run would differ then.
   bool depends_on_end(double h) const { return integrator_->depends_on_end(h); }
 
-  Motion state() const {
-    Motion motion;
-    read_state(motion);
-    return motion;
-  }
-  void read_state(Motion& motion) const {
+  void read_state(Motion& motion) const override {
     make_room(time(), motion);
     integrator_->read_state(motion.q.data(), motion.v.data());
   }
@@ -71,25 +67,18 @@ class Integrator {
   /// copy of the state per step.
   void remember_steps(bool wanted) { integrator_->remember_steps(wanted); }
 
-  /// The state at `time` within the last step by dense output, the polynomial through its stages: cheap. Its order is
-  /// one more than the number of stages for positions, that number for rates.
-  Motion at(double time) {
-    Motion motion;
-    at(time, motion);
-    return motion;
-  }
-  void at(double time, Motion& motion) {
+  using StepView::at;
+  void at(double time, Motion& motion) override {
     make_room(time, motion);
     integrator_->at(time, motion.q.data(), motion.v.data());
   }
 
-  /// Bounds of how far coordinates and rates get, anywhere in the last step, from where they were when it began:
-  /// cheaper than by dense output. Returns whether they are known.
-  bool bound_excursions(double* q, double* v) const { return integrator_->bound_excursions(q, v); }
+  bool bound_excursions(Motion& farthest) const override {
+    return integrator_->bound_excursions(farthest.q.data(), farthest.v.data());
+  }
 
-  /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
-  /// began. The integrator is unchanged; `motion` is set if the outcome is ok.
-  Outcome at_full_order(double time, Motion& motion) {
+  /// The integrator is unchanged.
+  Outcome at_full_order(double time, Motion& motion) override {
     double work = 0;
     return at_full_order(time, motion, work);
   }

@@ -22,7 +22,10 @@ class Relay : public PlainIntegrator {
   }
   void at(double time, double* q, double* v) override { write(of(time).at(time), q, v); }
   bool bound_excursions(double* q, double* v) const override {
-    return (before_ ? *before_ : *now_).bound_excursions(q, v);
+    Motion farthest = now_->state();
+    if (!(before_ ? *before_ : *now_).bound_excursions(farthest)) return false;
+    write(farthest, q, v);
+    return true;
   }
   Outcome at_full_order(double time, double* q, double* v, double& work) override {
     const double done = &of(time) == before_.get() ? before_work_ : done_.load_work;

@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <pendula/system/motion.hpp>
+#include <pendula/system/options.hpp>
+#include <pendula/system/plain_integrator.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
@@ -207,5 +210,10 @@ inline std::vector<Sides> SwitchingSystem::all_sides() const {
   }
   return all;
 }
+
+/// Steps of a system with functions of several pieces: a step ends where one of its switching functions is zero, to
+/// rounding, and from there on a new integrator goes by other pieces. Where the motion cannot leave a zero, the next
+/// step fails.
+std::unique_ptr<PlainIntegrator> make_switching_integrator(SwitchingSystem system, const RunOptions& options);
 
 }  // namespace pendula

@@ -8,7 +8,6 @@
 #include <pendula/run/library.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/run/switching.hpp>
-#include <pendula/run/switching_integrator.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
@@ -74,7 +73,7 @@ class SystemSubject : public Subject {
       throw std::invalid_argument("solver: the chain solver is for chains, got chain; dense is for any system");
     }
     if (!switches().empty()) {
-      return std::make_unique<Integrator>(std::make_unique<SwitchingIntegrator>(switching(), options),
+      return std::make_unique<Integrator>(make_switching_integrator(switching(), options),
                                           static_cast<Eigen::Index>(info().coordinates.size()), "system");
     }
     return std::make_unique<Integrator>(library().make_system_integrator(*table_, numbers_.plain(), options, 0),

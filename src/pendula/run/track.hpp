@@ -8,6 +8,7 @@
 #include <iterator>
 #include <limits>
 #include <optional>
+#include <pendula/run/step_view.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <utility>
@@ -100,9 +101,17 @@ class Track {
     return std::move(*this);
   }
 
+  /// Looks into steps by dense output alone, and so do tracks that are made of this one: of many motions at once,
+  /// where looks at full order take too long.
+  Track&& by_dense_output() && {
+    is_dense_output_ = true;
+    return std::move(*this);
+  }
+
   /// A track at the times of `other`, which is finished.
   static Track at_times_of(const Track& other) {
     Track track(0);
+    track.is_dense_output_ = other.is_dense_output_;
     for (const Motion& state : other.states_) track.times_.push_back(state.time);
     return track;
   }
@@ -111,6 +120,7 @@ class Track {
   /// more than of two tracks.
   static Track beside(const Track& other) {
     Track track(0);
+    track.is_dense_output_ = other.is_dense_output_;
     track.common_ = other.common_;
     track.times_ = other.common_;
     track.times_.insert(track.times_.end(), other.fast_.begin(), other.fast_.end());
@@ -132,18 +142,17 @@ class Track {
     numbers_.push_back(0);
   }
 
-  /// Call after every step of `mover`, an Integrator or anything with its time, state, at_full_order and at. `end` is
-  /// the state at which the run ended within the step, if it did.
-  template <class Mover>
-  void follow(Mover& mover, const std::optional<Motion>& end) {
+  /// Call after every step. `end` is the state at which the run ended within it, if it did.
+  void follow(StepView& step, const std::optional<Motion>& end) {
     ++steps_;
-    if (has_fast_places_ && !end) places_.follow(mover.state());
-    if (!looks()) return count_step(mover);
-    const double last = end ? end->time : mover.time();
+    if (has_fast_places_ && !end) places_.follow(step.state());
+    if (!looks()) return count_step(step);
+    const double last = end ? end->time : step.time();
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {
       const double time = times_[states_.size()];
       Motion there;
-      states_.push_back(mover.at_full_order(time, there) ? std::move(there) : mover.at(time));
+      if (is_dense_output_ || !step.at_full_order(time, there)) step.at(time, there);
+      states_.push_back(std::move(there));
     }
   }
 
@@ -196,10 +205,9 @@ class Track {
     states_.erase(std::unique(states_.begin(), states_.end(), is_same), states_.end());
   }
 
-  template <class Mover>
-  void count_step(const Mover& mover) {
+  void count_step(const StepView& step) {
     if (!is_kept(steps_)) return;
-    states_.push_back(mover.state());
+    states_.push_back(step.state());
     numbers_.push_back(steps_);
     if (states_.size() < (every_ < apart ? std::min(few, most_) : most_)) return;
     every_ *= 2;
@@ -218,7 +226,7 @@ class Track {
   std::size_t most_numbers_;
   std::int64_t every_, steps_ = 0, first_ = 12;
   std::size_t most_ = few;
-  bool has_fast_places_ = false;
+  bool has_fast_places_ = false, is_dense_output_ = false;
   FastPlaces places_;
   std::vector<double> times_, common_, fast_;  // to look at; of tracks alike; of the own fastest places
   std::vector<Motion> states_;

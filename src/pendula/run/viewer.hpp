@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <pendula/run/integrator.hpp>
 #include <pendula/run/observer.hpp>
 #include <pendula/run/row_times.hpp>
+#include <pendula/run/step_view.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <utility>
@@ -32,13 +32,14 @@ class Viewer {
     while (start + times_.at(next_) <= state.time) ++next_;
   }
 
-  /// Call after every step of size `step`. `end` is the state at which the run ended within it, if it did.
-  void follow(Integrator& integrator, const std::optional<Motion>& end, double step) {
-    step_ = step;
-    for (double time = 0; is_reached(time = times_.at(next_), integrator.time() - start_); ++next_) {
+  /// Call after every step, of size `h`. `end` is the state at which the run ended within it, if it did.
+  void follow(StepView& step, const std::optional<Motion>& end, double h) {
+    step_ = h;
+    for (double time = 0; is_reached(time = times_.at(next_), step.time() - start_); ++next_) {
       if (end && start_ + time > end->time) return;
       Motion there;
-      show(integrator.at_full_order(start_ + time, there) ? there : integrator.at(start_ + time));
+      if (!step.at_full_order(start_ + time, there)) step.at(start_ + time, there);
+      show(there);
     }
   }
 

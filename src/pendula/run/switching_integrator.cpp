@@ -1,5 +1,3 @@
-#pragma once
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <optional>
 #include <pendula/numeric/interval.hpp>
 #include <pendula/numeric/sampled_polynomial.hpp>
+#include <pendula/run/event_location.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/relay.hpp>
@@ -21,6 +20,8 @@
 #include <vector>
 
 namespace pendula {
+
+namespace {
 
 /// Whether a motion switches ever faster and ever closer to where it switches, without end: a preloaded detent with a
 /// viscous damper does, whose n-th swing takes 1/n as long and gets 1/n² as far. Switchings are counted in blocks, each
@@ -70,13 +71,10 @@ class PileUp {
       before_;  // how far functions get from zero: ever; in this block; in the one before
 };
 
-inline constexpr const char* pieces_have_no_derivatives =
+constexpr const char* pieces_have_no_derivatives =
     "derivatives: expected a model whose functions are of one piece, got one that switches between pieces: derivatives "
     "of its motion jump there, and are not told";
 
-/// Steps of a system with functions of several pieces: a step ends where one of its switching functions is zero, to
-/// rounding, and from there on a new integrator goes by other pieces. Where the motion cannot leave a zero, the next
-/// step fails.
 class SwitchingIntegrator : public Relay {
  public:
   SwitchingIntegrator(SwitchingSystem system, const RunOptions& options)
@@ -330,5 +328,11 @@ class SwitchingIntegrator : public Relay {
   PileUp pile_;
   EventWatch watch_;
 };
+
+}  // namespace
+
+std::unique_ptr<PlainIntegrator> make_switching_integrator(SwitchingSystem system, const RunOptions& options) {
+  return std::make_unique<SwitchingIntegrator>(std::move(system), options);
+}
 
 }  // namespace pendula

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <pendula/system/motion.hpp>
+#include <pendula/system/outcome.hpp>
+
+namespace pendula {
+
+/// The last step of something that moves, for all that looks into steps: events, rows between steps, tracks.
+class StepView {
+ public:
+  StepView() = default;
+  StepView(const StepView&) = delete;
+  StepView& operator=(const StepView&) = delete;
+  virtual ~StepView() = default;
+
+  /// When the step ended  [s], and the state there.
+  virtual double time() const = 0;
+  virtual void read_state(Motion& motion) const = 0;
+
+  /// The state at `time` by dense output, the polynomial through the step's stages: cheap. Its order is one more than
+  /// the number of stages for positions, that number for rates.
+  virtual void at(double time, Motion& motion) = 0;
+
+  /// The same where the share of the step that is done then, 0 to 1, is known: what motions side by side ask for by the
+  /// same share is found for all of them at once.
+  virtual void at(double /*share*/, double time, Motion& motion) { at(time, motion); }
+
+  /// The state at `time` at the full order of the method: by a step from where the last one began. `motion` is set if
+  /// the outcome is ok.
+  virtual Outcome at_full_order(double time, Motion& motion) = 0;
+
+  /// Bounds of how far coordinates and rates get, anywhere in the step, from where it began: cheaper than by dense
+  /// output. Returns whether they are known; `farthest` has the right size.
+  virtual bool bound_excursions(Motion& /*farthest*/) const { return false; }
+
+  Motion state() const {
+    Motion motion;
+    read_state(motion);
+    return motion;
+  }
+  Motion at(double time) {
+    Motion motion;
+    at(time, motion);
+    return motion;
+  }
+};
+
+}  // namespace pendula
