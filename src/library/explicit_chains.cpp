@@ -2,6 +2,9 @@
 #include <pendula/explicit/explicit_chain.hpp>
 #include <pendula/explicit/explicit_steps.hpp>
 #include <pendula/explicit/single_integrator.hpp>
+#include <pendula/taylor/taylor_steps.hpp>
+#include <stdexcept>
+#include <string>
 
 #include "library/explicit_methods.hpp"
 
@@ -19,7 +22,17 @@ struct Make {
     return std::make_unique<SingleIntegrator<Steps, ExplicitChain<Space>>>(ExplicitChain<Space>(chain),
                                                                            options.tolerance);
   }
-  std::unique_ptr<PlainIntegrator> by_series() const { return make_taylor_integrator(chain, options); }
+  std::unique_ptr<PlainIntegrator> by_series() const {
+    if (chain.loaded()) {
+      throw std::invalid_argument(
+          "method: taylor takes damping, torques and drives where there is a planar kernel for the number of links, "
+          "got " +
+          std::string(Space::name) + ':' + std::to_string(chain.links()) + "; gauss takes them all");
+    }
+    using Steps = TaylorSteps<ChainAccelerations<Space, Eigen::Dynamic, double>>;
+    return std::make_unique<SingleIntegrator<Steps, ExplicitChain<Space>>>(
+        ExplicitChain<Space>(chain), options.tolerance, typename Steps::Options{options.tolerance});
+  }
 };
 
 }  // namespace

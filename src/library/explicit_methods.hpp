@@ -12,16 +12,8 @@
 
 namespace pendula {
 
-/// Taylor series steps for rods, for any number of links; passes poles. Throws std::invalid_argument for chains with
-/// damping, torques or drives, and for a tolerance ≤ 0.
-template <class Space>
-std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Space>& chain, const RunOptions& options);
-
-extern template std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Planar>&, const RunOptions&);
-extern template std::unique_ptr<PlainIntegrator> make_taylor_integrator(const Chain<Spatial>&, const RunOptions&);
-
-/// Explicit methods on rods, for any number of links. They pass poles.
-/// Throws std::invalid_argument for taylor, and for a tolerance ≤ 0.
+/// Explicit methods on rods, for any number of links. They pass poles. Throws std::invalid_argument for a tolerance
+/// ≤ 0, and for Taylor series of chains with damping, torques or drives.
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_explicit_chain(const Chain<Space>& chain, const RunOptions& options);
 

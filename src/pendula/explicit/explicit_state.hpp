@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/long_real.hpp>
 #include <pendula/numeric/numeric.hpp>
 #include <pendula/numeric/tangent_numbers.hpp>
@@ -40,20 +42,6 @@ class ExplicitState {
     for (int i = 0; i < count(); ++i) visit(i, detail::values_of(parts_[i].rate), L(0.0));
   }
 
-  /// Visits the numbers of the member in a lane, as MemberNumbers does.
-  template <class Numbers>
-  void member(int lane, Numbers& numbers) requires(!has_tangent) {
-    for (int i = 0; i < count(); ++i) {
-      for (auto* vector : {&parts_[i].place, &parts_[i].rate}) {
-        for (L& x : *vector) {
-          double number = get(x, lane);
-          numbers(number);
-          set(x, lane, number);
-        }
-      }
-    }
-  }
-
   L energy() { return dynamics_.energy(now_, parts_); }
   const L& energy_sum() const requires requires(const Dynamics& dynamics) { dynamics.energy_sum(); }
   { return dynamics_.energy_sum(); }
@@ -90,11 +78,55 @@ class ExplicitState {
     return Dynamics::at(of, link);
   }
 
+  /// Low parts of members: none.
+  struct NoParts {
+    explicit NoParts(const Parts& /*parts*/) {}
+  };
+  using LowParts = std::conditional_t<is_twofold, Parts, NoParts>;
+
+  /// Moves all parts from the state by h moved(i), and restores what a step keeps.
+  template <class Moved>
+  [[gnu::always_inline]] void arrive(const L& h, Moved moved, Parts& there, LowParts& low) {
+    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
+      const Part by = moved(i), &from = at(parts_, i);
+      Part& to = at(there, i);
+      for (std::size_t k = 0; k < D; ++k) {
+        if constexpr (is_twofold) {
+          const Part& rest = at(low_, i);
+          const Twofold<L> place = exact_sum(from.place[k], fma(h, by.place[k], rest.place[k]));
+          const Twofold<L> rate = exact_sum(from.rate[k], fma(h, by.rate[k], rest.rate[k]));
+          to.place[k] = place.value;
+          to.rate[k] = rate.value;
+          at(low, i).place[k] = place.low;
+          at(low, i).rate[k] = rate.low;
+        } else {
+          to.place[k] = fma(h, by.place[k], from.place[k]);
+          to.rate[k] = fma(h, by.rate[k], from.rate[k]);
+        }
+      }
+    });
+    if constexpr (is_twofold) {
+      dynamics_.restore(there, low);
+    } else {
+      dynamics_.restore(there);
+    }
+  }
+
   static void assign(const Mask& which, const Part& from, Part& to) {
     for (std::size_t k = 0; k < D; ++k) {
       to.place[k] = select(which, from.place[k], to.place[k]);
       to.rate[k] = select(which, from.rate[k], to.rate[k]);
     }
+  }
+
+  /// The first part of one motion that is not finite; −1: none.
+  int not_finite(const Parts& parts) const requires is_twofold {
+    for (int i = 0; i < count(); ++i) {
+      for (std::size_t k = 0; k < D; ++k) {
+        if (!std::isfinite(parts[i].place[k]) || !std::isfinite(parts[i].rate[k])) return i;
+      }
+    }
+    return -1;
   }
 
   /// Factor that scales the tangents of these members to length 1; 1 for the others.
@@ -105,12 +137,6 @@ class ExplicitState {
       part.rate[k].slope = factor * part.rate[k].slope;
     }
   }
-
-  /// Low parts of members: none.
-  struct NoParts {
-    explicit NoParts(const Parts& /*parts*/) {}
-  };
-  using LowParts = std::conditional_t<is_twofold, Parts, NoParts>;
 
   Dynamics dynamics_;
   L now_{0.0};

@@ -139,7 +139,8 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
       weigh<stage>(h, Method::a[stage], stages_);
       dynamics_.slopes(fma(h, L(detail::node_of(Method::a[stage])), time), stages_, inner_slopes_[stage - 1]);
     });
-    arrive(h);
+    State::arrive(
+        h, [&](auto i) PENDULA_WRITTEN_OUT { return weighed<Method::stages>(Method::b, i); }, trial_.parts, trial_.low);
     dynamics_.slopes(time + h, trial_.parts, trial_.slopes);
     const L pace = dynamics_.pace_squared(trial_.parts);
     if constexpr (can_choose) find_error(time, h, pace);
@@ -157,14 +158,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
   const Parts& tried() const { return trial_.parts; }
 
   /// The first part of the tried step that is not finite; −1: none.
-  int part_not_finite() const requires is_twofold {
-    for (int i = 0; i < count(); ++i) {
-      for (std::size_t k = 0; k < D; ++k) {
-        if (!std::isfinite(trial_.parts[i].place[k]) || !std::isfinite(trial_.parts[i].rate[k])) return i;
-      }
-    }
-    return -1;
-  }
+  int part_not_finite() const requires is_twofold { return State::not_finite(trial_.parts); }
 
   /// Moves these members to the end of the tried step.
   void accept(const Mask& which) {
@@ -314,27 +308,6 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
         }
       }
     });
-  }
-
-  // Computes the end of the step.
-  [[gnu::always_inline]] void arrive(const L& h) {
-    if constexpr (is_twofold) {
-      for (int i = 0; i < count(); ++i) {
-        const Part moved = weighed<Method::stages>(Method::b, i), &from = parts_[i], &rest = low_[i];
-        for (std::size_t k = 0; k < D; ++k) {
-          const Twofold<L> place = exact_sum(from.place[k], fma(h, moved.place[k], rest.place[k]));
-          const Twofold<L> rate = exact_sum(from.rate[k], fma(h, moved.rate[k], rest.rate[k]));
-          trial_.parts[i].place[k] = place.value;
-          trial_.parts[i].rate[k] = rate.value;
-          trial_.low[i].place[k] = place.low;
-          trial_.low[i].rate[k] = rate.low;
-        }
-      }
-      dynamics_.restore(trial_.parts, trial_.low);
-    } else {
-      weigh<Method::stages>(h, Method::b, trial_.parts);
-      dynamics_.restore(trial_.parts);
-    }
   }
 
   [[gnu::always_inline]] void find_error(const L& time, const L& h, const L& pace_squared) {

@@ -8,6 +8,7 @@
 #include <pendula/system/plain_integrator.hpp>
 #include <pendula/system/step_rules.hpp>
 #include <pendula/system/stop_sign.hpp>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -31,8 +32,7 @@ class SingleIntegrator final : public PlainIntegrator {
       : subject_(std::move(subject)),
         steps_(subject_.subject(), options),
         controller_(Subject::tolerance_share * tolerance),
-        kept_(steps_.place()),
-        end_(kept_),
+        parts_(steps_),
         tolerance_(tolerance) {
     // An integrator may be resumed without a start, so the subject's numbers must come into the steps here.
     const std::vector<double> zero(subject_.coordinates());
@@ -43,7 +43,7 @@ class SingleIntegrator final : public PlainIntegrator {
     time_.assign(time);
     statistics_ = {};
     step_ = 0;
-    parts_of_last_ = 1;
+    parts_.of_last = 1;
     const Outcome outcome = subject_.start(time, q, v, steps_);
     if constexpr (Steps::can_choose) {
       if (outcome) controller_.start(true, steps_);
@@ -72,7 +72,7 @@ class SingleIntegrator final : public PlainIntegrator {
 
   bool bound_excursions(double* q, double* v) const override {
     if constexpr (requires { steps_.excursion(0); }) {
-      if (step_ == 0 || parts_of_last_ != 1) return false;
+      if (step_ == 0 || parts_.of_last != 1) return false;
       for (int i = 0; i < steps_.count(); ++i) {
         const auto farthest = steps_.excursion(i);
         q[i] = farthest.place[0];
@@ -88,13 +88,10 @@ class SingleIntegrator final : public PlainIntegrator {
     work = statistics_.load_work;
     if (step_ == 0 || time == this->time()) {
       read_state(q, v);
-    } else if (parts_of_last_ == 1) {
+    } else {
       const double share = (time - begin_) / step_;
       subject_.read_within(steps_, share, q, v);
-      steps_.for_each_at_full_order(
-          share, [&](int i, const auto& place, const auto& rate) { subject_.read_near(i, place, rate, q, v); });
-    } else {
-      look_in_parts(time, q, v);
+      look(time, share, [&](int i, const auto& place, const auto& rate) { subject_.read_near(i, place, rate, q, v); });
     }
     if (is_stopped()) return interrupted(time - begin_);
     return {.status = Status::ok, .time = time, .step = time - begin_};
@@ -133,6 +130,19 @@ class SingleIntegrator final : public PlainIntegrator {
   static constexpr bool has_tangents = requires(Steps steps) { steps.tangent(); };
   static constexpr int most_parts = 1024;
 
+  // How many parts the last step was taken in; states for such steps, which only steps of a given size are.
+  struct NoParts {
+    explicit NoParts(const Steps& /*steps*/) {}
+    int of_last = 1;
+  };
+  template <class Stepper>
+  struct SomeParts {
+    explicit SomeParts(const Stepper& steps) : kept(steps.place()), end(kept) {}
+    int of_last = 1;
+    typename Stepper::FullState kept, end;
+  };
+  using StepParts = std::conditional_t<Steps::can_choose, NoParts, SomeParts<Steps>>;
+
   Outcome ok(double h) const { return {.status = Status::ok, .time = time(), .step = h}; }
   Outcome interrupted(double h) const { return {.status = Status::interrupted, .time = time(), .step = h}; }
   Outcome failure(Status status, double h) {
@@ -150,6 +160,15 @@ class SingleIntegrator final : public PlainIntegrator {
     return ok(h);
   }
 
+  // At the full order of the method.
+  template <class Visit>
+  void look(double time, double share, Visit visit) {
+    if constexpr (!Steps::can_choose) {
+      if (parts_.of_last != 1) return look_in_parts(time, visit);
+    }
+    steps_.for_each_at_full_order(share, visit);
+  }
+
   // --- Steps of a given size ---
 
   // A step that fails or turns too far is divided into ever more parts.
@@ -159,8 +178,8 @@ class SingleIntegrator final : public PlainIntegrator {
       if (is_stopped()) return interrupted(h);
       if (is_good) {
         if (subject_.has_to_look()) count_unseen(parts, h);
-        parts_of_last_ = parts;
-        parts == 1 ? steps_.accept(true) : steps_.set_step(kept_, time(), h);
+        parts_.of_last = parts;
+        parts == 1 ? steps_.accept(true) : steps_.set_step(parts_.kept, time(), h);
         return accept(h);
       }
       ++statistics_.rejected_steps;
@@ -171,35 +190,33 @@ class SingleIntegrator final : public PlainIntegrator {
 
   void count_unseen(int parts, double h) {
     const Unseen unseen = parts == 1 ? subject_.unseen(steps_.parts(), steps_.tried(), time(), h, 0)
-                                     : subject_.unseen(kept_.parts, steps_.parts(), time(), h, 0);
+                                     : subject_.unseen(parts_.kept.parts, steps_.parts(), time(), h, 0);
     statistics_.step_over(time(), unseen.effect, 0);
     subject_.move_on();
   }
 
+  template <class Visit>
+  void look_in_parts(double time, Visit visit) {
+    parts_.end = steps_.place();
+    steps_.go_to(steps_.begin());
+    goes_in(parts_.of_last, begin_, time - begin_);
+    for (int i = 0; i < steps_.count(); ++i) visit(i, steps_.exact_place(i), steps_.exact_rate(i));
+    steps_.go_to(parts_.end);
+    steps_.set_step(parts_.kept, begin_, step_);
+  }
+
   // Takes h in `parts` steps from the current state, which is kept. On failure returns to it.
   bool goes_in(int parts, double time, double h) {
-    kept_ = steps_.place();
+    parts_.kept = steps_.place();
     const double size = h / parts;
     for (int part = 0; part < parts; ++part) {
       if (is_stopped() || !steps_.solve(time + part * size, size, true)) {
-        steps_.go_to(kept_);
+        steps_.go_to(parts_.kept);
         return false;
       }
       steps_.accept(true);
     }
     return true;
-  }
-
-  void look_in_parts(double time, double* q, double* v) {
-    subject_.read_within(steps_, (time - begin_) / step_, q, v);
-    end_ = steps_.place();
-    steps_.go_to(steps_.begin());
-    goes_in(parts_of_last_, begin_, time - begin_);
-    for (int i = 0; i < steps_.count(); ++i) {
-      subject_.read_near(i, steps_.exact_place(i), steps_.exact_rate(i), q, v);
-    }
-    steps_.go_to(end_);
-    steps_.set_step(kept_, begin_, step_);
   }
 
   // --- Adaptive steps, at most h long ---
@@ -276,12 +293,11 @@ class SingleIntegrator final : public PlainIntegrator {
   Subject subject_;
   Steps steps_;
   typename Steps::Controller controller_;
-  typename Steps::FullState kept_, end_;  // for steps taken in parts
+  StepParts parts_;
   double tolerance_;
   Statistics statistics_;
   Compensated<double> time_{};
   double begin_ = 0, step_ = 0;  // of the last step; 0: there was none
-  int parts_of_last_ = 1;
   StopSign stop_;
 };
 

@@ -66,6 +66,12 @@ Real min(const Real& a, const Real& b) {
   return a < b ? a : b;
 }
 
+/// LanePack's.
+template <std::floating_point Real>
+Real in_register(const Real& a) {
+  return a;
+}
+
 /// a b + c, with one rounding where the processor has a fast fused multiply-add.
 template <std::floating_point Real>
 Real fma(const Real& a, const Real& b, const Real& c) {

@@ -62,19 +62,30 @@ class ChainSeries {
     return term;
   }
 
-  /// Value after the time t/pace.
-  [[gnu::always_inline]] Part sum(int i, const L& t) const {
+  /// How far it gets in the time t/pace, over t.
+  [[gnu::always_inline]] Part rise(int i, const L& t) const {
     const auto last = static_cast<std::size_t>(order_);
     const Link& link = at(i);
-    Part there;
-    for (std::size_t d = 0; d < D; ++d) there.place[d] = link.place[d][last + 1];
-    for (std::size_t d = 0; d < D; ++d) there.rate[d] = link.rate[d][last];
-    for (std::size_t d = 0; d < D; ++d) there.place[d] = fma(t, there.place[d], link.place[d][last]);
-    for (std::size_t k = last; k-- > 0;) {
+    Part rise;
+    for (std::size_t d = 0; d < D; ++d) rise.place[d] = link.place[d][last + 1];
+    for (std::size_t d = 0; d < D; ++d) rise.rate[d] = link.rate[d][last];
+    for (std::size_t d = 0; d < D; ++d) rise.place[d] = fma(t, rise.place[d], link.place[d][last]);
+    for (std::size_t k = last; k-- > 1;) {
       for (std::size_t d = 0; d < D; ++d) {
-        there.place[d] = fma(t, there.place[d], link.place[d][k]);
-        there.rate[d] = fma(t, there.rate[d], link.rate[d][k]);
+        rise.place[d] = fma(t, rise.place[d], link.place[d][k]);
+        rise.rate[d] = fma(t, rise.rate[d], link.rate[d][k]);
       }
+    }
+    return rise;
+  }
+
+  /// Value after the time t/pace.
+  [[gnu::always_inline]] Part sum(int i, const L& t) const {
+    const Link& link = at(i);
+    Part there = rise(i, t);
+    for (std::size_t d = 0; d < D; ++d) {
+      there.place[d] = fma(t, there.place[d], link.place[d][0]);
+      there.rate[d] = fma(t, there.rate[d], link.rate[d][0]);
     }
     return there;
   }

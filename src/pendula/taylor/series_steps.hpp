@@ -101,12 +101,6 @@ class SeriesSteps {
     Parts parts;                       // q and v
     L unit{1.0};                       // of time, for the series about this state  [s]
   };
-  FullState place() const { return now_; }
-  void go_to(const FullState& place) {
-    now_ = place;
-    is_expanded_ = false;
-  }
-
   /// A member comes into a lane, with its numbers, at q and v at `time`. The first one comes into all lanes, so that
   /// they have numbers to compute with.
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v) {
@@ -315,13 +309,6 @@ class SeriesSteps {
     }
     read_rates(fma(L(share), step_, begin_time_), trial_.state, trial_.parts);
     for (int i = 0; i < count(); ++i) visit(i, trial_.parts[i].place, trial_.parts[i].rate);
-  }
-
-  const FullState& begin() const requires(!is_batch<L>) { return begin_; }
-  void set_step(const FullState& begin, double time, double h) requires(!is_batch<L>) {
-    begin_ = begin;
-    begin_time_ = time;
-    step_ = h;
   }
 
  private:

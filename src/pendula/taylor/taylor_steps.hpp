@@ -10,12 +10,14 @@
 #include <pendula/taylor/chain_series.hpp>
 #include <pendula/taylor/series_controller.hpp>
 #include <pendula/taylor/series_limits.hpp>
+#include <utility>
 
 namespace pendula {
 
-/// Taylor series steps for several chains at once, one in each lane; a stepper of MemberQueue. The order follows from
-/// the tolerance, the step size from the last terms of the series. After each step, rods are restored to their lengths
-/// and rates are made perpendicular to them. `Rods` is ChainAccelerations, with or without a tangent of each member.
+/// Taylor series steps for one chain (the stepper of SingleIntegrator), or for several at once, one in each lane (a
+/// stepper of MemberQueue). The order follows from the tolerance, the step size from the last terms of the series.
+/// After each step, rods are restored to their lengths and rates are made perpendicular to them. `Rods` is
+/// ChainAccelerations, with or without a tangent of each member.
 template <class Rods>
 class TaylorSteps : public ExplicitState<Rods> {
   using State = ExplicitState<Rods>;
@@ -27,7 +29,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   using Subject = typename Rods::Subject;
   using typename State::L;
   using typename State::Mask;
-  static constexpr bool has_tangent = State::has_tangent;
+  static constexpr bool has_tangent = State::has_tangent, is_twofold = State::is_twofold;
   using State::count;
   using Controller = SeriesController<L>;
 
@@ -35,7 +37,11 @@ class TaylorSteps : public ExplicitState<Rods> {
     double tolerance = 1e-9;  ///< error of a step relative to the size of the motion
   };
   explicit TaylorSteps(Subject subject, Options options = {})
-      : State(subject), series_(dynamics_, order_for(options.tolerance)), trial_(parts_), terms_(parts_) {
+      : State(subject),
+        series_(dynamics_, order_for(options.tolerance)),
+        trial_(parts_),
+        trial_low_(parts_),
+        terms_(parts_) {
     log_reach_ = std::log2(std::max(options.tolerance, detail::finest_of_series)) / series_.order();
   }
 
@@ -45,29 +51,30 @@ class TaylorSteps : public ExplicitState<Rods> {
   template <class... Start>
   void start(int lane, double time, const Start&... start) {
     State::seat(lane, time, start...);
+    is_expanded_ = false;
   }
 
-  /// Computes the series about the current states; the largest steps that they allow.
-  ///
-  /// A light rod between heavy ones may soon turn much faster than anything does now, which overflows the coefficients:
-  /// then a shorter unit of time is used.
-  L longest_step() {
-    const L found = sqrt(State::pace_squared()), now = select(found > L(0.0), found, L(1.0));
-    pace_ = now;
-    for (int k = 0; k < most_units; ++k) {
-      series_.expand(dynamics_, parts_, pace_);
-      const L step = size_by_terms(now);
-      if (xsimd::all(step > L(0.0))) return step;
-      pace_ = select(step > L(0.0), pace_, L(shorter_unit) * pace_);
+  /// Visits the numbers of one motion, as MemberNumbers does.
+  template <class Numbers>
+  void member(Numbers& numbers) requires is_twofold {
+    for (int i = 0; i < count(); ++i) {
+      for (Parts* parts : {&parts_, &low_}) numbers((*parts)[i].place, (*parts)[i].rate);
     }
-    return size_by_terms(now);
+    is_expanded_ = false;
+  }
+
+  /// The largest steps that the series about the current states allow.
+  L longest_step() {
+    if (!std::exchange(is_expanded_, true)) longest_ = expand();
+    return longest_;
   }
 
   /// Tries a step of `h` from `time` with the current series. Returns which of the `wanted` members turn by less than
   /// half a turn. The state is unchanged.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
-    dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT { State::at(trial_, i) = series_.sum(i, pace_ * h); });
-    dynamics_.restore(trial_);
+    const L t = pace_ * h;
+    State::arrive(
+        t, [&](auto i) PENDULA_WRITTEN_OUT { return series_.rise(i, t); }, trial_, trial_low_);
     tried_ = h;
     tried_from_ = time;
     const L turned = max(dynamics_.pace_squared(trial_), State::pace_squared()) * (h * h);
@@ -81,8 +88,14 @@ class TaylorSteps : public ExplicitState<Rods> {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {
       const Part& there = State::at(trial_, i);
       State::assign(which, there, State::at(parts_, i));
+      if constexpr (is_twofold) State::assign(which, State::at(trial_low_, i), State::at(low_, i));
     });
+    is_expanded_ = false;
   }
+
+  /// The end of the tried step, and the first part of it that is not finite; −1: none.
+  const auto& tried() const { return trial_; }
+  int part_not_finite() const requires is_twofold { return State::not_finite(trial_); }
 
   /// Dense output: a rod and its rate at the fraction `share` of the last accepted step.
   auto at(int i, double share) const { return series_.sum(i, L(share) * (pace_ * step_)); }
@@ -109,6 +122,7 @@ class TaylorSteps : public ExplicitState<Rods> {
 
  private:
   using State::dynamics_;
+  using State::low_;
   using State::now_;
   using State::parts_;
   using typename State::Part;
@@ -122,6 +136,22 @@ class TaylorSteps : public ExplicitState<Rods> {
   static int order_for(double tolerance) {
     const double order = 3.5 - 1.15 * std::log10(std::max(tolerance, detail::finest_of_series));
     return std::clamp(static_cast<int>(std::lround(order)), least_order, ChainSeries<Rods>::most_order);
+  }
+
+  // Computes the series about the current states; the largest steps that they allow.
+  //
+  // A light rod between heavy ones may soon turn much faster than anything does now, which overflows the coefficients:
+  // then a shorter unit of time is used.
+  L expand() {
+    const L found = sqrt(State::pace_squared()), now = select(found > L(0.0), found, L(1.0));
+    pace_ = now;
+    for (int k = 0; k < most_units; ++k) {
+      series_.expand(dynamics_, parts_, pace_);
+      const L step = size_by_terms(now);
+      if (all(step > L(0.0))) return step;
+      pace_ = select(step > L(0.0), pace_, L(shorter_unit) * pace_);
+    }
+    return size_by_terms(now);
   }
 
   // From the decay of the last terms, relative to the size of the motion. Several terms are used, because motions that
@@ -153,7 +183,11 @@ class TaylorSteps : public ExplicitState<Rods> {
   L pace_{1.0};               // inverse of the unit of time
   L tried_{0.0}, step_{1.0};  // tried steps, last accepted steps
   L tried_from_{0.0};         // times at which these began
-  Parts trial_, terms_;
+  L longest_{0.0};            // that the series allows
+  bool is_expanded_ = false;  // the series is about the current states
+  Parts trial_;
+  [[no_unique_address]] typename State::LowParts trial_low_;
+  Parts terms_;
 };
 
 }  // namespace pendula
