@@ -96,7 +96,8 @@ std::string postfix_text(const ExpressionProgram& program, const std::vector<std
 
 }  // namespace
 
-std::vector<FeedbackPlan> read_feedback(const Section& system) {
+std::vector<FeedbackPlan> read_feedback(const Section& system, std::span<const std::string_view> inputs,
+                                        std::span<const std::string_view> units) {
   std::vector<FeedbackPlan> plans;
   for (const Section& table : system.each("feedback")) {
     FeedbackPlan plan;
@@ -108,7 +109,9 @@ std::vector<FeedbackPlan> read_feedback(const Section& system) {
     if (const auto sample = table.find("sample")) plan.sample = sample->number();
     if (const auto limit = table.find("limit")) {
       if (plan.sample == 0) limit->fail("sample beside it: a limit is not smooth");
-      plan.limit = limit->number();
+      const auto known = std::ranges::find(inputs, plan.input);
+      const bool has_unit = known != inputs.end();
+      plan.limit = limit->number(has_unit ? units[static_cast<std::size_t>(known - inputs.begin())] : "");
     }
     plans.push_back(std::move(plan));
   }

@@ -119,7 +119,7 @@ constexpr std::array<ScenarioKey, 4> system_feedback = {
     another("input", text, required, "the name of an input of the model"),
     another("value", text, required, "an expression in the columns of the motion, as \"-12*x - 9*x_dot\""),
     a_number("sample", "s", positive, InWords{"continuous"}, "time from sample to sample, in between it is held"),
-    a_number("limit", "", positive, none, "the largest size of the value, of sampled feedback"),
+    a_number("limit", "", positive, none, "the largest size of the value, in the unit of the input, of sampled feedback"),
 };
 
 constexpr std::array<ScenarioKey, 4> chain_feedback = {

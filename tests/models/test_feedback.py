@@ -143,7 +143,7 @@ def test_the_linear_system_has_it(written, pendula):
 
 
 def test_sampled_feedback_is_held_from_sample_to_sample(written, moved):
-    rows = moved(written(feedback(sample=0.1, limit=5.0)))
+    rows = moved(written(feedback(sample=0.1, limit="0.005 kN")))
     said = np.clip(fed_back(rows), -5, 5)
     at_samples = slice(0, None, 2)
     assert np.abs(rows["push"] - said)[at_samples].max() < 1e-12  # measured 3e-15
@@ -278,6 +278,7 @@ def test_rows_at_samples_have_what_is_held_from_there_on(moved, tmp_path):
         (feedback("abs(x)"), "expected smooth functions in continuous feedback"),
         (feedback("x > 0 ? 1 : 2"), "expected smooth functions in continuous feedback"),
         (feedback(limit=3.0), "feedback[1].limit: expected sample beside it"),
+        (feedback(sample=0.1, limit="5 m"), "feedback[1].limit: expected"),
         (feedback(sample=0.0), "feedback[1].sample: expected a finite number > 0"),
         (feedback("x +", sample=0.1), "expected a number, a name or a parenthesis before its end"),
         (feedback(sample=0.1) + '[[event]]\nname = "e"\nwhen = "push"\n', "inputs that have feedback"),
