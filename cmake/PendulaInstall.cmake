@@ -33,10 +33,11 @@ install(DIRECTORY "${PENDULA_CODEGEN_DIR}/pendula_codegen" DESTINATION "${codege
 install(FILES "${PENDULA_CODEGEN_DIR}/requirements.txt" DESTINATION "${codegen_dir}" COMPONENT program)
 
 configure_package_config_file(
-  "${PROJECT_SOURCE_DIR}/cmake/pendulaConfig.cmake.in" "${PROJECT_BINARY_DIR}/pendulaConfig.cmake"
+  "${PROJECT_SOURCE_DIR}/cmake/pendulaConfig.cmake.in" "${PROJECT_BINARY_DIR}/package/pendulaConfig.cmake"
   INSTALL_DESTINATION "${package_dir}" PATH_VARS CMAKE_INSTALL_INCLUDEDIR codegen_dir)
-write_basic_package_version_file("${PROJECT_BINARY_DIR}/pendulaConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
-install(FILES "${PROJECT_BINARY_DIR}/pendulaConfig.cmake" "${PROJECT_BINARY_DIR}/pendulaConfigVersion.cmake"
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/package/pendulaConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+# Not in the build folder itself, which find_package would take for an installed one where its bin/ is in PATH.
+install(FILES "${PROJECT_BINARY_DIR}/package/pendulaConfig.cmake" "${PROJECT_BINARY_DIR}/package/pendulaConfigVersion.cmake"
               "${PROJECT_SOURCE_DIR}/cmake/PendulaKernels.cmake" "${PROJECT_SOURCE_DIR}/cmake/PendulaPython.cmake"
               "${PROJECT_SOURCE_DIR}/cmake/PendulaXsimd.cmake" "${PROJECT_SOURCE_DIR}/cmake/check_requirements.py"
         DESTINATION "${package_dir}")

@@ -68,6 +68,16 @@ TEST(MethodChoice, LeavesTheOthersToGaussSteps) {
   EXPECT_EQ(pendula::Run(run_of_chain(4)).go().options.method, Method::gauss);
 }
 
+/// A rod that is let go level does not swing yet: damping that is weak was "strong" there.
+TEST(MethodChoice, JudgesDampingWhereTheMotionIs) {
+  RunSetup level = run_of_chain(1, 1e-9, 10, 0.01);
+  level.start.q[0] = std::numbers::pi / 2;
+  EXPECT_GT(choose_method(level).series_tolerance, 0);
+  RunSetup strong = run_of_chain(1, 1e-9, 10, 500);
+  strong.start.q[0] = std::numbers::pi / 2;
+  EXPECT_EQ(choose_method(strong).reason, "strong damping");
+}
+
 /// The energy does not drift beyond the tolerance.
 TEST(MethodChoice, MovesLongerRunsByASmallerTolerance) {
   RunSetup setup = run_of_chain(2, 1e-6, 2000);

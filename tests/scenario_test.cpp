@@ -563,8 +563,21 @@ TEST(Scenario, AnElementIsFoundOnItsOwnLine) {
             "file.toml:5: chain.masses[2]: expected a finite number > 0, got -2.0");
 }
 
-TEST(Scenario, AnEmptyFileLacksItsFirstKey) {
-  EXPECT_EQ(error_of(""), "file.toml:1: chain.space: expected \"planar\" or \"spatial\", got no such key");
+TEST(Scenario, AnEmptyFileMovesNothing) {
+  EXPECT_EQ(error_of(""), "file.toml: expected [chain] or [system], got neither");
+}
+
+// Nothing makes it a part of the equations of a chain: it was left out without a word.
+TEST(Scenario, FeedbackOfAChainIsSampled) {
+  const std::string law = "\n[[chain.feedback]]\ninput = \"torque_1\"\nvalue = \"-theta_1\"\n";
+  EXPECT_NE(error_of(planar_text + law).find("chain.feedback[1].sample: expected"), std::string::npos);
+  EXPECT_EQ(error_of(planar_text + law + "sample = 0.01\n"), "no error");
+}
+
+TEST(Scenario, ValuesOfSignalsMayHaveUnits) {
+  const std::string signal = "\n[[chain.signal]]\ninput = \"torque_1\"\ntimes = [0, \"500 ms\"]\nvalues = [0, ";
+  EXPECT_EQ(error_of(planar_text + signal + "\"200 mN m\"]\n"), "no error");
+  EXPECT_NE(error_of(planar_text + signal + "\"200 mm\"]\n").find("values[2]"), std::string::npos);
 }
 
 TEST(Scenario, BadOverridesAreToldByTheirText) {

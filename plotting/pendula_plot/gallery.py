@@ -62,8 +62,8 @@ CASES = (
         "Swinging Atwood machine",
         "A counterweight of three times the bob: the ratio without chaos.",
     ),
-    Case("spring_pendulum", "Spring pendulum", "Energy goes to and fro between bouncing and swinging.", 8),
-    Case("furuta", "Furuta pendulum", "A motor at the arm swings the rod up.", 10),
+    Case("spring_pendulum", "Spring pendulum", "A bob on a spring, in space, bounces and swings at once.", 8),
+    Case("furuta", "Furuta pendulum", "A motor at the arm swings the rod beyond the level.", 10),
     Case(
         "driven_damped",
         "Driven and damped",

@@ -129,7 +129,7 @@ class Solution:
         return self._result.begin, max(last, self.summary.get("final", {}).get("t", last))
 
     def go_on(self, duration: float, *, progress: bool | None = None) -> Solution:
-        """The same run to a later end, as if it had never stopped, to the bit.
+        """The same run to a later end, by its method and its steps: to the bit what it would have been with these.
 
         Parameters
         ----------

@@ -86,7 +86,9 @@ void with_scenario(const io::RunSource& source, RunModel model, const PythonEven
 
 /// The source of the same run again. Throws io::InputError where this build does not make it to the bit.
 io::RunSource again_of(const Result& result) {
-  return io::resumed_source(result.file, result.saved, {});
+  io::SavedRun saved = result.saved;
+  if (!result.rows.empty()) saved.end = result.rows[result.rows.size() - result.columns.size()];
+  return io::resumed_source(result.file, std::move(saved), {});
 }
 
 /// Throws io::InputError if functions are missing that were asked by the run.

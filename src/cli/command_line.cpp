@@ -121,7 +121,7 @@ CLI::Validator set_of(const std::vector<std::string_view>& words) {
 }  // namespace
 
 CommandLine::CommandLine()
-    : app("Multiple pendulums: chains of any length, in the plane and in space, moved by Gauss-Legendre.", "pendula") {
+    : app("How pendulums move: chains of any length, in the plane and in space, and systems of your own.", "pendula") {
   app.formatter_fn(
       [this](const CLI::App* asked, const std::string&, CLI::AppFormatMode) { return help_text(*this, *asked); });
   app.set_version_flag("--version", version_text, "Print the version and the instruction set in use, and end");

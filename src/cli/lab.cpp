@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "cli/commands.hpp"
+#include "cli/output_files.hpp"
 #include "io/errors.hpp"
 #include "io/files.hpp"
 #include "io/kernel_cache.hpp"
@@ -87,6 +88,7 @@ json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
 }  // namespace
 
 ExitStatus lab(const LabOptions& options) {
+  require_page(options.output);
   io::WholeFile page(options.output);
   io::Toolchain toolchain = io::Toolchain::of_this_program();
   toolchain.kernels_by = "interpreter";  // as in the page

@@ -73,12 +73,17 @@ std::unique_ptr<io::RowsFile> open_rows(const std::optional<std::string>& file, 
   return opened;
 }
 
+void require_page(const std::string& file) {
+  if (!file.ends_with(".html")) throw io::InputError(file + ": expected a name that ends in .html");
+}
+
 std::unique_ptr<view::Page> open_page(const SimulateOptions& options, const view::Scene& scene) {
   if (!options.view) return nullptr;
   spare_scenario(*options.view, "page", options);
   if (*options.view == "-" || (options.output && is_same_file(*options.view, *options.output))) {
     throw io::InputError(*options.view + ": expected a file of its own for the page");
   }
+  require_page(*options.view);
   return std::make_unique<view::Page>(*options.view, scene, 1 + static_cast<std::size_t>(options.copies));
 }
 

@@ -33,6 +33,9 @@ std::unique_ptr<io::RowsFile> open_rows(const std::optional<std::string>& file, 
                                         const io::RunOrigin& origin, const std::optional<io::SavedRun>& saved,
                                         const io::RunContents& contents);
 
+/// Checks the name of a page.
+void require_page(const std::string& file);
+
 /// Opens the page if one is asked for.
 std::unique_ptr<view::Page> open_page(const SimulateOptions& options, const view::Scene& scene);
 

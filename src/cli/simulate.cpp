@@ -49,10 +49,10 @@ RowTimes film_times(const FilmOptions& film) {
 }
 
 /// Gives a page's laboratory the model that moves there. Where its program cannot be made, there is no laboratory.
-void add_model(view::Scene& scene, const io::ModelName& name, const SystemInfo& info,
-               const std::function<void(const std::string&)>& tell) {
+void add_model(view::Scene& scene, const io::ModelName& name, const SystemInfo& info) {
   try {
-    const std::string program = io::kernel_program(name, io::Toolchain::of_this_program(), tell);
+    const auto no_words = [](const std::string&) {};  // the kernel that the run goes by was told of
+    const std::string program = io::kernel_program(name, io::Toolchain::of_this_program(), no_words);
     scene.laboratory_model = view::lab_model(info, program).dump();
   } catch (const io::ModelError&) {
     scene.laboratory.clear();
@@ -300,7 +300,7 @@ ExitStatus simulate(const SimulateOptions& options) {
         view::Scene scene = view::scene_of(scenario, source);
         if (options.view) scene.laboratory = view::laboratory_of(scenario);
         if constexpr (requires { scenario.system; }) {
-          if (!scene.laboratory.empty()) add_model(scene, *model_name, scenario.system->info(), tell);
+          if (!scene.laboratory.empty()) add_model(scene, *model_name, scenario.system->info());
         }
         RunSession session(setup, scene, scenario, source, model, options);
         io::Summary summary = session.run();

@@ -32,6 +32,9 @@ extern "C" pendula_status pendula_lyapunov(const pendula_tangents* tangents, dou
                                            pendula_spectrum* rest) {
   return guarded([&] {
     require_count(*tangents);
+    if (!(tangents->duration > 0) || std::isinf(tangents->duration)) {
+      throw std::invalid_argument("duration: expected a number > 0, got " + std::to_string(tangents->duration));
+    }
     const pendula_model& model = *tangents->model;
     const RunOptions options = options_of(tangents->options);
     const Motion start = motion_of(model, tangents->time, tangents->q, tangents->v);

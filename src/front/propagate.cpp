@@ -3,6 +3,7 @@
 #include <pendula/pendula.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <stdexcept>
@@ -46,6 +47,10 @@ extern "C" pendula_status pendula_propagate(const pendula_ensemble* ensemble, do
   return guarded([&] {
     if (ensemble->members == 0) return PENDULA_OK;
     const std::vector<EnsembleMember> members = members_of(*ensemble);
+    if (!(ensemble->duration >= 0) || std::isinf(ensemble->duration)) {
+      throw std::invalid_argument("duration: expected a number, not negative, got " +
+                                  std::to_string(ensemble->duration));
+    }
     const std::size_t coordinates = ensemble->models[0]->coordinates;
     EnsembleSchedule schedule;
     schedule.options = options_of(ensemble->options);

@@ -33,11 +33,12 @@ EventPlan read_event(const Section& table) {
   return plan;
 }
 
-/// Inputs with feedback may change faster than the motion, and jump: no event is found on them.
+/// Inputs with feedback or signals may change faster than the motion, and jump: no event is found on them.
 void require_unfed(const Expression& expression, const Subject& subject, const std::vector<std::string>& names) {
   for (const std::size_t column : subject.fed_columns()) {
     if (std::ranges::find(expression.columns(), column) == expression.columns().end()) continue;
-    throw ExpressionError("an expression without inputs that have feedback (write what is fed back)", names[column]);
+    throw ExpressionError("an expression without inputs that have feedback or signals (write what is fed back)",
+                          names[column]);
   }
 }
 

@@ -96,8 +96,14 @@ std::string postfix_text(const ExpressionProgram& program, const std::vector<std
 
 }  // namespace
 
-std::vector<FeedbackPlan> read_feedback(const Section& system, std::span<const std::string_view> inputs,
-                                        std::span<const std::string_view> units) {
+std::string_view unit_of_input(const SystemInfo* system, std::string_view input) {
+  if (system == nullptr) return "N m";
+  const auto known = std::ranges::find(system->inputs, input);
+  return known == system->inputs.end() ? std::string_view()
+                                       : system->input_units[static_cast<std::size_t>(known - system->inputs.begin())];
+}
+
+std::vector<FeedbackPlan> read_feedback(const Section& system, const SystemInfo* info) {
   std::vector<FeedbackPlan> plans;
   for (const Section& table : system.each("feedback")) {
     FeedbackPlan plan;
@@ -106,12 +112,11 @@ std::vector<FeedbackPlan> read_feedback(const Section& system, std::span<const s
     plan.input_place = input.place();
     plan.value = value.text();
     plan.place = value.place();
+    if (info == nullptr) table.require("sample");
     if (const auto sample = table.find("sample")) plan.sample = sample->number();
     if (const auto limit = table.find("limit")) {
       if (plan.sample == 0) limit->fail("sample beside it: a limit is not smooth");
-      const auto known = std::ranges::find(inputs, plan.input);
-      const bool has_unit = known != inputs.end();
-      plan.limit = limit->number(has_unit ? units[static_cast<std::size_t>(known - inputs.begin())] : "");
+      plan.limit = limit->number(unit_of_input(info, plan.input));
     }
     plans.push_back(std::move(plan));
   }

@@ -6,7 +6,6 @@
 #include <pendula/run/feedback.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/run/system_subject.hpp>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,10 +31,12 @@ std::vector<FeedbackPlan> read_drive_values(const Section& system);
 /// InputError if an expression cannot be read, or is not of time alone.
 std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans);
 
-/// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. `inputs` of a system have `units`,
-/// in which limits are. Throws InputError.
-std::vector<FeedbackPlan> read_feedback(const Section& system, std::span<const std::string_view> inputs = {},
-                                        std::span<const std::string_view> units = {});
+/// The unit of an input of a system, empty if it is none; that of a torque of a chain, for which there is no `system`.
+std::string_view unit_of_input(const SystemInfo* system, std::string_view input);
+
+/// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Feedback of a chain, for which
+/// there is no `info`, is always sampled. Throws InputError.
+std::vector<FeedbackPlan> read_feedback(const Section& system, const SystemInfo* info = nullptr);
 
 /// The index of an input of a subject. Throws InputError with the place of its name.
 std::size_t input_named(const std::string& input, const std::string& place, const Subject& subject);

@@ -114,8 +114,9 @@ RunOrigin origin_of(const RunSource& source, const Description& description, con
 std::optional<Checkpoint> checkpoint_of(const RunSource& source, double end) {
   if (!source.saved || !source.saved->checkpoint) return std::nullopt;
   const Checkpoint& checkpoint = *source.saved->checkpoint;
-  if (checkpoint.time <= end) return checkpoint;
-  throw InputError("run.duration: expected at least " + shortest(checkpoint.time) + ", where the run is already, got " +
+  const double reached = std::max(checkpoint.time, source.saved->end);
+  if (reached <= end) return checkpoint;
+  throw InputError("run.duration: expected at least " + shortest(reached) + ", where the run is already, got " +
                    shortest(end));
 }
 

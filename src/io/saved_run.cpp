@@ -191,7 +191,12 @@ SavedRun read_saved_run(const std::string& file) {
     saved.origin = read_origin(opened, run);
     saved.has_rows = hdf5::has(opened, "t");
     double rows = std::numeric_limits<double>::infinity();
-    if (saved.has_rows) rows = static_cast<double>(hdf5::extent(hdf5::open_dataset(opened, "t"))[0]);
+    if (saved.has_rows) {
+      const hdf5::Handle times = hdf5::open_dataset(opened, "t");
+      const auto count = hdf5::extent(times)[0];
+      rows = static_cast<double>(count);
+      if (count > 0) saved.end = hdf5::read_rows(times, static_cast<std::size_t>(count) - 1, 1)[0];
+    }
     if (const auto last = last_checkpoint(run, rows)) {
       saved.checkpoint = last->checkpoint;
       saved.so_far = last->so_far;

@@ -71,7 +71,9 @@ struct SavedRun {
   RunOrigin origin;                      ///< `history` is that of the file
   std::optional<Checkpoint> checkpoint;  ///< empty if the run had just begun
   std::optional<RunSoFar> so_far;        ///< empty, too, in older files
-  bool has_rows = true;                  ///< whether the file keeps the trajectory, too
+  /// Time of the last row  [s]; −∞ where there is none.
+  double end = -std::numeric_limits<double>::infinity();
+  bool has_rows = true;  ///< whether the file keeps the trajectory, too
   bool has_events = true;
 };
 

@@ -382,6 +382,7 @@ AnyScenario read_document(const toml::table& document, std::string_view name, co
     return scenario;
   }
   Sections sections(document);
+  if (!document.contains("chain")) throw InputError(std::string(name) + ": expected [chain] or [system], got neither");
   if (sections.chain.require("space").choice() == 0) return read<Planar>(sections, folder);
   return read<Spatial>(sections, folder);
 }

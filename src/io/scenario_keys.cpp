@@ -107,7 +107,7 @@ constexpr std::array<ScenarioKey, 6> signal_of(std::string_view inputs) {
       another("file", text, none, "a CSV file with names in its first line and a column t, in s"),
       another("column", text, InWords{"the name of the input"}, "the column of the file"),
       {.name = "times", .type = numbers, .unit = "s", .otherwise = none, .hint = "in place of file: ascending times"},
-      another("values", numbers, none, "and a number at each, in the unit of the input"),
+      another("values", numbers, none, "a number at each of the times, in the unit of the input"),
       another("hold", truth, false, "whether it is held from time to time; else it is linear in between"),
   };
 }
@@ -119,7 +119,8 @@ constexpr std::array<ScenarioKey, 4> system_feedback = {
     another("input", text, required, "the name of an input of the model"),
     another("value", text, required, "an expression in the columns of the motion, as \"-12*x - 9*x_dot\""),
     a_number("sample", "s", positive, InWords{"continuous"}, "time from sample to sample, in between it is held"),
-    a_number("limit", "", positive, none, "the largest size of the value, in the unit of the input, of sampled feedback"),
+    a_number("limit", "", positive, none,
+             "the largest size of the value, in the unit of the input, of sampled feedback"),
 };
 
 constexpr std::array<ScenarioKey, 4> chain_feedback = {

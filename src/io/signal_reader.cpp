@@ -146,7 +146,7 @@ void read_file(const Section& table, const Entry& file, const std::filesystem::p
   }
 }
 
-void read_arrays(const Section& table, SignalPlan& plan) {
+void read_arrays(const Section& table, std::string_view unit, SignalPlan& plan) {
   const Entry times = table.require("times", "a file, or times and values"), values = table.require("values");
   if (const auto column = table.find("column")) column->fail("nothing without file");
   if (times.size() == 0) times.fail("an array of times, one at least");
@@ -157,13 +157,14 @@ void read_arrays(const Section& table, SignalPlan& plan) {
     const double time = times.element(k).number();
     if (k > 0 && time <= plan.signal.times.back()) times.element(k).fail("a time after the one before it");
     plan.signal.times.push_back(time);
-    plan.signal.values.push_back(values.element(k).number());
+    plan.signal.values.push_back(values.element(k).number(unit));
   }
 }
 
 }  // namespace
 
-std::vector<SignalPlan> read_signals(const Section& system, const std::filesystem::path& folder) {
+std::vector<SignalPlan> read_signals(const Section& system, const std::filesystem::path& folder,
+                                     const SystemInfo* info) {
   std::vector<SignalPlan> plans;
   for (const Section& table : system.each("signal")) {
     SignalPlan plan;
@@ -174,7 +175,7 @@ std::vector<SignalPlan> read_signals(const Section& system, const std::filesyste
     if (const auto file = table.find("file")) {
       read_file(table, *file, folder, plan);
     } else {
-      read_arrays(table, plan);
+      read_arrays(table, unit_of_input(info, plan.input), plan);
     }
     plans.push_back(std::move(plan));
   }

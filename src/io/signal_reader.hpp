@@ -19,7 +19,8 @@ struct SignalPlan {
 };
 
 /// Reads [[NAME.signal]] of the table of a system or a chain; files are relative to `folder`. Throws InputError.
-std::vector<SignalPlan> read_signals(const Section& system, const std::filesystem::path& folder);
+std::vector<SignalPlan> read_signals(const Section& system, const std::filesystem::path& folder,
+                                     const SystemInfo* info = nullptr);
 
 /// Throws InputError for an input that the subject does not have.
 std::vector<Signal> signals_of(const std::vector<SignalPlan>& plans, const Subject& subject);

@@ -260,11 +260,11 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   if (const auto entry = table.find("links")) links = static_cast<int>(entry->integer());
   SystemScenario scenario;
   const std::vector<FeedbackPlan> drives = read_drive_values(table);
-  scenario.signals = read_signals(table, folder);
   try {
     ModelName name{model.text(), links, folder, drive_laws(drives)};
     const auto kernel = find(name);
-    scenario.feedback = read_feedback(table, kernel->info.inputs, kernel->info.input_units);
+    scenario.feedback = read_feedback(table, &kernel->info);
+    scenario.signals = read_signals(table, folder, &kernel->info);
     const SystemNumbers numbers = read_numbers(table, kernel->info);
     const auto system = std::make_shared<SystemSubject>(kernel, numbers);
     std::vector<FeedbackPlan> laws = drives;

@@ -75,6 +75,7 @@ def test_copies_that_are_interrupted_are_missed(double, tmp_path):
         (["--view", "-"], "pendula: -: expected a file of its own for the page"),
         (["--view", "a.csv", "-o", "a.csv"], "pendula: a.csv: expected a file of its own for the page"),
         (["--view", "a.csv", "-o", "./a.csv"], "pendula: a.csv: expected a file of its own for the page"),
+        (["--view", "a.txt"], "pendula: a.txt: expected a name that ends in .html"),
         (
             ["--view", "a.html", "--copies", "2", "--apart", "nan"],
             "--apart: expected a number that is finite, got nan",

@@ -115,8 +115,9 @@ inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& part
   const std::string of_those = of_wanted + "even runs by the smallest useful tolerances part; ";
   // The trials diverge from one another, but this run does not diverge from the finest of them.
   if (std::isinf(seen)) return of_those + rows_after(trust.until, start) + " may be less accurate";
-  return of_those + rows_after(trust.until, start) + " are less accurate, " +
-         untrusted_after(std::max(seen, trust.until), start);
+  const std::string untrusted = untrusted_after(std::max(seen, trust.until), start);
+  return seen > trust.until ? of_those + rows_after(trust.until, start) + " are less accurate, " + untrusted
+                            : of_those + untrusted;
 }
 
 /// Options of another run to compare a run with.

@@ -52,11 +52,11 @@ bool is_stiff(const Subject& subject, const Motion& place) {
 }
 
 /// Whether it is stiff at the start, or at a state that coarse steps come to: friction grows as rates fall, and a mass
-/// may run into a damper.
+/// may run into a damper. A start at rest tells nothing: where a rod is level, nothing swings, and all damping is fast.
 bool becomes_stiff(const RunSetup& setup) {
   constexpr int most_steps = 256;
   const Subject& subject = *setup.subject;
-  if (is_stiff(subject, setup.start)) return true;
+  if (setup.start.v.any() && is_stiff(subject, setup.start)) return true;
   RunOptions coarse = setup.options;
   coarse.stages = 4;
   coarse.tolerance = 1e-3;

@@ -97,8 +97,8 @@ inline std::string message(const Outcome& outcome, std::span<const std::string_v
       break;
     case Status::singular_mass_matrix:
       if (is_chain) {
-        out << "the mass matrix in (theta, phi) is singular" << where(": sin(theta) = 0 at ")
-            << ", where phi has no meaning";
+        out << "the mass matrix is singular" << where(" at ")
+            << ": in space phi has no meaning where sin(theta) = 0; in the plane masses or lengths are too far apart";
       } else {
         out << "the mass matrix is singular" << where(": no inertia is left in ") << ", which has no meaning there";
       }
