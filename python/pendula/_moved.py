@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._derivatives import Gradient, Varied, gradient
+from ._gradient import Gradient, Varied, gradient
 from ._runs import numbers, plainly, unknown
 from ._simulation import RUN_OPTIONS, Beginning
 from ._systems import System

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
+from ._gradient import Gradient, gradient
 from ._progress import bar
 from ._runs import RunFailed, in_order, missing, number, numbers, places, plainly, tell, warn
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
-
-    from ._derivatives import Gradient
 
 
 class Solution:
@@ -247,8 +246,6 @@ class Solution:
         >>> run = pendula.Chain(links=1).simulate(1.0, theta=0.5, step=0.01)
         >>> by_length = run.gradient([1, 0]).parameters["lengths"]  # of theta at the end
         """
-        from ._derivatives import gradient
-
         given = numbers("by_end", by_end)
         if given.shape not in ((len(self.names),), self.y.shape):
             raise _core.InputError(
