@@ -11,9 +11,9 @@ from . import _core
 from ._core import InputError
 from ._gradient import Varied
 from ._linear import LinearSystem
-from ._runs import number, numbers, plainly, warn
+from ._runs import duration_of, plainly, positive, state_names, warn
 from ._simulation import Beginning, Simulation, split
-from ._systems import System, starts_of, system_of
+from ._systems import System, ascending_times, span_of, starts_of, system_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -131,13 +131,12 @@ def differentiate(
     of_time = np.zeros(size + varied.count)
     if until is not None:
         of_time = _at_event(made, until, float(made.time + times[-1]), states[-1], by_all[-1])
-    columns = made.columns
     by_parameters, by_inputs = varied.by_name(by_all[:, :, size:])
     time_by_parameters, time_by_inputs = varied.by_name(of_time[size:])
     return Derivatives(
         times,
         states.T,
-        [columns[k] for k in made.state],
+        state_names(made),
         by_all[:, :, :size],
         by_parameters,
         by_inputs,
@@ -200,27 +199,21 @@ def linearize(
         if tolerance is not None:
             raise InputError("tolerance: expected none without step, got one")
         return simulation.linearize(outputs)
-    if number("step", step) <= 0:
-        raise InputError(f"step: expected a positive number, got {step!r}")
-    moved = differentiate(system, step, start={**system.at_zero(), **given}, tolerance=tolerance)
+    moved = differentiate(
+        system, positive("step", step), start={**system.at_zero(), **given}, tolerance=tolerance
+    )
     by_inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
     b = np.hstack([np.empty((moved.y.shape[0], 0)), *by_inputs])
     return LinearSystem(moved.by_start[0], b, step=float(step), **simulation._seen(outputs))
 
 
 def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:
-    if t is None and duration is None:
-        raise TypeError("differentiate: expected duration= or t=, got neither")
-    if duration is not None and number("duration", duration) < 0:
-        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
-    times = numbers("t", t) if t is not None else np.array([number("duration", duration)])
-    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
-        raise InputError(f"t: expected a vector of finite times, got {t!r}")
-    if np.any(times < 0) or np.any(np.diff(times) < 0):
-        raise InputError("t: expected times from 0 on, ascending, got others")
-    if t is not None and duration is not None:
+    times, end = span_of("differentiate", duration, t)
+    if times is None:
+        return np.array([duration_of(end)])
+    if duration is not None:
         raise InputError("duration: expected none beside t, got both")
-    return times
+    return ascending_times(times)
 
 
 def _slopes(
