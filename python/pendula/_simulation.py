@@ -71,7 +71,6 @@ class Beginning(NamedTuple):
         step: float | None,
         options: Mapping[str, object],
         remember: bool = True,
-        feeds_back: bool = True,
     ) -> Beginning:
         system = system_of(system)
         if step is None and tolerance is None:
@@ -79,12 +78,7 @@ class Beginning(NamedTuple):
         run = {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
 
         def text_of(one: System) -> str:
-            tables = {
-                key: table
-                for key, table in one.tables().items()
-                if feeds_back or not key.endswith(".feedback")
-            }
-            return _toml.document({**tables, "start": start, "run": run})
+            return _toml.document({**one.tables(), "start": start, "run": run})
 
         file = system.model_file()
         return cls(
