@@ -19,7 +19,7 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import SampledLaw
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
-from pendula_codegen.model import CPP_KEYWORDS, Parameter
+from pendula_codegen.model import CPP_KEYWORDS
 from pendula_codegen.places import Place
 from pendula_codegen.program import shortest_program
 from pendula_codegen.recording import Recorder
@@ -360,7 +360,7 @@ def render_export(
         "slopes_of": slopes_of,
         "limits": "FLT" if request.number == "float" else "DBL",
         "rows": {
-            "parameters": _listed((name, p.unit) for p in declared.parameters for name in _names(p)),
+            "parameters": _listed((name, p.unit) for p in declared.parameters for name in p.names),
             "inputs": _listed((each.symbol.name, each.unit) for each in declared.inputs),
             "coordinates": _listed((each.symbol.name, each.unit) for each in declared.coordinates),
         },
@@ -380,12 +380,6 @@ def render_export(
 
 def _listed(rows: Iterable[tuple[str, str]]) -> list[str]:
     return [f"{place:<3} {name}  [{unit}]" for place, (name, unit) in enumerate(rows)]
-
-
-def _names(parameter: Parameter) -> list[str]:
-    if not parameter.per_link:
-        return [parameter.name]
-    return [f"{parameter.name}_{k + 1}" for k in range(len(parameter.symbols))]
 
 
 def _head(request: Request, function: ExportedFunction) -> str:

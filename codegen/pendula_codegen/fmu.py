@@ -89,8 +89,7 @@ def _rows(
     numbers = iter(values["parameters"])
     own = len(declared.parameters) - 2 * len(declared.switches)
     for parameter in declared.parameters[:own]:
-        for k in range(len(parameter.symbols)):
-            name = f"{parameter.name}_{k + 1}" if parameter.per_link else parameter.name
+        for name in parameter.names:
             yield name, "parameter", tunable, parameter.unit, _start(next(numbers))
     for parameter in declared.parameters[own:]:
         yield parameter.name, INDICATOR, "", "", ""

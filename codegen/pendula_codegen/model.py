@@ -73,6 +73,11 @@ class Parameter:
     positive: bool
     per_link: bool
 
+    @property
+    def names(self) -> list[str]:
+        """Of its numbers."""
+        return [f"{self.name}_{k + 1}" for k in range(len(self.symbols))] if self.per_link else [self.name]
+
 
 @dataclass(frozen=True)
 class Input:
@@ -123,7 +128,7 @@ class _Said:
     where: str
 
 
-@dataclass
+@dataclass(eq=False)  # it is what it is by identity, so that results can be kept for it
 class Model:
     """A mechanical system as its file tells it; see `define` in the documentation."""
 

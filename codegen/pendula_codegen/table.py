@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from pendula_codegen.entry_points import Function
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.model_kernel import ModelKernel
@@ -85,7 +84,7 @@ class _Tables:
         start, following = series_functions(series)
         composed = {
             "energies": self._energies,
-            "acceleration_along": self._acceleration_along,
+            "acceleration_along": lambda: _along(self._one("acceleration"), ("q", "v")),
             "momentum_form_along": self._momentum_form_along,
         }
         # The factors of larger matrices, which series keep, have no derivative here.
@@ -96,7 +95,7 @@ class _Tables:
         def of(name: str) -> TableFunction | None:
             if name in composed:
                 return composed[name]()
-            return self._one(self._functions[name]) if name in self._functions else None
+            return self._one(name) if name in self._functions else None
 
         names = self._recorder.names
         return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, names, self._rows(series))
@@ -105,17 +104,18 @@ class _Tables:
         system = self._kernel.system
         n = len(system.coordinates)
         sizes = {"parameters": len(system.parameters), "times": 1, "inputs": len(system.inputs)}
-        sizes |= dict.fromkeys(("q", "v", "a", "p", "dq", "dv"), n)
+        sizes |= dict.fromkeys(("q", "v", "a", "p"), n)
         sizes |= {"unit": 1, "order": 4, "state": 2 * n, "kept": series.kept, "sums": len(series.series.sums)}
-        return sizes | {f"d_{array}": size for array, size in sizes.items()}
+        return sizes | {_slope_of(array): size for array, size in sizes.items()}
 
     # --- functions
 
-    def _one(self, function: Function) -> TableFunction:
-        tape = Tape()
+    def _one(self, name: str) -> TableFunction:
+        function, tape = self._functions[name], Tape()
         found = self._recorder.record(tape, function)
         gives = tuple(output.name for output in function.written)
-        return TableFunction(function.name, _taken(function), gives, tape.give(found))
+        takes = tuple(argument.name for argument in function.inputs if argument.type == "vector")
+        return TableFunction(name, takes, gives, tape.give(found))
 
     def _energies(self) -> TableFunction:
         tape, found = Tape(), {}
@@ -124,39 +124,12 @@ class _Tables:
             found[given, 0] = value
         return TableFunction("energies", ("q", "v"), ("kinetic", "total"), tape.give(found))
 
-    def _acceleration_along(self) -> TableFunction:
-        return self._along("acceleration", ("q", "v"), ("dq", "dv"), keep=True)
-
     def _momentum_form_along(self) -> TableFunction:
-        varied = ("d_parameters", "d_inputs")
-        return self._along("momentum_form", ("parameters", "inputs"), varied, keep=False)
-
-    def _along(self, name: str, moved: tuple[str, ...], by: tuple[str, ...], keep: bool) -> TableFunction:
-        """A function's derivative where some arrays change by others; `keep`: with what it gives itself."""
-        function, tape = self._functions[name], Tape()
-        found = self._recorder.record(tape, function)
-        directions = dict(zip(moved, by, strict=True))
-        slope = slopes(
-            tape, lambda row: tape.read((directions[row[0]], row[1])) if row[0] in directions else None
-        )
-        changes = {
-            (f"d{array}", k): slope[value] if value in slope else tape.number(0.0)
-            for (array, k), value in found.items()
-        }
-        gives = [output.name for output in function.written]
-        slopes_given = [f"d{array}" for array in gives]
-        taken = _taken(function)
-        takes = (*taken, *by) if {*moved} <= {*taken} else (*by, *taken)
-        return TableFunction(
-            f"{name}_along",
-            takes,
-            (*gives, *slopes_given) if keep else tuple(slopes_given),
-            tape.give(found | changes if keep else changes),
-        )
-
-
-def _taken(function: Function) -> tuple[str, ...]:
-    return tuple(argument.name for argument in function.inputs if argument.type == "vector")
+        """Slopes alone."""
+        whole, gives = _along(self._one("momentum_form"), ("parameters", "inputs")), ("dp", "df")
+        outputs = {row: value for row, value in whole.tape.outputs.items() if row[0] in gives}
+        takes = ("d_parameters", "d_inputs", "q", "v")
+        return replace(whole, takes=takes, gives=gives, tape=whole.tape.give(outputs))
 
 
 def series_functions(tapes: SeriesTapes) -> tuple[TableFunction, TableFunction]:
@@ -167,19 +140,24 @@ def series_functions(tapes: SeriesTapes) -> tuple[TableFunction, TableFunction]:
     )
 
 
+def _slope_of(array: str) -> str:
+    """How fast an array changes, as an array: dq, d_state."""
+    return f"d{array}" if len(array) == 1 else f"d_{array}"
+
+
 def _along(function: TableFunction, moved: tuple[str, ...]) -> TableFunction:
-    """A function, and its derivative where some arrays change: `d_state` is how fast `state` does, and so on."""
+    """A function, and its derivative where some arrays change."""
     tape = Tape()
     place = tape.repeat(function.tape)
-    slope = slopes(tape, lambda row: tape.read((f"d_{row[0]}", row[1])) if row[0] in moved else None)
+    slope = slopes(tape, lambda row: tape.read((_slope_of(row[0]), row[1])) if row[0] in moved else None)
     values = {row: place[value] for row, value in function.tape.outputs.items()}
     changes = {
-        (f"d_{array}", k): slope[value] if value in slope else tape.number(0.0)
+        (_slope_of(array), k): slope[value] if value in slope else tape.number(0.0)
         for (array, k), value in values.items()
     }
     return TableFunction(
         f"{function.name}_along",
-        (*function.takes, *(f"d_{array}" for array in moved)),
-        (*function.gives, *(f"d_{array}" for array in function.gives)),
+        (*function.takes, *map(_slope_of, moved)),
+        (*function.gives, *map(_slope_of, function.gives)),
         tape.give(values | changes),
     )

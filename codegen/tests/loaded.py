@@ -6,6 +6,7 @@ import ctypes
 import math
 import shutil
 import subprocess
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from platform import machine
@@ -92,11 +93,18 @@ def jit(text: str) -> Any:
     return engine
 
 
+@cache
+def table_of(model: Model) -> KernelTable:
+    """It is derived once."""
+    return kernel_table(ModelKernel(model))
+
+
 class LoadedKernel:
     """The kernel of a model, by a compiler, with instructions that `march` names; or by LLVM from its own text."""
 
     def __init__(self, model: Model, folder: Path, compiler: str, march: str = "native"):
-        self.table: KernelTable = kernel_table(ModelKernel(model))
+        self.model = model
+        self.table = table_of(model)
         if compiler == LLVM:
             self._library = jit(render_llvm(model, INSTRUCTION_SETS[march]))
             self._kernel = _Kernel.from_address(self._library.get_global_value_address("pendula_kernel"))

@@ -7,16 +7,16 @@ from collections.abc import Callable
 import pytest
 from mpmath import mp, mpf
 
+from loaded import table_of
 from pendula_codegen.backends.c import INTERFACE
 from pendula_codegen.kernel_program import render_bytecode
 from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.system_info import info_lines
-from pendula_codegen.table import kernel_table
 from pendula_codegen.tape import triangle
 from pendula_codegen.written import DIGITS
 from series_truth import Decimals, by_tapes
-from test_c_kernels import CASES, EVERYTHING, MANY, Truth, drawn, own
+from test_c_kernels import CASES, EVERYTHING, MANY, drawn, truth_of
 from test_model_kernels import read
 
 OPERATIONS: dict[str, Callable[..., float]] = {
@@ -102,14 +102,13 @@ def solve(registers: list[float], numbers: list[int]) -> None:
 
 def error(model: Model, seed: int) -> float:
     """The largest of all functions, relative to the largest number that an array has, or 1."""
-    truth, worst = Truth(model), 0.0
+    truth, worst = truth_of(model), 0.0
     given = {array: [row[0] for row in rows] for array, rows in drawn(truth, 1, seed).items()}
     for name, lines in functions_of(render_bytecode(model)).items():
         if name.startswith("series_"):
             continue
         found = carry_out(lines, given)
-        with mp.workdps(DIGITS):
-            true = truth.of(name, {array: [*map(mpf, numbers)] for array, numbers in given.items()})
+        true = truth.exact(name, given)
         assert {array: len(rows) for array, rows in found.items()} == {
             a: len(rows) for a, rows in true.items()
         }
@@ -121,8 +120,7 @@ def error(model: Model, seed: int) -> float:
 
 def series_error(model: Model, seed: int) -> float:
     """Of Taylor coefficients, relative to the largest of an order, against the tapes in 50 digits."""
-    kernel, order, draw = ModelKernel(model), 12, random.Random(seed)
-    table = kernel_table(kernel)
+    table, order, draw = table_of(model), 12, random.Random(seed)
     size, rows = 2 * len(model.coordinates), table.rows
     given = {
         "parameters": [draw.uniform(0.5, 1.5) for _ in range(rows["parameters"])],
@@ -163,14 +161,14 @@ def test_programs_compute_what_models_say(name, links):
     assert series_error(read(name, links), 1) < 1e-12  # measured 3.2e-14
 
 
-def test_every_function_of_models(tmp_path):
-    model = own(EVERYTHING, "everything", tmp_path)
+def test_every_function_of_models(own):
+    model = own(EVERYTHING, "everything")
     assert error(model, 2) < 1e-14
     assert series_error(model, 2) < 1e-13  # measured 2.8e-16
 
 
-def test_large_linear_systems(tmp_path):
-    model = own(MANY, "many", tmp_path, links=12)
+def test_large_linear_systems(own):
+    model = own(MANY, "many", 12)
     assert error(model, 3) < 1e-14
     assert series_error(model, 3) < 1e-13  # measured 1.4e-15
 
@@ -178,8 +176,7 @@ def test_large_linear_systems(tmp_path):
 def test_a_program_says_what_it_is_of():
     model = read("furuta", None)
     first, *lines = render_bytecode(model).splitlines()
-    kernel = ModelKernel(model)
-    said = info_lines(kernel, kernel_table(kernel).series)
+    said = info_lines(ModelKernel(model), table_of(model).series)
     assert first == f"program\t{INTERFACE}" and lines[: len(said)] == said
     rest = [line for line in lines[len(said) :] if not line.startswith("sum\t")]
     assert rest[0].startswith("function\thamiltonian_form\t")

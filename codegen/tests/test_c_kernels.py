@@ -3,6 +3,7 @@
 import math
 import random
 import re
+from functools import cache
 
 import mpmath
 import pytest
@@ -10,12 +11,12 @@ from mpmath import mp, mpf
 from sympy import Symbol, lambdify
 
 from conftest import REPOSITORY
-from loaded import COMPILERS, FEATURES, WIDTHS, LoadedKernel
+from loaded import COMPILERS, FEATURES, WIDTHS, LoadedKernel, table_of
 from pendula_codegen.backends.c import INTERFACE, quoted
-from pendula_codegen.model import Model, read_model
+from pendula_codegen.model import Model
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.models import model_names
-from pendula_codegen.table import OF_MANY, PLAIN, kernel_table
+from pendula_codegen.table import OF_MANY, PLAIN
 from pendula_codegen.written import DIGITS, written
 from series_error import series_error
 from series_truth import Decimals, carry_out
@@ -96,12 +97,6 @@ def define(model, links):
 """
 
 
-def own(text: str, name: str, folder, links: int | None = None) -> Model:
-    file = folder / f"{name}.py"
-    file.write_text(text)
-    return read_model(file, links)
-
-
 class Truth:
     """The functions of a table in 50 digits, by SymPy's derivation of what the file says."""
 
@@ -119,9 +114,10 @@ class Truth:
             "p": [Symbol(f"given_{k}") for k in range(self.size)],
         }
         self._written = written(model)
-        self._tapes = kernel_table(kernel).series
+        self._tapes = table_of(model).series
         self._arguments = [value for value, _ in kernel.call_arguments]
         self._known: dict[str, object] = {}
+        self._exact: dict[tuple, dict[str, list]] = {}
 
     def rows(self) -> dict[str, int]:
         """How many rows each array has that functions take."""
@@ -147,8 +143,17 @@ class Truth:
         matrix = mpmath.matrix([[entries[i * n + j] for j in range(n)] for i in range(n)])
         return [*mpmath.lu_solve(matrix, mpmath.matrix(right))]
 
+    def exact(self, function: str, numbers: dict[str, list[float]]) -> dict[str, list]:
+        """What a function gives of these doubles, array by array in 50 digits, which are found once."""
+        key = (function, *(number for array in numbers.values() for number in array))
+        if key not in self._exact:
+            with mp.workdps(DIGITS):
+                at = {array: [*map(mpf, values)] for array, values in numbers.items()}
+                self._exact[key] = self.of(function, at)
+        return self._exact[key]
+
     def of(self, function: str, at: dict[str, list]) -> dict[str, list]:
-        """What a function gives, array by array."""
+        """The same of numbers of any kind."""
         said = self._said
         match function:
             case "hamiltonian_form":
@@ -223,6 +228,9 @@ class Truth:
         }
 
 
+truth_of = cache(Truth)
+
+
 def drawn(truth: Truth, width: int, seed: int) -> dict[str, list[list[float]]]:
     draw = random.Random(seed)
     return {
@@ -244,9 +252,7 @@ def error(loaded: LoadedKernel, truth: Truth, width: int, seed: int) -> float:
             continue
         found = loaded.call(name, width, given)
         for lane in range(width):
-            at = {array: [mpf(row[lane]) for row in rows] for array, rows in given.items()}
-            with mp.workdps(DIGITS):
-                true = truth.of(name, at)
+            true = truth.exact(name, {array: [row[lane] for row in rows] for array, rows in given.items()})
             assert {*true} == {*found}, name
             for array, rows in found.items():
                 values = [row[lane] for row in rows]
@@ -260,42 +266,42 @@ def error(loaded: LoadedKernel, truth: Truth, width: int, seed: int) -> float:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize(("name", "links"), CASES)
-def test_kernels_compute_what_models_say(name, links, compiler, tmp_path):
+def test_kernels_compute_what_models_say(name, links, compiler, kernel_of):
     model = read(name, links)
-    loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
+    loaded, truth = kernel_of(model, compiler), truth_of(model)
     assert max(error(loaded, truth, width, width) for width in WIDTHS) < 1e-14  # measured 1.1e-15
     assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-12  # measured 1.9e-13
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("march", INSTRUCTIONS)
-def test_every_function_of_models_with_any_instructions(compiler, march, tmp_path):
-    model = own(EVERYTHING, "everything", tmp_path)
-    loaded, truth = LoadedKernel(model, tmp_path, compiler, march), Truth(model)
+def test_every_function_of_models_with_any_instructions(compiler, march, own, kernel_of):
+    model = own(EVERYTHING, "everything")
+    loaded, truth = kernel_of(model, compiler, march), truth_of(model)
     assert max(error(loaded, truth, width, 10 + width) for width in WIDTHS) < 1e-14  # measured 1.3e-15
     assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-13  # measured 6.9e-16
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_functions_of_several_pieces(compiler, tmp_path):
-    model = own(PIECES, "pieces", tmp_path)
-    loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
+def test_functions_of_several_pieces(compiler, own, kernel_of):
+    model = own(PIECES, "pieces")
+    loaded, truth = kernel_of(model, compiler), truth_of(model)
     assert max(error(loaded, truth, width, 20 + width) for width in WIDTHS) < 1e-14  # measured 8.9e-16
     assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-13  # measured 4.9e-15
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_linear_systems_too_large_to_be_written_out(compiler, tmp_path):
-    model = own(MANY, "many", tmp_path, links=12)
-    loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
+def test_linear_systems_too_large_to_be_written_out(compiler, own, kernel_of):
+    model = own(MANY, "many", 12)
+    loaded, truth = kernel_of(model, compiler), truth_of(model)
     assert max(error(loaded, truth, width, width) for width in (1, 4)) < 1e-14  # measured 1.6e-15
     assert max(series_error(loaded, width, width) for width in (1, 4)) < 1e-13  # measured 4.8e-15
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_names_of_models_meet_no_others(compiler, tmp_path):
-    model = own(NAMES, "double", tmp_path)
-    loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
+def test_names_of_models_meet_no_others(compiler, own, kernel_of):
+    model = own(NAMES, "double")
+    loaded, truth = kernel_of(model, compiler), truth_of(model)
     assert error(loaded, truth, 2, 1) < 1e-14  # measured 1.4e-16
 
 
@@ -304,10 +310,9 @@ def test_names_of_models_meet_no_others(compiler, tmp_path):
     params=[(name, march) for name in COMPILERS for march in INSTRUCTIONS[-2:]],
     ids="-".join,
 )
-def everything(request, tmp_path_factory) -> tuple[LoadedKernel, Truth]:
-    folder = tmp_path_factory.mktemp("everything")
-    model = own(EVERYTHING, "everything", folder)
-    return LoadedKernel(model, folder, *request.param), Truth(model)
+def everything(request, own, kernel_of) -> tuple[LoadedKernel, Truth]:
+    model = own(EVERYTHING, "everything")
+    return kernel_of(model, *request.param), truth_of(model)
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -382,9 +387,8 @@ def test_large_angles_are_as_exact(width, everything):
     given["q"][2] = [10 ** random.Random(lane).uniform(4, 9) for lane in range(width)]
     found = loaded.call("mass_matrix", width, given)["M"]
     for lane in range(width):
-        at = {array: [mpf(row[lane]) for row in rows] for array, rows in given.items()}
-        with mp.workdps(DIGITS):
-            true = truth.of("mass_matrix", at)["M"]
+        at = {array: [row[lane] for row in rows] for array, rows in given.items()}
+        true = truth.exact("mass_matrix", at)["M"]
         assert [row[lane] for row in found] == pytest.approx([float(x) for x in true], rel=1e-15, abs=1e-15)
 
 

@@ -2,17 +2,17 @@
 
 import pytest
 
-from loaded import COMPILERS, WIDTHS, LoadedKernel
+from loaded import COMPILERS, WIDTHS
 from series_error import series_error
-from test_c_kernels import INSTRUCTIONS, Truth, error, own
+from test_c_kernels import INSTRUCTIONS, error, truth_of
 from test_model_kernels import read
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("march", INSTRUCTIONS)
-def test_few_sums_with_any_instructions(compiler, march, tmp_path):
+def test_few_sums_with_any_instructions(compiler, march, kernel_of):
     """Whose newest terms are added one by one: EVERYTHING has too many."""
-    loaded = LoadedKernel(read("rods", 2), tmp_path, compiler, march)
+    loaded = kernel_of(read("rods", 2), compiler, march)
     assert len(loaded.table.series.series.sums) == 10
     assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-13  # measured 9.9e-15
 
@@ -28,8 +28,8 @@ def define(model, links):
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_linear_models(compiler, tmp_path):
-    model = own(LINEAR, "linear", tmp_path)
-    loaded, truth = LoadedKernel(model, tmp_path, compiler), Truth(model)
+def test_linear_models(compiler, own, kernel_of):
+    model = own(LINEAR, "linear")
+    loaded, truth = kernel_of(model, compiler), truth_of(model)
     assert error(loaded, truth, 1, 1) < 1e-15  # measured 6.8e-17
     assert max(series_error(loaded, width, width) for width in WIDTHS) < 1e-14  # measured 3.1e-16

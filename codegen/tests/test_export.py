@@ -19,7 +19,7 @@ from pendula_codegen.feedback import sampled_laws_of_chain
 from pendula_codegen.links import find_link
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.written import DIGITS
-from test_c_kernels import EVERYTHING, MANY, NAMES, PIECES, Truth, drawn, own
+from test_c_kernels import EVERYTHING, MANY, NAMES, PIECES, Truth, drawn, truth_of
 from test_model_kernels import read
 
 COMPILERS = [name for name in ("gcc", "clang", "tcc") if shutil.which(name)]
@@ -142,25 +142,25 @@ def define(model, links):
 
 def test_functions_and_derivatives_are_the_models(tmp_path):
     model = read("cart_chain", 2)
-    assert error(Loaded(ModelKernel(model), tmp_path), Truth(model), 1) < 1e-14  # measured 6.4e-16
+    assert error(Loaded(ModelKernel(model), tmp_path), truth_of(model), 1) < 1e-14  # measured 6.4e-16
 
 
-def test_every_function_that_models_may_hold(tmp_path):
-    model = own(EVERYTHING, "everything", tmp_path)
-    assert error(Loaded(ModelKernel(model), tmp_path), Truth(model), 2) < 1e-14  # measured 2.3e-16
+def test_every_function_that_models_may_hold(own, tmp_path):
+    model = own(EVERYTHING, "everything")
+    assert error(Loaded(ModelKernel(model), tmp_path), truth_of(model), 2) < 1e-14  # measured 2.3e-16
 
 
-def test_linear_systems_too_large_to_be_written_out(tmp_path):
-    model = own(MANY, "many", tmp_path, links=12)
+def test_linear_systems_too_large_to_be_written_out(own, tmp_path):
+    model = own(MANY, "many", 12)
     wanted = re.compile("(rates|acceleration)$|acceleration_D_parameters")
-    assert error(Loaded(ModelKernel(model), tmp_path), Truth(model), 3, wanted) < 1e-14  # measured 1.4e-16
+    assert error(Loaded(ModelKernel(model), tmp_path), truth_of(model), 3, wanted) < 1e-14  # measured 1.4e-16
 
 
 @pytest.mark.parametrize(("space", "links"), [("planar", 2), ("spatial", 2)])
-def test_chains_are_what_a_model_file_says(space, links, tmp_path):
+def test_chains_are_what_a_model_file_says(space, links, own, tmp_path):
     """Two derivations, of the paper's chain and of a Lagrangian as a user writes it."""
-    model = own(f"SPATIAL = {space == 'spatial'}\n{CHAIN}", "written", tmp_path, links)
-    assert error(Loaded(chain(space, links), tmp_path), Truth(model), 4) < 1e-14  # measured 1.3e-15
+    model = own(f"SPATIAL = {space == 'spatial'}\n{CHAIN}", "written", links)
+    assert error(Loaded(chain(space, links), tmp_path), truth_of(model), 4) < 1e-14  # measured 1.3e-15
 
 
 # Derivatives by the input hold the coordinate as long as they are not written out.
@@ -173,16 +173,16 @@ def define(model, links):
 
 
 @pytest.fixture(scope="module", params=["double", "float"])
-def sources(request, tmp_path_factory) -> tuple[str, list[Path]]:
+def sources(request, own, tmp_path_factory) -> tuple[str, list[Path]]:
     """The type of numbers, and systems of all kinds in it."""
     folder = tmp_path_factory.mktemp("sources")
     kernels = [
         chain("spatial", 1),
-        ModelKernel(own(EVERYTHING, "everything", folder)),
-        ModelKernel(own(MANY, "many", folder, links=11)),
-        ModelKernel(own(NAMES, "double", folder)),
-        ModelKernel(own(CANCELS, "cancels", folder)),
-        ModelKernel(own(PIECES, "pieces", folder)),
+        ModelKernel(own(EVERYTHING, "everything")),
+        ModelKernel(own(MANY, "many", 11)),
+        ModelKernel(own(NAMES, "double")),
+        ModelKernel(own(CANCELS, "cancels")),
+        ModelKernel(own(PIECES, "pieces")),
     ]
     found = []
     for k, kernel in enumerate(kernels):
@@ -293,8 +293,8 @@ def test_what_is_wrong_is_told(request_, words):
         render_export(chain("planar", 1), Request(**{"name": "system", **request_}), "")
 
 
-def test_what_cannot_be_exported_is_told(tmp_path):
+def test_what_cannot_be_exported_is_told(own):
     with pytest.raises(GenerationError, match="expected at most 16 coordinates, got 17"):
         render_export(chain("planar", 17), Request("too_long"), "")
     with pytest.raises(GenerationError, match="casadi: expected a smooth model"):
-        render_export(ModelKernel(own(PIECES, "pieces", tmp_path)), Request("pieces", "casadi"), "")
+        render_export(ModelKernel(own(PIECES, "pieces")), Request("pieces", "casadi"), "")

@@ -2,6 +2,7 @@
 
 import math
 import random
+from functools import cache
 
 import pytest
 from sympy import Rational, Symbol, atan, cos, diff, exp, lambdify, log, simplify, sin, sqrt, symbols, tan
@@ -18,7 +19,9 @@ LINKED = {"cart_chain", "driven_chain", "joint_springs", "rods"}
 CASES = [(name, n) for name in model_names() for n in ((1, 2, 3) if name in LINKED else (None,))]
 
 
+@cache
 def read(name: str, links: int | None) -> Model:
+    """It is read once."""
     return read_model(find_model(name), links)
 
 

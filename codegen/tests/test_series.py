@@ -15,7 +15,7 @@ from pendula_codegen.models import model_names
 from pendula_codegen.series import series_in
 from pendula_codegen.series_tape import SeriesTapes, series_tapes
 from series_truth import Decimals, Equations, Numbers, Rationals, by_tapes, equations, motion
-from test_c_kernels import EVERYTHING, MANY, own
+from test_c_kernels import EVERYTHING, MANY
 from test_model_kernels import LINKED, read
 
 ORDER = 12
@@ -130,16 +130,16 @@ def test_coefficients_of_chains(space, links):
     assert of_chain(space, links).differences(Rationals()) == [0, 0]
 
 
-def test_every_function_of_models(tmp_path):
+def test_every_function_of_models(own):
     with mpmath.workdps(50):
-        differences = case_of(own(EVERYTHING, "everything", tmp_path)).differences(Decimals())
+        differences = case_of(own(EVERYTHING, "everything")).differences(Decimals())
         assert max(differences) < 1e-48  # measured 2.9e-50
 
 
-def test_large_linear_systems(tmp_path):
+def test_large_linear_systems(own):
     """Whose factors are kept, and not written out at order 0."""
     with mpmath.workdps(50):
-        case = case_of(own(MANY, "many", tmp_path, links=12))
+        case = case_of(own(MANY, "many", 12))
         assert max(case.differences(Decimals(), 5)) < 1e-46
 
 
@@ -161,13 +161,13 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_coefficients_of_other_models(what, tmp_path):
+def test_coefficients_of_other_models(what, own):
     head = """
 def define(model, links):
     x, y, t = model.coordinate("x", "m"), model.coordinate("y", "m"), model.time
     v, w = model.rate(x), model.rate(y)
     """
-    assert case_of(own(head + OTHERS[what] + "\n", "other", tmp_path)).differences(Rationals()) == [0, 0]
+    assert case_of(own(head + OTHERS[what] + "\n", "other")).differences(Rationals()) == [0, 0]
 
 
 # The momentum is 3 (x_dot + x)² − 3 x_dot²: linear once multiplied out, which keeps fewer digits.
@@ -180,8 +180,8 @@ def define(model, links):
 """
 
 
-def test_momenta_in_which_terms_cancel(tmp_path):
-    assert case_of(own(CANCELLING, "cancelling", tmp_path)).differences(Rationals()) == [0, 0]
+def test_momenta_in_which_terms_cancel(own):
+    assert case_of(own(CANCELLING, "cancelling")).differences(Rationals()) == [0, 0]
 
 
 def test_a_pendulum_by_repeated_differentiation():

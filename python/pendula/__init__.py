@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 from ._core import InputError, instruction_set
 from ._core import version as _version
-from ._derivatives import Derivatives, Gradient, differentiate, linearize
+from ._derivatives import Derivatives, differentiate, linearize
 from ._ensemble import ensemble
 from ._ensemble_data import merge, open_ensemble
+from ._gradient import Gradient
 from ._linear import LinearSystem
 from ._map import map as map  # not in __all__: `from pendula import *` leaves Python its own
 from ._models import Kernel, Model, models

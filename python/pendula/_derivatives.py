@@ -9,10 +9,11 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
+from ._gradient import Varied
 from ._linear import LinearSystem
-from ._runs import number, numbers, plainly, warn
+from ._runs import duration_of, plainly, positive, state_names, warn
 from ._simulation import Beginning, Simulation, split
-from ._systems import System, starts_of, system_of
+from ._systems import System, ascending_times, span_of, starts_of, system_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,29 +37,6 @@ class Derivatives(NamedTuple):
     time_by_start: NDArray[np.float64]  #: (coordinates + rates,) of the last time; zeros without an event
     time_by_parameters: dict[str, NDArray[np.float64]]  #: (numbers of it,)
     time_by_inputs: dict[str, NDArray[np.float64]]  #: the same
-
-
-class Gradient(NamedTuple):
-    """What a number that depends on a motion changes by."""
-
-    start: NDArray[np.float64]  #: (coordinates + rates,)
-    parameters: dict[str, NDArray[np.float64]]  #: (numbers of it,), by name
-    inputs: dict[str, NDArray[np.float64]]  #: the same
-
-
-class Varied:
-    """Names of parameters and inputs, and their places among all numbers. Raises InputError for natural units."""
-
-    def __init__(self, made: _core.Prepared) -> None:
-        if made.is_natural:
-            raise InputError('units: expected "SI" for derivatives, got "natural"')
-        self.parameters: dict[str, slice] = {}
-        self.inputs: dict[str, slice] = {}
-        self.count = 0
-        for name, size, is_input in _core.varied_by(made):
-            group = self.inputs if is_input else self.parameters
-            group[name] = slice(self.count, self.count + size)
-            self.count += size
 
 
 def differentiate(
@@ -153,18 +131,18 @@ def differentiate(
     of_time = np.zeros(size + varied.count)
     if until is not None:
         of_time = _at_event(made, until, float(made.time + times[-1]), states[-1], by_all[-1])
-    columns = made.columns
-    by_varied, time_by_varied = by_all[:, :, size:], of_time[size:]
+    by_parameters, by_inputs = varied.by_name(by_all[:, :, size:])
+    time_by_parameters, time_by_inputs = varied.by_name(of_time[size:])
     return Derivatives(
         times,
         states.T,
-        [columns[k] for k in made.state],
+        state_names(made),
         by_all[:, :, :size],
-        {name: by_varied[:, :, place] for name, place in varied.parameters.items()},
-        {name: by_varied[:, :, place] for name, place in varied.inputs.items()},
+        by_parameters,
+        by_inputs,
         of_time[:size],
-        {name: time_by_varied[place] for name, place in varied.parameters.items()},
-        {name: time_by_varied[place] for name, place in varied.inputs.items()},
+        time_by_parameters,
+        time_by_inputs,
     )
 
 
@@ -221,27 +199,21 @@ def linearize(
         if tolerance is not None:
             raise InputError("tolerance: expected none without step, got one")
         return simulation.linearize(outputs)
-    if number("step", step) <= 0:
-        raise InputError(f"step: expected a positive number, got {step!r}")
-    moved = differentiate(system, step, start={**system.at_zero(), **given}, tolerance=tolerance)
+    moved = differentiate(
+        system, positive("step", step), start={**system.at_zero(), **given}, tolerance=tolerance
+    )
     by_inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
     b = np.hstack([np.empty((moved.y.shape[0], 0)), *by_inputs])
     return LinearSystem(moved.by_start[0], b, step=float(step), **simulation._seen(outputs))
 
 
 def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:
-    if t is None and duration is None:
-        raise TypeError("differentiate: expected duration= or t=, got neither")
-    if duration is not None and number("duration", duration) < 0:
-        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
-    times = numbers("t", t) if t is not None else np.array([number("duration", duration)])
-    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
-        raise InputError(f"t: expected a vector of finite times, got {t!r}")
-    if np.any(times < 0) or np.any(np.diff(times) < 0):
-        raise InputError("t: expected times from 0 on, ascending, got others")
-    if t is not None and duration is not None:
+    times, end = span_of("differentiate", duration, t)
+    if times is None:
+        return np.array([duration_of(end)])
+    if duration is not None:
         raise InputError("duration: expected none beside t, got both")
-    return times
+    return ascending_times(times)
 
 
 def _slopes(
@@ -272,22 +244,3 @@ def _at_event(
     of_time: NDArray[np.float64] = -(slopes[1:] @ by_all) / speed
     by_all += np.outer(field, of_time)
     return of_time
-
-
-def gradient(
-    made: _core.Prepared,
-    start: NDArray[np.float64],
-    times: NDArray[np.float64],
-    by_states: NDArray[np.float64],
-) -> Gradient:
-    """Backward: from a number's gradient by the states at the times, (coordinates + rates, times)."""
-    varied = Varied(made)
-    with plainly():
-        _, by_start, all_varied = _core.backward(
-            made, made.time, start, np.ascontiguousarray(times), np.ascontiguousarray(by_states)
-        )
-    return Gradient(
-        by_start,
-        {name: all_varied[place] for name, place in varied.parameters.items()},
-        {name: all_varied[place] for name, place in varied.inputs.items()},
-    )

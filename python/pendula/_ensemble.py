@@ -10,12 +10,12 @@ from . import _core, _toml
 from ._core import InputError
 from ._ensemble_data import dataset_of, open_ensemble
 from ._ensemble_rows import rows_of_members, threads_of
-from ._ensemble_text import Design, ensemble_text, some_start
+from ._ensemble_text import Design, ensemble_text
 from ._events import event_tables
 from ._progress import progress_line
-from ._runs import RunFailed, mapping, number, places, plainly, tell, warn
-from ._simulation import Beginning, split
-from ._systems import System, system_of, times_of
+from ._runs import RunFailed, duration_of, mapping, places, plainly, tell, warn
+from ._simulation import split
+from ._systems import System, span_of, system_of
 
 if TYPE_CHECKING:
     import xarray
@@ -129,28 +129,19 @@ def ensemble(
     >>> data["theta_2"].dims, data["theta_2"].shape
     (('member', 't'), (4, 11))
     """
-    times = None if t is None else times_of(t)
-    if duration is None and times is None:
-        raise TypeError("ensemble: expected duration= or t=, got neither")
-    how_long = float(times[-1]) if duration is None and times is not None else number("duration", duration)
-    if how_long < 0:
-        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
+    times, how_long = span_of("ensemble", duration, t)
     starts, runs = split(ensemble, system, start, options)
     kept = [keep] if isinstance(keep, str) else keep
     method = runs.pop("method", None)
     keys, drawn = mapping("axes", axes), mapping("random", random)
-    # A model may have no start where all is zero.
-    begin = system_of(system).at_zero() or some_start(starts, keys, drawn)
-    # Names alone are asked for, which feedback does not change; a program cannot step what is sampled.
-    made = Beginning.of(system, begin, tolerance=None, step=None, options={}, feeds_back=False).prepare()
-    design = Design(system, [made.columns[k] for k in made.state])
+    design = Design(system_of(system))
     design.add_start(starts)
     design.add_axes(keys)
     design.add_random(drawn)
     if step is None and tolerance is None and accuracy is None:
         tolerance = 1e-9
     run = {
-        "duration": how_long,
+        "duration": duration_of(how_long),
         "method": None if method == "auto" else method,
         "tolerance": tolerance,
         "step": step,

@@ -20,13 +20,18 @@ if TYPE_CHECKING:
 OWN = ("long_name", "units", "natural_unit", "flag_values", "flag_meanings")
 
 
-def dataset_of(made: _core.Ensemble) -> xarray.Dataset:
-    """What came of members in memory, as :func:`open_ensemble` has it of a file."""
+# What comes of moving members.
+MOVED = ("status", "trusted", "steps")
+
+
+def dataset_of(made: _core.Ensemble, has_moved: bool = True) -> xarray.Dataset:
+    """What came of members in memory, as :func:`open_ensemble` has it of a file; or what is known before."""
     data: dict[str, Any] = {}
     scales: dict[str, Any] = {}
     for k, (name, kind, attributes, flags) in enumerate(made.arrays):
         attrs: dict[str, Any] = dict(attributes)
-        values: Any = made.numbers(k)
+        is_known = has_moved or name not in MOVED
+        values: Any = made.numbers(k) if is_known else np.full(made.members, -1, np.int8)
         if flags:
             attrs["flag_values"] = np.arange(-1, flags - 1, dtype=values.dtype)
         if kind == "scale":

@@ -7,22 +7,19 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._ensemble_data import dataset
+from ._ensemble_data import MOVED, dataset_of
 from ._progress import progress_line
-from ._runs import RunFailed, did_you_mean, in_order, places, plainly, tell, warn
+from ._runs import RunFailed, columns_of, did_you_mean, in_order, places, plainly, tell, warn
 
 if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
-
-
-NOT_OF_MEMBERS = ("status", "trusted")  # they come of moving them
 
 
 def rows_of_members(
@@ -37,26 +34,37 @@ def rows_of_members(
     how_many = threads_of(threads) or os.cpu_count() or 1
     with plainly():
         made = _core.Ensemble(text, "pendula", [], "pendula.ensemble", *places(), tell)
-    members = _Members(made)
+    before = dataset_of(made, has_moved=False)
+    dims, meanings = before["status"].dims, before["status"].attrs["flag_meanings"].split()
+    lists = [name for name in before.data_vars if name not in MOVED]
+    own = {
+        before[name].attrs["long_name"]: before[name].broadcast_like(before["status"]).transpose(*dims)
+        for name in (*dims, *lists)
+        if name != "member"
+    }
+
+    def overrides(member: int) -> list[str]:
+        return [f"{key}={float(numbers.values.flat[member])!r}" for key, numbers in own.items()]
+
     with plainly():
-        prepared = _core.prepare(alone, "pendula", members.overrides(0), *places(), tell, False)
+        prepared = _core.prepare(alone, "pendula", overrides(0), *places(), tell, False)
     columns = prepared.columns
     kept = _kept(columns, in_order(columns, prepared.state)[1:], keep)
     rows = np.full((made.members, times.size, len(kept)), np.nan)
-    status = np.full(made.members, members.meanings.index("wrong_input") - 1, np.int8)
+    status = np.full(made.members, meanings.index("wrong_input") - 1, np.int8)
     trusted = np.full(made.members, -1, np.int8)
     problems: dict[int, str] = {}
 
     def move(member: int) -> None:
         try:
             with plainly():
-                found = _core.simulate(alone, "pendula", members.overrides(member), [], None, *places(), tell)
+                found = _core.simulate(alone, "pendula", overrides(member), [], None, *places(), tell)
         except InputError as error:
             problems[member] = str(error)
             return
         told = json.loads(found.summary)
         outcome = told.get("outcome", {})
-        status[member] = members.meanings.index(outcome["status"]) - 1
+        status[member] = meanings.index(outcome["status"]) - 1
         if status[member] > 1:
             problems[member] = outcome.get("message", outcome["status"])
         else:
@@ -69,13 +77,14 @@ def rows_of_members(
         for done, _ in enumerate(pool.map(move, range(made.members)), 1):
             if shown:
                 shown(done)
-    data = members.dataset(times)
+    data = before.drop_vars("steps").set_coords(lists).assign_coords(t=("t", times, {"units": "s"}))
+    data = data.assign_attrs(members_done=made.members, complete=1)
     for k, column in enumerate(kept):
         name = columns[column]
         attrs = {"long_name": name, "units": prepared.units[name]}
-        data[name] = ((*members.dims, "t"), rows[:, :, k].reshape(*made.shape, times.size), attrs)
-    data["status"] = (members.dims, status.reshape(made.shape), data["status"].attrs)
-    data["trusted"] = (members.dims, trusted.reshape(made.shape), data["trusted"].attrs)
+        data[name] = ((*dims, "t"), rows[:, :, k].reshape(*made.shape, times.size), attrs)
+    data["status"] = (dims, status.reshape(made.shape), data["status"].attrs)
+    data["trusted"] = (dims, trusted.reshape(made.shape), data["trusted"].attrs)
     sentences = []
     if problems:
         first = min(problems)
@@ -101,59 +110,6 @@ def threads_of(given: object) -> int:
     raise InputError(f"threads: expected how many up to 1024, 0 for all processors, got {given!r}")
 
 
-class _Key(NamedTuple):
-    """A key of a scenario, and its numbers: of an axis, or one of each member."""
-
-    key: str
-    numbers: NDArray[np.float64]
-    axis: int | None
-
-
-class _Members:
-    """What the members of an ensemble have each for itself."""
-
-    def __init__(self, made: _core.Ensemble) -> None:
-        self.dims: tuple[str, ...] = ()
-        self.meanings: list[str] = []
-        self._shape = made.shape
-        self._attributes = dict(made.attributes)
-        self._scales: dict[str, Any] = {}
-        self._data: dict[str, Any] = {}
-        self._keys: list[_Key] = []
-        for k, (name, kind, attributes, flags) in enumerate(made.arrays):
-            attrs: dict[str, Any] = dict(attributes)
-            numbers: Any = None if name in (*NOT_OF_MEMBERS, "steps") else made.numbers(k)
-            if name in NOT_OF_MEMBERS:
-                attrs["flag_values"] = np.arange(-1, flags - 1, dtype=np.int8)
-                self._data[name] = attrs
-                if name == "status":
-                    self.meanings = attrs["flag_meanings"].split()
-            elif kind == "scale":
-                self._scales[name] = (name, numbers, attrs)
-                if name != "member":
-                    self._keys.append(_Key(attrs["long_name"], numbers, len(self.dims)))
-                self.dims = (*self.dims, name)
-            elif name != "steps":
-                self._keys.append(_Key(attrs["long_name"], numbers, None))
-                self._scales[name] = (self.dims, numbers.reshape(made.shape), attrs)
-
-    def overrides(self, member: int) -> list[str]:
-        """Its numbers, as a scenario takes them."""
-        place = np.unravel_index(member, self._shape)
-        return [
-            f"{one.key}={float(one.numbers[member if one.axis is None else place[one.axis]])!r}"
-            for one in self._keys
-        ]
-
-    def dataset(self, times: NDArray[np.float64]) -> xarray.Dataset:
-        """With all but the rows."""
-        nothing = np.zeros(self._shape, np.int8)
-        data = {name: (self.dims, nothing, attrs) for name, attrs in self._data.items()}
-        members = int(np.prod(self._shape))
-        attributes = {**self._attributes, "members_done": members, "complete": 1}
-        return dataset(data, {**self._scales, "t": ("t", times, {"units": "s"})}, attributes)
-
-
 @contextmanager
 def _pool(threads: int) -> Iterator[ThreadPoolExecutor]:
     """Threads; what has not begun is left where something is raised, as by Ctrl-C."""
@@ -168,13 +124,12 @@ def _kept(columns: list[str], order: list[int], keep: Sequence[str] | None) -> l
     """Columns, in their order. Raises InputError."""
     if keep is None:
         return order
-    found = {
-        name: [k for k in order if columns[k] == name or columns[k].rsplit("_", 1)[0] == name]
-        for name in keep
-    }
-    for name, places_of in found.items():
-        if not places_of:
-            near = did_you_mean(str(name), [columns[k] for k in order])
+    names = [columns[k] for k in order]
+    wanted: set[str] = set()
+    for name in keep:
+        found = columns_of(str(name), names)
+        if not found:
+            near = did_you_mean(str(name), names)
             raise InputError(f"keep: expected columns of rows beside t, got {name}{near}")
-    wanted = {k for places_of in found.values() for k in places_of}
-    return [k for k in order if k in wanted]
+        wanted.update(found)
+    return [k for k in order if columns[k] in wanted]

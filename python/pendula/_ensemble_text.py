@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _toml
 from ._core import InputError
-from ._runs import numbers
+from ._runs import columns_of, numbers, require_known
 from ._systems import Chain, System
 
 if TYPE_CHECKING:
@@ -22,11 +22,10 @@ DRAWN = {"normal": ("mean", "deviation"), "uniform": ("from", "to")}
 class Design:
     """What the members of a system have in common, and what each has for itself."""
 
-    def __init__(self, system: System, names: list[str]) -> None:
-        """``names`` are those of coordinates, then of their rates."""
+    def __init__(self, system: System) -> None:
         self._system = system
-        self._coordinates = names[: len(names) // 2]
-        self._columns = [*names, *(f"p_{name}" for name in self._coordinates)]
+        coordinates = system.coordinates
+        self._columns = [*coordinates, *system.rates, *(f"p_{name}" for name in coordinates)]
         self._fixed: dict[str, object] = {}
         self._axes: dict[str, NDArray[np.float64]] = {}
         self._lists: dict[str, NDArray[np.float64]] = {}
@@ -93,9 +92,9 @@ class Design:
 
     def _columns_of(self, name: str, given: object) -> list[tuple[str, object]]:
         """What each column has: a number, a text, or an array of one axis."""
-        links = [name] if name in self._columns else self._links_of(name)
+        links = columns_of(name, self._columns)
         if not links:
-            raise InputError(f"start: expected some of {', '.join(self._columns)}, got {name}")
+            require_known("start", [name], self._columns)
         if isinstance(given, tuple) or _has_texts(given):
             if len(given) != len(links):  # type: ignore[arg-type]
                 raise InputError(f"start: expected {len(links)} of {name}, got {len(given)}")  # type: ignore[arg-type]
@@ -112,10 +111,6 @@ class Design:
             raise InputError(f"start: expected {members} for {name}, got shape {array.shape}")
         return [(column, array[:, k]) for k, column in enumerate(links)]
 
-    def _links_of(self, name: str) -> list[str]:
-        named = (f"{name}_{k + 1}" for k in range(len(self._columns)))
-        return [column for column in named if column in self._columns]
-
     def _key(self, column: str) -> str:
         """A chain's scenario has arrays, one number a link; others have each coordinate by its name."""
         if not isinstance(self._system, Chain):
@@ -124,9 +119,21 @@ class Design:
         return f"start.{family}[{link}]"
 
     def _start(self) -> dict[str, object]:
+        """From amid those of the members: at the ends of a range a model is singular more often."""
         if not isinstance(self._system, Chain):
-            return {**some_start({}, {**self._axes, **self._lists}, self._drawn), **self._fixed}
-        return {name: [self._fixed.get(one, 0.0) for one in self._links_of(name)] for name in self._families}
+            of_members = {**self._axes, **self._lists}
+            amid: dict[str, object] = {
+                key: float(values[values.size // 2]) for key, values in of_members.items()
+            }
+            amid |= {key: _mean(given) for key, given in self._drawn.items()}
+            starts = {
+                key.removeprefix("start."): one for key, one in amid.items() if key.startswith("start.")
+            }
+            return {**starts, **self._fixed}
+        return {
+            name: [self._fixed.get(one, 0.0) for one in columns_of(name, self._columns)]
+            for name in self._families
+        }
 
     def _write_as_array(self, tables: dict[str, Any], key: str) -> None:
         """A key of one link needs an array that it is in."""
@@ -134,24 +141,10 @@ class Design:
         if found is None:
             return
         table, name = tables[found[1]], found[2]
-        known = name in tables["chain"] if found[1] == "chain" else self._links_of(name)
+        known = name in tables["chain"] if found[1] == "chain" else columns_of(name, self._columns)
         one = table.get(name)
         if known and np.ndim(one) == 0:  # None, too
-            links = sum(1 for column in self._coordinates if column.startswith("theta_"))
-            table[name] = [0.0 if one is None else one] * links
-
-
-def some_start(
-    start: Mapping[str, object], keys: Mapping[str, object], random: Mapping[str, object]
-) -> dict[str, object]:
-    """A start from among those of the members: at the ends of a range a model is singular more often than amid it.
-    Nothing is checked."""
-    found = {key: _middle(given) for key, given in keys.items()}
-    for key, given in random.items():
-        if isinstance(given, Sequence) and len(given) == 3:
-            found[key] = _mean(given)
-    named = {key.removeprefix("start."): one for key, one in found.items() if key.startswith("start.")}
-    return named | {name: _middle(given) for name, given in start.items()}
+            table[name] = [0.0 if one is None else one] * len(columns_of("theta", self._columns))
 
 
 def _mean(given: Sequence[Any]) -> object:
@@ -160,18 +153,6 @@ def _mean(given: Sequence[Any]) -> object:
         return given[1] if given[0] == "normal" else (given[1] + given[2]) / 2
     except TypeError:
         return given[1]  # no number, which the reader tells
-
-
-def _middle(given: object) -> object:
-    """Of an array, the number or row in its middle; of a tuple, that of each."""
-    if isinstance(given, tuple):
-        all_of_them = [_middle(one) for one in given]
-        return all_of_them[0] if len(all_of_them) == 1 else all_of_them
-    if isinstance(given, str) or np.ndim(given) == 0:  # type: ignore[arg-type]
-        return given
-    array = np.asarray(given)
-    one = array[len(array) // 2] if array.size else np.zeros(1)
-    return one.item() if one.size == 1 else one.tolist()
 
 
 def ensemble_text(

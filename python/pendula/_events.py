@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ._core import InputError
-from ._runs import Raised, mapping, number
+from ._runs import Raised, mapping, number, require_known
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,9 +42,7 @@ def event_tables(events: object) -> list[dict[str, object]]:
 def _function(name: str, given: Mapping[str, Any]) -> tuple[str, Any, int, bool]:
     if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         raise InputError(f"events: expected a name of letters, digits, - and _, got {name!r}")
-    unknown = [key for key in given if key not in ("when", "direction", "stop")]
-    if unknown:
-        raise InputError(f"events.{name}: expected when, direction and stop, got {unknown[0]}")
+    require_known(f"events.{name}", given, ("when", "direction", "stop"))
     function = given["when"]
     terminal = given.get("stop", getattr(function, "terminal", False))
     if terminal not in (False, True):

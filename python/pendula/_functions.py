@@ -93,18 +93,13 @@ class _Text:
             return
         definition = _definition(function, is_model)
         definition.name = name
-        surroundings = {**function.__globals__, **_cells(function)}
         code = function.__code__
         own = {*code.co_varnames, *code.co_cellvars}
         lines: dict[str, int] = {}
         for node in ast.walk(definition):
             if isinstance(node, ast.Name) and node.id not in own:
                 lines[node.id] = min(node.lineno, lines.get(node.id, node.lineno))
-        for used, line in sorted(lines.items()):
-            if used in surroundings:
-                self._use(function.__name__, used, surroundings[used])
-            elif not hasattr(builtins, used) and used in code.co_names:
-                raise _unknown_name(function, used, code.co_firstlineno + line - 1)
+        self._use_all(function, {used: code.co_firstlineno + line - 1 for used, line in lines.items()})
         text = ast.unparse(definition)
         statements = (
             [node for node in ast.walk(tree) if isinstance(node, ast.stmt)]
@@ -117,12 +112,7 @@ class _Text:
         self._parts.append((text, where))
 
     def _add_compiled(self, function: types.FunctionType, name: str) -> None:
-        surroundings = {**function.__globals__, **_cells(function)}
-        for used in sorted(_names_in(function.__code__)):
-            if used in surroundings:
-                self._use(function.__name__, used, surroundings[used])
-            elif not hasattr(builtins, used):
-                raise _unknown_name(function, used, function.__code__.co_firstlineno)
+        self._use_all(function, dict.fromkeys(_names_in(function.__code__), function.__code__.co_firstlineno))
         defaults = [self._value(function.__name__, "a default", one) for one in function.__defaults__ or ()]
         keywords = {
             key: self._value(function.__name__, key, one)
@@ -139,6 +129,15 @@ class _Text:
         lines = {line for _, _, line in function.__code__.co_lines() if line is not None}
         where = {line: f"{function.__code__.co_filename}:{line}" for line in lines}
         self._parts.append((f"{name} = _function({', '.join(arguments)})", where))
+
+    def _use_all(self, function: types.FunctionType, lines: Mapping[str, int]) -> None:
+        """What a function uses from around it, and the lines where it does."""
+        surroundings = {**function.__globals__, **_cells(function)}
+        for used, line in sorted(lines.items()):
+            if used in surroundings:
+                self._use(function.__name__, used, surroundings[used])
+            elif not hasattr(builtins, used) and used in _names_in(function.__code__):
+                raise _unknown_name(function, used, line)
 
     def _require_one(self, where: str, name: str, what: object) -> bool:
         """Whether a name is new. Raises InputError where it means something else elsewhere."""

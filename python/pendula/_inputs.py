@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from ._core import InputError
-from ._runs import mapping, number, numbers
+from ._runs import mapping, number, numbers, require_known
 
 Signals = dict[str, dict[str, object]]
 _KEYS = ("file", "column", "times", "values", "hold")
@@ -38,9 +38,7 @@ def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, float], Signals]:
 
 
 def _signal(name: str, where: str, given: Mapping[str, object]) -> dict[str, object]:
-    unknown = [key for key in given if key not in _KEYS]
-    if unknown:
-        raise InputError(f"{where}: expected some of {', '.join(_KEYS)}, got {', '.join(unknown)}")
+    require_known(where, given, _KEYS)
     table = {"input": name, **given}
     if "file" in given:
         table["file"] = str(Path(str(given["file"])).resolve())

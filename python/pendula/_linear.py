@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._runs import mapping, plainly
+from ._runs import mapping, plainly, state_names
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -110,11 +110,10 @@ def seen(
             raise InputError(f"outputs: expected columns or expressions, got {text!r}")
     with plainly():
         c, d = _core.output_slopes(made, list(texts.values()), time, state, list(held))
-    columns = made.columns
     return {
         "C": c,
         "D": d,
-        "names": [columns[k] for k in made.state],
+        "names": state_names(made),
         "inputs": made.inputs,
         "outputs": list(texts),
     }

@@ -16,8 +16,8 @@ import numpy as np
 from . import _core
 from ._core import InputError
 from ._inputs import inputs_of
-from ._runs import did_you_mean, mapping, places, plainly, tell
-from ._systems import System, Tables, rate_of, tables_of
+from ._runs import mapping, places, plainly, require_known, tell
+from ._systems import System, Tables, tables_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -137,6 +137,11 @@ class Model(System):
         return [name for name, _ in self._info.coordinates]
 
     @property
+    def rates(self) -> list[str]:
+        """Names of their rates."""
+        return [name for name, _ in self._info.rates]
+
+    @property
     def inputs(self) -> list[str]:
         """Names of the inputs."""
         return [name for name, _ in self._info.inputs]
@@ -173,7 +178,7 @@ class Model(System):
 
     def start_names(self) -> list[str]:
         names = dict.fromkeys([*self.coordinates, *(re.sub(r"_\d+$", "", one) for one in self.coordinates)])
-        return [form(name) for form in (str, rate_of, "{}_dot".format, "p_{}".format) for name in names]
+        return [*names, *self.rates, *(form.format(name) for form in ("{}_dot", "p_{}") for name in names)]
 
     def model_file(self) -> Path | None:
         return Path(self._name) if self._name.endswith(".py") else None
@@ -208,12 +213,7 @@ class Model(System):
         return self.replaced({}, {name: np.zeros(1) for name in self.inputs})
 
     def held(self, inputs: Mapping[str, object]) -> Model:
-        for name in inputs:
-            if name not in self.inputs:
-                known = ", ".join(self.inputs) or "none"
-                raise InputError(
-                    f"inputs: expected some of {known}, got {name}{did_you_mean(name, self.inputs)}"
-                )
+        require_known("inputs", inputs, self.inputs)
         numbers, signals = inputs_of(inputs)
         other = self.replaced({}, {name: np.array([numbers.get(name, 0.0)]) for name in inputs})
         other._signals = {

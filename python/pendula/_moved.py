@@ -9,10 +9,10 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._derivatives import Gradient, Varied, gradient
-from ._runs import numbers, plainly, unknown
+from ._gradient import Gradient, Varied, gradient
+from ._runs import plainly, require_known, unknown
 from ._simulation import RUN_OPTIONS, Beginning
-from ._systems import System
+from ._systems import System, ascending_times
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,19 +22,10 @@ class Moved:
     """A system at times, whose start, parameters and inputs vary."""
 
     def __init__(self, system: System, t: ArrayLike, options: Mapping[str, object]) -> None:
-        times = numbers("t", t)
-        if (
-            times.ndim != 1
-            or times.size == 0
-            or not np.all(times >= 0)
-            or not np.all(np.isfinite(times))
-            or np.any(np.diff(times) < 0)
-        ):
-            raise InputError(f"t: expected a vector of times from 0 on, ascending, got {t!r}")
         for name in options:
             if name not in ("tolerance", "step", *RUN_OPTIONS):
                 raise unknown("simulate", name, ("tolerance", "step", *RUN_OPTIONS))
-        self.system, self.times, self.options = system, times, options
+        self.system, self.times, self.options = system, ascending_times(t), options
         self.made = self._prepared(system)
         self.varied = Varied(self.made)
         self.size = int(self.made.start.size)
@@ -57,9 +48,7 @@ class Moved:
 
     def places(self, names: Mapping[str, object]) -> dict[str, slice]:
         known = {**self.varied.parameters, **self.varied.inputs}
-        for name in names:
-            if name not in known:
-                raise InputError(f"parameters: expected some of {', '.join(known)}, got {name}")
+        require_known("parameters", names, known)
         return {name: known[name] for name in names}
 
     def require(self, state: Any, values: Mapping[str, Any]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,8 +97,6 @@ def frames(t: NDArray[np.float64], seconds: float | None, fps: float) -> NDArray
 
 def iframe(page: str) -> str:
     """A page as a part of another one, which it cannot reach."""
-    from html import escape
-
     return (
         f'<iframe srcdoc="{escape(page)}" sandbox="allow-scripts" title="pendula" '
         'style="width: 100%; height: 640px; border: 0"></iframe>'

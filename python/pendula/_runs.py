@@ -150,6 +150,23 @@ def did_you_mean(given: str, names: Iterable[str]) -> str:
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
+def require_known(where: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Raises InputError on a name that is none of those."""
+    names = list(known)
+    for name in given:
+        if name not in names:
+            listed = ", ".join(names) or "none"
+            near = did_you_mean(name, names)
+            raise _core.InputError(f"{where}: expected some of {listed}, got {name}{near}")
+
+
+def columns_of(name: str, columns: Sequence[str]) -> list[str]:
+    """A column by its name; by one without an index those of all links. None where there is no such column."""
+    if name in columns:
+        return [name]
+    return [column for column in columns if re.fullmatch(re.escape(name) + r"_\d+", column)]
+
+
 def missing(extra: str, error: ImportError) -> ImportError:
     """What to say where an optional package is not installed."""
     return ImportError(
@@ -166,18 +183,41 @@ def number(name: str, given: object) -> float:
     raise _core.InputError(f"{name}: expected a finite number, got {given!r}")
 
 
-def arrayed(given: object) -> object:
-    """An array of another package as NumPy's, if that package lends it by DLPack alone."""
+def positive(name: str, given: object) -> float:
+    """The same of one > 0."""
+    found = number(name, given)
+    if found <= 0:
+        raise _core.InputError(f"{name}: expected a number > 0, got {given!r}")
+    return found
+
+
+def whole(name: str, given: object, least: int) -> int:
+    """Raises InputError on what is no whole number, or less."""
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and given >= least:
+        return int(given)
+    raise _core.InputError(f"{name}: expected a whole number >= {least}, got {given!r}")
+
+
+def duration_of(given: object) -> float:
+    """In s. Raises InputError."""
+    found = number("duration", given)
+    if found < 0:
+        raise _core.InputError(f"duration: expected a number, not negative, got {given!r}")
+    return found
+
+
+def arrayed(name: str, given: object) -> object:
+    """An array of another package as NumPy's, if that package lends it by DLPack alone. Raises InputError."""
+    if isinstance(given, np.ma.MaskedArray):
+        raise _core.InputError(f"{name}: expected an array without a mask, got one with a mask")
     is_lent = hasattr(given, "__dlpack__") and not hasattr(given, "__array__")
     return np.from_dlpack(given) if is_lent else given  # type: ignore[arg-type]
 
 
 def numbers(name: str, given: object) -> NDArray[np.float64]:
     """An array of numbers; NaN may be among them. Raises InputError."""
-    if isinstance(given, np.ma.MaskedArray):
-        raise _core.InputError(f"{name}: expected an array without a mask, got one with a mask")
     try:
-        array = np.asarray(arrayed(given))
+        array = np.asarray(arrayed(name, given))
     except ValueError as error:
         raise _core.InputError(f"{name}: expected an array of numbers, got {error}") from None
     if array.dtype.kind not in "iuf" and array.size > 0:
@@ -189,6 +229,12 @@ def in_order(columns: list[str], state: Sequence[int]) -> list[int]:
     """Places of the time, of coordinates and rates in the order of all states, and of what else a row has."""
     first = dict.fromkeys([0, *state])
     return [*first, *(k for k in range(len(columns)) if k not in first)]
+
+
+def state_names(made: _core.Prepared) -> list[str]:
+    """What the numbers of a state are: coordinates, then their rates."""
+    columns = made.columns
+    return [columns[k] for k in made.state]
 
 
 def tell(what: str) -> None:

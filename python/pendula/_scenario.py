@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _core, _toml
 from ._core import InputError
+from ._ensemble import move_members
 from ._progress import bar
 from ._runs import mapping, places, plainly, tell
 from ._solution import Solution, concluded
@@ -58,8 +59,6 @@ class Scenario:
     ) -> xarray.Dataset:
         """Moves all members of a scenario with ``[ensemble]``; as :func:`ensemble`, and to the bit as ``pendula
         ensemble``."""
-        from ._ensemble import move_members
-
         return move_members(
             self.file.read_text(encoding="utf-8"),
             str(self.file),

@@ -15,7 +15,20 @@ from . import _core, _toml
 from ._core import InputError
 from ._events import events_of
 from ._linear import LinearSystem, seen
-from ._runs import in_order, mapping, merged, number, places, plainly, tell, warn
+from ._runs import (
+    duration_of,
+    in_order,
+    mapping,
+    merged,
+    number,
+    places,
+    plainly,
+    require_known,
+    state_names,
+    tell,
+    warn,
+    whole,
+)
 from ._solution import Solution, concluded
 from ._systems import System, starts_of, system_of, times_of
 
@@ -58,7 +71,6 @@ class Beginning(NamedTuple):
         step: float | None,
         options: Mapping[str, object],
         remember: bool = True,
-        feeds_back: bool = True,
     ) -> Beginning:
         system = system_of(system)
         if step is None and tolerance is None:
@@ -66,12 +78,7 @@ class Beginning(NamedTuple):
         run = {"duration": 1.0, "step": step, "tolerance": tolerance, **options}
 
         def text_of(one: System) -> str:
-            tables = {
-                key: table
-                for key, table in one.tables().items()
-                if feeds_back or not key.endswith(".feedback")
-            }
-            return _toml.document({**tables, "start": start, "run": run})
+            return _toml.document({**one.tables(), "start": start, "run": run})
 
         file = system.model_file()
         return cls(
@@ -197,8 +204,7 @@ class Simulation:
     @property
     def names(self) -> list[str]:
         """What the numbers of the state are: coordinates, then their rates; of a chain all theta, then all phi."""
-        columns = self._made.columns
-        return [columns[k] for k in self._made.state]
+        return state_names(self._made)
 
     @property
     def state(self) -> NDArray[np.float64]:
@@ -228,9 +234,7 @@ class Simulation:
     def hold(self, inputs: Mapping[str, float] | None = None, **more: float) -> Simulation:
         """Holds inputs from now on, until others are held. Raises InputError, and then holds what it did."""
         given = merged("inputs", inputs, more)
-        unknown = [name for name in given if name not in self._inputs]
-        if unknown:
-            raise InputError(f"inputs: expected some of {', '.join(self._inputs)}, got {', '.join(unknown)}")
+        require_known("inputs", given, self._inputs)
         values = {name: number(name, one) for name, one in given.items()}
         with self._alone():
             before = dict(zip(self._inputs, self._core.held, strict=True))
@@ -421,13 +425,10 @@ def lyapunov(
     >>> pendula.lyapunov(pendula.Chain(links=1), 20.0, theta=0.5, step=0.02).exponents.shape
     (2,)
     """
-    how_long = number("duration", duration)
-    if how_long < 0:
-        raise InputError(f"duration: expected a number, not negative, got {duration!r}")
-    if not isinstance(count, (int, np.integer)) or isinstance(count, bool):
-        raise InputError(f"count: expected how many exponents, got {count!r}")
+    how_long = duration_of(duration)
+    how_many = whole("count", count, 0)
     given, runs = split(lyapunov, system, start, starts)
     made = Beginning.of(system, given, tolerance=tolerance, step=step, options=runs).prepare()
     warn(made.warnings, stacklevel=3)
     with plainly():
-        return Lyapunov(*_core.lyapunov(made, how_long, int(count)))
+        return Lyapunov(*_core.lyapunov(made, how_long, how_many))

@@ -8,21 +8,21 @@ from collections.abc import Mapping
 from math import inf
 from os import PathLike, fspath
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _core
+from . import _core, _pictures
+from ._gradient import Gradient, gradient
 from ._progress import bar
-from ._runs import RunFailed, in_order, missing, number, numbers, places, plainly, tell, warn
+from ._runs import RunFailed, columns_of, in_order, missing, number, numbers, places, plainly, tell, warn
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
-
-    from ._derivatives import Gradient
 
 
 class Solution:
@@ -88,12 +88,10 @@ class Solution:
         return self._rows[:, found[0]] if name in self._places else self._rows[:, found].T
 
     def _columns(self, name: str) -> list[str]:
-        if name in self._places:
-            return [name]
-        links = [column for column in self.columns if re.fullmatch(re.escape(name) + r"_\d+", column)]
-        if not links:
+        found = columns_of(name, self.columns)
+        if not found:
             raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
-        return links
+        return found
 
     def sol(self, t: ArrayLike) -> NDArray[np.float64]:
         """The motion at any times of the run, in any order, at the full order of the method.
@@ -195,26 +193,18 @@ class Solution:
         """The page in a notebook, if the run is not one of more than a few seconds; :meth:`to_html` writes that."""
         if not self.summary.get("wall_seconds", inf) < 5 or self.t.size == 0:
             return None
-        from tempfile import TemporaryDirectory
-
-        from ._pictures import iframe
-
         with TemporaryDirectory() as folder:
             page = Path(folder) / "page.html"
             self.to_html(page)
-            return iframe(page.read_text(encoding="utf-8"))
+            return _pictures.iframe(page.read_text(encoding="utf-8"))
 
     def __getstate__(self) -> dict[str, Any]:
-        from tempfile import TemporaryDirectory
-
         with TemporaryDirectory() as folder:
             file = Path(folder) / "run.h5"
             self.save(file)
             return {"file": file.read_bytes(), "summary": self.summary}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        from tempfile import TemporaryDirectory
-
         with TemporaryDirectory() as folder:
             file = Path(folder) / "run.h5"
             file.write_bytes(state["file"])
@@ -247,8 +237,6 @@ class Solution:
         >>> run = pendula.Chain(links=1).simulate(1.0, theta=0.5, step=0.01)
         >>> by_length = run.gradient([1, 0]).parameters["lengths"]  # of theta at the end
         """
-        from ._derivatives import gradient
-
         given = numbers("by_end", by_end)
         if given.shape not in ((len(self.names),), self.y.shape):
             raise _core.InputError(
@@ -317,11 +305,9 @@ class Solution:
         >>> axes.get_ylabel(), [line.get_label() for line in axes.lines]
         ('$θ_{2}$ [rad]', ['1', '1.1'])
         """
-        from ._pictures import plot
-
         columns = [column for name in names for column in self._columns(name)]
         rows = self._fine_rows()
-        return plot(
+        return _pictures.plot(
             {name: rows[:, place] for name, place in self._places.items()},
             dict(zip(self.columns, self.units, strict=True)),
             columns,
@@ -331,14 +317,12 @@ class Solution:
 
     def _fine_rows(self) -> NDArray[np.float64]:
         """Rows close enough for a picture, if they can be made in a few seconds; else those that there are."""
-        from ._pictures import POINTS
-
         quick = self.summary.get("wall_seconds", inf) < 5
-        if not quick or not 2 <= self.t.size < POINTS or not self.t[-1] > self.t[0]:
+        if not quick or not 2 <= self.t.size < _pictures.POINTS or not self.t[-1] > self.t[0]:
             return self._rows
-        times = np.linspace(self.t[0], self.t[-1], POINTS)
+        times = np.linspace(self.t[0], self.t[-1], _pictures.POINTS)
         for more in (self.t, *self.t_events.values()):
-            times = np.union1d(times, more[:POINTS])
+            times = np.union1d(times, more[: _pictures.POINTS])
         try:
             rows = self._rows_at(times[(times >= self.t[0]) & (times <= self.t[-1])])
         except _core.InputError:  # of a file that another build has made
@@ -363,10 +347,10 @@ class Solution:
         >>> run = pendula.Chain(links=2).simulate(1.0, theta=1.0)
         >>> run.animate(fps=10).save("double.gif")  # doctest: +SKIP
         """
-        from ._pictures import animation, frames
-
-        times = frames(self.t, seconds, fps)
-        return animation(times, self._rows_at(times), self._result.points, self._result.units, 1000 / fps)
+        times = _pictures.frames(self.t, seconds, fps)
+        return _pictures.animation(
+            times, self._rows_at(times), self._result.points, self._result.units, 1000 / fps
+        )
 
     def to_xarray(self) -> xarray.Dataset:
         """All columns by name over ``t``, with their units: those of links over ``link``, too, counted from 1.
@@ -382,11 +366,11 @@ class Solution:
             raise missing("data", error) from None
         units = dict(zip(self.columns, self.units, strict=True))
         of_links = self._columns_of_links()
-        joined = {column for columns in of_links.values() for column in columns}
+        joined = {column: stem for stem, columns in of_links.items() for column in columns}
         data: dict[str, Any] = {}
         for name in self.columns[1:]:
-            stem = re.sub(r"_\d+$", "", name)
-            if name not in joined:
+            stem = joined.get(name)
+            if stem is None:
                 data[name] = ("t", self[name], {"units": units[name]})
             elif stem not in data:
                 data[stem] = (("t", "link"), self[stem].T, {"units": units[name]})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
@@ -17,7 +16,7 @@ from ._core import InputError
 from ._events import events_of
 from ._inputs import Signals, inputs_of
 from ._progress import bar
-from ._runs import mapping, merged, numbers, places, plainly, tell, unknown
+from ._runs import mapping, merged, numbers, places, plainly, state_names, tell, unknown
 from ._solution import Solution, concluded
 
 if TYPE_CHECKING:
@@ -52,9 +51,20 @@ def times_of(given: object) -> NDArray[np.float64]:
     return times
 
 
-def rate_of(coordinate: str) -> str:
-    """x_dot of x, theta_dot_1 of theta_1: an index stays last."""
-    return re.sub(r"(_\d+)?$", r"_dot\1", coordinate, count=1)
+def ascending_times(given: object) -> NDArray[np.float64]:
+    """Times from 0 on. Raises InputError."""
+    times = times_of(given)
+    if not np.isfinite(times).all() or times[0] < 0 or np.any(np.diff(times) < 0):
+        raise InputError(f"t: expected a vector of times from 0 on, ascending, got {given!r}")
+    return times
+
+
+def span_of(where: str, duration: Any, t: object) -> tuple[NDArray[np.float64] | None, Any]:
+    """Times of rows where they are given, and a duration: the last of them where none is."""
+    times = None if t is None else times_of(t)
+    if duration is None and times is None:
+        raise TypeError(f"{where}: expected duration= or t=, got neither")
+    return times, float(times[-1]) if duration is None and times is not None else duration
 
 
 def starts_of(
@@ -105,9 +115,9 @@ class System(ABC):
         """Of coordinates, rates, inputs and parameters, by name."""
 
     @property
+    @abstractmethod
     def rates(self) -> list[str]:
         """Names of the rates of the coordinates."""
-        return [rate_of(name) for name in self.coordinates]
 
     @abstractmethod
     def start_names(self) -> list[str]:
@@ -155,13 +165,9 @@ class System(ABC):
     def unforced(self) -> System:
         """The same without constant parts of inputs."""
 
+    @abstractmethod
     def held(self, inputs: Mapping[str, object]) -> System:
         """The same with these inputs, in place of its own. Raises InputError."""
-        if inputs:
-            raise InputError(
-                f"inputs: expected tables over time of a chain, which has torque for numbers, got {', '.join(inputs)}"
-            )
-        return self
 
     def simulate(
         self,
@@ -232,11 +238,7 @@ class System(ABC):
         TrustWarning
             How far the rows can be trusted, where that is less than was asked for.
         """
-        times = None if t is None else times_of(t)
-        if duration is None:
-            if times is None:
-                raise TypeError("simulate: expected duration= or t=, got neither")
-            duration = float(times[-1])
+        times, duration = span_of("simulate", duration, t)
         if step is None and tolerance is None and accuracy is None:
             accuracy = 1e-9
         tables = self.held(mapping("inputs", inputs)).tables()
@@ -372,8 +374,14 @@ class Chain(System):
     @property
     def coordinates(self) -> list[str]:
         """Names of the coordinates: all theta, then all phi."""
-        columns, state = self._info.columns, self._info.state
-        return [columns[k] for k in state[: len(state) // 2]]
+        names = state_names(self._info)
+        return names[: len(names) // 2]
+
+    @property
+    def rates(self) -> list[str]:
+        """Names of their rates."""
+        names = state_names(self._info)
+        return names[len(names) // 2 :]
 
     @property
     def inputs(self) -> list[str]:
@@ -427,7 +435,9 @@ class Chain(System):
     def held(self, inputs: Mapping[str, object]) -> Chain:
         numbers, signals = inputs_of(inputs)
         if numbers:
-            return super().held(numbers)  # type: ignore[return-value]
+            raise InputError(
+                f"inputs: expected tables over time of a chain, which has torque for numbers, got {', '.join(numbers)}"
+            )
         other = copy.copy(self)
         other._signals = signals
         return other

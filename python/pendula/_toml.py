@@ -31,10 +31,8 @@ def value(given: object, key: str) -> str:
     if isinstance(given, Mapping):
         inside = (f"{_text(str(name))} = {value(one, f'{key}.{name}')}" for name, one in given.items())
         return "{" + ", ".join(inside) + "}"
-    if isinstance(given, np.ma.MaskedArray):
-        raise InputError(f"{key}: expected an array without a mask, got one with a mask")
     if hasattr(given, "__array__") or hasattr(given, "__dlpack__"):
-        array = np.asarray(arrayed(given))
+        array = np.asarray(arrayed(key, given))
         if array.dtype == np.float64 and array.ndim > 0:
             return str(array.tolist())  # as TOML has them, and fast
         return value(array.tolist(), key)

@@ -42,7 +42,7 @@ from . import _core
 from ._core import InputError
 from ._derivatives import differentiate
 from ._models import Model
-from ._runs import mapping, number, numbers, plainly
+from ._runs import mapping, numbers, plainly, positive, require_known, whole
 from ._simulation import Simulation
 from ._systems import Chain, System
 
@@ -87,14 +87,14 @@ class Pendulum(gymnasium.Env[Any, Any]):
             raise InputError(f'task: expected "swing_up" or "balance", got {task!r}')
         if getattr(dtype, "__name__", str(dtype)) not in ("float32", "float64"):
             raise InputError(f"dtype: expected float32 or float64, got {dtype!r}")
-        self._step, self._tolerance = _positive("step", step), _positive("tolerance", tolerance)
+        self._step, self._tolerance = positive("step", step), positive("tolerance", tolerance)
         self._system, self._task, self._links, self._motors = system, task, links, motors
         self._state: NDArray[np.float64] | None = None
         self._members = self._made_members()  # what is wrong with the system is told now
         each = np.broadcast_to(numbers("lengths", lengths), (links,))
         self._share = np.ascontiguousarray(each / each.sum())  # of each link in the height
         places = np.array([*limits, *[np.inf] * links])
-        self._limits = np.concatenate([places, np.full(places.size, _positive("speed_limit", speed_limit))])
+        self._limits = np.concatenate([places, np.full(places.size, positive("speed_limit", speed_limit))])
         seen = np.concatenate([[*limits], np.ones(2 * links), self._limits[places.size :]]).astype(dtype)
         one = np.ones(motors, dtype)
         self.observation_space = self._seeable = Box(-seen, seen, dtype=dtype)
@@ -309,13 +309,13 @@ class CartPendulum(Pendulum):
         dtype: type[np.float64 | np.float32] = np.float64,
         **parameters: Any,
     ) -> None:
-        self._force = _positive("force", force)
+        self._force = positive("force", force)
         super().__init__(
-            Model("cart_chain", _count("links", links, 1), **parameters),
+            Model("cart_chain", whole("links", links, 1), **parameters),
             parameters.get("lengths", 1.0),
             links=links,
             motors=1,
-            limits=(_positive("track", track),),
+            limits=(positive("track", track),),
             speed_limit=speed_limit,
             task=task,
             step=step,
@@ -359,14 +359,10 @@ class Acrobot(Pendulum):
         dtype: type[np.float64 | np.float32] = np.float64,
         **parameters: Any,
     ) -> None:
-        self._torque = _positive("torque", torque)
-        for name in parameters:
-            if name not in ("masses", "lengths", "damping", "gravity"):
-                raise InputError(
-                    f"parameters: expected some of masses, lengths, damping, gravity, got {name}"
-                )
+        self._torque = positive("torque", torque)
+        require_known("parameters", parameters, ("masses", "lengths", "damping", "gravity"))
         super().__init__(
-            Chain(links=_count("links", links, 2), **parameters),
+            Chain(links=whole("links", links, 2), **parameters),
             parameters.get("lengths", 1.0),
             links=links,
             motors=links - 1,
@@ -424,8 +420,8 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
             raise InputError(f"autoreset_mode: expected one of {told}, got {autoreset_mode!r}")
         self._mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.single.metadata, "autoreset_mode": self._mode}
-        self.num_envs = _count("num_envs", num_envs, 1)
-        self._most = None if max_episode_steps is None else _count("max_episode_steps", max_episode_steps, 1)
+        self.num_envs = whole("num_envs", num_envs, 1)
+        self._most = None if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1)
         self._one = first = self.single(**options)
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
         self._states: NDArray[np.float64] | None = None
@@ -527,19 +523,6 @@ def _is_one(seed: object) -> bool:
 def _told(states: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str, Any]:
     """The infos of a vector environment: states, and of which environments."""
     return {"state": np.where(mask[:, None], states, 0.0), "_state": mask.copy()}
-
-
-def _positive(name: str, given: object) -> float:
-    found = number(name, given)
-    if found <= 0:
-        raise InputError(f"{name}: expected a number > 0, got {given!r}")
-    return found
-
-
-def _count(name: str, given: object, least: int) -> int:
-    if not isinstance(given, (int, np.integer)) or isinstance(given, bool) or given < least:
-        raise InputError(f"{name}: expected a whole number >= {least}, got {given!r}")
-    return int(given)
 
 
 for _name in ("CartPendulum", "Acrobot"):

@@ -234,8 +234,8 @@ def test_taylor_series_have_the_derivatives_of_gauss_steps(system: Any, start: d
     ("arguments", "message"),
     [
         ({"duration": 1.0, "method": "dopri5", "tolerance": 1e-9}, "expected method = gauss or radau"),
-        ({"t": [1.0, 0.5]}, "t: expected times from 0 on, ascending"),
-        ({"t": [[1.0]]}, "t: expected a vector of finite times"),
+        ({"t": [1.0, 0.5]}, "t: expected a vector of times from 0 on, ascending"),
+        ({"t": [[1.0]]}, "t: expected a vector of times, got an array of shape (1, 1)"),
         ({"duration": float("nan")}, "duration: expected a finite number"),
         ({"duration": 1.0, "t": [1.0]}, "duration: expected none beside t"),
         (

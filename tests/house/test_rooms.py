@@ -1,11 +1,14 @@
-"""The arrows between the rooms of the source: who may include whom."""
+"""The arrows between the rooms of the source, who may include whom, and between modules of Python."""
 
+import ast
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-SOURCE = Path(__file__).parents[2] / "src"
+ROOT = Path(__file__).parents[2]
+SOURCE = ROOT / "src"
 
 # A room, and those that it knows besides itself.
 KNOWS = {
@@ -95,7 +98,7 @@ def test_every_room_has_its_arrows():
 
 def heights() -> dict[str, int]:
     """How far from the top each room begins in the picture of CONTRIBUTING."""
-    picture = (SOURCE.parent / "docs/images/rooms.svg").read_text()
+    picture = (ROOT / "docs/images/rooms.svg").read_text()
     return {name: int(y) for y, name in re.findall(r'<text class="n" x="\d+" y="(\d+)">(\w+)<', picture)}
 
 
@@ -108,8 +111,27 @@ def test_the_picture_shows_what_stands_on_what():
 
 
 def test_the_arrows_make_no_circle():
-    done: set[str] = set()
-    while len(done) < len(KNOWS):
-        ready = {room for room in KNOWS if room not in done and KNOWS[room] <= done}
-        assert ready, f"a circle among {set(KNOWS) - done}"
-        done |= ready
+    TopologicalSorter(KNOWS).prepare()
+
+
+def imports(package: Path) -> dict[str, set[str]]:
+    """Modules of a package, and which of the others each imports, within functions and for type checkers, too."""
+    files = {
+        path.relative_to(package.parent).with_suffix("").as_posix().removesuffix("/__init__"): path
+        for path in package.rglob("*.py")
+    }
+    found: dict[str, set[str]] = {name: set() for name in files}
+    for name, path in files.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                said = (node.module or "").replace(".", "/")
+                module = f"{package.name}/{said}".rstrip("/") if node.level else said
+                found[name] |= {module, *(f"{module}/{each.name}" for each in node.names)} & {*files}
+    return {name: others - {name, package.name} for name, others in found.items()}  # in which all are
+
+
+@pytest.mark.parametrize("package", ["python/pendula", "codegen/pendula_codegen", "plotting/pendula_plot"])
+def test_modules_of_python_make_no_circle(package):
+    arrows = imports(ROOT / package)
+    assert sum(map(len, arrows.values())) >= len(arrows)
+    TopologicalSorter(arrows).prepare()

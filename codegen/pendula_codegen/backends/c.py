@@ -100,86 +100,91 @@ def quoted(text: str) -> str:
     return f'"{text}\\n"'
 
 
-class Printer:
-    """Writes the steps of a tape.
+class Statements:
+    """The steps of a tape as statements, a number each.
 
-    names       what people call what is read
-    variables   what is read, and has a name already
-    conditions  arrays that stand in Conditions
+    number   the type of numbers
+    names    what people call what is read
     """
 
-    def __init__(
-        self,
-        names: Mapping[Row, str],
-        variables: Mapping[Row, str] | None = None,
-        conditions: Sequence[str] = CONDITIONS,
-    ):
-        self._variables = variables or {}
-        self._conditions = conditions
+    def __init__(self, number: str, names: Mapping[Row, str]):
+        self.number = number
         self._called = names
         self._taken: set[str] = set()
         self._names: dict[Value, str] = {}
         self._numbers: dict[Value, float] = {}
 
-    def lines(self, tape: Tape) -> list[str]:
-        steps = self.steps(tape)
-        return [*steps, *(f"WRITE({name}, {k}) = {self.pack(v)};" for (name, k), v in tape.outputs.items())]
-
     def steps(self, tape: Tape) -> list[str]:
         return [line for step in tape.steps for line in self._step(step)]
 
+    def value(self, value: Value) -> str:
+        """What a step gave."""
+        return self._operand(value)
+
+    # --- how these are written
+
+    def literal(self, value: float) -> str:
+        return repr(value)
+
+    def function(self, name: str) -> str:
+        """Of the mathematical library."""
+        return name
+
+    def _solver(self, operation: str) -> str:
+        """Of a linear system that is too large to be written out."""
+        return self.function(operation)
+
+    def _read(self, step: Step) -> list[str]:
+        array, k = step.row
+        return [f"const {self.number} {self._names[step.first]} = {array}[{k}];"]
+
+    def _sine_and_cosine(self, step: Step) -> list[str]:
+        raise NotImplementedError
+
+    # --- what they have in common
+
     def _step(self, step: Step) -> list[str]:
-        if step.operation == "number":
-            self._numbers[step.first] = step.number
-            return []
-        if step.operation == "read":
-            if step.row in self._variables:
-                self._names[step.first] = self._variables[step.row]
+        match step.operation:
+            case "number":
+                self._numbers[step.first] = step.number
                 return []
-            self._names[step.first] = self._name_of(step.row)
-            array, k = step.row
-            array = f"at->{array}" if array in self._conditions else array
-            return [f"const V {self._names[step.first]} = READ({array}, {k});"]
-        if step.operation in ("factor", "solve"):
-            return self._array(step)
-        for value in step.results:
-            self._names[value] = f"t{value}"
+            case "read":
+                self._names[step.first] = self._name_of(step.row)
+                return self._read(step)
+            case "factor" | "solve":
+                return self._array(step)
+        self._names |= {value: f"t{value}" for value in step.results}
         if step.operation == "sincos":
-            sine, cosine = step.results
-            names = f"{self._names[sine]}, {self._names[cosine]}"
-            addresses = f"&{self._names[sine]}, &{self._names[cosine]}"
-            return [f"V {names};", f"NAME(sincos)({self.pack(step.operands[0])}, {addresses});"]
-        return [f"const V {self._names[step.first]} = {self._expression(step)};"]
+            return self._sine_and_cosine(step)
+        return [f"const {self.number} t{step.first} = {self._expression(step)};"]
 
     def _array(self, step: Step) -> list[str]:
-        """A linear system that is too large to be written out."""
         name = f"t{step.first}"
         self._names |= {value: f"{name}[{k}]" for k, value in enumerate(step.results)}
-        given = ", ".join(map(self.pack, step.operands[-step.count :]))
-        factors = (
-            "" if step.operation == "factor" else f"{self._names[step.operands[0]].removesuffix('[0]')}, "
-        )
-        return [f"V {name}[] = {{{given}}};", f"NAME({step.operation})({factors}{name});"]
+        given = ", ".join(map(self.value, step.operands[-step.count :]))
+        factors = ""
+        if step.operation == "solve":
+            factors = self._names[step.operands[0]].removesuffix("[0]") + ", "
+        return [
+            f"{self.number} {name}[] = {{{given}}};",
+            f"{self._solver(step.operation)}({factors}{name});",
+        ]
 
     def _expression(self, step: Step) -> str:
-        first = step.operands[0]
         if step.operation in _SIGNS:
             x, y = map(self._operand, step.operands)
             return f"{x} {_SIGNS[step.operation]} {y}"
+        first = self.value(step.operands[0])
         if step.operation == "negative":
-            return f"-{self.pack(first)}"
+            return f"-({first})" if first.startswith("-") else f"-{first}"
         if step.operation == "inverse":
-            return f"1.0 / {self.pack(first)}"
-        more = f", {step.number!r}" if step.operation == "pow" else ""
-        return f"NAME({step.operation})({self.pack(first)}{more})"
+            return f"{self.literal(1.0)} / {first}"
+        more = f", {self.literal(step.number)}" if step.operation == "pow" else ""
+        return f"{self.function(step.operation)}({first}{more})"
 
     def _operand(self, value: Value) -> str:
-        """Of an operation whose other operand is a pack."""
-        return self._names.get(value) or repr(self._numbers[value])
-
-    def pack(self, value: Value) -> str:
-        """A value that steps gave."""
-        return self._names.get(value) or f"SPLAT({self._numbers[value]!r})"
+        """Of an operation that takes a number, too, where it takes several at once."""
+        return self._names.get(value) or self.literal(self._numbers[value])
 
     def _name_of(self, row: Row) -> str:
         """What is the model's ends in an underscore, and nothing else does."""
@@ -190,3 +195,44 @@ class Printer:
             name += "_"
         self._taken.add(name)
         return name
+
+
+class Printer(Statements):
+    """Statements of as many numbers as a register has.
+
+    variables   what is read, and has a name already
+    conditions  arrays that stand in Conditions
+    """
+
+    def __init__(
+        self,
+        names: Mapping[Row, str],
+        variables: Mapping[Row, str] | None = None,
+        conditions: Sequence[str] = CONDITIONS,
+    ):
+        super().__init__("V", names)
+        self._variables = variables or {}
+        self._conditions = conditions
+
+    def lines(self, tape: Tape) -> list[str]:
+        steps = self.steps(tape)
+        return [*steps, *(f"WRITE({name}, {k}) = {self.value(v)};" for (name, k), v in tape.outputs.items())]
+
+    def value(self, value: Value) -> str:
+        return self._names.get(value) or f"SPLAT({self._numbers[value]!r})"
+
+    def function(self, name: str) -> str:
+        return f"NAME({name})"
+
+    def _read(self, step: Step) -> list[str]:
+        if step.row in self._variables:
+            self._names[step.first] = self._variables[step.row]
+            return []
+        array, k = step.row
+        array = f"at->{array}" if array in self._conditions else array
+        return [f"const V {self._names[step.first]} = READ({array}, {k});"]
+
+    def _sine_and_cosine(self, step: Step) -> list[str]:
+        sine, cosine = (self._names[value] for value in step.results)
+        argument = self.value(step.operands[0])
+        return [f"V {sine}, {cosine};", f"NAME(sincos)({argument}, &{sine}, &{cosine});"]

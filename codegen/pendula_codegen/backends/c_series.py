@@ -50,7 +50,7 @@ def print_series(tapes: SeriesTapes, names: Mapping[Row, str]) -> CSeries:
     variables |= {("sums", k): f"sum_{k}" for k in range(len(series.sums))}
     printer = Printer({}, variables, conditions=())
     steps = printer.steps(tapes.next)
-    written = {row: printer.pack(value) for row, value in tapes.next.outputs.items()}
+    written = {row: printer.value(value) for row, value in tapes.next.outputs.items()}
     operands = [written["operands", k] for k in range(len(series.operands))]
     one = _One(series.places, operands)
     return CSeries(
