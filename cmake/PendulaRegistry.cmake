@@ -99,7 +99,6 @@ function(pendula_registry_sources out_sources)
     math(EXPR ${kind}_count "${${kind}_count} + 1")
   endforeach()
   configure_file("${PROJECT_SOURCE_DIR}/cmake/library.cpp.in" "${folder}/library.cpp" @ONLY)
-  set_source_files_properties("${folder}/library.cpp" PROPERTIES COMPILE_OPTIONS "-ffunction-sections;-fdata-sections")
   set(${out_sources} ${sources} "${folder}/library.cpp" PARENT_SCOPE)
 endfunction()
 
