@@ -39,8 +39,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
   benchmark::AddCustomContext("compiler", BENCH_COMPILER);
-  benchmark::AddCustomContext(
-      "flags", BENCH_FLAGS + (" with the library for " + std::string(pendula::library().instruction_set)));
+  benchmark::AddCustomContext("flags",
+                              BENCH_FLAGS + (" with the library for " + std::string(pendula::instruction_set())));
   bench::register_unit();
   if (kernels.empty()) {
     bench::register_few_links();

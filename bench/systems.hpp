@@ -77,7 +77,7 @@ auto with_kernel(const Problem& problem, Visit visit) {
 
 /// The system as a run moves it, by the library; nothing where this build has no kernel of it.
 inline std::shared_ptr<const pendula::SystemSubject> subject_of(const Problem& problem) {
-  for (const pendula::SystemTable* table : pendula::library().systems) {
+  for (const pendula::SystemTable* table : pendula::library<pendula::KernelList<pendula::Models>>().tables) {
     if (table->info.name != problem.kernel) continue;
     const std::shared_ptr<const pendula::SystemTable> kept(table, [](const pendula::SystemTable*) {});
     return std::make_shared<pendula::SystemSubject>(kept, numbers_of(system_start(problem), table->info));

@@ -4,7 +4,8 @@
 # Code compiled for AVX-512 must not be what a linker takes for some inline function that other code uses, too: a machine
 # without AVX-512 would die there. Nor may a program's copy of such a function, compiled with other flags, be what the
 # library uses: how Eigen allocates depends on them. So each copy is sealed: its objects are linked into one, whose
-# symbols are all made local but `pendula_library_<instruction set>`. What passes through that is in library.hpp.
+# symbols are all made local but the functions `copy_of`, which give its parts (library_copies.hpp.in). What passes through
+# those is in library.hpp. Sections stay apart, so that a linker can leave out what nobody needs.
 include_guard(GLOBAL)
 
 # Stages of the chain integrators, those of one translation unit in one item.
@@ -128,14 +129,18 @@ function(pendula_add_copies target)
   list(GET _pendula_archs 0 least)
   target_compile_options(${target} PRIVATE ${_pendula_flags_${least}})
   set(declarations "")
-  set(pointers "")
+  set(names "")
+  set(functions "")
+  list(LENGTH PENDULA_ARCHS count)
   foreach(arch IN LISTS PENDULA_ARCHS)
     _pendula_compile_copy(pendula_${arch} ${arch} ${ARGN})
-    _pendula_seal(${target} pendula_${arch} pendula_library_${arch} pendula_${arch})
-    string(APPEND declarations "extern const pendula::Library pendula_library_${arch};\n")
-    list(APPEND pointers "&pendula_library_${arch}")
+    _pendula_seal(${target} pendula_${arch} "_ZN7pendula7copy_of*" pendula_${arch})
+    string(APPEND declarations "struct ${arch};\n")
+    list(APPEND names "\"${arch}\"")
+    list(APPEND functions "&copy_of<Part, ${arch}>")
   endforeach()
-  list(JOIN pointers ", " pointers)
+  list(JOIN names ", " names)
+  list(JOIN functions ", " functions)
   configure_file("${PROJECT_SOURCE_DIR}/cmake/library_copies.hpp.in" "${PROJECT_BINARY_DIR}/kernels/library_copies.hpp"
                  @ONLY)
   target_include_directories(${target} PRIVATE "${PROJECT_BINARY_DIR}/kernels")
@@ -153,8 +158,9 @@ function(_pendula_compile_copy copy arch)
     # and sanitized steps would take minutes.
     target_compile_options(${copy} PRIVATE $<$<NOT:$<CONFIG:Release,RelWithDebInfo,MinSizeRel>>:-O1>)
   endif()
-  target_compile_definitions(${copy} PRIVATE PENDULA_LIBRARY=pendula_library_${arch} PENDULA_INSTRUCTION_SET="${arch}")
-  target_include_directories(${copy} PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
+  target_compile_definitions(${copy} PRIVATE PENDULA_INSTRUCTION_SET=${arch})
+  target_include_directories(${copy} PRIVATE "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}"
+                                             "${PROJECT_BINARY_DIR}/kernels")
   target_link_libraries(${copy} PRIVATE pendula_kernels pendula::xsimd)
   # A precompiled header holds paths and times: by it ccache would find nothing of what another checkout has compiled.
   if(NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
@@ -182,8 +188,8 @@ function(_pendula_seal target copy symbols)
   add_custom_command(
     OUTPUT "${sealed}"
     COMMAND "${CMAKE_COMMAND}" -E make_directory "${CMAKE_CURRENT_BINARY_DIR}/$<CONFIG>"
-    COMMAND "${CMAKE_CXX_COMPILER}" -r -nostdlib -fuse-ld=bfd -Wl,--force-group-allocation -o "${sealed}.open"
-            ${objects}
+    COMMAND "${CMAKE_CXX_COMPILER}" -r -nostdlib -fuse-ld=bfd -Wl,--force-group-allocation
+            "-Wl,--unique=.text*,--unique=.data*,--unique=.rodata*" -o "${sealed}.open" ${objects}
     COMMAND "${CMAKE_COMMAND}" -D "OBJECT=${sealed}.open" -D "OBJDUMP=${CMAKE_OBJDUMP}" -D "COPY=${copy}"
             -P "${PROJECT_SOURCE_DIR}/cmake/check_runs_nothing.cmake"
     COMMAND "${CMAKE_OBJCOPY}" --wildcard "--keep-global-symbol=${symbols}" "${sealed}.open" "${sealed}"
@@ -202,7 +208,8 @@ function(pendula_add_objects name)
   add_library(${name} OBJECT ${ARGN})
   pendula_own_target(${name} JOINED)
   target_compile_options(${name} PUBLIC ${_pendula_flags_${least}}
-                                 PRIVATE -fno-lto $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+                                 PRIVATE -ffunction-sections -fdata-sections -fno-lto
+                                         $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
   target_include_directories(${name} PUBLIC "${PROJECT_SOURCE_DIR}/src" "${PENDULA_INCLUDE_DIR}")
   target_link_libraries(${name} PUBLIC pendula_kernels pendula::xsimd)
   set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON INTERPROCEDURAL_OPTIMIZATION OFF)

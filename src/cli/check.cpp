@@ -103,7 +103,7 @@ void add(const MotionCheck& check, std::string_view kernel, Tally& tally) {
 template <class Space>
 void check_space(const CheckOptions& options, Tally& tally) {
   if (options.space && *options.space != Space::name) return;
-  for (const SystemTable* kernel : library_of<Space>().kernels) {
+  for (const SystemTable* kernel : library<KernelList<Space>>().tables) {
     const std::string_view name = kernel->info.name;
     const int links = kernel->info.links;
     if (options.links && *options.links != links) continue;

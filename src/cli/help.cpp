@@ -119,7 +119,7 @@ std::string example_text(std::string_view command) {
 std::string version_text() {
   try {
     const std::string needed(needed_instruction_set());
-    return "pendula " + std::string(version) + " (" + std::string(library().instruction_set) +
+    return "pendula " + std::string(version) + " (" + std::string(instruction_set()) +
            (needed.empty() ? "" : ", on processors with " + needed + " only") + ")";
   } catch (const std::invalid_argument& error) {
     throw io::InputError(error.what());

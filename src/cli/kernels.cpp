@@ -13,7 +13,7 @@ ExitStatus kernels() {
   for (const KernelInfo& kernel : built_in_kernels()) {
     std::cout << std::setw(14) << kernel.name << std::setw(9) << kernel.space << kernel.links << '\n';
   }
-  for (const SystemTable* table : library().systems) {
+  for (const SystemTable* table : library<KernelList<Models>>().tables) {
     std::cout << std::setw(14) << table->info.name << std::setw(9) << "-" << table->info.links << '\n';
   }
   return done;

@@ -113,7 +113,7 @@ std::vector<double> numbers_or_defaults(const SystemInfo& info, const double* gi
 
 const SystemTable* find_system(const std::string& name, int links) {
   std::string built;
-  for (const SystemTable* table : library().systems) {
+  for (const SystemTable* table : library<KernelList<Models>>().tables) {
     if (table->info.model == name && (links == 0 || table->info.links == links)) return table;
     built += (built.empty() ? "" : ", ") + std::string(table->info.name);
   }
@@ -169,7 +169,7 @@ const char* pendula_version(void) {
 }
 
 const char* pendula_instruction_set(void) {
-  return made([] { return library().instruction_set.data(); });
+  return made([] { return instruction_set().data(); });
 }
 
 pendula_model* pendula_model_of_chain(const pendula_chain* chain) {
@@ -206,7 +206,7 @@ pendula_model* pendula_model_of_kernel(const void* kernel, const double* paramet
 
 pendula_model* pendula_model_of_program(const char* text, const double* parameters, size_t count) {
   return made([&] {
-    std::shared_ptr<const SystemTable> table = table_of(text, *library().interpreter);
+    std::shared_ptr<const SystemTable> table = table_of(text, *library<const ProgramInterpreter*>());
     const std::vector<double> numbers = numbers_or_defaults(table->info, parameters, count);
     return make_system(std::move(table), numbers, {});
   });

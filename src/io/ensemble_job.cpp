@@ -47,7 +47,7 @@ bool EnsembleJob::go_in_lanes() const {
 RunOrigin EnsembleJob::origin(const std::string& command) const {
   RunOrigin origin;
   origin.version = version;
-  origin.instruction_set = library().instruction_set;
+  origin.instruction_set = instruction_set();
   const std::string& name = scenarios_.text().name;
   origin.title =
       std::filesystem::path(name).stem().string() + ": " + std::to_string(scenarios_.plan().count) + " members";

@@ -91,7 +91,7 @@ class Workshop {
 /// The kernel of a built-in model, if this build has it; else null.
 const SystemTable* built_in_table(const ModelName& name) {
   if (name.model.ends_with(".py")) return nullptr;
-  for (const SystemTable* table : library().systems) {
+  for (const SystemTable* table : library<KernelList<Models>>().tables) {
     if (table->info.name == kernel_name(name)) return table;
   }
   return nullptr;
@@ -103,7 +103,7 @@ ModelKernel kept_kernel(const ModelName& model, const Toolchain& toolchain,
   const std::string name = kernel_name(model);
   const std::vector<std::string> arguments = about("program", model, toolchain);
   Key key;
-  key.add(read_model(find_model(model, toolchain))).add(name).add(version).add(library().instruction_set);
+  key.add(read_model(find_model(model, toolchain))).add(name).add(version).add(instruction_set());
   for (const InputLaw& law : model.laws) key.add(law.input).add(law.value);
   key.add(toolchain.python).add(toolchain.compiler).add_file(this_program());
   for (const std::string& flag : toolchain.flags) key.add(flag);

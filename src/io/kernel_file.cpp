@@ -97,7 +97,7 @@ void run_compilers(const std::vector<std::vector<std::string>>& commands, const 
 fs::path compile(const std::string& name, const fs::path& text, const Toolchain& toolchain) {
   std::vector<std::string> compiler{toolchain.compiler};
   compiler.insert(compiler.end(), std::begin(flags_of_kernels), std::end(flags_of_kernels));
-  for (const std::string& flag : architecture_flags(library().instruction_set)) compiler.push_back(flag);
+  for (const std::string& flag : architecture_flags(instruction_set())) compiler.push_back(flag);
   for (const std::string& flag : toolchain.flags) compiler.push_back(flag);
   const auto with = [&](std::initializer_list<std::string> more) {
     std::vector<std::string> command = compiler;
@@ -166,7 +166,7 @@ fs::path make_kernel(std::string_view kind, const std::string& name, std::vector
   const bool is_c = kind == compiled_kernel, is_llvm = kind == llvm_kernel;
   const fs::path text = folder / (is_c ? "kernel.c" : is_llvm ? "kernel.ll" : "kernel.program");
   arguments.insert(arguments.end(), {"--as", is_c ? "c" : is_llvm ? "llvm" : "bytecode", "--output", text.string()});
-  if (is_llvm) arguments.insert(arguments.end(), {"--for", std::string(library().instruction_set)});
+  if (is_llvm) arguments.insert(arguments.end(), {"--for", std::string(instruction_set())});
   run_generator(arguments, toolchain);
   derived();
   if (is_c) return compile(name, text, toolchain);
@@ -268,7 +268,7 @@ std::shared_ptr<const SystemTable> load_kernel(const fs::path& kept, const Toolc
     if (kept.extension() == compiled_kernel) return table_of_object(std::move(opened));
     file.text.resize(file.text.size() - seal_of({}).size());
     if (kept.extension() == llvm_kernel) return table_of(*toolchain.llvm.load(file.text), nullptr);
-    return table_of(std::move(file.text), *library().interpreter);
+    return table_of(std::move(file.text), *library<const ProgramInterpreter*>());
   } catch (const std::invalid_argument& error) {
     return none(error.what());
   }

@@ -66,7 +66,7 @@ RunSource resumed_source(const std::string& file, SavedRun saved, const std::vec
   RunSource source{{saved.origin.scenario_name, saved.origin.scenario}, saved.origin.overrides, std::move(saved)};
   const RunOrigin& origin = source.saved->origin;
   require_same(file, "pendula", std::string(version), origin.version);
-  const std::string instruction_set(library().instruction_set);
+  const std::string instruction_set(pendula::instruction_set());
   if (origin.instruction_set != instruction_set) {
     throw InputError(file + ": expected a run on " + instruction_set + ", got one on " + origin.instruction_set +
                      ", which others do not follow to the last bit; PENDULA_ARCH=" + origin.instruction_set +
@@ -97,7 +97,7 @@ RunOrigin origin_of(const RunSource& source, const Description& description, con
   origin.title = title;
   origin.command = command;
   origin.version = version;
-  origin.instruction_set = library().instruction_set;
+  origin.instruction_set = instruction_set();
   origin.solver = description.solver;
   origin.kernel = description.kernel;
   origin.scenario_name = public_name(source.text.name);

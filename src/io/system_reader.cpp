@@ -287,7 +287,7 @@ std::shared_ptr<const SystemTable> built_in_system(const ModelName& model) {
   const std::string name = kernel_name(model);
   if (!model.laws.empty()) throw ModelError("no kernel with feedback is in this build, which cannot make one here");
   std::vector<std::string_view> names;
-  for (const SystemTable* table : library().systems) {
+  for (const SystemTable* table : library<KernelList<Models>>().tables) {
     if (table->info.name == name) return {table, [](const SystemTable*) {}};
     names.push_back(table->info.name);
   }

@@ -49,26 +49,39 @@ std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table
       model, options, GaussDescription{"dense", table.info.name, named}, options.iteration, family_of(options.method));
 }
 
-MoveMembers* no_lanes(const RunOptions&) {
-  return nullptr;
-}
-MoveSystemMembers* no_system_lanes(const RunOptions&) {
-  return nullptr;
-}
-
 }  // namespace
 
-const Library& library() {
-  static const Library only = {"wasm",
-                               {&make_plain_integrator<Planar>, {}, &no_lanes, &no_lanes},
-                               {&make_plain_integrator<Spatial>, {}, &no_lanes, &no_lanes},
-                               {},
-                               &make_system_integrator,
-                               &no_system_lanes,
-                               &no_system_lanes,
-                               &make_orthonormal,
-                               &interpreter};
-  return only;
+template <>
+ChainMaker<Planar> library() {
+  return {&make_plain_integrator<Planar>};
+}
+template <>
+ChainMaker<Spatial> library() {
+  return {&make_plain_integrator<Spatial>};
+}
+template <>
+SystemMaker library() {
+  return {&make_system_integrator};
+}
+template <>
+KernelList<Planar> library() {
+  return {};
+}
+template <>
+KernelList<Spatial> library() {
+  return {};
+}
+template <>
+Orthonormalizer library() {
+  return {&make_orthonormal};
+}
+template <>
+const ProgramInterpreter* library() {
+  return &interpreter;
+}
+
+std::string_view instruction_set() {
+  return "wasm";
 }
 
 std::string_view needed_instruction_set() {

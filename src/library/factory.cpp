@@ -17,7 +17,7 @@ template <class Space>
 std::string no_kernel_message(int links) {
   const std::string wanted = std::string(Space::name) + ":" + std::to_string(links);
   std::string built;
-  for (const SystemTable* kernel : library_of<Space>().kernels) {
+  for (const SystemTable* kernel : library<KernelList<Space>>().tables) {
     built += (built.empty() ? "" : ", ") + std::string(kernel->info.name);
   }
   return "no kernel for a " + std::string(Space::name) + " chain of " + std::to_string(links) +

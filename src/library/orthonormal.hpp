@@ -4,7 +4,7 @@
 
 namespace pendula {
 
-/// Library::make_orthonormal: makes tangents orthonormal by QR, for Lyapunov exponents.
+/// Orthonormalizer::make_orthonormal: makes tangents orthonormal by QR, for Lyapunov exponents.
 void make_orthonormal(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
 
 }  // namespace pendula

@@ -19,7 +19,7 @@ namespace {
 /// Stands for every model: what finds one runs programs.
 std::shared_ptr<const SystemTable> furuta(const ModelName&) {
   static const std::shared_ptr<const SystemTable> table =
-      table_of(fuzz::whole_text(FURUTA_PROGRAM), *library().interpreter);
+      table_of(fuzz::whole_text(FURUTA_PROGRAM), *library<const ProgramInterpreter*>());
   return table;
 }
 

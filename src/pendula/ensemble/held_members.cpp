@@ -121,14 +121,14 @@ bool HeldMembers::go_in_lanes(Numbers inputs, Numbers states, std::span<MemberEn
   const auto by_system = [&](const PlainSystem& model) {
     const auto members = members_of(model, ends.size(), duration_, states.data(), coordinates_,
                                     [&](std::size_t k, PlainSystem& own) { own.inputs = input(k); });
-    return library().system_lanes(in_lanes_)(*kind_->kernel, in_lanes_, 0, members, ends, watch);
+    return library<LaneMovers<Models>>().plain(in_lanes_)(*kind_->kernel, in_lanes_, 0, members, ends, watch);
   };
   const auto by_chain = [&]<class Space>(const Chain<Space>& chain) {
     const PlainChain model = plain(chain, {});
     if (kind_->kernel != nullptr) return by_system(ChainSystem(model, Space::torque_components).plain());
     const auto members = members_of(model, ends.size(), duration_, states.data(), coordinates_,
                                     [&](std::size_t k, PlainChain& own) { own.torque = input(k); });
-    return library_of<Space>().lanes(in_lanes_)(in_lanes_, 0, members, ends, watch);
+    return library<LaneMovers<Space>>().plain(in_lanes_)(in_lanes_, 0, members, ends, watch);
   };
   return as_its_kind(*subject_, [&](const auto& kind) {
     if constexpr (requires { kind.chain(); }) {

@@ -10,12 +10,17 @@ namespace pendula {
 
 namespace {
 
+template <class Kind>
+bool has_lanes(const RunOptions& options, bool with_tangents) {
+  const LaneMovers<Kind> lanes = library<LaneMovers<Kind>>();
+  return (with_tangents ? lanes.with_tangents : lanes.plain)(options) != nullptr;
+}
+
 // Names the chain or kernel in `kind`; false if there are no lanes for it.
 template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tangents, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
-  const SpaceLibrary& lanes = library_of<Space>();
-  if (chain == nullptr || (with_tangents ? lanes.tangent_lanes : lanes.lanes)(options) == nullptr) return false;
+  if (chain == nullptr || !has_lanes<Space>(options, with_tangents)) return false;
   kind.dimension = Space::dimension;
   kind.links = chain->chain().links();
   if (options.method == Method::taylor) {
@@ -33,9 +38,7 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tang
 }
 bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tangents, LaneKind& kind) {
   const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
-  const Library& lanes = library();
-  if (system == nullptr) return false;
-  if ((with_tangents ? lanes.system_tangent_lanes : lanes.system_lanes)(options) == nullptr) return false;
+  if (system == nullptr || !has_lanes<Models>(options, with_tangents)) return false;
   const bool by_series = options.method == Method::taylor;
   if (by_series && system->table().of_1.series_next == nullptr) return false;
   if (!is_explicit(options.method) && system->info().depends_on_time) return false;

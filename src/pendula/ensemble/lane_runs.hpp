@@ -54,10 +54,10 @@ class PlainChains : public MemberEnds {
 
   /// Moves all; false if `watch` stopped it.
   bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
-    return library_of<Space>().lanes(options)(options, every, members_, all(), watch);
+    return library<LaneMovers<Space>>().plain(options)(options, every, members_, all(), watch);
   }
   bool move_with_tangents(const RunOptions& options, MemberWatch& watch) {
-    return library_of<Space>().tangent_lanes(options)(options, 0, members_, all(), watch);
+    return library<LaneMovers<Space>>().with_tangents(options)(options, 0, members_, all(), watch);
   }
 
   /// What solves the stage equations.
@@ -82,10 +82,10 @@ class PlainSystems : public MemberEnds {
   }
 
   bool move(const RunOptions& options, std::int64_t every, MemberWatch& watch) {
-    return library().system_lanes(options)(table_, options, every, members_, all(), watch);
+    return library<LaneMovers<Models>>().plain(options)(table_, options, every, members_, all(), watch);
   }
   bool move_with_tangents(const RunOptions& options, MemberWatch& watch) {
-    return library().system_tangent_lanes(options)(table_, options, 0, members_, all(), watch);
+    return library<LaneMovers<Models>>().with_tangents(options)(table_, options, 0, members_, all(), watch);
   }
 
   Description description() const { return {"dense", "fixed-point", std::string(table_.info.name)}; }

@@ -90,6 +90,23 @@ class ChainSubject : public Subject {
   }
 
   std::shared_ptr<Subject> copy() const override { return std::make_shared<ChainSubject>(chain_); }
+  std::shared_ptr<const Subject> with_inputs(std::span<const double> inputs,
+                                             std::span<const InputSine> added) const override {
+    ChainParameters<Space> parameters{chain_.masses(), chain_.lengths(), chain_.gravity(), chain_.damping()};
+    parameters.torque.resize(Space::torque_components, chain_.links());
+    std::ranges::copy(inputs, parameters.torque.data());
+    parameters.drives = chain_.drives();
+    for (const InputSine& sine : added) {
+      Drive<Space> drive;
+      drive.link = sine.input / Space::torque_components;
+      drive.frequency = sine.frequency;
+      drive.phase = sine.phase;
+      drive.amplitude.setZero();
+      drive.amplitude[sine.input % Space::torque_components] = sine.amplitude;
+      parameters.drives.push_back(drive);
+    }
+    return std::make_shared<ChainSubject>(Chain<Space>(std::move(parameters)));
+  }
 
   void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {
     const int links = chain_.links();

@@ -1,12 +1,9 @@
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <pendula/chain/chain.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/inputs.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <stdexcept>
-#include <utility>
 
 namespace pendula {
 namespace {
@@ -44,36 +41,6 @@ InputSine sine_of(const InputLine& line) {
   return {static_cast<int>(line.input), line.slope / frequency, frequency, -frequency * line.since};
 }
 
-std::shared_ptr<const Subject> with(const SystemSubject& system, const std::shared_ptr<const Subject>& owner,
-                                    std::span<const double> inputs, std::span<const InputLine> lines) {
-  SystemNumbers numbers = system.numbers();
-  numbers.inputs.assign(inputs.begin(), inputs.end());
-  for (const InputLine& line : lines) numbers.sines.push_back(sine_of(line));
-  return std::make_shared<SystemSubject>(std::shared_ptr<const SystemTable>(owner, &system.table()), std::move(numbers),
-                                         system.feedback());
-}
-
-template <class Space>
-std::shared_ptr<const Subject> with(const ChainSubject<Space>& subject, const std::shared_ptr<const Subject>& /*owner*/,
-                                    std::span<const double> inputs, std::span<const InputLine> lines) {
-  const Chain<Space>& chain = subject.chain();
-  ChainParameters<Space> parameters{chain.masses(), chain.lengths(), chain.gravity(), chain.damping()};
-  parameters.torque.resize(Space::torque_components, chain.links());
-  std::ranges::copy(inputs, parameters.torque.data());
-  parameters.drives = chain.drives();
-  for (const InputLine& line : lines) {
-    const InputSine sine = sine_of(line);
-    Drive<Space> drive;
-    drive.link = sine.input / Space::torque_components;
-    drive.frequency = sine.frequency;
-    drive.phase = sine.phase;
-    drive.amplitude.setZero();
-    drive.amplitude[sine.input % Space::torque_components] = sine.amplitude;
-    parameters.drives.push_back(drive);
-  }
-  return std::make_shared<ChainSubject<Space>>(Chain<Space>(std::move(parameters)));
-}
-
 }  // namespace
 
 std::vector<std::string> input_names(const Subject& subject) {
@@ -95,7 +62,9 @@ std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>&
     if (std::isfinite(inputs[k])) continue;
     throw std::invalid_argument(known[k] + ": expected a finite number, got " + shortest(inputs[k]));
   }
-  return as_its_kind(*subject, [&](const auto& kind) { return with(kind, subject, inputs, lines); });
+  std::vector<InputSine> sines;
+  for (const InputLine& line : lines) sines.push_back(sine_of(line));
+  return subject->with_inputs(inputs, sines);
 }
 
 }  // namespace pendula

@@ -26,9 +26,8 @@ struct InputLine {
   double duration = 0;  ///< > 0  [s]
 };
 
-/// The same subject with `inputs` as the constant parts, and with `lines` added; drives stay. It shares ownership of
-/// `subject`. Throws std::invalid_argument on another number of inputs than the subject has, and on one that is not
-/// finite.
+/// The same subject with `inputs` as the constant parts, and with `lines` added; drives stay. Throws
+/// std::invalid_argument on another number of inputs than the subject has, and on one that is not finite.
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
                                            std::span<const double> inputs, std::span<const InputLine> lines = {});
 

@@ -208,7 +208,7 @@ class ScopedStopSign {
 template <class Space>
 std::unique_ptr<Integrator> make_integrator(const Chain<Space>& chain, const RunOptions& options) {
   const std::vector<PlainChain::Drive> drives = plain_drives(chain);
-  return std::make_unique<Integrator>(library_of<Space>().make_integrator(plain(chain, drives), options),
+  return std::make_unique<Integrator>(library<ChainMaker<Space>>().make_integrator(plain(chain, drives), options),
                                       Space::dof * chain.links(), "chain");
 }
 
@@ -222,7 +222,7 @@ struct KernelInfo {
 /// The kernels in this build, by space and number of links.
 inline std::vector<KernelInfo> built_in_kernels() {
   std::vector<KernelInfo> kernels;
-  for (const auto& tables : {library().planar.kernels, library().spatial.kernels}) {
+  for (const auto& tables : {library<KernelList<Planar>>().tables, library<KernelList<Spatial>>().tables}) {
     for (const SystemTable* table : tables) kernels.push_back({table->info.name, table->info.model, table->info.links});
   }
   return kernels;

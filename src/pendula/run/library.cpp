@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstddef>
 #include <cstdlib>
 #include <pendula/run/library.hpp>
 #include <stdexcept>
@@ -26,42 +27,62 @@ bool processor_has([[maybe_unused]] std::string_view instruction_set) {
 
 std::string names(bool (*wanted)(std::string_view)) {
   std::string names;
-  for (const Library* copy : library_copies) {
-    if (wanted(copy->instruction_set)) names += (names.empty() ? "" : ", ") + std::string(copy->instruction_set);
+  for (const std::string_view name : instruction_sets) {
+    if (wanted(name)) names += (names.empty() ? "" : ", ") + std::string(name);
   }
   return names.empty() ? "none" : names;
 }
 
-const Library& best() {
-  const auto found = std::find_if(library_copies.rbegin(), library_copies.rend(),
-                                  [](const Library* copy) { return processor_has(copy->instruction_set); });
-  if (found != library_copies.rend()) return **found;
+std::size_t best() {
+  for (std::size_t k = instruction_sets.size(); k > 0; --k) {
+    if (processor_has(instruction_sets[k - 1])) return k - 1;
+  }
   throw std::runtime_error("this processor has none of the instruction sets that pendula was compiled for: " +
                            names([](std::string_view) { return true; }) +
                            "; -D PENDULA_ARCHS=\"sse2;avx2;avx512\" compiles it for any");
 }
 
-const Library& asked_for(std::string_view name) {
-  const auto found = std::find_if(library_copies.begin(), library_copies.end(),
-                                  [&](const Library* copy) { return copy->instruction_set == name; });
-  if (found != library_copies.end() && processor_has(name)) return **found;
-  const std::string why = found == library_copies.end() ? "" : ", which this processor lacks";
+std::size_t asked_for(std::string_view name) {
+  const auto found = std::ranges::find(instruction_sets, name);
+  const bool is_there = found != instruction_sets.end();
+  if (is_there && processor_has(name)) return static_cast<std::size_t>(found - instruction_sets.begin());
   throw std::invalid_argument("PENDULA_ARCH: expected one of " + names(processor_has) + ", got " + std::string(name) +
-                              why);
+                              (is_there ? ", which this processor lacks" : ""));
+}
+
+std::size_t chosen() {
+  static const std::size_t chosen = [] {
+    const char* wanted = std::getenv("PENDULA_ARCH");
+    return wanted == nullptr || *wanted == '\0' ? best() : asked_for(wanted);
+  }();
+  return chosen;
 }
 
 }  // namespace
 
-const Library& library() {
-  static const Library* const chosen = [] {
-    const char* wanted = std::getenv("PENDULA_ARCH");
-    return wanted == nullptr || *wanted == '\0' ? &best() : &asked_for(wanted);
-  }();
-  return *chosen;
+template <class Part>
+Part library() {
+  return copies<Part>[chosen()]();
+}
+
+template ChainMaker<Planar> library();
+template ChainMaker<Spatial> library();
+template SystemMaker library();
+template KernelList<Planar> library();
+template KernelList<Spatial> library();
+template KernelList<Models> library();
+template LaneMovers<Planar> library();
+template LaneMovers<Spatial> library();
+template LaneMovers<Models> library();
+template Orthonormalizer library();
+template const ProgramInterpreter* library();
+
+std::string_view instruction_set() {
+  return instruction_sets[chosen()];
 }
 
 std::string_view needed_instruction_set() {
-  const std::string_view least = library_copies.front()->instruction_set;
+  const std::string_view least = instruction_sets.front();
   return least == "sse2" || least == "baseline" ? "" : least;
 }
 

@@ -10,63 +10,75 @@
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 namespace pendula {
 
-/// The part of the compiled library for chains of one space.
-struct SpaceLibrary {
+struct Planar;
+struct Spatial;
+
+// The parts of the compiled library, and `const ProgramInterpreter*`, the functions of interpreted kernels
+// (system/interpreted_kernel.hpp). Those that a program does not ask for, -Wl,--gc-sections leaves out of it.
+//
+// A program contains several compiled versions of each, with different flags; only what is declared here passes between
+// them and the program: numbers, pointers to numbers, and classes with virtual functions only. So it does not matter
+// how either was compiled. (The memory layout of Eigen's vectors, and who may free them, depend on flags such as
+// -mavx.)
+
+/// Every method for chains of one space.
+template <class Space>
+struct ChainMaker {
   /// As make_integrator of integrator.hpp.
   std::unique_ptr<PlainIntegrator> (*make_integrator)(const PlainChain&, const RunOptions&);
-  /// The fixed-n kernels of this build, by number of links.
-  std::span<const SystemTable* const> kernels;
-  /// Moves members in lanes; nullptr for methods and stages that move members one by one.
-  MoveMembers* (*lanes)(const RunOptions&);
-  /// The same with a tangent of each member; nullptr for methods that have none.
-  MoveMembers* (*tangent_lanes)(const RunOptions&);
 };
 
-/// The compiled library for one instruction set. A program contains several, compiled with different flags; only what
-/// is declared here passes between them and the program: numbers, pointers to numbers, and classes with virtual
-/// functions only. So it does not matter how either was compiled. (The memory layout of Eigen's vectors, and who may
-/// free them, depend on flags such as -mavx.)
-struct Library {
-  std::string_view instruction_set;  ///< "sse2", "avx2" or "avx512"; "baseline" if there is only one
-  SpaceLibrary planar, spatial;
-  std::span<const SystemTable* const> systems;  ///< kernels of this build other than chains
-  /// Every method for these kernels and any other. `parts` is the number of parts that failures name, 0 for the
-  /// coordinates. Throws as make_integrator.
-  std::unique_ptr<PlainIntegrator> (*make_system_integrator)(const SystemTable&, const PlainSystem&, const RunOptions&,
-                                                             int parts);
-  /// Moves members of any kernel in lanes; nullptr for methods that move members one by one.
-  MoveSystemMembers* (*system_lanes)(const RunOptions&);
+/// Every method for any kernel.
+struct SystemMaker {
+  /// `parts` is the number of parts that failures name, 0 for the coordinates. Throws as make_integrator.
+  std::unique_ptr<PlainIntegrator> (*make_integrator)(const SystemTable&, const PlainSystem&, const RunOptions&,
+                                                      int parts);
+};
+
+/// The kernels of this build: of chains of one space, by number of links, or of `Models`.
+template <class Kind>
+struct KernelList {
+  std::span<const SystemTable* const> tables;
+};
+struct Models;
+
+/// What moves members of ensembles in lanes: chains of one space, or, for `Models`, systems of any kernel.
+template <class Kind>
+struct LaneMovers {
+  using Move = std::conditional_t<std::is_same_v<Kind, Models>, MoveSystemMembers, MoveMembers>;
+  /// nullptr for methods and stages that move members one by one.
+  Move* (*plain)(const RunOptions&);
   /// The same with a tangent of each member; nullptr for methods that have none.
-  MoveSystemMembers* (*system_tangent_lanes)(const RunOptions&);
+  Move* (*with_tangents)(const RunOptions&);
+};
+
+struct Orthonormalizer {
   /// Replaces directions, (rows, count) numbers row by row, by an orthonormal basis such that the first k span the same
   /// space as before, for every k. `lengths`, (count), is set to |R_kk| of the QR decomposition, by Householder
   /// reflections.
   void (*make_orthonormal)(double* directions, std::ptrdiff_t rows, std::ptrdiff_t count, double* lengths);
-  /// Functions of interpreted kernels (system/interpreted_kernel.hpp).
-  const ProgramInterpreter* interpreter;
 };
 
-/// The library for the best instruction set of this processor, or for the lesser one that the environment variable
-/// PENDULA_ARCH asks for, which is read once. Throws std::invalid_argument if PENDULA_ARCH names none of this build, or
-/// one that the processor lacks; std::runtime_error if the processor supports none of this build.
-const Library& library();
+/// A part of the library for the best instruction set of this processor, or for the lesser one that the environment
+/// variable PENDULA_ARCH asks for, which is read once. Throws std::invalid_argument if PENDULA_ARCH names none of this
+/// build, or one that the processor lacks; std::runtime_error if the processor supports none of this build.
+template <class Part>
+Part library();
+
+/// That instruction set: "sse2", "avx2" or "avx512"; "baseline" if there is only one.
+std::string_view instruction_set();
 
 /// The instruction set that a processor needs to run this build; empty if every processor of its kind can.
 std::string_view needed_instruction_set();
 
-/// The part of the library for one space.
-template <class Space>
-const SpaceLibrary& library_of() {
-  return Space::dof == 1 ? library().planar : library().spatial;
-}
-
 /// The fixed-n kernel of this build for a chain; nullptr if there is none.
 template <class Space>
 const SystemTable* kernel_of(int links) {
-  for (const SystemTable* kernel : library_of<Space>().kernels) {
+  for (const SystemTable* kernel : library<KernelList<Space>>().tables) {
     if (kernel->info.links == links) return kernel;
   }
   return nullptr;

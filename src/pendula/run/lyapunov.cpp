@@ -147,7 +147,7 @@ void LyapunovTangents::begin(Integrator& integrator, const Eigen::VectorXd& scal
   scale_ = scale;
   push(integrator);
   Eigen::VectorXd grown(tangents_.cols());
-  library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+  library<Orthonormalizer>().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
   has_begun_ = true;
 }
 
@@ -199,7 +199,7 @@ void LyapunovTangents::push(Integrator& integrator) {
 void LyapunovTangents::make_orthonormal() {
   const double span = time_ - history_.last_time();
   Eigen::VectorXd grown(tangents_.cols());
-  library().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
+  library<Orthonormalizer>().make_orthonormal(tangents_.data(), tangents_.rows(), tangents_.cols(), grown.data());
   grown = grown.array().max(smallest).log().matrix().eval();
   if (has_begun_ || history_.size() > 1) {
     const double parting = std::max(grown.maxCoeff() - grown.minCoeff(), grown.cwiseAbs().maxCoeff());

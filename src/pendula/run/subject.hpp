@@ -9,6 +9,7 @@
 #include <pendula/run/quantity.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
+#include <pendula/system/plain_system.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -81,6 +82,11 @@ class Subject {
   virtual void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const = 0;
 
   virtual std::shared_ptr<Subject> copy() const = 0;
+  /// with_inputs of inputs.hpp, of as many numbers as there are inputs; null where feedback or signals hold them.
+  virtual std::shared_ptr<const Subject> with_inputs(std::span<const double> /*inputs*/,
+                                                     std::span<const InputSine> /*added*/) const {
+    return nullptr;
+  }
 
   /// The subject that moves this one around a time, where signals add lines to inputs. Null where this one moves
   /// itself, and for sampled feedback.

@@ -42,7 +42,7 @@ auto as_its_kind_at(const Subject& subject, double time, Act act) {
 template <class Space>
 SystemModel system_model_of(const ChainSubject<Space>& subject) {
   const Chain<Space>& chain = subject.chain();
-  for (const SystemTable* kernel : library_of<Space>().kernels) {
+  for (const SystemTable* kernel : library<KernelList<Space>>().tables) {
     if (kernel->info.links != chain.links()) continue;
     const std::vector<PlainChain::Drive> drives = plain_drives(chain);
     return {*kernel, ChainSystem(plain(chain, drives), Space::torque_components).plain()};

@@ -158,8 +158,9 @@ class SwitchingIntegrator : public Relay {
   std::unique_ptr<Integrator> make() {
     made_for_ = sides_;
     const SystemNumbers numbers = system_.numbers(sides_);
-    return std::make_unique<Integrator>(library().make_system_integrator(system_.table(), numbers.plain(), options_, 0),
-                                        static_cast<Eigen::Index>(system_.table().info.coordinates.size()), "system");
+    return std::make_unique<Integrator>(
+        library<SystemMaker>().make_integrator(system_.table(), numbers.plain(), options_, 0),
+        static_cast<Eigen::Index>(system_.table().info.coordinates.size()), "system");
   }
 
   void choose(const Motion& motion) {

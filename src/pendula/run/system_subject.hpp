@@ -76,7 +76,7 @@ class SystemSubject : public Subject {
       return std::make_unique<Integrator>(make_switching_integrator(switching(), options),
                                           static_cast<Eigen::Index>(info().coordinates.size()), "system");
     }
-    return std::make_unique<Integrator>(library().make_system_integrator(*table_, numbers_.plain(), options, 0),
+    return std::make_unique<Integrator>(library<SystemMaker>().make_integrator(*table_, numbers_.plain(), options, 0),
                                         static_cast<Eigen::Index>(info().coordinates.size()), "system");
   }
 
@@ -147,6 +147,13 @@ class SystemSubject : public Subject {
 
   std::shared_ptr<Subject> copy() const override {
     return std::make_shared<SystemSubject>(table_, numbers_, feedback_);
+  }
+  std::shared_ptr<const Subject> with_inputs(std::span<const double> inputs,
+                                             std::span<const InputSine> added) const override {
+    SystemNumbers numbers = numbers_;
+    numbers.inputs.assign(inputs.begin(), inputs.end());
+    numbers.sines.insert(numbers.sines.end(), added.begin(), added.end());
+    return std::make_shared<SystemSubject>(table_, std::move(numbers), feedback_);
   }
 
   void append_motion_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const override {

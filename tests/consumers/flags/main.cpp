@@ -40,7 +40,7 @@ bool throws(const std::string& what, Action action) {
 }  // namespace
 
 int main() {
-  std::cout << "library for " << library().instruction_set << ", heap aligned to " << EIGEN_DEFAULT_ALIGN_BYTES << '\n';
+  std::cout << "library for " << instruction_set() << ", heap aligned to " << EIGEN_DEFAULT_ALIGN_BYTES << '\n';
   const RunOptions chain{.solver = Solver::chain}, dense{.solver = Solver::dense};
   // Two discretisations of one motion: with so many stages, both are the motion.
   const RunOptions exact_chain{.stages = 6, .solver = Solver::chain}, exact_dense{.stages = 6, .solver = Solver::dense};
