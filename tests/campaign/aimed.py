@@ -158,11 +158,11 @@ def quotients(dice: random.Random) -> Drawn:
     )
     system = {"model": "model.py", "parameters": {"a": power(dice, -2, 1), "w": width}}
     run = {"duration": dice.uniform(2.0, 10.0), **asked(dice)}
-    edges = ("x*x/w - w", narrow) if f"** {k}" in lagrangian else ("x", narrow)
+    edges = f"x*x/{width!r} - {width!r}" if f"** {k}" in lagrangian else "x"
     return (
         {"system": system, "start": turn_or_pass(dice, -4, 4), "run": run},
         QUOTIENTS.format(lagrangian=lagrangian),
-        edges,
+        (edges, narrow),
     )
 
 
