@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 Real = np.longdouble
-Drawn = tuple[dict, str]  # tables of the scenario, the text of model.py
+# Tables of the scenario, the text of model.py; for the compiled reference, expressions and widths of what is narrow.
+Drawn = tuple[dict, str, *tuple[tuple[str, float], ...]]
 
 
 def power(dice: random.Random, low: float, high: float) -> float:
@@ -89,6 +90,82 @@ def whip(dice: random.Random) -> Drawn:
     }, ""
 
 
+# --- hills that a look or two between may miss, and what is not smooth
+
+
+POWERS = """from sympy import Abs, cos, sign, sqrt
+
+
+def define(model, links):
+    x = model.coordinate("x", "{unit}")
+    v = model.rate(x)
+    a = model.parameter("a", "1", default=1.0)
+    model.lagrangian = v**2 / 2 - ({potential})
+    model.force(x, {force})
+"""
+QUOTIENTS = """def define(model, links):
+    x = model.coordinate("x", "m")
+    v = model.rate(x)
+    a = model.parameter("a", "1", default=1.0)
+    w = model.parameter("w", "1", default=1.0)
+    model.lagrangian = {lagrangian}
+"""
+
+
+def turn_or_pass(dice: random.Random, low: float, high: float) -> dict:
+    """A start that any of what stands at 0 is met from."""
+    return {
+        "x": dice.uniform(low, high),
+        "x_dot": dice.choice([0.0, dice.uniform(-3, 3), power(dice, -3, 1)]),
+    }
+
+
+def powers(dice: random.Random) -> Drawn:
+    """Hills, walls and wells of a high power, drag and springs of one that is no integer, roots at zero."""
+    k = dice.choice([20, 40, 60])
+    unit, potential, force, narrow = dice.choice(
+        [
+            ("rad", f"a * ((1 + cos(x)) / 2) ** {k}", "0", ("sin(x/2)", 0.1)),
+            ("rad", f"a * cos(x / 2) ** {k}", "0", ("sin(x/2)", 0.1)),
+            ("m", f"a * x**{k}", "0", ("1 - x*x", 0.03)),
+            ("m", f"x**2 / 2 - a * x**2 * (1 - x**2 / 16) ** {k}", "0", ("x", 0.1)),
+            ("m", "x**2 / 2", "-a * sign(v) * Abs(v) ** 1.7", ("x_dot", 1e-3)),
+            ("m", "x**2 / 2", "-a * v * Abs(v) ** 0.5", ("x_dot", 1e-3)),
+            ("m", "0", "-a * sign(x) * Abs(x) ** 2.5", ("x", 1e-3)),
+            ("m", "0", "-a * sign(x) * sqrt(Abs(x))", ("x", 1e-3)),
+        ]
+    )
+    start = turn_or_pass(dice, -4, 4) if "16" in potential or unit == "rad" else turn_or_pass(dice, -0.9, 0.9)
+    system = {"model": "model.py", "parameters": {"a": power(dice, -2, 1)}}
+    run = {"duration": dice.uniform(2.0, 10.0), **asked(dice)}
+    return (
+        {"system": system, "start": start, "run": run},
+        POWERS.format(unit=unit, potential=potential, force=force),
+        narrow,
+    )
+
+
+def quotients(dice: random.Random) -> Drawn:
+    """Hills with flat tops, narrow gates, masses that almost vanish."""
+    k, gate = dice.choice([10, 20, 60]), power(dice, -5, -1)
+    width = dice.choice([dice.uniform(0.05, 1.0), gate])
+    lagrangian, narrow = dice.choice(
+        [
+            (f"v**2 / 2 - x**2 / 2 - a / (1 + (x / w) ** {k})", width / k),
+            ("v**2 / 2 - x**2 / 2 - a / (1 + (x / w) ** 2)", width),
+            ("(x**2 + w**2) * v**2 / 2 - a * x**2 / 2", width),
+        ]
+    )
+    system = {"model": "model.py", "parameters": {"a": power(dice, -2, 1), "w": width}}
+    run = {"duration": dice.uniform(2.0, 10.0), **asked(dice)}
+    edges = f"x*x/{width!r} - {width!r}" if f"** {k}" in lagrangian else "x"
+    return (
+        {"system": system, "start": turn_or_pass(dice, -4, 4), "run": run},
+        QUOTIENTS.format(lagrangian=lagrangian),
+        (edges, narrow),
+    )
+
+
 # --- pieces
 
 
@@ -154,7 +231,7 @@ def define(model, links):
 
 
 def strong_damping(dice: random.Random) -> Drawn:
-    """An overdamped spring, with and without a rate at the start that the damping stops at once."""
+    """A spring, most often overdamped, with and without a rate at the start that the damping stops at once."""
     start = {"x": dice.choice([1.0, 1.0, 0.0]), "x_dot": dice.choice([-1, 1]) * power(dice, -6, 1)}
     if start["x"] and dice.random() < 0.2:
         del start["x_dot"]
@@ -162,7 +239,7 @@ def strong_damping(dice: random.Random) -> Drawn:
     if dice.random() < 0.3:
         run["method"] = "radau"
     return {
-        "system": {"model": "model.py", "parameters": {"c": power(dice, 0.4, 7)}},
+        "system": {"model": "model.py", "parameters": {"c": power(dice, 0, 7)}},
         "start": start,
         "run": run,
     }, SPRING
@@ -181,7 +258,16 @@ def late_damping(dice: random.Random) -> Drawn:
 
 FAMILIES: dict[str, Callable[[random.Random], Drawn]] = {
     each.__name__: each
-    for each in (close_passage, whip, stiff_wall, piled_switches, strong_damping, late_damping)
+    for each in (
+        close_passage,
+        whip,
+        powers,
+        quotients,
+        stiff_wall,
+        piled_switches,
+        strong_damping,
+        late_damping,
+    )
 }
 
 
@@ -237,8 +323,8 @@ def detents(x: Real, v: Real, parameters: dict[str, Real]) -> Iterator[Piece]:
 
 
 def exponentials(x: Real, v: Real, parameters: dict[str, Real]) -> Iterator[Piece]:
-    """x'' = −x − c x', c > 2."""
-    c = Real(parameters["c"])
+    """x'' = −x − c x'; below c = 2 its rates are complex."""
+    c = np.clongdouble(parameters["c"])
     fast = -(c + np.sqrt((c - 2) * (c + 2))) / 2
     slow = 1 / fast
     b = (v - slow * x) / (fast - slow)
@@ -246,7 +332,7 @@ def exponentials(x: Real, v: Real, parameters: dict[str, Real]) -> Iterator[Piec
 
     def piece(t: Real) -> tuple[Real, Real]:
         one, other = a * np.exp(slow * t), b * np.exp(fast * t)
-        return one + other, slow * one + fast * other
+        return (one + other).real, (slow * one + fast * other).real
 
     yield Real(0), piece
     yield Real(np.inf), piece
@@ -297,10 +383,10 @@ def rows(
     return np.array(found, dtype=Real).reshape(-1, 3)
 
 
-def draw(seed: int, number: int) -> tuple[str, dict, str]:
-    """Family, tables, the text of the model."""
+def draw(seed: int, number: int) -> tuple[str, dict, str, list[tuple[str, float]]]:
+    """Family, tables, the text of the model, what is narrow in it."""
     dice = random.Random(f"aimed:{seed}:{number}")
     family = list(FAMILIES)[number % len(FAMILIES)]
-    tables, text = FAMILIES[family](dice)
+    tables, text, *narrow = FAMILIES[family](dice)
     tables["output"] = dice.choice([{"every": 1}, {"every": 1}, {"interval": tables["run"]["duration"] / 50}])
-    return family, tables, text
+    return family, tables, text, narrow

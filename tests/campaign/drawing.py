@@ -72,8 +72,8 @@ def draw(kind: str, seed: int, number: int) -> Case:
 
 
 def an_aimed_one(seed: int, number: int) -> Case:
-    family, tables, text = aimed.draw(seed, number)
-    return Case("aimed", seed, number, family, tables, text)
+    family, tables, text, narrow = aimed.draw(seed, number)
+    return Case("aimed", seed, number, family, tables, text, narrow)
 
 
 # --- how a run is moved, and what is written of it

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from sympy import Expr, Function, Symbol, cse, diff, lambdify, sympify
+from sympy import DiracDelta, Expr, Function, Integer, Symbol, cse, diff, lambdify, sympify
 from sympy.codegen.ast import float80, real
 from sympy.printing.c import C99CodePrinter
 
@@ -167,7 +167,11 @@ class Model:
         for array, symbols in (("u", self.said.inputs), ("du", self.du)):
             places |= {s: f"of_{array}[{k}]" for k, s in enumerate(symbols)}
         printer = Printer()
-        everything = [entry for entries in outputs.values() for entry in entries]
+        everything = [
+            entry.replace(DiracDelta, lambda *_: Integer(0))
+            for entries in outputs.values()
+            for entry in entries
+        ]
         shared, entries = cse(everything, symbols=(Symbol(f"shared_{k}") for k in range(10**6)), order="none")
         used = set().union(*(e.free_symbols for e in (*entries, *(e for _, e in shared))))
         lines = [f"const R {s} = {place};" for s, place in places.items() if s in used]

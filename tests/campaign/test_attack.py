@@ -6,6 +6,7 @@ import stat
 import sys
 from pathlib import Path
 
+import aimed
 import crossings
 import drawing
 import judging
@@ -98,6 +99,51 @@ def define(model, links):
     rows = truth.rows_at(subject, [20.0], 20.0)
     assert float(rows.columns["x_dot"][0]) == pytest.approx(1e-6 / math.sqrt(8), rel=1e-6)  # measured 1e-9
     assert float(rows.columns["x"][0]) == pytest.approx(2.5, abs=1e-4)  # v²/2/0.2, and what it creeps
+
+
+@pytest.mark.parametrize(
+    ("family", "text", "start", "parameters"),
+    [
+        ("strong_damping", aimed.SPRING, {"x": 1.0, "x_dot": 0.5}, {"c": 1.3}),
+        ("strong_damping", aimed.SPRING, {"x": 1.0, "x_dot": 0.5}, {"c": 5.0}),
+        ("late_damping", aimed.BUFFER, {"x": 0.3, "x_dot": 0.5}, {"c": 5.0}),
+        ("stiff_wall", aimed.WALL, {"x": 0.3}, {"k": 100.0}),
+        ("piled_switches", aimed.DETENT, {"x": 0.3}, {"a": 1.0, "c": 0.5}),
+    ],
+)
+def test_motions_in_closed_form_are_those_of_the_models(room, family, text, start, parameters):
+    tables = {
+        "system": {"model": "model.py", "parameters": parameters},
+        "start": start,
+        "run": {"duration": 2.0},
+    }
+    closed, moved = (
+        truth.rows_at(subject, [0.1, 1.0, 2.0], 2.0)
+        for subject in (
+            truth.PieceSubject(room, tables, text, family),
+            truth.ModelSubject(room, tables, text, [("x", 1e-15)]),
+        )
+    )
+    assert np.abs(closed.numbers - moved.numbers).max() < 1e-14  # measured 9e-17
+
+
+def test_a_hill_is_met_from_where_its_derivatives_vanish_and_a_root_is_passed(room):
+    """The hill by quadrature of 1/v. A quarter of the root's period is √(3/4) ∫ dx/√(1 − x^(3/2)), a Beta function."""
+    hill = aimed.POWERS.format(unit="rad", potential="a * ((1 + cos(x)) / 2) ** 20", force="0")
+    tables = {
+        "system": {"model": "model.py", "parameters": {"a": 0.2}},
+        "start": {"x": math.pi, "x_dot": 1.0},
+        "run": {"duration": 6.0},
+    }
+    rows = truth.rows_at(truth.ModelSubject(room, tables, hill, [("sin(x/2)", 0.1)]), [6.0], 6.0)
+    assert float(rows.columns["x"][0]) == pytest.approx(8.937268514984021, abs=1e-13)  # measured 0
+
+    root = aimed.POWERS.format(unit="m", potential="0", force="-a * sign(x) * sqrt(Abs(x))")
+    quarter = math.sqrt(3) / 3 * math.gamma(2 / 3) * math.gamma(1 / 2) / math.gamma(7 / 6)
+    tables = {"system": {"model": "model.py"}, "start": {"x": 1.0}, "run": {"duration": 2 * quarter}}
+    subject = truth.ModelSubject(room, tables, root, [("x", 1e-3)])
+    rows = truth.rows_at(subject, [quarter, 2 * quarter], 2 * quarter)
+    assert rows.columns["x"].astype(float) == pytest.approx([0, -1], abs=1e-13)  # measured 1e-15
 
 
 def test_the_equations_are_those_of_the_chain(room):

@@ -239,8 +239,13 @@ class ModelSubject(Subject):
         columns = self.named(columns)
         rows = np.array([columns[name] for name in (*self.model.names, "t")]).T
         own = self.model.columns(rows, self.parameters)
-        kinetic = own.pop("kinetic")
-        own = {name: column for name, column in own.items() if name not in (*self.model.names, "t")}
+        own = {
+            name: column for name, column in own.items() if name not in (*self.model.names, "t", "kinetic")
+        }
+        n = len(self.model.q)  # what all but rests has no energy that its own could be compared with
+        speeds = np.maximum(np.abs(rows[:, n:-1]), self.sizes(columns)[n:])
+        rows[:, n:-1] = np.copysign(speeds, rows[:, n:-1])
+        kinetic = self.model.columns(rows, self.parameters)["kinetic"]
         size = {name: max(float(np.abs(column).max()), 1e-300) for name, column in own.items()}
         size["energy"] += 2 * float(np.abs(kinetic).max())
         return own, size
