@@ -249,12 +249,6 @@ TEST_F(PageTest, FiftyRunsShareThePage) {
   EXPECT_LE(html.size(), 1'500'000u);  // measured 1,241,178
 }
 
-TEST_F(PageTest, ThreeIsInPagesOfSpaceOnly) {
-  const std::string licence = "Copyright © 2010-2019 three.js authors";
-  EXPECT_NE(page_of(file(), chain_scene<Spatial>(1), 3).find(licence), std::string::npos);
-  EXPECT_EQ(page_of(file(), chain_scene<Planar>(1), 3).find(licence), std::string::npos);
-}
-
 TEST_F(PageTest, RunsWithoutRowsAreLeftOut) {
   const Scene scene = chain_scene<Planar>(1);
   {

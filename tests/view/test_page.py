@@ -113,7 +113,7 @@ def test_help_opens_and_closes_by_key(open_page):
     page = open_page("demo")
     page.keyboard.press("?")
     assert page.locator("#help").is_visible()
-    assert "three.js r111" in page.inner_text("#about")
+    assert "Made by pendula" in page.inner_text("#about")
     page.keyboard.press("Escape")
     assert not page.locator("#help").is_visible()
 
@@ -149,14 +149,6 @@ def test_the_view_changes_and_comes_back(open_page, name):
         assert picture(page) != first, what
         page.keyboard.press("r")
         assert picture(page) == first, f"back from {what}"
-
-
-@pytest.mark.parametrize("name", ["demo", "hundred_in_space"])
-def test_turning_says_nothing_to_the_console(open_page, name):
-    page = open_page(name)
-    for key in ["d"] * 12 + ["w"] * 6:  # three.js complained of flat shadows, dozens of times
-        page.keyboard.press(key)
-        picture(page)
 
 
 @pytest.mark.parametrize("name", ["demo", "cart"])
@@ -330,20 +322,6 @@ def test_between_rows_rods_keep_their_length_and_motion_is_cubic(browser, pages)
     assert max(stretched) < 1e-12  # measured 6e-16
     assert max(off) < 0.1  # of 4 m; measured 0.026
     assert sorted(off)[len(off) // 2] < 1e-3  # measured 2.4e-4
-
-
-def test_without_webgl_the_plots_still_work(browser, pages):
-    page = browser.new_page(reduced_motion="reduce")
-    page.add_init_script(
-        "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {"
-        "return kind === '2d' ? get.call(this, kind, ...more) : null;"
-        "})(HTMLCanvasElement.prototype.getContext)"
-    )
-    page.goto(f"file://{pages.folder}/demo.html")
-    until(page, "document.querySelector('#stage .notice') !== null")
-    page.keyboard.press("End")
-    until(page, "Number(document.getElementById('scrub').value) === 10")
-    page.close()
 
 
 def test_no_names_leak(open_page, pages):
