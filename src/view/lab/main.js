@@ -378,7 +378,7 @@ class Lab {
 
   #writeTime() {
     const { history, shown } = this;
-    const words = `${shown.toFixed(2)} s`;
+    const words = `${steady(shown)} s`;
     if (words !== this.written) at("clock").textContent = at("time").textContent = this.written = words;
     const scrub = at("scrub");
     if (this.frames % 4 === 0 || !this.playing) {

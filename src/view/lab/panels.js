@@ -116,7 +116,7 @@ class EnergyPanel extends Panel {
     const colours = [1, 0, 5].map((k) => rgba(palette.curves[k]));
     values.forEach((value, k) => this.curve(pen, colours[k], value, k === 2 ? 2.2 : 1.6));
     pen.restore();
-    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${x.toFixed(2).replace("-", "−")} J`);
+    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${steady(x)} J`);
     const names = ["kinetic", "potential", "total"].map((key, k) => `${text(key)} ${now[k]}`);
     this.name(...names.map((name, k) => [colours[k], name]));
     this.describe(`${text("panel.energy")}: ${names.join(", ")}`);
@@ -148,7 +148,7 @@ class InputsPanel extends Panel {
     axes.drawGrid(pen, this.timeAxis(), linearTicks(axes.y, axes.height / 30, false, 3), "s");
     acting.forEach((k, place) => this.curve(pen, rgba(palette.curves[place]), since(k)));
     pen.restore();
-    const names = acting.map((k) => `${symbol(inputs[k].name)} ${value(k, lab.shown).toFixed(2).replace("-", "−")} ${unitWords(inputs[k].unit)}`);
+    const names = acting.map((k) => `${symbol(inputs[k].name)} ${steady(value(k, lab.shown))} ${unitWords(inputs[k].unit)}`);
     this.name(...names.map((name, place) => [rgba(palette.curves[place]), name]));
     this.describe(`${text("panel.inputs")}: ${names.join(", ")}`);
   }
@@ -228,7 +228,7 @@ const turnOfAngles = { low: -1.06 * Math.PI, high: 1.06 * Math.PI };
 /// Angles in degrees, other numbers as they are.
 function degreeTicks(axis, count, wrapped) {
   if (!wrapped) return linearTicks(axis, count, false);
-  return [-180, -90, 0, 90, 180].map((k) => ({ at: (k * Math.PI) / 180, text: `${k}°`.replace("-", "−") }));
+  return [-180, -90, 0, 90, 180].map((k) => ({ at: (k * Math.PI) / 180, text: `${steady(k, 0)}°` }));
 }
 
 /// Where the first coordinate goes through zero upwards: the last one and its rate.

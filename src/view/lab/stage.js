@@ -94,7 +94,7 @@ class Bench extends Stage {
       for (let k = 0; k <= 32; ++k) pen.lineTo(...place((theta * k) / 32, radius).slice(0, 2));
       pen.stroke();
       const [x, y] = place(theta / 2, 1.35 * radius);
-      pen.fillText(`${Math.round((theta * 180) / Math.PI) || 0}°`.replace("-", "−"), x, y + 4);
+      pen.fillText(`${steady(Math.round((theta * 180) / Math.PI) || 0, 0)}°`, x, y + 4);
     }
   }
 

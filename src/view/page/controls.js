@@ -31,7 +31,7 @@ class Controls {
   showTime() {
     const { player } = this;
     const digits = Math.min(Math.max(3 - Math.floor(Math.log10(player.duration || 1)), 0), 12);
-    const text = `${player.time.toFixed(digits)} ${scene.timeUnit}`;
+    const text = `${steady(player.time, digits)} ${scene.timeUnit}`;
     at("clock").textContent = text;
     at("time").textContent = text;
     const scrub = at("scrub");

@@ -24,6 +24,11 @@ function readable(x, digits = 4) {
   return text.replaceAll("-", "−");
 }
 
+/// A number that changes while it is read: always as many digits after the point.
+function steady(x, digits = 2) {
+  return x.toFixed(digits).replace("-", "−");
+}
+
 function trimmedExponential(x, digits) {
   const [mantissa, exponent] = x.toExponential(digits - 1).split("e");
   return `${trimmed(mantissa)}e${Number(exponent)}`;
