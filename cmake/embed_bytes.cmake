@@ -13,7 +13,7 @@ function(embed name)
                               "const std::string_view ${name}(${name}_bytes, sizeof(${name}_bytes));\n\n")
 endfunction()
 
-# Sets OUT to the text of the scripts that follow, without lines that are comments: these tell those who read the sources.
+# Sets OUT to the text of the scripts that follow, without comments and indentation: these are for those who read the sources.
 function(read_scripts out)
   set(all "")
   foreach(file IN LISTS ARGN)
@@ -21,6 +21,7 @@ function(read_scripts out)
     string(APPEND all "${text}")
   endforeach()
   string(REGEX REPLACE "\n *//[^\n]*" "" all "\n${all}")
+  string(REGEX REPLACE "\n +" "\n" all "${all}")
   set(${out} "${all}" PARENT_SCOPE)
 endfunction()
 

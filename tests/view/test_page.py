@@ -371,7 +371,7 @@ def test_controls_have_names(open_page):
 
 
 def test_a_page_is_small(pages):
-    assert pages.sizes["demo"] <= 1_500_000  # measured 430,000
+    assert pages.sizes["demo"] <= 1_500_000  # measured 424,000
 
 
 # What a frame paints: of long chains little more than their balls. A page has some 16 ms for it.

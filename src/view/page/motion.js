@@ -226,18 +226,6 @@ function norm(vectors, i) {
   return Math.sqrt(square);
 }
 
-/// Index of the last sample of a path that is not later than a time.
-function sampleAt(times, time) {
-  let low = 0;
-  let high = times.length - 1;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (times[middle] <= time) low = middle;
-    else high = middle - 1;
-  }
-  return low;
-}
-
 /// Points whose paths are traced: the last of a chain; of a model all bobs and carts, if there are few.
 const traced = (() => {
   const last = scene.points.length - 1;

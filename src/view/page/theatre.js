@@ -50,8 +50,9 @@ class Theatre extends Stage {
   // Of a traced point, to where it is now.
   #way(k, n, since, time) {
     const { times, places } = this.paths[k][n];
-    const to = sampleAt(times, time);
-    const from = Math.min(sampleAt(times, since), to);
+    const at = (when) => lastBy(when, times.length, (sample) => times[sample]);
+    const to = at(time);
+    const from = Math.min(at(since), to);
     const way = new Float32Array(3 * (to - from + 2));
     way.set(places.subarray(3 * from, 3 * to + 3));
     way.set(this.runPlaces[k].subarray(3 * traced[n], 3 * traced[n] + 3), way.length - 3);
